@@ -1,0 +1,1 @@
+"""The buildarena command line."""

@@ -1,0 +1,1 @@
+"""Build machines block by block; every step is checked."""

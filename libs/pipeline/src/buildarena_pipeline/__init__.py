@@ -1,0 +1,1 @@
+"""The road of a job: states, leases, queues, and the embedded servers."""

@@ -1,0 +1,1 @@
+"""What BuildArena keeps: tables, repositories and artifacts."""

@@ -1,0 +1,1 @@
+"""Stage handlers that run simulators."""

@@ -1,0 +1,1 @@
+"""Construction sessions: workflows, model requests, journal, built-in models."""
