@@ -1,0 +1,52 @@
+"""The command `python -m buildarena_geometry`."""
+
+from __future__ import annotations
+
+import argparse
+import gzip
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from .errors import GeometryError
+from .sequences import parse, run_sequences
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+_GZIP_MAGIC = b"\x1f\x8b"
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs the command.
+
+    Args:
+        arguments: its arguments; the process's own if left out.
+
+    Returns:
+        The exit code: 0 done, 1 the input is no sequence, 2 wrong usage.
+    """
+    parser = argparse.ArgumentParser(prog="python -m buildarena_geometry")
+    commands = parser.add_subparsers(dest="command", required=True)
+    replay = commands.add_parser("replay", help="builds machines from action sequences")
+    replay.add_argument("file", help="JSON, plain or gzip; - reads standard input")
+    replay.add_argument("--states", choices=("all", "last"), default="all")
+    options = parser.parse_args(arguments)
+    try:
+        content = parse(_read(options.file))
+        for told in run_sequences(content, every_state=options.states == "all"):
+            print(json.dumps(told, allow_nan=False))  # noqa: T201  the command's output
+    except (GeometryError, OSError, UnicodeDecodeError, gzip.BadGzipFile) as error:
+        print(f"error: {error}", file=sys.stderr)  # noqa: T201  the command's message
+        return 1
+    return 0
+
+
+def _read(file: str) -> str:
+    data = sys.stdin.buffer.read() if file == "-" else Path(file).read_bytes()
+    return (gzip.decompress(data) if data.startswith(_GZIP_MAGIC) else data).decode()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

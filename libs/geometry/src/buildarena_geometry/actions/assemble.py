@@ -1,0 +1,176 @@
+"""Actions that put whole machines together."""
+
+from dataclasses import replace
+
+from buildarena_geometry.blocks import Block, Connector, FaceRef
+from buildarena_geometry.changes import Change
+from buildarena_geometry.feedback import state as words
+from buildarena_geometry.feedback.words import listing, point
+from buildarena_geometry.outcomes import Cause
+from buildarena_geometry.parameters import Name, RefusalError, Triple, shown
+from buildarena_geometry.poses import ORIGIN, Pose
+from buildarena_geometry.state import MachineState, SubStructure, follow, moved_connector
+
+from .build import told_removal, without
+from .lookups import named, structure
+from .motions import turn_about, turned
+
+
+def add_machine(
+    state: MachineState,
+    machine_id: Name,
+    init_shift: Triple = ORIGIN,
+    init_rotation: Triple = ORIGIN,
+) -> Change:
+    """Adds a finished machine as a sub-structure; its block 3 becomes A_3, B_3, and so on.
+
+    Args:
+        machine_id: Name of the finished machine.
+        init_shift: How far it moves from where it was built [east, north, up].
+        init_rotation: [yaw, pitch, roll] in degrees about its starting block's center: yaw turns
+            north to east, pitch north down, roll up to east.
+    """
+    source = state.available.get(machine_id)
+    if source is None or not source.started:
+        problem = "is empty" if source is not None else "does not exist"
+        raise RefusalError(
+            Cause.NO_SUCH_MACHINE,
+            f"Machine {shown(machine_id)} {problem}. Machines: {named(state.available)}.",
+        )
+    letter = _letter(state.structures_made)
+    root = next(iter(source.blocks.values()))
+    motion = turn_about(root.center_xyz, turned(init_rotation)).shifted(init_shift)
+    blocks = [_copy_block(block, letter, motion) for block in source.blocks.values()]
+    structures = {
+        **state.structures,
+        letter: SubStructure(letter=letter, source=machine_id, root=f"{letter}_{root.id}"),
+    }
+    all_blocks = {**state.blocks, **{block.id: block for block in blocks}}
+    links = [_copy_connector(link, letter, motion) for link in source.connectors.values()]
+    connectors = {**state.connectors, **{link.id: link for link in links}}
+    after = replace(
+        state,
+        blocks=all_blocks,
+        connectors=follow(connectors, all_blocks, {block.id for block in blocks}),
+        occupants={**state.occupants, **_copy_occupants(source, letter)},
+        structures=structures,
+        structures_made=state.structures_made + 1,
+    )
+    return Change(
+        after=after,
+        placed=tuple(block.id for block in blocks),
+        touched=tuple(link.id for link in links),
+        attempt=f"Machine {machine_id}",
+        told=lambda: _told(after, letter, f"Added {machine_id} as sub-structure {letter}."),
+    )
+
+
+def shift_machine(state: MachineState, machine_index: Name, position: Triple) -> Change:
+    """Moves a whole sub-structure.
+
+    Args:
+        machine_index: Letter of the sub-structure, such as "A".
+        position: How far to move it [east, north, up].
+    """
+    found = structure(state, machine_index)
+    return _motion(state, found, Pose(position=position), f"shifted by {point(position)}")
+
+
+def rotate_machine(state: MachineState, machine_index: Name, rotation: Triple) -> Change:
+    """Turns a whole sub-structure about its starting block's center.
+
+    Args:
+        machine_index: Letter of the sub-structure, such as "A".
+        rotation: [yaw, pitch, roll] in degrees: yaw turns north to east, pitch north down, roll up
+            to east.
+    """
+    found = structure(state, machine_index)
+    center = state.blocks[found.root].center_xyz
+    motion = turn_about(center, turned(rotation))
+    return _motion(state, found, motion, f"rotated by {point(rotation)}")
+
+
+def remove_machine(state: MachineState, machine_index: Name) -> Change:
+    """Removes a whole sub-structure with everything attached to it.
+
+    Args:
+        machine_index: Letter of the sub-structure, such as "A".
+    """
+    found = structure(state, machine_index)
+    gone = state.members(found.letter)
+    remaining, links = without(state, gone)
+    kept = {letter: other for letter, other in state.structures.items() if letter != found.letter}
+    after = replace(remaining, structures=kept)
+    return Change(
+        after=after,
+        removed=(*(block.id for block in gone), *links),
+        told=lambda: " ".join(
+            [f"Removed sub-structure {found.letter}.", *told_removal(state, after, links)]
+        ),
+    )
+
+
+def _motion(state: MachineState, found: SubStructure, motion: Pose, how: str) -> Change:
+    members = state.members(found.letter)
+    moved = [replace(block, world_from_block=motion @ block.world_from_block) for block in members]
+    ids = tuple(block.id for block in moved)
+    after = state.with_blocks(*moved)
+    connectors = {
+        key: moved_connector(link, motion) if link.structure == found.letter else link
+        for key, link in after.connectors.items()
+    }
+    after = replace(after, connectors=connectors)
+    return Change(
+        after=after,
+        placed=ids,
+        attempt=f"Sub-structure {found.letter} {how}",
+        told=lambda: _told(after, found.letter, f"Sub-structure {found.letter} {how}."),
+    )
+
+
+def _told(state: MachineState, letter: str, sentence: str) -> str:
+    lines = [sentence, *(words.block_line(state, block) for block in state.members(letter))]
+    return "\n".join(lines)
+
+
+def _letter(count: int) -> str:
+    """A, B, … Z, AA, AB, …"""
+    letters = ""
+    count += 1
+    while count:
+        count, digit = divmod(count - 1, 26)
+        letters = chr(ord("A") + digit) + letters
+    return letters
+
+
+def _renamed(face: FaceRef | None, letter: str) -> FaceRef | None:
+    return None if face is None else (f"{letter}_{face[0]}", face[1])
+
+
+def _copy_block(block: Block, letter: str, motion: Pose) -> Block:
+    return replace(
+        block,
+        id=f"{letter}_{block.id}",
+        world_from_block=motion @ block.world_from_block,
+        mount=_renamed(block.mount, letter),
+        lost_mount=_renamed(block.lost_mount, letter),
+        structure=letter,
+    )
+
+
+def _copy_connector(link: Connector, letter: str, motion: Pose) -> Connector:
+    return replace(
+        link,
+        id=f"{letter}_{link.id}",
+        start=(f"{letter}_{link.start[0]}", link.start[1]),
+        end=(f"{letter}_{link.end[0]}", link.end[1]),
+        world_from_connector=motion @ link.world_from_connector,
+        structure=letter,
+    )
+
+
+def _copy_occupants(source: MachineState, letter: str) -> dict[FaceRef, str]:
+    return {
+        (f"{letter}_{base}", label): f"{letter}_{child}"
+        for (base, label), child in source.occupants.items()
+    }

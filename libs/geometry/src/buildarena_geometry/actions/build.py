@@ -1,0 +1,275 @@
+"""Actions that put a machine together."""
+
+from dataclasses import replace
+from math import dist
+
+from buildarena_geometry.blocks import Block, Connector
+from buildarena_geometry.changes import Change
+from buildarena_geometry.feedback import state as words
+from buildarena_geometry.feedback.words import caption, listing, point
+from buildarena_geometry.outcomes import Cause
+from buildarena_geometry.parameters import BlockId, Name, Note, RefusalError, Triple, shown
+from buildarena_geometry.poses import ORIGIN, Pose
+from buildarena_geometry.state import MachineState, span_in
+
+from .lookups import attachable_module, connector_module, part, require_started
+from .motions import turned
+
+CLOSEST_FACES = 0.01  # units; a connector between faces nearer than this has no direction
+
+
+def start(
+    state: MachineState,
+    init_shift: Triple = ORIGIN,
+    init_rotation: Triple = ORIGIN,
+    note: Note = "",
+) -> Change:
+    """Begins the machine with its starting block, which becomes block 1.
+
+    Args:
+        init_shift: Position of the block's center [east, north, up]; [0, 0, 0] if left out.
+        init_rotation: [yaw, pitch, roll] in degrees: yaw turns north to east, pitch north down, roll
+            up to east; [0, 0, 0] if left out.
+        note: What this machine is, in your words.
+    """
+    if state.is_assembly:
+        raise RefusalError(
+            Cause.UNKNOWN_ACTION,
+            f"An assembly begins with add_machine. Machines: {listing(state.available)}.",
+        )
+    if state.started:
+        raise RefusalError(
+            Cause.ALREADY_STARTED, "The machine has its starting block, block 1; reset starts anew."
+        )
+    pose = Pose(position=init_shift, quaternion=turned(init_rotation))
+    block = _new_block(
+        state, Block(id="", module=state.catalogue.start, world_from_block=pose), note
+    )
+    after = replace(state, blocks={block.id: block}, next_id=state.next_id + 1)
+    return Change(
+        after=after,
+        placed=(block.id,),
+        told=lambda: f"Started. {words.block_details(after, block)}",
+    )
+
+
+def attach_block_to(
+    state: MachineState, base_block: BlockId, face: Name, new_block: Name, note: Note = ""
+) -> Change:
+    """Attaches a new block to a free face of a block.
+
+    Args:
+        base_block: Id of the block that carries the new one.
+        face: Label of the base block's face, such as "A".
+        new_block: Name of the module to attach; connectors go in with connect_blocks.
+        note: What the new block is for, in your words.
+    """
+    require_started(state)
+    module = attachable_module(state, new_block)
+    base = part(state, base_block)
+    if isinstance(base, Connector) or face not in base.module.face_of_label:
+        free = state.free_faces(base) if isinstance(base, Block) else []
+        raise RefusalError(
+            Cause.NO_SUCH_FACE,
+            f"{words.title(base).capitalize()} has no face {shown(face)}. "
+            f"Its free faces: {listing(free)}.",
+        )
+    if state.is_occupied(base, face):
+        raise RefusalError(
+            Cause.FACE_OCCUPIED,
+            f"Face {face} of {words.title(base)} is taken. "
+            f"Its free faces: {listing(state.free_faces(base))}.",
+        )
+    block = _new_block(
+        state,
+        Block(
+            id="",
+            module=module,
+            world_from_block=base.world_from_face(face),
+            mount=(base.id, face),
+            structure=base.structure,
+        ),
+        note,
+    )
+    after = replace(
+        state,
+        blocks={**state.blocks, block.id: block},
+        occupants={**state.occupants, (base.id, face): block.id},
+        next_id=state.next_id + 1,
+    )
+    return Change(
+        after=after,
+        placed=(block.id,),
+        attempt=f"A {module.name} on face {face} of block {base.id}",
+        told=lambda: f"Attached. {words.block_details(after, block)}",
+    )
+
+
+def connect_blocks(
+    state: MachineState,
+    block_a: BlockId,
+    face_a: Name,
+    block_b: BlockId,
+    face_b: Name,
+    connector: Name,
+    note: Note = "",
+) -> Change:
+    """Joins two faces of existing blocks with a connector; the faces may be taken.
+
+    Args:
+        block_a: Id of the block where the connector begins.
+        face_a: Label of that block's face.
+        block_b: Id of the block where it ends.
+        face_b: Label of that block's face.
+        connector: Name of the connector.
+        note: What it is for, in your words.
+    """
+    require_started(state)
+    module = connector_module(state, connector)
+    parts = (part(state, block_a), part(state, block_b))
+    start_block, end_block = (
+        _with_face(found, label) for found, label in zip(parts, (face_a, face_b), strict=True)
+    )
+    start_xyz, end_xyz = start_block.face_center(face_a), end_block.face_center(face_b)
+    _check_distance((start_block, face_a), (end_block, face_b), dist(start_xyz, end_xyz))
+    pose = start_block.world_from_face(face_a)
+    link = Connector(
+        id=str(state.next_id),
+        module=module,
+        start=(start_block.id, face_a),
+        end=(end_block.id, face_b),
+        start_xyz=start_xyz,
+        end_xyz=end_xyz,
+        world_from_connector=pose,
+        span=ORIGIN,
+        structure=start_block.structure,
+        note=note,
+    )
+    link = replace(link, span=span_in(pose, link))
+    after = replace(
+        state,
+        connectors={**state.connectors, link.id: link},
+        next_id=state.next_id + 1,
+    )
+    return Change(
+        after=after,
+        touched=(link.id,),
+        told=lambda: f"Connected. {words.connector_line(link)}.",
+    )
+
+
+def remove_block(state: MachineState, block_id: BlockId) -> Change:
+    """Removes a block or connector; blocks that sit on it stay where they are.
+
+    Args:
+        block_id: Id of the block or connector.
+    """
+    gone = part(state, block_id)
+    if isinstance(gone, Connector):
+        kept = {key: link for key, link in state.connectors.items() if key != gone.id}
+        after = replace(state, connectors=kept)
+        return _removal(state, after, gone, ())
+    if gone.module.kind == "start":
+        raise RefusalError(
+            Cause.START_BLOCK,
+            f"{words.title(gone).capitalize()} can't be removed; reset starts anew.",
+        )
+    after, links = without(state, [gone])
+    return _removal(state, after, gone, links)
+
+
+def reset(state: MachineState) -> Change:
+    """Removes everything, so that the machine can be started anew."""
+    after = MachineState(catalogue=state.catalogue, available=state.available)
+    return Change(
+        after=after,
+        removed=(*state.blocks, *state.connectors),
+        told=lambda: "Everything is removed; ids start at 1 again.",
+    )
+
+
+def without(state: MachineState, gone: list[Block]) -> tuple[MachineState, tuple[str, ...]]:
+    """The state without some blocks and the connectors that end on them.
+
+    Returns:
+        The state, in which the faces they used are open and blocks that sat on them sit on nothing,
+        and the ids of the connectors that went too.
+    """
+    ids = {block.id for block in gone}
+    blocks = {key: block for key, block in state.blocks.items() if key not in ids}
+    occupants = dict(state.occupants)
+    for block in gone:
+        if block.mount is not None:
+            occupants.pop(block.mount, None)
+        for child in state.children(block):
+            if child.id in blocks:
+                blocks[child.id] = replace(child, mount=None, lost_mount=child.mount)
+                del occupants[child.mount or ("", "")]
+    links = tuple(
+        link.id for link in state.connectors.values() if link.start[0] in ids or link.end[0] in ids
+    )
+    connectors = {key: link for key, link in state.connectors.items() if key not in links}
+    return replace(state, blocks=blocks, occupants=occupants, connectors=connectors), links
+
+
+def told_removal(before: MachineState, after: MachineState, links: tuple[str, ...]) -> list[str]:
+    """Sentences about what a removal took along and what it left without a hold."""
+    told = []
+    if links:
+        told.append(f"Connectors that ended on it went too: {listing(links)}.")
+    lost = set(after.detached()) - set(before.detached())
+    if lost:
+        order = [block for block in after.blocks if block in lost]
+        told.append(f"No longer connected to the starting block: {listing(order)}.")
+    return told
+
+
+def _removal(
+    before: MachineState, after: MachineState, gone: Block | Connector, links: tuple[str, ...]
+) -> Change:
+    return Change(
+        after=after,
+        removed=(gone.id, *links),
+        told=lambda: " ".join(
+            [f"Removed {words.title(gone)}.", *told_removal(before, after, links)]
+        ),
+    )
+
+
+def _new_block(state: MachineState, block: Block, note: str) -> Block:
+    bindings: dict[str, tuple[str, ...]] = {action: () for action in block.module.actions}
+    return replace(block, id=str(state.next_id), bindings=bindings, note=note)
+
+
+def _with_face(found: Block | Connector, label: str) -> Block:
+    if isinstance(found, Connector) or not found.module.faces:
+        raise RefusalError(
+            Cause.NO_FACES, f"{words.title(found).capitalize()} has no faces to connect."
+        )
+    if label not in found.module.face_of_label:
+        raise RefusalError(
+            Cause.NO_SUCH_FACE,
+            f"{words.title(found).capitalize()} has no face {shown(label)}. "
+            f"Its faces: {listing(found.module.face_of_label)}.",
+        )
+    return found
+
+
+def _check_distance(left: tuple[Block, str], right: tuple[Block, str], distance: float) -> None:
+    if distance >= CLOSEST_FACES:
+        return
+    (a, face_a), (b, face_b) = left, right
+    pair = f"{a.id}/{face_a} and {b.id}/{face_b}"
+    if _sits_on(a, face_a, b, face_b) or _sits_on(b, face_b, a, face_a):
+        raise RefusalError(
+            Cause.EXCESS_CONNECTION,
+            f"{pair} are attached to each other already. Connect other faces to reinforce them.",
+        )
+    raise RefusalError(
+        Cause.TOO_CLOSE,
+        f"{pair} are at the same place. A connector needs faces at least {CLOSEST_FACES} apart.",
+    )
+
+
+def _sits_on(part_block: Block, part_face: str, base: Block, base_face: str) -> bool:
+    return part_block.mount == (base.id, base_face) and part_face == part_block.module.root_face

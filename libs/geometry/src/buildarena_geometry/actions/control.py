@@ -1,0 +1,102 @@
+"""Actions that say which key does what, and when keys are pressed."""
+
+from dataclasses import replace
+
+from buildarena_geometry.blocks import KeyPress
+from buildarena_geometry.changes import Change
+from buildarena_geometry.feedback import state as words
+from buildarena_geometry.feedback.words import listing, plain
+from buildarena_geometry.keys import KEYS
+from buildarena_geometry.outcomes import Cause
+from buildarena_geometry.parameters import BlockId, Index, Key, Name, Number, RefusalError, shown
+from buildarena_geometry.state import MachineState
+
+from .lookups import part, powered, require_started
+
+
+def change_control_key(
+    state: MachineState, block_id: BlockId, action: Name, new_key: Key
+) -> Change:
+    """Binds a key to an action of a block, in place of the keys it had.
+
+    Args:
+        block_id: Id of the block.
+        action: The block's action, such as "spinning_forward".
+        new_key: The key.
+    """
+    return _bind(state, block_id, action, new_key, keep=False)
+
+
+def add_control_key(state: MachineState, block_id: BlockId, action: Name, new_key: Key) -> Change:
+    """Binds a further key to an action of a block, beside the keys it has.
+
+    Args:
+        block_id: Id of the block.
+        action: The block's action, such as "spinning_forward".
+        new_key: The key.
+    """
+    return _bind(state, block_id, action, new_key, keep=True)
+
+
+def add_control_sequence(state: MachineState, time: Number, key: Key, hold_for: Number) -> Change:
+    """Adds a key press to the control sequence; presses may overlap.
+
+    Args:
+        time: When the key goes down, in seconds from the start, at least 0.
+        key: A key that some block is bound to.
+        hold_for: How long it stays down, in seconds, more than 0.
+    """
+    require_started(state)
+    bound = state.keys_in_use()
+    if key not in bound:
+        problem = "no action has this key" if key in KEYS else "there is no such key"
+        raise RefusalError(
+            Cause.BAD_KEY, f"{shown(key)}: {problem}. Keys in use: {listing(bound)}."
+        )
+    if time < 0 or hold_for <= 0:
+        raise RefusalError(
+            Cause.OUT_OF_RANGE,
+            f"time must be at least 0 and hold_for more than 0, "
+            f"not {shown(time)} and {shown(hold_for)}.",
+        )
+    press = KeyPress(time_s=time, key=key, hold_for_s=hold_for)
+    after = replace(state, control_sequence=(*state.control_sequence, press))
+    return Change(after=after, told=lambda: f"Added.\n{words.control_sequence(after)}")
+
+
+def remove_control_sequence(state: MachineState, index: Index) -> Change:
+    """Removes a key press from the control sequence.
+
+    Args:
+        index: Its number in review_control_sequence; the first is 0.
+    """
+    presses = state.control_sequence
+    if not 0 <= index < len(presses):
+        choices = f"0 to {len(presses) - 1}" if presses else "none"
+        raise RefusalError(
+            Cause.BAD_INDEX, f"There is no entry {shown(index)}. Entries: {choices}."
+        )
+    after = replace(state, control_sequence=(*presses[:index], *presses[index + 1 :]))
+    return Change(after=after, told=lambda: f"Removed.\n{words.control_sequence(after)}")
+
+
+def reset_control_sequence(state: MachineState) -> Change:
+    """Removes every key press from the control sequence; key bindings stay."""
+    after = replace(state, control_sequence=())
+    return Change(after=after, told=lambda: words.control_sequence(after))
+
+
+def _bind(state: MachineState, block_id: str, action: str, key: str, *, keep: bool) -> Change:
+    part(state, block_id)
+    if key not in KEYS:
+        raise RefusalError(Cause.BAD_KEY, f"There is no key {shown(key)}. Keys: {listing(KEYS)}.")
+    block = powered(state, block_id, action)
+    had = block.bindings.get(action, ()) if keep else ()
+    keys = had if key in had else (*had, key)
+    bound = replace(block, bindings={**block.bindings, action: keys})
+    after = replace(state, blocks={**state.blocks, block.id: bound})
+    return Change(
+        after=after,
+        touched=(block.id,),
+        told=lambda: f"Bound: {words.title(block)}, {action}: {listing(keys)}.",
+    )

@@ -1,0 +1,127 @@
+"""Finds what an action's arguments name, or says what there is instead."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from buildarena_geometry.feedback.state import title
+from buildarena_geometry.feedback.words import listing
+from buildarena_geometry.outcomes import Cause
+from buildarena_geometry.parameters import RefusalError, shown
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from buildarena_geometry.blocks import Block, Connector
+    from buildarena_geometry.modules import Module
+    from buildarena_geometry.state import MachineState, SubStructure
+
+_MOST_NAMED = 12  # a refusal names so many choices and counts the rest
+
+
+def require_started(state: MachineState) -> None:
+    """Refuses unless there is a starting block.
+
+    Raises:
+        RefusalError: nothing has been started.
+    """
+    if not state.started:
+        first = "add_machine" if state.is_assembly else "start"
+        raise RefusalError(Cause.NOT_STARTED, f"There is nothing yet; call {first} first.")
+
+
+def part(state: MachineState, part_id: str) -> Block | Connector:
+    """The block or connector with an id.
+
+    Raises:
+        RefusalError: there is none.
+    """
+    require_started(state)
+    found = state.blocks.get(part_id) or state.connectors.get(part_id)
+    if found is None:
+        ids = named([*state.blocks, *state.connectors])
+        raise RefusalError(
+            Cause.NO_SUCH_BLOCK, f"There is no block {shown(part_id)}. Blocks: {ids}."
+        )
+    return found
+
+
+def powered(state: MachineState, block_id: str, action: str) -> Block:
+    """The block with an id, if it has an action that takes keys.
+
+    Raises:
+        RefusalError: no such block, a block without keys, or one without this action.
+    """
+    found = part(state, block_id)
+    actions = found.module.actions
+    if not actions or block_id not in state.blocks:
+        keyed = named(block.id for block in state.blocks.values() if block.module.actions)
+        raise RefusalError(
+            Cause.NO_LOCOMOTION,
+            f"{title(found).capitalize()} takes no keys. Blocks that do: {keyed}.",
+        )
+    if action not in actions:
+        raise RefusalError(
+            Cause.BAD_ACTION,
+            f"{title(found).capitalize()} has no action {shown(action)}; "
+            f"its actions: {listing(actions)}.",
+        )
+    return state.blocks[block_id]
+
+
+def attachable_module(state: MachineState, name: str) -> Module:
+    """The module of a name, if it can be attached to a face.
+
+    Raises:
+        RefusalError: there is none, or it is a connector.
+    """
+    module = state.catalogue.get(name)
+    if module is not None and module.kind == "connector":
+        raise RefusalError(
+            Cause.CONNECTOR_MISUSE,
+            f"A {name} joins two faces and can't be attached to one; use connect_blocks.",
+        )
+    if module is None or not module.attachable:
+        choices = listing(state.catalogue.attachable)
+        raise RefusalError(
+            Cause.UNKNOWN_MODULE, f"{shown(name)} can't be attached. Modules: {choices}."
+        )
+    return module
+
+
+def connector_module(state: MachineState, name: str) -> Module:
+    """The module of a name, if it is a connector.
+
+    Raises:
+        RefusalError: there is none, or it is not a connector.
+    """
+    module = state.catalogue.get(name)
+    if module is None or module.kind != "connector":
+        cause = Cause.UNKNOWN_CONNECTOR if module is None else Cause.BASIC_AS_CONNECTOR
+        choices = listing(state.catalogue.connectors)
+        raise RefusalError(cause, f"{shown(name)} is no connector. Connectors: {choices}.")
+    return module
+
+
+def structure(state: MachineState, letter: str) -> SubStructure:
+    """The sub-structure with a letter.
+
+    Raises:
+        RefusalError: there is none.
+    """
+    found = state.structures.get(letter)
+    if found is None:
+        there = f"Sub-structures: {named(state.structures)}."
+        raise RefusalError(
+            Cause.NO_SUCH_MACHINE, f"There is no sub-structure {shown(letter)}. {there}"
+        )
+    return found
+
+
+def named(choices: Iterable[str]) -> str:
+    """The first of some choices, and how many more there are."""
+    names = list(choices)
+    more = len(names) - _MOST_NAMED
+    if more <= 0:
+        return listing(names)
+    return f"{listing(names[:_MOST_NAMED])} and {more} more"

@@ -1,0 +1,50 @@
+"""Questions about the machine; they change nothing."""
+
+from collections.abc import Callable
+
+from buildarena_geometry.blocks import Block
+from buildarena_geometry.changes import Change
+from buildarena_geometry.feedback import state as words
+from buildarena_geometry.parameters import BlockId
+from buildarena_geometry.state import MachineState
+
+from .lookups import part, require_started
+
+
+def get_machine_summary(state: MachineState) -> Change:
+    """Lists all blocks and connectors, without their faces."""
+    require_started(state)
+    return _answer(state, lambda: words.summary(state))
+
+
+def get_block_details(state: MachineState, block_id: BlockId) -> Change:
+    """Tells everything about one block: position, faces, what sits on them, keys.
+
+    Args:
+        block_id: Id of the block or connector.
+    """
+    found = part(state, block_id)
+    if isinstance(found, Block):
+        return _answer(state, lambda: words.block_details(state, found))
+    return _answer(state, lambda: f"{words.connector_line(found)}.")
+
+
+def review_powered_blocks(state: MachineState) -> Change:
+    """Lists the blocks that take keys, where they are and what they do."""
+    require_started(state)
+    return _answer(state, lambda: words.powered_blocks(state))
+
+
+def review_control_config(state: MachineState) -> Change:
+    """Lists the key bindings of every block that takes keys."""
+    require_started(state)
+    return _answer(state, lambda: words.control_config(state))
+
+
+def review_control_sequence(state: MachineState) -> Change:
+    """Lists the control sequence."""
+    return _answer(state, lambda: words.control_sequence(state))
+
+
+def _answer(state: MachineState, told: Callable[[], str]) -> Change:
+    return Change(after=state, told=told)

@@ -1,0 +1,102 @@
+"""Actions that adjust blocks that are already in place."""
+
+from dataclasses import replace
+
+from buildarena_geometry.blocks import Block, Connector
+from buildarena_geometry.changes import Change
+from buildarena_geometry.feedback import state as words
+from buildarena_geometry.feedback.words import listing, plain, point
+from buildarena_geometry.outcomes import Cause
+from buildarena_geometry.parameters import BlockId, Number, RefusalError, Triple
+from buildarena_geometry.poses import ORIGIN, Pose, about_axis
+from buildarena_geometry.state import MachineState
+
+from .lookups import part
+
+LARGEST_SHIFT = 0.5  # units a call in each direction
+_AWAY_FROM_FACE = (0.0, 0.0, 1.0)
+
+
+def twist_block(state: MachineState, block_id: BlockId, angle: Number) -> Change:
+    """Turns one block on the face it sits on; blocks that sit on it stay where they are.
+
+    Args:
+        block_id: Id of the block.
+        angle: Degrees, clockwise seen from outside that face.
+    """
+    found = part(state, block_id)
+    if found.module.kind == "start":
+        raise RefusalError(
+            Cause.START_BLOCK,
+            f"{words.title(found).capitalize()} sits on no face and can't be twisted.",
+        )
+    twist = Pose(quaternion=about_axis(_AWAY_FROM_FACE, -angle))
+    told = f"by {plain(angle)}°"
+    if isinstance(found, Connector):
+        return _move_connector(state, found, found.world_from_connector @ twist, f"Twisted {told}")
+    return _move(state, found, found.world_from_block @ twist, "twisted " + told)
+
+
+def shift_block(state: MachineState, block_id: BlockId, shift_real: Triple) -> Change:
+    """Moves one block; blocks that sit on it stay where they are.
+
+    Args:
+        block_id: Id of the block.
+        shift_real: [east, north, up], each between -0.5 and 0.5.
+    """
+    found = part(state, block_id)
+    if max(map(abs, shift_real)) > LARGEST_SHIFT:
+        raise RefusalError(
+            Cause.OUT_OF_RANGE,
+            f"One call shifts by at most {LARGEST_SHIFT} in each direction, not {point(shift_real)}.",
+        )
+    told = f"by {point(shift_real)}"
+    if isinstance(found, Connector):
+        pose = found.world_from_connector.shifted(shift_real)
+        return _move_connector(state, found, pose, f"Shifted {told}")
+    return _move(state, found, found.world_from_block.shifted(shift_real), "shifted " + told)
+
+
+def flip_spin(state: MachineState, block_id: BlockId) -> Change:
+    """Reverses the direction a wheel spins and rolls.
+
+    Args:
+        block_id: Id of the wheel.
+    """
+    found = part(state, block_id)
+    if isinstance(found, Connector) or not found.module.spins:
+        wheels = listing(block.id for block in state.blocks.values() if block.module.spins)
+        raise RefusalError(
+            Cause.NOT_SPINNING,
+            f"{words.title(found).capitalize()} does not spin. Blocks that do: {wheels}.",
+        )
+    block = replace(found, flipped=not found.flipped)
+    after = state.with_blocks(block)
+    return Change(
+        after=after,
+        touched=(block.id,),
+        told=lambda: f"Flipped. {words.block_line(after, block)}.",
+    )
+
+
+def _move(state: MachineState, block: Block, pose: Pose, how: str) -> Change:
+    moved = replace(block, world_from_block=pose)
+    after = state.with_blocks(moved)
+    return Change(
+        after=after,
+        placed=(block.id,),
+        attempt=f"{words.title(block).capitalize()} {how}",
+        told=lambda: " ".join(
+            [f"Moved. {words.block_line(after, moved)}.", *words.loosened(after, [block.id])]
+        ),
+    )
+
+
+def _move_connector(state: MachineState, link: Connector, pose: Pose, how: str) -> Change:
+    moved = replace(link, world_from_connector=pose)
+    after = replace(state, connectors={**state.connectors, link.id: moved})
+    return Change(
+        after=after,
+        touched=(link.id,),
+        told=lambda: f"{how}; its ends stay on their faces. {words.connector_line(moved)}.",
+    )

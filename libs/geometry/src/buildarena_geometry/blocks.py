@@ -1,0 +1,185 @@
+"""The parts a machine is made of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .modules import Module
+from .poses import Pose, Vector, add, scaled
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+FaceRef = tuple[str, str]  # block id, face label
+
+JOINT_REACH = 0.5  # units; Besiege joins two sides that were moved apart by this much and no more
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Block:
+    """One block of a machine: anything but connectors.
+
+    Attributes:
+        id: "1", "2", … in the order of creation, or "A_3" in an assembly; never used twice.
+        module: what it is.
+        world_from_block: where its root point is and how it is turned; +z points away from the face it
+            sits on.
+        mount: the face it sits on; None for a starting block and for one whose base was removed.
+        lost_mount: the face it sat on before that block was removed.
+        flipped: whether a wheel's spin is reversed.
+        bindings: the keys bound to each of its actions.
+        structure: the sub-structure it belongs to in an assembly; "" elsewhere.
+        note: the builder's own words about it.
+    """
+
+    id: str
+    module: Module
+    world_from_block: Pose
+    mount: FaceRef | None = None
+    lost_mount: FaceRef | None = None
+    flipped: bool = False
+    bindings: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    structure: str = ""
+    note: str = ""
+
+    @property
+    def center(self) -> NDArray[np.float64]:
+        """(3,) the position shown to models, world frame, units."""
+        return _array(self.center_xyz)
+
+    @property
+    def center_xyz(self) -> Vector:
+        """The position shown to models as plain floats, world frame, units."""
+        return self.world_from_block.point(self.module.center)
+
+    @property
+    def pointing(self) -> NDArray[np.float64] | None:
+        """(3,) the way a cannon or torch points, world frame, unit length; None for the others."""
+        towards = self.pointing_xyz
+        return None if towards is None else _array(towards)
+
+    @property
+    def pointing_xyz(self) -> Vector | None:
+        """The way a cannon or torch points as plain floats, world frame; None for the others."""
+        if self.module.pointing is None:
+            return None
+        return self.world_from_block.direction(self.module.pointing)
+
+    @property
+    def axis_xyz(self) -> Vector:
+        """Away from the face the block sits on, world frame, unit length; a wheel's axle."""
+        return self.world_from_block.direction((0.0, 0.0, 1.0))
+
+    def world_from_face(self, label: str) -> Pose:
+        """The frame of one of its faces: origin at the face's centre, +z outwards.
+
+        Raises:
+            KeyError: the block's module has no such face.
+        """
+        return self.world_from_block @ self.module.face_of_label[label].block_from_face
+
+    def face_center(self, label: str) -> Vector:
+        """The centre of one of its faces, world frame, units."""
+        return self.world_from_block.point(self.module.face_of_label[label].center)
+
+    def face_normal(self, label: str) -> Vector:
+        """The outward normal of one of its faces, world frame, unit length."""
+        return self.world_from_block.direction(self.module.face_of_label[label].normal)
+
+    def landmark(self, along: float) -> Vector:
+        """The point so far from its centre in the pointing direction, world frame, units."""
+        towards = self.pointing_xyz
+        return self.center_xyz if towards is None else add(self.center_xyz, scaled(towards, along))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Connector:
+    """A brace or winch between two faces.
+
+    Attributes:
+        id: from the same count as the blocks' ids.
+        module: what it is.
+        start: the face it begins on.
+        end: the face it ends on.
+        start_xyz: the present centre of the start face, world frame, units.
+        end_xyz: the present centre of the end face, world frame, units.
+        world_from_connector: its own frame, that of a block attached to the start face when it was
+            made. Later twists and shifts of the connector turn and move this frame, not the ends.
+        span: (3,) from start to end in that frame, when the connector was made or last moved as part of
+            a sub-structure.
+        structure: the sub-structure its start belongs to in an assembly; "" elsewhere.
+        note: the builder's own words about it.
+    """
+
+    id: str
+    module: Module
+    start: FaceRef
+    end: FaceRef
+    start_xyz: Vector
+    end_xyz: Vector
+    world_from_connector: Pose
+    span: Vector
+    structure: str = ""
+    note: str = ""
+
+    @property
+    def start_point(self) -> NDArray[np.float64]:
+        """(3,) the present centre of the start face, world frame, units."""
+        return _array(self.start_xyz)
+
+    @property
+    def end_point(self) -> NDArray[np.float64]:
+        """(3,) the present centre of the end face, world frame, units."""
+        return _array(self.end_xyz)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Joint:
+    """What holds a block to the face it was attached to.
+
+    Attributes:
+        base: id of the block it sits on.
+        part: id of the block that sits.
+        face: label of the base's face.
+        part_xyz: the part's root point, world frame, units.
+        base_xyz: the face's centre, world frame, units.
+        offset: how far these two were moved apart since they were joined, units.
+    """
+
+    base: str
+    part: str
+    face: str
+    part_xyz: Vector
+    base_xyz: Vector
+    offset: float
+
+    @property
+    def point(self) -> NDArray[np.float64]:
+        """(3,) where it acts: the part's root point, world frame, units."""
+        return _array(self.part_xyz)
+
+    @property
+    def holds(self) -> bool:
+        """Whether Besiege would still form it."""
+        # Shifts add up in floating point: an exact half must not fail by rounding.
+        return self.offset <= JOINT_REACH + 1e-9
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KeyPress:
+    """One entry of a control sequence: from `time_s` on, `key` is held for `hold_for_s` seconds."""
+
+    time_s: float
+    key: str
+    hold_for_s: float
+
+
+def _array(vector: Vector) -> NDArray[np.float64]:
+    array = np.array(vector, np.float64)
+    array.flags.writeable = False
+    return array

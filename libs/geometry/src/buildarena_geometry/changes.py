@@ -1,0 +1,32 @@
+"""What an action proposes: the next state, and what has to be checked and told about it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from .state import MachineState
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Change:
+    """A valid action's effect, apart from overlaps, which are checked before it is taken over.
+
+    Attributes:
+        after: the next state.
+        told: puts the feedback into words.
+        placed: ids of blocks that are new or have moved: as one rigid body, not against each other.
+        removed: ids of blocks and connectors that are gone.
+        touched: ids of other parts that changed without moving.
+        attempt: what the action tried, as a refusal for overlap begins.
+    """
+
+    after: MachineState
+    told: Callable[[], str]
+    placed: tuple[str, ...] = ()
+    removed: tuple[str, ...] = ()
+    touched: tuple[str, ...] = ()
+    attempt: str = ""

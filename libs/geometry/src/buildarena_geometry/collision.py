@@ -1,0 +1,125 @@
+"""Finds overlapping blocks. The only module that uses FCL."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import TYPE_CHECKING
+
+import fcl
+import numpy as np
+
+from .modules import Box, Solid
+from .poses import Pose
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from .blocks import Block
+
+TOUCHING = 1e-6  # units; solids that reach into each other less than this touch, which is allowed
+_ALL_CONTACTS = 1_000_000  # FCL's broadphase stops at so many contacts: more than any machine has
+
+
+class CollisionWorld:
+    """The solids of a machine's blocks in FCL's dynamic tree of bounding boxes.
+
+    It is told of every block that is placed, moved or removed, so that a question costs what the moved
+    blocks' surroundings cost and not what the machine costs.
+    """
+
+    __slots__ = ("_objects", "_owners", "_tree")
+
+    def __init__(self) -> None:
+        """An empty world."""
+        self._tree = fcl.DynamicAABBTreeCollisionManager()
+        self._tree.setup()
+        self._objects: dict[str, list[fcl.CollisionObject]] = {}
+        # FCL's contacts name geometries, so each block has its own, and this is the way back.
+        self._owners: dict[int, tuple[str, fcl.CollisionGeometry]] = {}
+
+    def overlaps(self, blocks: Iterable[Block]) -> list[tuple[str, str]]:
+        """Pairs of ids of blocks that would overlap if these blocks were where they say they are.
+
+        Blocks given here are tested against the world's others and not against each other: they are
+        one block, or move together as one rigid body.
+
+        Args:
+            blocks: new blocks, or blocks of the world in new places.
+
+        Returns:
+            The pairs (given block, block of the world), each once, in no particular order.
+        """
+        candidates = list(blocks)
+        moving = {block.id for block in candidates}
+        pairs: dict[tuple[str, str], None] = {}
+        for block in candidates:
+            for solid in block.module.colliders:
+                for other in self._touched_by(solid, block.world_from_block):
+                    if other not in moving:
+                        pairs[block.id, other] = None
+        return list(pairs)
+
+    def place(self, blocks: Iterable[Block]) -> None:
+        """Takes blocks in, or moves those it has to where they are now."""
+        for block in blocks:
+            known = self._objects.get(block.id)
+            if known is None:
+                self._add(block)
+                continue
+            for solid, placed in zip(block.module.colliders, known, strict=True):
+                placed.setTransform(_transform(solid, block.world_from_block))
+                self._tree.update(placed)
+
+    def remove(self, ids: Iterable[str]) -> None:
+        """Takes blocks out; ids it does not have (connectors) are passed over."""
+        gone = [placed for block in ids for placed in self._objects.pop(block, ())]
+        for placed in gone:
+            self._tree.unregisterObject(placed)
+        if gone:
+            kept = set(self._objects)
+            self._owners = {key: owner for key, owner in self._owners.items() if owner[0] in kept}
+
+    def _add(self, block: Block) -> None:
+        placed = []
+        for solid in block.module.colliders:
+            geometry = _geometry(solid)
+            self._owners[id(geometry)] = (block.id, geometry)
+            placed.append(fcl.CollisionObject(geometry, _transform(solid, block.world_from_block)))
+            self._tree.registerObject(placed[-1])
+        self._objects[block.id] = placed
+
+    def _touched_by(self, solid: Solid, world_from_block: Pose) -> set[str]:
+        request = fcl.CollisionRequest(num_max_contacts=_ALL_CONTACTS, enable_contact=True)
+        found = fcl.CollisionData(request, fcl.CollisionResult())
+        probe = fcl.CollisionObject(_probe(solid), _transform(solid, world_from_block))
+        self._tree.collide(probe, found, fcl.defaultCollisionCallback)
+        touched = set()
+        for contact in found.result.contacts:
+            if contact.penetration_depth >= TOUCHING:
+                # One side is the probe, which no block owns.
+                owner = self._owners.get(id(contact.o1)) or self._owners[id(contact.o2)]
+                touched.add(owner[0])
+        return touched
+
+
+def _geometry(solid: Solid) -> fcl.CollisionGeometry:
+    if isinstance(solid, Box):
+        return fcl.Box(*solid.size)
+    return fcl.Cylinder(solid.radius, solid.length)
+
+
+@cache
+def _probe(solid: Solid) -> fcl.CollisionGeometry:
+    """One geometry for all questions about a solid: only blocks of the world need their own."""
+    return _geometry(solid)
+
+
+@cache
+def _block_from_solid(solid: Solid) -> Pose:
+    """FCL's solids lie around their own middle, with a cylinder's axis along z."""
+    return Pose(position=solid.center) if isinstance(solid, Box) else solid.block_from_axis
+
+
+def _transform(solid: Solid, world_from_block: Pose) -> fcl.Transform:
+    pose = world_from_block @ _block_from_solid(solid)
+    return fcl.Transform(np.array(pose.wxyz), np.array(pose.xyz))

@@ -1,0 +1,19 @@
+"""What the library raises: a caller's faults only. What a model does wrong is a `Refused` value."""
+
+from __future__ import annotations
+
+
+class GeometryError(ValueError):
+    """Base of everything the library raises."""
+
+
+class CatalogueError(GeometryError):
+    """A module file breaks the catalogue's format; the message names the entry and what is allowed."""
+
+
+class DocumentError(GeometryError):
+    """A machine document is not a machine; the message names the entry and what is allowed."""
+
+
+class SequenceError(GeometryError):
+    """Input of the replay command is not a list of actions; the message names the entry."""

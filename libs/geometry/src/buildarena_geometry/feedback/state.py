@@ -1,0 +1,173 @@
+"""Blocks, connectors, joints and whole machines in words, made from the state alone."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from .words import caption, counted, listing, number, plain, point, rolling
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from buildarena_geometry.blocks import Block, Connector
+    from buildarena_geometry.poses import Vector
+    from buildarena_geometry.state import MachineState
+
+FLUSH_OFFSET = 1e-6  # units; a joint whose sides are nearer sits flush
+
+
+def title(part: Block | Connector) -> str:
+    """What a part is called: "block 3 (Torch)"."""
+    return f"block {part.id} ({part.module.name})"
+
+
+def block_line(state: MachineState, block: Block) -> str:
+    """A block in one line, without its faces."""
+    facts = [f"{block.id} {block.module.name}"]
+    if block.mount is not None:
+        facts.append(f"on {block.mount[0]}/{block.mount[1]}")
+    elif block.lost_mount is not None:
+        facts.append("on nothing")
+    facts.append(f"at {point(block.center_xyz)}")
+    facts.extend(_use(block))
+    joint = state.joint(block)
+    if joint is not None and not joint.holds:
+        facts.append(f"joint broken ({plain(joint.offset)} apart)")
+    return ", ".join(facts) + _note(block.note)
+
+
+def connector_line(link: Connector) -> str:
+    """A connector in one line."""
+    (start, start_face), (end, end_face) = link.start, link.end
+    return (
+        f"{link.id} {link.module.name}, {start}/{start_face} {point(link.start_xyz)} to "
+        f"{end}/{end_face} {point(link.end_xyz)}{_note(link.note)}"
+    )
+
+
+def faces(state: MachineState, block: Block) -> str:
+    """The faces of a block: where they are, which way they look, what sits on them."""
+    if not block.module.faces:
+        return "No faces."
+    told = []
+    for face in block.module.faces:
+        place = f"{face.label} {caption(block.face_normal(face.label))}"
+        place += f" {point(block.face_center(face.label), 3)}"
+        told.append(place + _use_of_face(state, block, face.label))
+    return f"Faces: {'; '.join(told)}."
+
+
+def block_details(state: MachineState, block: Block) -> str:
+    """Everything a model can ask about one block."""
+    lines = [block_line(state, block) + ".", faces(state, block)]
+    bound = [f"{action} {listing(keys)}" for action, keys in block.bindings.items()]
+    if bound:
+        lines.append(f"Keys: {'; '.join(bound)}.")
+    links = [link.id for link in state.connectors.values() if block.id in _ends(link)]
+    if links:
+        lines.append(f"Connectors: {listing(links)}.")
+    return "\n".join(lines)
+
+
+def summary(state: MachineState) -> str:
+    """The whole machine, one line a part, without faces."""
+    parts = [*state.blocks.values(), *state.connectors.values()]
+    mass = sum(part.module.mass for part in parts)
+    cost = sum(part.module.cost for part in parts)
+    lines = [f"{counted(len(parts), 'part')}, mass {plain(mass)}, cost {cost}."]
+    lines.extend(
+        f"Sub-structure {structure.letter}: {structure.source}."
+        for structure in state.structures.values()
+    )
+    lines.extend(block_line(state, block) for block in state.blocks.values())
+    lines.extend(connector_line(link) for link in state.connectors.values())
+    detached = state.detached()
+    if detached:
+        lines.append(f"Not connected to block {next(iter(state.blocks))}: {listing(detached)}.")
+    return "\n".join(lines)
+
+
+def control_sequence(state: MachineState) -> str:
+    """The control sequence, one entry a line, with the numbers `remove_control_sequence` takes."""
+    if not state.control_sequence:
+        return "The control sequence is empty."
+    return "\n".join(
+        f"{index}: at {plain(press.time_s)} s hold {press.key} for {plain(press.hold_for_s)} s"
+        for index, press in enumerate(state.control_sequence)
+    )
+
+
+def control_config(state: MachineState) -> str:
+    """Which key does what, block by block."""
+    lines = [
+        f"{block.id} {block.module.name}: "
+        + "; ".join(f"{action} {listing(keys)}" for action, keys in block.bindings.items())
+        for block in state.blocks.values()
+        if block.bindings
+    ]
+    return "\n".join(lines) or "No block takes a key."
+
+
+def powered_blocks(state: MachineState) -> str:
+    """The blocks that take keys, where they are and what they do."""
+    lines = [block_line(state, block) for block in state.blocks.values() if block.bindings]
+    return "\n".join(lines) or "No block is powered."
+
+
+def loosened(state: MachineState, moved: Iterable[str]) -> list[str]:
+    """Sentences about joints at the moved blocks whose two sides no longer meet."""
+    told = []
+    for block in (state.blocks[moved_id] for moved_id in moved):
+        joints = [state.joint(block), *(state.joint(child) for child in state.children(block))]
+        for joint in joints:
+            if joint is None or joint.offset <= FLUSH_OFFSET:
+                continue
+            verdict = "" if joint.holds else " and no longer holds"
+            told.append(
+                f"Block {joint.part} no longer sits flush on {joint.base}/{joint.face} "
+                f"({number(joint.offset)} apart){verdict}."
+            )
+    return told
+
+
+def placed(block: Block) -> str:
+    """Where a block is and what it does there, after it moved."""
+    return ", ".join([f"at {point(block.center_xyz)}", *_use(block)])
+
+
+def _use(block: Block) -> list[str]:
+    if block.module.spins:
+        return [rolling(block.axis_xyz, flipped=block.flipped) + _flipped(block)]
+    towards = block.pointing_xyz
+    if towards is None:
+        return []
+    marks = [
+        _landmark(mark.name, block.landmark(mark.along), mark.radius)
+        for mark in block.module.landmarks
+    ]
+    return [f"points {caption(towards)}", *marks]
+
+
+def _flipped(block: Block) -> str:
+    return " (flipped)" if block.flipped else ""
+
+
+def _landmark(name: str, place: Vector, radius: float | None) -> str:
+    return f"{name} {point(place)}" + ("" if radius is None else f" radius {plain(radius)}")
+
+
+def _use_of_face(state: MachineState, block: Block, label: str) -> str:
+    child = state.occupants.get((block.id, label))
+    if child is not None:
+        return f" holds {child}"
+    if block.mount is not None and label == block.module.root_face:
+        return f" sits on {block.mount[0]}/{block.mount[1]}"
+    return ""
+
+
+def _ends(link: Connector) -> tuple[str, str]:
+    return (link.start[0], link.end[0])
+
+
+def _note(note: str) -> str:
+    return f" — {note}" if note else ""

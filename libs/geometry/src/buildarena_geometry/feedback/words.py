@@ -1,0 +1,96 @@
+"""Numbers, directions and turning in words."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from buildarena_geometry.poses import cross
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from buildarena_geometry.poses import Vector
+
+DOWN = (0.0, 0.0, -1.0)
+AXIS_TOLERANCE_DEG = 1e-6  # nearer than this to an axis of the world, a direction is that axis
+ROLLING_TILT_DEG = 60.0  # a wheel whose axle is tilted more than this lies too flat to roll
+
+_CARDINALS = ("North", "East", "South", "West")
+_QUADRANTS = ("Northeast", "Southeast", "Southwest", "Northwest")
+
+
+def number(value: float, decimals: int = 2) -> str:
+    """The number with so many decimals, and never "-0.00"."""
+    text = f"{value:.{decimals}f}"
+    return text.lstrip("-") if float(text) == 0 else text
+
+
+def point(vector: Vector, decimals: int = 2) -> str:
+    """A place or offset, east, north, up: "[1.00, 0.00, -0.50]"."""
+    return f"[{', '.join(number(value, decimals) for value in vector)}]"
+
+
+def plain(value: float) -> str:
+    """The number with as few digits as say it to a hundredth: "3.65", "2"."""
+    return number(value).rstrip("0").rstrip(".")
+
+
+def caption(direction: Vector) -> str:
+    """A direction as an azimuth from north through east and a pitch above the horizon.
+
+    Args:
+        direction: unit length, world frame.
+
+    Returns:
+        "<North>", "<Southeast 146.3°>", "<North with 12.0° pitch>", "<Up>" or "<Down>".
+    """
+    east, north, up = direction
+    across = math.hypot(east, north)
+    pitch = math.degrees(math.atan2(up, across))
+    if abs(pitch) > 90 - AXIS_TOLERANCE_DEG:
+        return "<Up>" if up > 0 else "<Down>"
+    bearing = _bearing(math.degrees(math.atan2(east, north)) % 360)
+    if abs(pitch) < AXIS_TOLERANCE_DEG:
+        return f"<{bearing}>"
+    return f"<{bearing} with {number(pitch, 1)}° pitch>"
+
+
+def listing(words: Iterable[str]) -> str:
+    """The words with commas between them, or "none"."""
+    return ", ".join(words) or "none"
+
+
+def counted(amount: int, word: str) -> str:
+    """The amount with its word: "1 block", "2 blocks"."""
+    return f"{amount} {word}" if amount == 1 else f"{amount} {word}s"
+
+
+def rolling(axle: Vector, *, flipped: bool) -> str:
+    """What a wheel does while its forward key is held.
+
+    Args:
+        axle: outward normal of the wheel's outer face, world frame, unit length.
+        flipped: whether its spin is reversed.
+
+    Returns:
+        The way it rolls and its camber, or, where it lies too flat to roll, the way it spins.
+    """
+    tilt = math.degrees(math.asin(max(-1.0, min(1.0, axle[2]))))
+    if abs(tilt) >= ROLLING_TILT_DEG:
+        # It turns about −axle, so seen from above an unflipped wheel facing up goes clockwise.
+        clockwise = (axle[2] > 0) != flipped
+        return (
+            f"spins {'clockwise' if clockwise else 'counterclockwise'} seen from above, can't roll"
+        )
+    x, y, _ = cross(axle, DOWN)
+    sign = (-1.0 if flipped else 1.0) / math.hypot(x, y)
+    camber = "" if abs(tilt) < AXIS_TOLERANCE_DEG else f", camber {number(tilt, 1)}°"
+    return f"rolls {caption((x * sign, y * sign, 0.0))}{camber}"
+
+
+def _bearing(azimuth: float) -> str:
+    quarter = round(azimuth / 90)
+    if abs(azimuth - 90 * quarter) < AXIS_TOLERANCE_DEG:
+        return _CARDINALS[quarter % 4]
+    return f"{_QUADRANTS[int(azimuth // 90) % 4]} {number(azimuth, 1)}°"

@@ -1,0 +1,10 @@
+"""The keys a machine can be controlled by."""
+
+KEYS = (
+    "UpArrow",
+    "DownArrow",
+    "LeftArrow",
+    "RightArrow",
+    *(f"Alpha{digit}" for digit in range(10)),
+    *(f"Keypad{digit}" for digit in range(10)),
+)

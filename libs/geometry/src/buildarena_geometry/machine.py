@@ -1,0 +1,331 @@
+"""A machine under construction: the one dispatcher, and what it can be asked."""
+
+from __future__ import annotations
+
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+
+from .catalogue import load_catalogue
+from .changes import Change
+from .collision import CollisionWorld
+from .feedback.words import listing
+from .log import ActionLog, ActionRecord, json_value
+from .modules import Box
+from .outcomes import Accepted, Cause, Outcome, Refused
+from .parameters import RefusalError, shown
+from .poses import Vector
+from .state import MachineState
+from .tools import ACTIONS
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from numpy.typing import NDArray
+
+    from .blocks import Block, Connector, Joint, KeyPress
+    from .modules import Catalogue, Solid
+    from .state import SubStructure
+
+
+class Machine:
+    """A machine that is built action by action.
+
+    Every action goes through `act`, which checks it, carries it out or refuses it, and remembers it.
+    Whatever arrives, `act` returns an outcome and the machine stays sound: no two blocks overlap, each
+    block sits on at most one face, and a refused action leaves everything as it was.
+
+    World frame: x east, y north, z up; lengths in units (edge of a small block), masses in mass units.
+    """
+
+    __slots__ = ("_available", "_records", "_state", "_world")
+
+    def __init__(
+        self,
+        *,
+        catalogue: Catalogue | None = None,
+        available: Mapping[str, Machine] | None = None,
+    ) -> None:
+        """An empty machine.
+
+        Args:
+            catalogue: the modules it may be made of; the basic ones if left out.
+            available: finished machines by name. With some, this machine is an assembly: it begins
+                with `add_machine` instead of `start`. They are taken as they are now.
+        """
+        self._available = {name: machine.copy() for name, machine in (available or {}).items()}
+        self._state = MachineState(
+            catalogue=load_catalogue() if catalogue is None else catalogue,
+            available={name: machine._state for name, machine in self._available.items()},
+        )
+        self._records: list[ActionRecord] = []
+        self._world: CollisionWorld | None = CollisionWorld()
+
+    def act(self, name: object, arguments: object = None) -> Outcome:
+        """Carries out one action, or refuses it.
+
+        Args:
+            name: an action's name; `tool_definitions` lists them.
+            arguments: its arguments, JSON values by name.
+
+        Returns:
+            `Accepted` or `Refused`; no input raises.
+        """
+        try:
+            outcome: Outcome = self._carry_out(self._propose(name, arguments))
+        except RefusalError as refusal:
+            outcome = Refused(cause=refusal.cause, text=refusal.text, overlaps=refusal.overlaps)
+        self._record(name, arguments, outcome)
+        return outcome
+
+    @classmethod
+    def restored(
+        cls,
+        *,
+        state: MachineState,
+        available: Mapping[str, Machine],
+        records: Iterable[ActionRecord],
+    ) -> Self:
+        """A machine put together from parts that are known to be sound.
+
+        Args:
+            state: everything it is.
+            available: the machines the state's `available` was taken from.
+            records: how it came to be.
+        """
+        machine = object.__new__(cls)
+        machine._available = dict(available)
+        machine._state = state
+        machine._records = list(records)
+        machine._world = None  # built from the state when the first action asks for it
+        return machine
+
+    def copy(self) -> Self:
+        """A machine equal to this one, with its log, that goes its own way from here."""
+        return self.restored(state=self._state, available=self._available, records=self._records)
+
+    def __eq__(self, other: object) -> bool:
+        """Whether both are the same machine; how they were built does not matter."""
+        if not isinstance(other, Machine):
+            return NotImplemented
+        mine, theirs = self._state, other._state
+        return (
+            list(mine.blocks.items()) == list(theirs.blocks.items())
+            and list(mine.connectors.items()) == list(theirs.connectors.items())
+            and mine.control_sequence == theirs.control_sequence
+            and mine.next_id == theirs.next_id
+            and mine.structures == theirs.structures
+            and mine.structures_made == theirs.structures_made
+        )
+
+    __hash__ = None  # type: ignore[assignment]  # it changes
+
+    def __repr__(self) -> str:
+        return f"Machine({len(self.blocks)} blocks, {len(self.connectors)} connectors)"
+
+    @property
+    def state(self) -> MachineState:
+        """Everything it is at this moment, as a value."""
+        return self._state
+
+    @property
+    def started(self) -> bool:
+        """Whether it has a starting block."""
+        return self._state.started
+
+    @property
+    def catalogue(self) -> Catalogue:
+        """The modules it may be made of."""
+        return self._state.catalogue
+
+    @property
+    def available(self) -> Mapping[str, Machine]:
+        """The machines an assembly may be made of, by name."""
+        return MappingProxyType(self._available)
+
+    @property
+    def sub_structures(self) -> Mapping[str, SubStructure]:
+        """An assembly's sub-structures by letter."""
+        return MappingProxyType(dict(self._state.structures))
+
+    @property
+    def blocks(self) -> Mapping[str, Block]:
+        """Its blocks by id, in the order of creation; connectors are not among them."""
+        return MappingProxyType(dict(self._state.blocks))
+
+    @property
+    def connectors(self) -> Mapping[str, Connector]:
+        """Its braces and winches by id, in the order of creation."""
+        return MappingProxyType(dict(self._state.connectors))
+
+    @property
+    def joints(self) -> tuple[Joint, ...]:
+        """What holds each block to the face it sits on, in the order of the blocks."""
+        return tuple(self._state.joints())
+
+    @property
+    def control_sequence(self) -> tuple[KeyPress, ...]:
+        """The key presses in the order of entry."""
+        return self._state.control_sequence
+
+    @property
+    def log(self) -> ActionLog:
+        """Every action so far, accepted and refused."""
+        return ActionLog(
+            records=tuple(self._records), catalogue=self.catalogue, available=self.available
+        )
+
+    @property
+    def mass(self) -> float:
+        """Mass of all blocks and connectors, mass units."""
+        return float(sum(part.module.mass for part in self._parts()))
+
+    @property
+    def cost(self) -> int:
+        """Besiege's price of all blocks and connectors."""
+        return sum(part.module.cost for part in self._parts())
+
+    @property
+    def part_count(self) -> int:
+        """Number of blocks and connectors, the starting block included."""
+        return len(self._state.blocks) + len(self._state.connectors)
+
+    @property
+    def center_of_mass(self) -> NDArray[np.float64]:
+        """(3,) world frame, units; blocks count at their centers, connectors at their middles.
+
+        Raises:
+            ValueError: the machine is empty.
+        """
+        if not self.started:
+            raise ValueError("an empty machine has no center of mass")
+        blocks, links = self._state.blocks.values(), self._state.connectors.values()
+        points = [block.center_xyz for block in blocks]
+        points += [tuple((link.start_point + link.end_point) / 2) for link in links]
+        masses = [part.module.mass for part in self._parts()]
+        center: NDArray[np.float64] = np.average(np.array(points), axis=0, weights=masses)
+        return center
+
+    @property
+    def bounds(self) -> NDArray[np.float64]:
+        """(2, 3) smallest and largest coordinates of the blocks' bodies, world frame, units.
+
+        Raises:
+            ValueError: the machine is empty.
+        """
+        if not self.started:
+            raise ValueError("an empty machine has no bounds")
+        corners = [
+            _extent(block, solid)
+            for block in self._state.blocks.values()
+            for solid in block.module.body
+        ]
+        lowest, highest = zip(*corners, strict=True)
+        return np.array([np.min(lowest, axis=0), np.max(highest, axis=0)])
+
+    @property
+    def detached(self) -> tuple[str, ...]:
+        """Ids of the blocks without a path to the starting block.
+
+        A path runs over joints that hold and over connectors. In an assembly it is to lead to the
+        starting block of the first sub-structure.
+        """
+        return self._state.detached()
+
+    def to_document(self) -> dict[str, Any]:
+        """The machine and its log as JSON values; `from_document` reads them back."""
+        from .documents import machine_document  # noqa: PLC0415  documents hold whole machines
+
+        return machine_document(self)
+
+    @classmethod
+    def from_document(cls, document: object, *, catalogue: Catalogue | None = None) -> Machine:
+        """The machine a document describes.
+
+        Args:
+            document: what `to_document` made, as JSON values.
+            catalogue: the modules it is made of; the basic ones if left out.
+
+        Raises:
+            DocumentError: it is not a machine; the message names the entry.
+        """
+        from .documents import read_machine  # noqa: PLC0415  documents hold whole machines
+
+        return read_machine(document, catalogue=catalogue)
+
+    def _propose(self, name: object, arguments: object) -> Change:
+        action = ACTIONS.get(name) if isinstance(name, str) else None
+        if action is None:
+            raise RefusalError(
+                Cause.UNKNOWN_ACTION,
+                f"There is no action {shown(name)}. Actions: {listing(ACTIONS)}.",
+            )
+        return action.propose(self._state, **action.read(arguments))
+
+    def _carry_out(self, change: Change) -> Accepted:
+        world = self._collision_world()
+        placed = [change.after.blocks[block] for block in change.placed]
+        pairs = world.overlaps(placed)
+        if pairs:
+            raise _overlap(change, pairs)
+        world.remove(change.removed)
+        world.place(placed)
+        self._state = change.after
+        changed = (*change.placed, *change.touched, *change.removed)
+        return Accepted(changed=changed, tell=change.told)
+
+    def _collision_world(self) -> CollisionWorld:
+        if self._world is None:
+            self._world = CollisionWorld()
+            self._world.place(self._state.blocks.values())
+        return self._world
+
+    def _record(self, name: object, arguments: object, outcome: Outcome) -> None:
+        reason = None if isinstance(outcome, Accepted) else outcome.reason
+        written = name if isinstance(name, str) else ""
+        self._records.append(
+            ActionRecord(
+                name=str(json_value(written)),
+                arguments={} if arguments is None else json_value(arguments),
+                reason=reason,
+            )
+        )
+
+    def _parts(self) -> Iterable[Block | Connector]:
+        return (*self._state.blocks.values(), *self._state.connectors.values())
+
+
+def replay(log: ActionLog) -> Machine:
+    """The machine that results from doing a log's actions again, refused ones included."""
+    machine = Machine(catalogue=log.catalogue, available=log.available)
+    for record in log:
+        machine.act(record.name, record.arguments)
+    return machine
+
+
+def _overlap(change: Change, pairs: list[tuple[str, str]]) -> RefusalError:
+    others = list(dict.fromkeys(other for _, other in pairs))
+    if len(change.placed) == 1:
+        told = f"{change.attempt} would overlap {_blocks(change.after, others)}."
+    else:
+        named = "; ".join(f"{mine} and {other}" for mine, other in pairs)
+        told = f"{change.attempt} would make blocks overlap: {named}."
+    return RefusalError(Cause.OVERLAP, told, tuple(pairs))
+
+
+def _blocks(state: MachineState, ids: list[str]) -> str:
+    return listing(f"block {found} ({state.blocks[found].module.name})" for found in ids)
+
+
+def _extent(block: Block, solid: Solid) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Smallest and largest coordinates of one solid, world frame."""
+    rotation = block.world_from_block.rotation
+    if isinstance(solid, Box):
+        middle = block.world_from_block.apply(solid.center)
+        reach = np.abs(rotation) @ (np.array(solid.size) / 2)
+        return middle - reach, middle + reach
+    ends = block.world_from_block.apply([solid.base, solid.top])
+    axis = (ends[1] - ends[0]) / solid.length
+    reach = solid.radius * np.sqrt(np.clip(1 - axis**2, 0, None))
+    return ends.min(axis=0) - reach, ends.max(axis=0) + reach

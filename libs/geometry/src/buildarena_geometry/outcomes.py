@@ -1,0 +1,148 @@
+"""What an action comes back with: accepted or refused, and what a model reads about it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TYPE_CHECKING, Literal
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+
+class RefusalClass(StrEnum):
+    """Why an action was refused, as results are counted by.
+
+    The first ten are the paper's failure reasons (appendix "Definitions of Failure Reasons").
+    """
+
+    MODULE_RESTRICTION = "module_restriction"
+    BLOCK_PRESENCE = "block_presence"
+    CONNECTOR_MISUSE = "connector_misuse"
+    FACE_OCCUPIED = "face_occupied"
+    EXCESS_CONNECTION = "excess_connection"
+    FACE_PRESENCE = "face_presence"
+    MULTIPLE_INITIALIZATION = "multiple_initialization"
+    INITIALIZATION_ABSENT = "initialization_absent"
+    SPIN_CAPABILITY = "spin_capability"
+    OVERLAP = "overlap"
+    TOO_CLOSE = "too_close"
+    BAD_KEY = "bad_key"
+    UNKNOWN_ACTION = "unknown_action"
+    BAD_INDEX = "bad_index"
+    OUT_OF_RANGE = "out_of_range"
+    MALFORMED_ARGUMENTS = "malformed_arguments"
+    UNKNOWN_SUB_STRUCTURE = "unknown_sub_structure"
+
+
+class Cause(StrEnum):
+    """What exactly was wrong: several causes can belong to one refusal class."""
+
+    NOT_STARTED = "not_started"
+    ALREADY_STARTED = "already_started"
+    UNKNOWN_MODULE = "unknown_module"
+    UNKNOWN_CONNECTOR = "unknown_connector"
+    CONNECTOR_MISUSE = "connector_misuse"
+    BASIC_AS_CONNECTOR = "basic_as_connector"
+    NO_SUCH_BLOCK = "no_such_block"
+    START_BLOCK = "start_block"
+    NO_SUCH_FACE = "no_such_face"
+    NO_FACES = "no_faces"
+    FACE_OCCUPIED = "face_occupied"
+    EXCESS_CONNECTION = "excess_connection"
+    TOO_CLOSE = "too_close"
+    NOT_SPINNING = "not_spinning"
+    OVERLAP = "overlap"
+    BAD_KEY = "bad_key"
+    NO_LOCOMOTION = "no_locomotion"
+    BAD_ACTION = "bad_action"
+    UNKNOWN_ACTION = "unknown_action"
+    BAD_INDEX = "bad_index"
+    OUT_OF_RANGE = "out_of_range"
+    MALFORMED_ARGUMENTS = "malformed_arguments"
+    NO_SUCH_MACHINE = "no_such_machine"
+
+
+CLASS_OF_CAUSE = {
+    Cause.NOT_STARTED: RefusalClass.INITIALIZATION_ABSENT,
+    Cause.ALREADY_STARTED: RefusalClass.MULTIPLE_INITIALIZATION,
+    Cause.UNKNOWN_MODULE: RefusalClass.MODULE_RESTRICTION,
+    Cause.UNKNOWN_CONNECTOR: RefusalClass.MODULE_RESTRICTION,
+    Cause.CONNECTOR_MISUSE: RefusalClass.CONNECTOR_MISUSE,
+    Cause.BASIC_AS_CONNECTOR: RefusalClass.CONNECTOR_MISUSE,
+    Cause.NO_SUCH_BLOCK: RefusalClass.BLOCK_PRESENCE,
+    Cause.START_BLOCK: RefusalClass.BLOCK_PRESENCE,
+    Cause.NO_SUCH_FACE: RefusalClass.FACE_PRESENCE,
+    Cause.NO_FACES: RefusalClass.FACE_PRESENCE,
+    Cause.FACE_OCCUPIED: RefusalClass.FACE_OCCUPIED,
+    Cause.EXCESS_CONNECTION: RefusalClass.EXCESS_CONNECTION,
+    Cause.TOO_CLOSE: RefusalClass.TOO_CLOSE,
+    Cause.NOT_SPINNING: RefusalClass.SPIN_CAPABILITY,
+    Cause.OVERLAP: RefusalClass.OVERLAP,
+    Cause.BAD_KEY: RefusalClass.BAD_KEY,
+    Cause.NO_LOCOMOTION: RefusalClass.UNKNOWN_ACTION,
+    Cause.BAD_ACTION: RefusalClass.UNKNOWN_ACTION,
+    Cause.UNKNOWN_ACTION: RefusalClass.UNKNOWN_ACTION,
+    Cause.BAD_INDEX: RefusalClass.BAD_INDEX,
+    Cause.OUT_OF_RANGE: RefusalClass.OUT_OF_RANGE,
+    Cause.MALFORMED_ARGUMENTS: RefusalClass.MALFORMED_ARGUMENTS,
+    Cause.NO_SUCH_MACHINE: RefusalClass.UNKNOWN_SUB_STRUCTURE,
+}
+
+
+class Accepted:
+    """An action that was carried out.
+
+    Attributes:
+        changed: ids of the blocks and connectors that are new, different or gone.
+    """
+
+    __slots__ = ("_tell", "_text", "changed")
+
+    ok: Literal[True] = True
+
+    def __init__(self, *, changed: tuple[str, ...], tell: Callable[[], str]) -> None:
+        """Keeps how to tell the feedback: many callers never read it, and putting it into words costs
+        more than the action.
+        """
+        self.changed = changed
+        self._tell = tell
+        self._text: str | None = None
+
+    @property
+    def text(self) -> str:
+        """What a model reads, about the machine as it was when the action ended."""
+        if self._text is None:
+            self._text = self._tell()
+        return self._text
+
+    def __repr__(self) -> str:
+        return f"Accepted({self.text!r})"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Refused:
+    """An action that was not carried out; the machine is what it was.
+
+    Attributes:
+        cause: what exactly was wrong.
+        text: what a model reads: what was wrong and what would be allowed.
+        overlaps: the pairs of block ids that would overlap; a new block has its id to be.
+    """
+
+    cause: Cause
+    text: str
+    overlaps: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def ok(self) -> Literal[False]:
+        """False: it was refused."""
+        return False
+
+    @property
+    def reason(self) -> RefusalClass:
+        """The class results are counted by."""
+        return CLASS_OF_CAUSE[self.cause]
+
+
+Outcome = Accepted | Refused

@@ -1,0 +1,193 @@
+"""Everything a machine is at one moment, as a value.
+
+Actions never change a state: they make the next one. So a refused action leaves no trace by
+construction, and feedback can be put into words long after the machine has moved on.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+from .blocks import Block, Connector, FaceRef, Joint, KeyPress
+from .poses import distance
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping
+
+    from .modules import Catalogue
+    from .poses import Pose
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SubStructure:
+    """One machine inside an assembly.
+
+    Attributes:
+        letter: the prefix of its blocks' ids.
+        source: the key of the machine it is a copy of.
+        root: id of its starting block.
+    """
+
+    letter: str
+    source: str
+    root: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MachineState:
+    """A machine at one moment; its mappings are never changed once they are in a state.
+
+    Attributes:
+        catalogue: the modules it may be made of.
+        available: the machines an assembly may be made of, by name, as states.
+        blocks: by id, in the order of creation.
+        connectors: by id, in the order of creation.
+        occupants: the id of the block that sits on a face, by that face.
+        structures: an assembly's sub-structures by letter.
+        structures_made: how many letters have been given out.
+        control_sequence: in the order of entry.
+        next_id: the number the next block or connector gets.
+    """
+
+    catalogue: Catalogue
+    available: Mapping[str, MachineState] = field(default_factory=dict)
+    blocks: Mapping[str, Block] = field(default_factory=dict)
+    connectors: Mapping[str, Connector] = field(default_factory=dict)
+    occupants: Mapping[FaceRef, str] = field(default_factory=dict)
+    structures: Mapping[str, SubStructure] = field(default_factory=dict)
+    structures_made: int = 0
+    control_sequence: tuple[KeyPress, ...] = ()
+    next_id: int = 1
+
+    @property
+    def started(self) -> bool:
+        """Whether there is a starting block."""
+        return bool(self.blocks)
+
+    @property
+    def is_assembly(self) -> bool:
+        """Whether it is built from whole machines instead of from a starting block."""
+        return bool(self.available)
+
+    def is_occupied(self, block: Block, label: str) -> bool:
+        """Whether a face of the block is in use by an attachment, its own or another block's."""
+        if (block.id, label) in self.occupants:
+            return True
+        return block.mount is not None and label == block.module.root_face
+
+    def free_faces(self, block: Block) -> list[str]:
+        """The labels of a block's faces that take another block."""
+        return [
+            face.label for face in block.module.faces if not self.is_occupied(block, face.label)
+        ]
+
+    def children(self, block: Block) -> list[Block]:
+        """The blocks that sit on a block."""
+        found = (self.occupants.get((block.id, face.label)) for face in block.module.faces)
+        return [self.blocks[child] for child in found if child is not None]
+
+    def joint(self, part: Block) -> Joint | None:
+        """What holds a block to the face it sits on; None where it sits on none."""
+        if part.mount is None:
+            return None
+        base, label = part.mount
+        face = self.blocks[base].face_center(label)
+        root = part.world_from_block.xyz
+        return Joint(
+            base=base,
+            part=part.id,
+            face=label,
+            part_xyz=root,
+            base_xyz=face,
+            offset=distance(root, face),
+        )
+
+    def joints(self) -> Iterator[Joint]:
+        """What holds the blocks together, in the order of the blocks."""
+        for block in self.blocks.values():
+            joint = self.joint(block)
+            if joint is not None:
+                yield joint
+
+    def detached(self) -> tuple[str, ...]:
+        """Ids of the blocks without a path of joints that hold and of connectors to the first block."""
+        if not self.blocks:
+            return ()
+        neighbours: dict[str, list[str]] = {block: [] for block in self.blocks}
+        held = [(joint.base, joint.part) for joint in self.joints() if joint.holds]
+        tied = [(link.start[0], link.end[0]) for link in self.connectors.values()]
+        for left, right in (*held, *tied):
+            neighbours[left].append(right)
+            neighbours[right].append(left)
+        frontier = [next(iter(self.blocks))]
+        reached = set(frontier)
+        while frontier:
+            for neighbour in neighbours[frontier.pop()]:
+                if neighbour not in reached:
+                    reached.add(neighbour)
+                    frontier.append(neighbour)
+        return tuple(block for block in self.blocks if block not in reached)
+
+    def members(self, letter: str) -> list[Block]:
+        """The blocks of a sub-structure, those attached to it later included."""
+        return [block for block in self.blocks.values() if block.structure == letter]
+
+    def keys_in_use(self) -> tuple[str, ...]:
+        """The keys that are bound to some action, in the order of the blocks."""
+        bound = (
+            key
+            for block in self.blocks.values()
+            for keys in block.bindings.values()
+            for key in keys
+        )
+        return tuple(dict.fromkeys(bound))
+
+    def with_blocks(self, *changed: Block) -> MachineState:
+        """The state in which these blocks are new or different, and connectors on them follow."""
+        blocks = {**self.blocks, **{block.id: block for block in changed}}
+        connectors = follow(self.connectors, blocks, {block.id for block in changed})
+        return replace(self, blocks=blocks, connectors=connectors)
+
+
+def follow(
+    connectors: Mapping[str, Connector], blocks: Mapping[str, Block], moved: Iterable[str]
+) -> Mapping[str, Connector]:
+    """The connectors with their ends where the faces they sit on are now.
+
+    Args:
+        connectors: before the move.
+        blocks: after the move.
+        moved: ids of the blocks that moved.
+    """
+    ids = moved if isinstance(moved, set) else set(moved)
+    touched = [link for link in connectors.values() if link.start[0] in ids or link.end[0] in ids]
+    if not touched:
+        return connectors
+    followed = dict(connectors)
+    for link in touched:
+        followed[link.id] = replace(
+            link,
+            start_xyz=blocks[link.start[0]].face_center(link.start[1]),
+            end_xyz=blocks[link.end[0]].face_center(link.end[1]),
+        )
+    return followed
+
+
+def moved_connector(link: Connector, motion: Pose) -> Connector:
+    """A connector whose frame went through a rigid motion with its sub-structure.
+
+    Args:
+        link: with its ends already in their new places.
+        motion: the motion, world frame.
+    """
+    pose = motion @ link.world_from_connector
+    return replace(link, world_from_connector=pose, span=span_in(pose, link))
+
+
+def span_in(world_from_connector: Pose, link: Connector) -> tuple[float, float, float]:
+    """From a connector's start to its end, in the given frame, units."""
+    (a, b, c), (x, y, z) = link.start_xyz, link.end_xyz
+    across = (x - a, y - b, z - c)
+    inverse = world_from_connector.inverse()
+    return inverse.direction(across)

@@ -1,0 +1,199 @@
+"""The action space: every action as a tool that models can be given, and how its arguments are read.
+
+Names, descriptions and schemas come from the actions' signatures and docstrings, so they cannot say
+anything else than what the actions do.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
+
+from .actions import assemble, build, control, query, refine
+from .changes import Change
+from .feedback.words import listing
+from .outcomes import Cause
+from .parameters import JsonSchema, Parameter, RefusalError, shown
+
+GROUPS = ("build", "refine", "assemble", "control", "query")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ToolDefinition:
+    """One action as a model's API takes it.
+
+    Attributes:
+        name: the action's name.
+        description: what it does.
+        parameters: JSON schema of its arguments, an object.
+        group: one of `GROUPS`.
+    """
+
+    name: str
+    description: str
+    parameters: JsonSchema
+    group: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Action:
+    """An action the dispatcher can carry out.
+
+    Attributes:
+        definition: what models are told.
+        propose: makes the change from a state and the arguments, or raises RefusalError.
+        readers: how each argument is read.
+        required: the arguments without a default.
+    """
+
+    definition: ToolDefinition
+    propose: Callable[..., Change]
+    readers: Mapping[str, Parameter] = field(repr=False)
+    required: tuple[str, ...]
+
+    def read(self, arguments: object) -> dict[str, Any]:
+        """The arguments as the action takes them.
+
+        Raises:
+            RefusalError: they are not an object, one is missing or unknown, or one has a bad value.
+        """
+        name = self.definition.name
+        if arguments is None:
+            arguments = {}
+        if not isinstance(arguments, Mapping):
+            raise RefusalError(
+                Cause.MALFORMED_ARGUMENTS,
+                f"{name} takes an object of arguments, not {shown(arguments)}.",
+            )
+        takes = f"{name} takes: {listing(self.readers)}."
+        for argument in arguments:
+            if not isinstance(argument, str) or argument not in self.readers:
+                raise RefusalError(
+                    Cause.MALFORMED_ARGUMENTS, f"There is no argument {shown(argument)}. {takes}"
+                )
+        missing = [argument for argument in self.required if argument not in arguments]
+        if missing:
+            raise RefusalError(Cause.MALFORMED_ARGUMENTS, f"Missing: {listing(missing)}. {takes}")
+        return {
+            argument: self.readers[argument].read(argument, value)
+            for argument, value in arguments.items()
+            if value is not None or argument in self.required
+        }
+
+
+def tool_definitions(groups: Iterable[str] = GROUPS) -> tuple[ToolDefinition, ...]:
+    """The actions of some groups as tools for models.
+
+    Args:
+        groups: names from `GROUPS`.
+
+    Returns:
+        The definitions, group by group in the order asked for.
+
+    Raises:
+        ValueError: a group that does not exist.
+    """
+    wanted = tuple(groups)
+    for group in wanted:
+        if group not in GROUPS:
+            raise ValueError(f"there is no group {group!r}; the groups are {', '.join(GROUPS)}")
+    return tuple(
+        action.definition
+        for group in wanted
+        for action in ACTIONS.values()
+        if action.definition.group == group
+    )
+
+
+def _action(propose: Callable[..., Change], group: str) -> Action:
+    signature = inspect.signature(propose)
+    hints = get_type_hints(propose, include_extras=True)
+    description, told = _parse_docstring(inspect.getdoc(propose) or "")
+    arguments = [name for name in signature.parameters if name != "state"]
+    readers = {name: _parameter(hints[name]) for name in arguments}
+    required = tuple(
+        name for name in arguments if signature.parameters[name].default is inspect.Parameter.empty
+    )
+    schema: JsonSchema = {
+        "type": "object",
+        "properties": {
+            name: {**readers[name].schema, "description": told[name]} for name in arguments
+        },
+        "required": list(required),
+        "additionalProperties": False,
+    }
+    definition = ToolDefinition(
+        name=propose.__name__, description=description, parameters=schema, group=group
+    )
+    return Action(definition=definition, propose=propose, readers=readers, required=required)
+
+
+def _parameter(hint: object) -> Parameter:
+    if get_origin(hint) is not Annotated:
+        raise TypeError(f"{hint} is not one of the annotations in buildarena_geometry.parameters")
+    parameter = get_args(hint)[1]
+    assert isinstance(parameter, Parameter)  # noqa: S101  guards the developer who adds an action
+    return parameter
+
+
+def _parse_docstring(text: str) -> tuple[str, dict[str, str]]:
+    """The description and the arguments' texts of a Google style docstring, each on one line."""
+    head, _, rest = text.partition("Args:\n")
+    told: dict[str, str] = {}
+    for line in inspect.cleandoc(rest).splitlines():
+        if line.startswith(" "):
+            told[list(told)[-1]] += " " + line.strip()
+        else:
+            name, _, words = line.partition(": ")
+            told[name] = words
+    return " ".join(head.split()), told
+
+
+ACTIONS: Mapping[str, Action] = {
+    propose.__name__: _action(propose, group)
+    for group, proposers in (
+        (
+            "build",
+            (
+                build.start,
+                build.attach_block_to,
+                build.connect_blocks,
+                build.remove_block,
+                build.reset,
+            ),
+        ),
+        ("refine", (refine.twist_block, refine.shift_block, refine.flip_spin)),
+        (
+            "assemble",
+            (
+                assemble.add_machine,
+                assemble.shift_machine,
+                assemble.rotate_machine,
+                assemble.remove_machine,
+            ),
+        ),
+        (
+            "control",
+            (
+                control.change_control_key,
+                control.add_control_key,
+                control.add_control_sequence,
+                control.remove_control_sequence,
+                control.reset_control_sequence,
+            ),
+        ),
+        (
+            "query",
+            (
+                query.get_machine_summary,
+                query.get_block_details,
+                query.review_powered_blocks,
+                query.review_control_config,
+                query.review_control_sequence,
+            ),
+        ),
+    )
+    for propose in proposers
+}
