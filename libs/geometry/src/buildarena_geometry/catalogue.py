@@ -89,7 +89,7 @@ def _read_file(file: Path) -> tuple[Module, ...]:
 
 def _parse_yaml(text: str, file: Path) -> object:
     try:
-        import yaml  # noqa: PLC0415  an extra: the library itself reads JSON
+        import yaml
     except ImportError as error:
         raise CatalogueError(
             f"{file}: is not JSON; for other YAML install buildarena-geometry[yaml]"

@@ -197,7 +197,7 @@ def _flipped(fields: Fields, module: Module) -> bool:
 
 
 def _bindings(fields: Fields, module: Module) -> dict[str, tuple[str, ...]]:
-    bindings: dict[str, tuple[str, ...]] = {action: () for action in module.actions}
+    bindings: dict[str, tuple[str, ...]] = dict.fromkeys(module.actions, ())
     if fields.has("bindings"):
         for action, keys in fields["bindings"].entries():
             if action not in bindings:

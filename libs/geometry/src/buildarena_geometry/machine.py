@@ -15,7 +15,6 @@ from .log import ActionLog, ActionRecord, json_value
 from .modules import Box
 from .outcomes import Accepted, Cause, Outcome, Refused
 from .parameters import RefusalError, shown
-from .poses import Vector
 from .state import MachineState
 from .tools import ACTIONS
 
@@ -235,7 +234,7 @@ class Machine:
 
     def to_document(self) -> dict[str, Any]:
         """The machine and its log as JSON values; `from_document` reads them back."""
-        from .documents import machine_document  # noqa: PLC0415  documents hold whole machines
+        from .documents import machine_document
 
         return machine_document(self)
 
@@ -250,7 +249,7 @@ class Machine:
         Raises:
             DocumentError: it is not a machine; the message names the entry.
         """
-        from .documents import read_machine  # noqa: PLC0415  documents hold whole machines
+        from .documents import read_machine
 
         return read_machine(document, catalogue=catalogue)
 

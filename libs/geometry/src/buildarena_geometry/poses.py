@@ -119,6 +119,10 @@ class Pose:
         """A direction given in the inner frame, seen from the outer one, as plain floats."""
         return rotate(self.wxyz, inner)
 
+    def turned(self, rotation: Quaternion) -> Pose:
+        """The same place, turned about it by a rotation of the outer frame."""
+        return _pose(self.xyz, normalized(multiply(rotation, self.wxyz)))
+
     def shifted(self, offset: Vector) -> Pose:
         """The same orientation, moved by an offset in the outer frame, units."""
         return _pose(add(self.xyz, offset), self.wxyz)

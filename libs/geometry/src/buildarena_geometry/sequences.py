@@ -13,9 +13,9 @@ from .poses import scaled
 from .reading import Reader
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator
 
-    from .blocks import Block, Connector
+    from .blocks import Block, Connector, FaceRef
     from .modules import Catalogue
     from .outcomes import Outcome
     from .state import MachineState
@@ -149,7 +149,7 @@ def _block_entry(state: MachineState, block: Block) -> dict[str, Any]:
             for face in block.module.faces
         }
     if block.mount is not None:
-        entry["root_face"] = list(block.mount)
+        entry["root_face"] = _seat(block, block.mount)
     elif block.lost_mount is not None:
         entry["root_face"] = [None, block.lost_mount[1], block.lost_mount[0]]
     if block.pointing_xyz is not None:
@@ -174,13 +174,26 @@ def _connector_entry(link: Connector) -> dict[str, Any]:
         "quat": list(besiege_rotation(link)),
         "flipped": False,
         "connector": {
-            "start": list(link.start),
-            "end": list(link.end),
+            "start": _seat(link, link.start),
+            "end": _seat(link, link.end),
             "start_point": list(link.start_xyz),
             "end_point": list(link.end_xyz),
             "projection_virtual": list(besiege_span(link)),
         },
     }
+
+
+def _seat(part: Block | Connector, face: FaceRef) -> list[str | None]:
+    """A face by its block and label.
+
+    The vectors look faces up by the ids of the machine a sub-structure was copied from, which are
+    unknown in the assembly: there the block's place is empty, and the id comes last.
+    """
+    block, label = face
+    prefix = f"{part.structure}_"
+    if part.structure and part.id.startswith(prefix):
+        return [None, label, block.removeprefix(prefix)]
+    return [block, label]
 
 
 def parse(text: str) -> object:

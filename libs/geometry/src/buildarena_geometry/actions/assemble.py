@@ -5,7 +5,7 @@ from dataclasses import replace
 from buildarena_geometry.blocks import Block, Connector, FaceRef
 from buildarena_geometry.changes import Change
 from buildarena_geometry.feedback import state as words
-from buildarena_geometry.feedback.words import listing, point
+from buildarena_geometry.feedback.words import point
 from buildarena_geometry.outcomes import Cause
 from buildarena_geometry.parameters import Name, RefusalError, Triple, shown
 from buildarena_geometry.poses import ORIGIN, Pose

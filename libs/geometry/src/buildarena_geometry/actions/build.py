@@ -6,7 +6,7 @@ from math import dist
 from buildarena_geometry.blocks import Block, Connector
 from buildarena_geometry.changes import Change
 from buildarena_geometry.feedback import state as words
-from buildarena_geometry.feedback.words import caption, listing, point
+from buildarena_geometry.feedback.words import listing
 from buildarena_geometry.outcomes import Cause
 from buildarena_geometry.parameters import BlockId, Name, Note, RefusalError, Triple, shown
 from buildarena_geometry.poses import ORIGIN, Pose
@@ -237,7 +237,7 @@ def _removal(
 
 
 def _new_block(state: MachineState, block: Block, note: str) -> Block:
-    bindings: dict[str, tuple[str, ...]] = {action: () for action in block.module.actions}
+    bindings: dict[str, tuple[str, ...]] = dict.fromkeys(block.module.actions, ())
     return replace(block, id=str(state.next_id), bindings=bindings, note=note)
 
 

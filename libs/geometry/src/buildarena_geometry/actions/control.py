@@ -5,7 +5,7 @@ from dataclasses import replace
 from buildarena_geometry.blocks import KeyPress
 from buildarena_geometry.changes import Change
 from buildarena_geometry.feedback import state as words
-from buildarena_geometry.feedback.words import listing, plain
+from buildarena_geometry.feedback.words import listing
 from buildarena_geometry.keys import KEYS
 from buildarena_geometry.outcomes import Cause
 from buildarena_geometry.parameters import BlockId, Index, Key, Name, Number, RefusalError, shown

@@ -8,13 +8,12 @@ from buildarena_geometry.feedback import state as words
 from buildarena_geometry.feedback.words import listing, plain, point
 from buildarena_geometry.outcomes import Cause
 from buildarena_geometry.parameters import BlockId, Number, RefusalError, Triple
-from buildarena_geometry.poses import ORIGIN, Pose, about_axis
+from buildarena_geometry.poses import Pose, Vector, about_axis
 from buildarena_geometry.state import MachineState
 
 from .lookups import part
 
 LARGEST_SHIFT = 0.5  # units a call in each direction
-_AWAY_FROM_FACE = (0.0, 0.0, 1.0)
 
 
 def twist_block(state: MachineState, block_id: BlockId, angle: Number) -> Change:
@@ -30,11 +29,12 @@ def twist_block(state: MachineState, block_id: BlockId, angle: Number) -> Change
             Cause.START_BLOCK,
             f"{words.title(found).capitalize()} sits on no face and can't be twisted.",
         )
-    twist = Pose(quaternion=about_axis(_AWAY_FROM_FACE, -angle))
+    turn = about_axis(_seat_normal(state, found), -angle)
     told = f"by {plain(angle)}°"
     if isinstance(found, Connector):
-        return _move_connector(state, found, found.world_from_connector @ twist, f"Twisted {told}")
-    return _move(state, found, found.world_from_block @ twist, "twisted " + told)
+        pose = found.world_from_connector.turned(turn)
+        return _move_connector(state, found, pose, f"Twisted {told}")
+    return _move(state, found, found.world_from_block.turned(turn), "twisted " + told)
 
 
 def shift_block(state: MachineState, block_id: BlockId, shift_real: Triple) -> Change:
@@ -77,6 +77,15 @@ def flip_spin(state: MachineState, block_id: BlockId) -> Change:
         touched=(block.id,),
         told=lambda: f"Flipped. {words.block_line(after, block)}.",
     )
+
+
+def _seat_normal(state: MachineState, found: Block | Connector) -> Vector:
+    """The normal of the face a part sits on, as that face looks now; its own axis if it sits on none."""
+    seat = found.start if isinstance(found, Connector) else found.mount
+    if seat is None:
+        assert isinstance(found, Block)  # noqa: S101  only blocks can lose their seat
+        return found.axis_xyz
+    return state.blocks[seat[0]].face_normal(seat[1])
 
 
 def _move(state: MachineState, block: Block, pose: Pose, how: str) -> Change:
