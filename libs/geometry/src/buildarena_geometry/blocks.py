@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .modules import Module
-from .poses import Pose, Vector, add, scaled
+from .poses import Pose
+from .rotations import Vector, add, scaled
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -27,8 +28,8 @@ class Block:
     Attributes:
         id: "1", "2", … in the order of creation, or "A_3" in an assembly; never used twice.
         module: what it is.
-        world_from_block: where its root point is and how it is turned; +z points away from the face it
-            sits on.
+        world_from_block: where its root point is and how it is turned; +z points away from the face
+            it sits on.
         mount: the face it sits on; None for a starting block and for one whose base was removed.
         lost_mount: the face it sat on before that block was removed.
         flipped: whether a wheel's spin is reversed.
@@ -110,8 +111,8 @@ class Connector:
         end_xyz: the present centre of the end face, world frame, units.
         world_from_connector: its own frame, that of a block attached to the start face when it was
             made. Later twists and shifts of the connector turn and move this frame, not the ends.
-        span: (3,) from start to end in that frame, when the connector was made or last moved as part of
-            a sub-structure.
+        span: (3,) from start to end in that frame, when the connector was made or last moved as
+            part of a sub-structure.
         structure: the sub-structure its start belongs to in an assembly; "" elsewhere.
         note: the builder's own words about it.
     """

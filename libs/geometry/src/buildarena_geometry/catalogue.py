@@ -1,7 +1,8 @@
 """Reads module files into the catalogue machines are built from.
 
-The library's own file, `modules.yaml`, is written in the subset of YAML that is JSON, so that reading
-it takes the standard library alone. A user's file may be JSON, or any YAML where PyYAML is installed.
+The library's own file, `modules.yaml`, is written in the subset of YAML that is JSON, so that
+reading it takes the standard library alone. A user's file may be JSON, or any YAML where PyYAML is
+installed.
 `modules.schema.json` describes the format for editors.
 """
 
@@ -15,8 +16,9 @@ from typing import Any, cast
 
 from .errors import CatalogueError
 from .modules import KINDS, Box, Catalogue, Cylinder, Face, Kind, Landmark, Module, Solid
-from .poses import ORIGIN, Pose, dot, from_axes
+from .poses import Pose
 from .reading import Fields, Reader
+from .rotations import ORIGIN, dot, from_axes
 
 CATALOGUE_VERSION = 1
 _REQUIRED = ("name", "kind", "mass", "cost", "size", "description", "besiege")

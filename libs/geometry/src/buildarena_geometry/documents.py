@@ -1,8 +1,8 @@
 """Machines as JSON documents.
 
-The parts are the truth of a document and are checked like a machine's; the log tells how it came to
-be. Quaternions and positions are written in full, so a machine that is read back equals the one that
-was written, bit for bit.
+The parts are the truth of a document and are checked like a machine's; the log tells how it came
+to be. Quaternions and positions are written in full, so a machine that is read back equals the one
+that was written, bit for bit.
 """
 
 from __future__ import annotations
@@ -13,13 +13,15 @@ from .blocks import Block, Connector, FaceRef, KeyPress
 from .catalogue import load_catalogue
 from .collision import CollisionWorld
 from .errors import DocumentError
+from .feedback.words import listing
 from .keys import KEYS
 from .log import ActionRecord
 from .machine import Machine
 from .outcomes import RefusalClass
 from .parameters import LARGEST_NUMBER, LONGEST_TEXT
-from .poses import SHORTEST_QUATERNION, Pose
+from .poses import Pose
 from .reading import Fields, Reader
+from .rotations import SHORTEST_QUATERNION
 from .state import MachineState, SubStructure
 
 if TYPE_CHECKING:
@@ -276,7 +278,7 @@ def _check_face(face: FaceRef, blocks: Mapping[str, Block], where: str) -> None:
     labels = blocks[block_id].module.face_of_label
     if label not in labels:
         raise DocumentError(
-            f"{where}: block {block_id} has no face {label!r}; its faces: {', '.join(labels) or 'none'}"
+            f"{where}: block {block_id} has no face {label!r}; its faces: {listing(labels)}"
         )
 
 

@@ -8,7 +8,7 @@ class GeometryError(ValueError):
 
 
 class CatalogueError(GeometryError):
-    """A module file breaks the catalogue's format; the message names the entry and what is allowed."""
+    """A module file breaks the format; the message names the entry and what is allowed."""
 
 
 class DocumentError(GeometryError):

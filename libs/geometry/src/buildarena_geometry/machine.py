@@ -5,14 +5,13 @@ from __future__ import annotations
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Self
 
-import numpy as np
-
 from .catalogue import load_catalogue
 from .changes import Change
 from .collision import CollisionWorld
 from .feedback.words import listing
-from .log import ActionLog, ActionRecord, json_value
-from .modules import Box
+from .json_values import json_value
+from .log import ActionLog, ActionRecord
+from .measures import bounds, center_of_mass
 from .outcomes import Accepted, Cause, Outcome, Refused
 from .parameters import RefusalError, shown
 from .state import MachineState
@@ -21,21 +20,23 @@ from .tools import ACTIONS
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
+    import numpy as np
     from numpy.typing import NDArray
 
     from .blocks import Block, Connector, Joint, KeyPress
-    from .modules import Catalogue, Solid
+    from .modules import Catalogue
     from .state import SubStructure
 
 
 class Machine:
     """A machine that is built action by action.
 
-    Every action goes through `act`, which checks it, carries it out or refuses it, and remembers it.
-    Whatever arrives, `act` returns an outcome and the machine stays sound: no two blocks overlap, each
-    block sits on at most one face, and a refused action leaves everything as it was.
+    Every action goes through `act`, which checks it, carries it out or refuses it, and remembers
+    it. Whatever arrives, `act` returns an outcome and the machine stays sound: no two blocks
+    overlap, each block sits on at most one face, and a refused action leaves everything as it was.
 
-    World frame: x east, y north, z up; lengths in units (edge of a small block), masses in mass units.
+    World frame: x east, y north, z up; lengths in units (edge of a small block), masses in mass
+    units.
     """
 
     __slots__ = ("_available", "_records", "_state", "_world")
@@ -56,7 +57,7 @@ class Machine:
         self._available = {name: machine.copy() for name, machine in (available or {}).items()}
         self._state = MachineState(
             catalogue=load_catalogue() if catalogue is None else catalogue,
-            available={name: machine._state for name, machine in self._available.items()},
+            available={name: machine.state for name, machine in self._available.items()},
         )
         self._records: list[ActionRecord] = []
         self._world: CollisionWorld | None = CollisionWorld()
@@ -146,17 +147,17 @@ class Machine:
     @property
     def sub_structures(self) -> Mapping[str, SubStructure]:
         """An assembly's sub-structures by letter."""
-        return MappingProxyType(dict(self._state.structures))
+        return MappingProxyType(self._state.structures)
 
     @property
     def blocks(self) -> Mapping[str, Block]:
         """Its blocks by id, in the order of creation; connectors are not among them."""
-        return MappingProxyType(dict(self._state.blocks))
+        return MappingProxyType(self._state.blocks)
 
     @property
     def connectors(self) -> Mapping[str, Connector]:
         """Its braces and winches by id, in the order of creation."""
-        return MappingProxyType(dict(self._state.connectors))
+        return MappingProxyType(self._state.connectors)
 
     @property
     def joints(self) -> tuple[Joint, ...]:
@@ -178,12 +179,12 @@ class Machine:
     @property
     def mass(self) -> float:
         """Mass of all blocks and connectors, mass units."""
-        return float(sum(part.module.mass for part in self._parts()))
+        return self._state.mass
 
     @property
     def cost(self) -> int:
         """Besiege's price of all blocks and connectors."""
-        return sum(part.module.cost for part in self._parts())
+        return self._state.cost
 
     @property
     def part_count(self) -> int:
@@ -197,14 +198,7 @@ class Machine:
         Raises:
             ValueError: the machine is empty.
         """
-        if not self.started:
-            raise ValueError("an empty machine has no center of mass")
-        blocks, links = self._state.blocks.values(), self._state.connectors.values()
-        points = [block.center_xyz for block in blocks]
-        points += [tuple((link.start_point + link.end_point) / 2) for link in links]
-        masses = [part.module.mass for part in self._parts()]
-        center: NDArray[np.float64] = np.average(np.array(points), axis=0, weights=masses)
-        return center
+        return center_of_mass(self._state)
 
     @property
     def bounds(self) -> NDArray[np.float64]:
@@ -213,15 +207,7 @@ class Machine:
         Raises:
             ValueError: the machine is empty.
         """
-        if not self.started:
-            raise ValueError("an empty machine has no bounds")
-        corners = [
-            _extent(block, solid)
-            for block in self._state.blocks.values()
-            for solid in block.module.body
-        ]
-        lowest, highest = zip(*corners, strict=True)
-        return np.array([np.min(lowest, axis=0), np.max(highest, axis=0)])
+        return bounds(self._state)
 
     @property
     def detached(self) -> tuple[str, ...]:
@@ -291,9 +277,6 @@ class Machine:
             )
         )
 
-    def _parts(self) -> Iterable[Block | Connector]:
-        return (*self._state.blocks.values(), *self._state.connectors.values())
-
 
 def replay(log: ActionLog) -> Machine:
     """The machine that results from doing a log's actions again, refused ones included."""
@@ -315,16 +298,3 @@ def _overlap(change: Change, pairs: list[tuple[str, str]]) -> RefusalError:
 
 def _blocks(state: MachineState, ids: list[str]) -> str:
     return listing(f"block {found} ({state.blocks[found].module.name})" for found in ids)
-
-
-def _extent(block: Block, solid: Solid) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Smallest and largest coordinates of one solid, world frame."""
-    rotation = block.world_from_block.rotation
-    if isinstance(solid, Box):
-        middle = block.world_from_block.apply(solid.center)
-        reach = np.abs(rotation) @ (np.array(solid.size) / 2)
-        return middle - reach, middle + reach
-    ends = block.world_from_block.apply([solid.base, solid.top])
-    axis = (ends[1] - ends[0]) / solid.length
-    reach = solid.radius * np.sqrt(np.clip(1 - axis**2, 0, None))
-    return ends.min(axis=0) - reach, ends.max(axis=0) + reach

@@ -6,7 +6,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Literal, get_args
 
-from .poses import ORIGIN, Pose, Vector, distance, from_axes
+from .poses import Pose
+from .rotations import ORIGIN, Vector, distance, from_axes
 
 Kind = Literal["start", "block", "wheel", "cannon", "torch", "connector", "cargo"]
 KINDS: tuple[str, ...] = get_args(Kind)
@@ -116,9 +117,9 @@ class Landmark:
 class Module:
     """A kind of part, as the catalogue describes it.
 
-    Shapes are in the block's frame: its origin is the root point, where the block touches the face it
-    sits on, and +z points away from that face. A starting block's root is its centre, and its axes are
-    the world's when it is not turned.
+    Shapes are in the block's frame: its origin is the root point, where the block touches the face
+    it sits on, and +z points away from that face. A starting block's root is its centre, and its
+    axes are the world's when it is not turned.
 
     Attributes:
         name: what models call it.

@@ -102,9 +102,7 @@ class Accepted:
     ok: Literal[True] = True
 
     def __init__(self, *, changed: tuple[str, ...], tell: Callable[[], str]) -> None:
-        """Keeps how to tell the feedback: many callers never read it, and putting it into words costs
-        more than the action.
-        """
+        """Keeps how to tell the feedback: wording it costs more than the action."""
         self.changed = changed
         self._tell = tell
         self._text: str | None = None

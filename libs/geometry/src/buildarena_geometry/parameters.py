@@ -6,19 +6,22 @@ arrives are made from that one place.
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeGuard
 
+from .json_values import LARGEST_INTEGER, is_storable
 from .keys import KEYS
 from .outcomes import Cause
-from .poses import Vector
+from .rotations import Vector
 
 LARGEST_NUMBER = (
     1e6  # units, degrees or seconds; far beyond any machine, well within a float's digits
 )
 LONGEST_TEXT = 500  # characters of a note or a name
+_LONGEST_QUOTE = 40  # characters of what a message quotes
 JsonSchema = dict[str, Any]
 
 
@@ -46,46 +49,41 @@ class Parameter:
     read: Callable[[str, object], Any]
 
 
-def _malformed(name: str, expected: str, value: object) -> RefusalError:
-    return RefusalError(
-        Cause.MALFORMED_ARGUMENTS, f"{name} must be {expected}, not {shown(value)}."
-    )
-
-
 def shown(value: object) -> str:
     """A value as a message quotes it: short whatever it is, and never an error itself."""
-    if value is None:
-        return "null"
-    if isinstance(value, bool):
-        return "true" if value else "false"
     if isinstance(value, str):
-        printable = "".join(char if char.isprintable() else "�" for char in value[:41])
-        return f'"{printable[:40]}…"' if len(value) > 40 else f'"{printable}"'  # noqa: PLR2004
+        printable = "".join(char if char.isprintable() else "?" for char in value[:_LONGEST_QUOTE])
+        return f'"{printable}…"' if len(value) > _LONGEST_QUOTE else f'"{printable}"'
+    if value is None or isinstance(value, bool):
+        return json.dumps(value)
+    if isinstance(value, int):
+        return str(value) if abs(value) <= LARGEST_INTEGER else "a huge number"
     if isinstance(value, float):
         return f"{value:g}"
-    if isinstance(value, int):
-        return str(value) if abs(value) < 10**12 else "a huge number"
     if isinstance(value, list | tuple):
         return f"a list of {len(value)}"
-    return "an object" if isinstance(value, dict) else f"a {type(value).__name__}"
+    return "an object"
+
+
+def _malformed(name: str, expected: str, value: object) -> RefusalError:
+    text = f"{name} must be {expected}, not {shown(value)}."
+    return RefusalError(Cause.MALFORMED_ARGUMENTS, text)
+
+
+def _is_integer(value: object) -> TypeGuard[int]:
+    """Whether it is a whole number that JSON readers everywhere can take."""
+    return isinstance(value, int) and not isinstance(value, bool) and abs(value) <= LARGEST_INTEGER
 
 
 def _read_id(name: str, value: object) -> str:
-    if isinstance(value, int) and not isinstance(value, bool) and abs(value) < 10**12:
-        return str(value)
-    return _read_text(name, value)
+    return str(value) if _is_integer(value) else _read_text(name, value)
 
 
 def _read_text(name: str, value: object) -> str:
-    if not isinstance(value, str):
-        raise _malformed(name, "a text", value)
-    if len(value) > LONGEST_TEXT:
-        raise RefusalError(
-            Cause.OUT_OF_RANGE, f"{name} may have {LONGEST_TEXT} characters, not {len(value)}."
-        )
-    # Such characters can neither be stored nor shown everywhere a machine goes.
-    if "\x00" in value or any("\ud800" <= char <= "\udfff" for char in value):
+    if not isinstance(value, str) or not is_storable(value):
         raise _malformed(name, "a text without NUL characters and lone surrogates", value)
+    if len(value) > LONGEST_TEXT:
+        raise _malformed(name, f"a text of at most {LONGEST_TEXT} characters", value)
     return value
 
 
@@ -94,22 +92,18 @@ def _read_note(name: str, value: object) -> str:
 
 
 def _read_number(name: str, value: object) -> float:
-    if not isinstance(value, int | float) or isinstance(value, bool):
-        raise _malformed(name, "a number", value)
-    if isinstance(value, float) and not math.isfinite(value):
+    if not _is_integer(value) and not (isinstance(value, float) and math.isfinite(value)):
         raise _malformed(name, "a finite number", value)
     if abs(value) > LARGEST_NUMBER:
-        raise RefusalError(
-            Cause.OUT_OF_RANGE,
-            f"{name} must lie within ±{LARGEST_NUMBER:.0f}, not {shown(value)}.",
-        )
+        text = f"{name} must lie within ±{LARGEST_NUMBER:.0f}, not {shown(value)}."
+        raise RefusalError(Cause.OUT_OF_RANGE, text)
     return float(value)
 
 
 def _read_index(name: str, value: object) -> int:
     if isinstance(value, float) and value.is_integer() and abs(value) <= LARGEST_NUMBER:
         return int(value)
-    if not isinstance(value, int) or isinstance(value, bool):
+    if not _is_integer(value):
         raise _malformed(name, "a whole number", value)
     return value
 

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Iterator
 
     from .errors import GeometryError
-    from .poses import Vector
+    from .rotations import Vector
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,4 +1,4 @@
-"""Runs action sequences in the golden vectors' format and tells the machine's state in their words."""
+"""Runs action sequences in the golden vectors' format and tells states in their words."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from .besiege import besiege_point, besiege_rotation, besiege_span
 from .errors import SequenceError
 from .machine import Machine
 from .outcomes import Cause, Refused
-from .poses import scaled
 from .reading import Reader
+from .rotations import scaled
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -68,16 +68,14 @@ def kind_of(outcome: Outcome) -> str:
 
 def state_entry(state: MachineState) -> dict[str, Any]:
     """A state in the vectors' field names; positions are east, north, up."""
-    parts = [*state.blocks.values(), *state.connectors.values()]
-    # An assembly's own blocks and connectors follow one count, which is not theirs by kind.
     return {
         "blocks": [
             *(_block_entry(state, block) for block in state.blocks.values()),
             *(_connector_entry(link) for link in state.connectors.values()),
         ],
-        "n": len(parts),
-        "cost": sum(part.module.cost for part in parts),
-        "mass": sum(part.module.mass for part in parts),
+        "n": len(state.blocks) + len(state.connectors),
+        "cost": state.cost,
+        "mass": state.mass,
         "next_id": state.next_id,
         "control_sequence": [
             {"time": press.time_s, "key": press.key, "hold_for": press.hold_for_s}

@@ -6,11 +6,12 @@ construction, and feedback can be put into words long after the machine has move
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from .blocks import Block, Connector, FaceRef, Joint, KeyPress
-from .poses import distance
+from .rotations import distance
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -70,6 +71,21 @@ class MachineState:
         """Whether it is built from whole machines instead of from a starting block."""
         return bool(self.available)
 
+    @property
+    def parts(self) -> tuple[Block | Connector, ...]:
+        """All blocks, then all connectors."""
+        return (*self.blocks.values(), *self.connectors.values())
+
+    @property
+    def mass(self) -> float:
+        """Mass of all blocks and connectors, mass units."""
+        return math.fsum(part.module.mass for part in self.parts)
+
+    @property
+    def cost(self) -> int:
+        """Besiege's price of all blocks and connectors."""
+        return sum(part.module.cost for part in self.parts)
+
     def is_occupied(self, block: Block, label: str) -> bool:
         """Whether a face of the block is in use by an attachment, its own or another block's."""
         if (block.id, label) in self.occupants:
@@ -111,7 +127,7 @@ class MachineState:
                 yield joint
 
     def detached(self) -> tuple[str, ...]:
-        """Ids of the blocks without a path of joints that hold and of connectors to the first block."""
+        """Ids of the blocks from which no joint that holds and no connector leads to the first."""
         if not self.blocks:
             return ()
         neighbours: dict[str, list[str]] = {block: [] for block in self.blocks}

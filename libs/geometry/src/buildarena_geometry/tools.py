@@ -1,4 +1,4 @@
-"""The action space: every action as a tool that models can be given, and how its arguments are read.
+"""The action space: each action as a tool for models, and how its arguments are read.
 
 Names, descriptions and schemas come from the actions' signatures and docstrings, so they cannot say
 anything else than what the actions do.
@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
-from .actions import assemble, build, control, query, refine
+from .actions import assemble, build, control, query, refine, remove
 from .changes import Change
 from .feedback.words import listing
 from .outcomes import Cause
@@ -160,8 +160,8 @@ ACTIONS: Mapping[str, Action] = {
                 build.start,
                 build.attach_block_to,
                 build.connect_blocks,
-                build.remove_block,
-                build.reset,
+                remove.remove_block,
+                remove.reset,
             ),
         ),
         ("refine", (refine.twist_block, refine.shift_block, refine.flip_spin)),

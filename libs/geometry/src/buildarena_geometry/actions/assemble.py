@@ -8,16 +8,18 @@ from buildarena_geometry.feedback import state as words
 from buildarena_geometry.feedback.words import point
 from buildarena_geometry.outcomes import Cause
 from buildarena_geometry.parameters import Name, RefusalError, Triple, shown
-from buildarena_geometry.poses import ORIGIN, Pose
+from buildarena_geometry.poses import Pose
+from buildarena_geometry.rotations import ORIGIN
 from buildarena_geometry.state import MachineState, SubStructure, follow, moved_connector
 
-from .build import told_removal, without
 from .lookups import named, structure
 from .motions import turn_about, turned
+from .remove import told_removal, without
 
 
 def add_machine(
     state: MachineState,
+    *,
     machine_id: Name,
     init_shift: Triple = ORIGIN,
     init_rotation: Triple = ORIGIN,
@@ -105,7 +107,7 @@ def remove_machine(state: MachineState, machine_index: Name) -> Change:
         after=after,
         removed=(*(block.id for block in gone), *links),
         told=lambda: " ".join(
-            [f"Removed sub-structure {found.letter}.", *told_removal(state, after, links)]
+            [f"Removed sub-structure {found.letter}.", *told_removal(after, links)]
         ),
     )
 
@@ -134,7 +136,7 @@ def _told(state: MachineState, letter: str, sentence: str) -> str:
 
 
 def _letter(count: int) -> str:
-    """A, B, … Z, AA, AB, …"""
+    """A, B, … Z, AA, AB and so on."""
     letters = ""
     count += 1
     while count:

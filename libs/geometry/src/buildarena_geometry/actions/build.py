@@ -9,7 +9,8 @@ from buildarena_geometry.feedback import state as words
 from buildarena_geometry.feedback.words import listing
 from buildarena_geometry.outcomes import Cause
 from buildarena_geometry.parameters import BlockId, Name, Note, RefusalError, Triple, shown
-from buildarena_geometry.poses import ORIGIN, Pose
+from buildarena_geometry.poses import Pose
+from buildarena_geometry.rotations import ORIGIN
 from buildarena_geometry.state import MachineState, span_in
 
 from .lookups import attachable_module, connector_module, part, require_started
@@ -20,6 +21,7 @@ CLOSEST_FACES = 0.01  # units; a connector between faces nearer than this has no
 
 def start(
     state: MachineState,
+    *,
     init_shift: Triple = ORIGIN,
     init_rotation: Triple = ORIGIN,
     note: Note = "",
@@ -28,8 +30,8 @@ def start(
 
     Args:
         init_shift: Position of the block's center [east, north, up]; [0, 0, 0] if left out.
-        init_rotation: [yaw, pitch, roll] in degrees: yaw turns north to east, pitch north down, roll
-            up to east; [0, 0, 0] if left out.
+        init_rotation: [yaw, pitch, roll] in degrees: yaw turns north to east, pitch north down,
+            roll up to east; [0, 0, 0] if left out.
         note: What this machine is, in your words.
     """
     if state.is_assembly:
@@ -54,7 +56,7 @@ def start(
 
 
 def attach_block_to(
-    state: MachineState, base_block: BlockId, face: Name, new_block: Name, note: Note = ""
+    state: MachineState, *, base_block: BlockId, face: Name, new_block: Name, note: Note = ""
 ) -> Change:
     """Attaches a new block to a free face of a block.
 
@@ -71,8 +73,7 @@ def attach_block_to(
         free = state.free_faces(base) if isinstance(base, Block) else []
         raise RefusalError(
             Cause.NO_SUCH_FACE,
-            f"{words.title(base).capitalize()} has no face {shown(face)}. "
-            f"Its free faces: {listing(free)}.",
+            f"{words.heading(base)} has no face {shown(face)}. Its free faces: {listing(free)}.",
         )
     if state.is_occupied(base, face):
         raise RefusalError(
@@ -107,6 +108,7 @@ def attach_block_to(
 
 def connect_blocks(
     state: MachineState,
+    *,
     block_a: BlockId,
     face_a: Name,
     block_b: BlockId,
@@ -158,84 +160,6 @@ def connect_blocks(
     )
 
 
-def remove_block(state: MachineState, block_id: BlockId) -> Change:
-    """Removes a block or connector; blocks that sit on it stay where they are.
-
-    Args:
-        block_id: Id of the block or connector.
-    """
-    gone = part(state, block_id)
-    if isinstance(gone, Connector):
-        kept = {key: link for key, link in state.connectors.items() if key != gone.id}
-        after = replace(state, connectors=kept)
-        return _removal(state, after, gone, ())
-    if gone.module.kind == "start":
-        raise RefusalError(
-            Cause.START_BLOCK,
-            f"{words.title(gone).capitalize()} can't be removed; reset starts anew.",
-        )
-    after, links = without(state, [gone])
-    return _removal(state, after, gone, links)
-
-
-def reset(state: MachineState) -> Change:
-    """Removes everything, so that the machine can be started anew."""
-    after = MachineState(catalogue=state.catalogue, available=state.available)
-    return Change(
-        after=after,
-        removed=(*state.blocks, *state.connectors),
-        told=lambda: "Everything is removed; ids start at 1 again.",
-    )
-
-
-def without(state: MachineState, gone: list[Block]) -> tuple[MachineState, tuple[str, ...]]:
-    """The state without some blocks and the connectors that end on them.
-
-    Returns:
-        The state, in which the faces they used are open and blocks that sat on them sit on nothing,
-        and the ids of the connectors that went too.
-    """
-    ids = {block.id for block in gone}
-    blocks = {key: block for key, block in state.blocks.items() if key not in ids}
-    occupants = dict(state.occupants)
-    for block in gone:
-        if block.mount is not None:
-            occupants.pop(block.mount, None)
-        for child in state.children(block):
-            if child.id in blocks:
-                blocks[child.id] = replace(child, mount=None, lost_mount=child.mount)
-                del occupants[child.mount or ("", "")]
-    links = tuple(
-        link.id for link in state.connectors.values() if link.start[0] in ids or link.end[0] in ids
-    )
-    connectors = {key: link for key, link in state.connectors.items() if key not in links}
-    return replace(state, blocks=blocks, occupants=occupants, connectors=connectors), links
-
-
-def told_removal(before: MachineState, after: MachineState, links: tuple[str, ...]) -> list[str]:
-    """Sentences about what a removal took along and what it left without a hold."""
-    told = []
-    if links:
-        told.append(f"Connectors that ended on it went too: {listing(links)}.")
-    lost = set(after.detached()) - set(before.detached())
-    if lost:
-        order = [block for block in after.blocks if block in lost]
-        told.append(f"No longer connected to the starting block: {listing(order)}.")
-    return told
-
-
-def _removal(
-    before: MachineState, after: MachineState, gone: Block | Connector, links: tuple[str, ...]
-) -> Change:
-    return Change(
-        after=after,
-        removed=(gone.id, *links),
-        told=lambda: " ".join(
-            [f"Removed {words.title(gone)}.", *told_removal(before, after, links)]
-        ),
-    )
-
-
 def _new_block(state: MachineState, block: Block, note: str) -> Block:
     bindings: dict[str, tuple[str, ...]] = dict.fromkeys(block.module.actions, ())
     return replace(block, id=str(state.next_id), bindings=bindings, note=note)
@@ -243,13 +167,11 @@ def _new_block(state: MachineState, block: Block, note: str) -> Block:
 
 def _with_face(found: Block | Connector, label: str) -> Block:
     if isinstance(found, Connector) or not found.module.faces:
-        raise RefusalError(
-            Cause.NO_FACES, f"{words.title(found).capitalize()} has no faces to connect."
-        )
+        raise RefusalError(Cause.NO_FACES, f"{words.heading(found)} has no faces to connect.")
     if label not in found.module.face_of_label:
         raise RefusalError(
             Cause.NO_SUCH_FACE,
-            f"{words.title(found).capitalize()} has no face {shown(label)}. "
+            f"{words.heading(found)} has no face {shown(label)}. "
             f"Its faces: {listing(found.module.face_of_label)}.",
         )
     return found

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from buildarena_geometry.feedback.state import title
+from buildarena_geometry.feedback.state import heading
 from buildarena_geometry.feedback.words import listing
 from buildarena_geometry.outcomes import Cause
 from buildarena_geometry.parameters import RefusalError, shown
@@ -58,13 +58,12 @@ def powered(state: MachineState, block_id: str, action: str) -> Block:
         keyed = named(block.id for block in state.blocks.values() if block.module.actions)
         raise RefusalError(
             Cause.NO_LOCOMOTION,
-            f"{title(found).capitalize()} takes no keys. Blocks that do: {keyed}.",
+            f"{heading(found)} takes no keys. Blocks that do: {keyed}.",
         )
     if action not in actions:
         raise RefusalError(
             Cause.BAD_ACTION,
-            f"{title(found).capitalize()} has no action {shown(action)}; "
-            f"its actions: {listing(actions)}.",
+            f"{heading(found)} has no action {shown(action)}; its actions: {listing(actions)}.",
         )
     return state.blocks[block_id]
 

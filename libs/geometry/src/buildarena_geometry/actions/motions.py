@@ -1,6 +1,7 @@
 """Rotations as builders name them."""
 
-from buildarena_geometry.poses import Pose, Quaternion, Vector, about_axis, multiply, subtract
+from buildarena_geometry.poses import Pose
+from buildarena_geometry.rotations import Quaternion, Vector, about_axis, multiply, subtract
 
 _EAST, _NORTH, _UP = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
@@ -9,8 +10,8 @@ def turned(yaw_pitch_roll_deg: Vector) -> Quaternion:
     """The rotation of a whole machine.
 
     Args:
-        yaw_pitch_roll_deg: degrees; yaw turns north to east, pitch north down, roll up to east. Roll
-            acts first, then yaw, then pitch, each about the world's axes.
+        yaw_pitch_roll_deg: degrees; yaw turns north to east, pitch north down, roll up to east.
+            Roll acts first, then yaw, then pitch, each about the world's axes.
 
     Returns:
         The rotation in the world frame, a unit quaternion.

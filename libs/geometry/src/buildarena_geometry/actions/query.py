@@ -8,12 +8,11 @@ from buildarena_geometry.feedback import state as words
 from buildarena_geometry.parameters import BlockId
 from buildarena_geometry.state import MachineState
 
-from .lookups import part, require_started
+from .lookups import part
 
 
 def get_machine_summary(state: MachineState) -> Change:
     """Lists all blocks and connectors, without their faces."""
-    require_started(state)
     return _answer(state, lambda: words.summary(state))
 
 
@@ -31,13 +30,11 @@ def get_block_details(state: MachineState, block_id: BlockId) -> Change:
 
 def review_powered_blocks(state: MachineState) -> Change:
     """Lists the blocks that take keys, where they are and what they do."""
-    require_started(state)
     return _answer(state, lambda: words.powered_blocks(state))
 
 
 def review_control_config(state: MachineState) -> Change:
     """Lists the key bindings of every block that takes keys."""
-    require_started(state)
     return _answer(state, lambda: words.control_config(state))
 
 

@@ -8,7 +8,8 @@ from buildarena_geometry.feedback import state as words
 from buildarena_geometry.feedback.words import listing, plain, point
 from buildarena_geometry.outcomes import Cause
 from buildarena_geometry.parameters import BlockId, Number, RefusalError, Triple
-from buildarena_geometry.poses import Pose, Vector, about_axis
+from buildarena_geometry.poses import Pose
+from buildarena_geometry.rotations import Vector, about_axis
 from buildarena_geometry.state import MachineState
 
 from .lookups import part
@@ -27,7 +28,7 @@ def twist_block(state: MachineState, block_id: BlockId, angle: Number) -> Change
     if found.module.kind == "start":
         raise RefusalError(
             Cause.START_BLOCK,
-            f"{words.title(found).capitalize()} sits on no face and can't be twisted.",
+            f"{words.heading(found)} sits on no face and can't be twisted.",
         )
     turn = about_axis(_seat_normal(state, found), -angle)
     told = f"by {plain(angle)}°"
@@ -48,7 +49,8 @@ def shift_block(state: MachineState, block_id: BlockId, shift_real: Triple) -> C
     if max(map(abs, shift_real)) > LARGEST_SHIFT:
         raise RefusalError(
             Cause.OUT_OF_RANGE,
-            f"One call shifts by at most {LARGEST_SHIFT} in each direction, not {point(shift_real)}.",
+            f"One call shifts by at most {LARGEST_SHIFT} in each direction, "
+            f"not {point(shift_real)}.",
         )
     told = f"by {point(shift_real)}"
     if isinstance(found, Connector):
@@ -68,7 +70,7 @@ def flip_spin(state: MachineState, block_id: BlockId) -> Change:
         wheels = listing(block.id for block in state.blocks.values() if block.module.spins)
         raise RefusalError(
             Cause.NOT_SPINNING,
-            f"{words.title(found).capitalize()} does not spin. Blocks that do: {wheels}.",
+            f"{words.heading(found)} does not spin. Blocks that do: {wheels}.",
         )
     block = replace(found, flipped=not found.flipped)
     after = state.with_blocks(block)
@@ -80,7 +82,7 @@ def flip_spin(state: MachineState, block_id: BlockId) -> Change:
 
 
 def _seat_normal(state: MachineState, found: Block | Connector) -> Vector:
-    """The normal of the face a part sits on, as that face looks now; its own axis if it sits on none."""
+    """The present normal of the face a part sits on; its own axis if it sits on none."""
     seat = found.start if isinstance(found, Connector) else found.mount
     if seat is None:
         assert isinstance(found, Block)  # noqa: S101  only blocks can lose their seat
@@ -94,7 +96,7 @@ def _move(state: MachineState, block: Block, pose: Pose, how: str) -> Change:
     return Change(
         after=after,
         placed=(block.id,),
-        attempt=f"{words.title(block).capitalize()} {how}",
+        attempt=f"{words.heading(block)} {how}",
         told=lambda: " ".join(
             [f"Moved. {words.block_line(after, moved)}.", *words.loosened(after, [block.id])]
         ),

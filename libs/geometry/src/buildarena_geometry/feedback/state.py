@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from buildarena_geometry.blocks import Block, Connector
-    from buildarena_geometry.poses import Vector
+    from buildarena_geometry.rotations import Vector
     from buildarena_geometry.state import MachineState
 
 FLUSH_OFFSET = 1e-6  # units; a joint whose sides are nearer sits flush
@@ -19,6 +19,11 @@ FLUSH_OFFSET = 1e-6  # units; a joint whose sides are nearer sits flush
 def title(part: Block | Connector) -> str:
     """What a part is called: "block 3 (Torch)"."""
     return f"block {part.id} ({part.module.name})"
+
+
+def heading(part: Block | Connector) -> str:
+    """The same at the start of a sentence."""
+    return f"B{title(part)[1:]}"
 
 
 def block_line(state: MachineState, block: Block) -> str:
@@ -71,20 +76,26 @@ def block_details(state: MachineState, block: Block) -> str:
 
 def summary(state: MachineState) -> str:
     """The whole machine, one line a part, without faces."""
-    parts = [*state.blocks.values(), *state.connectors.values()]
-    mass = sum(part.module.mass for part in parts)
-    cost = sum(part.module.cost for part in parts)
-    lines = [f"{counted(len(parts), 'part')}, mass {plain(mass)}, cost {cost}."]
+    if not state.started:
+        return "Nothing is built yet."
+    parts = counted(len(state.blocks) + len(state.connectors), "part")
+    lines = [f"{parts}, mass {plain(state.mass)}, cost {state.cost}."]
     lines.extend(
         f"Sub-structure {structure.letter}: {structure.source}."
         for structure in state.structures.values()
     )
     lines.extend(block_line(state, block) for block in state.blocks.values())
     lines.extend(connector_line(link) for link in state.connectors.values())
-    detached = state.detached()
-    if detached:
-        lines.append(f"Not connected to block {next(iter(state.blocks))}: {listing(detached)}.")
+    lines.extend(detached(state))
     return "\n".join(lines)
+
+
+def detached(state: MachineState) -> list[str]:
+    """A sentence about the blocks without a path to the first one, if there are any."""
+    loose = state.detached()
+    if not loose:
+        return []
+    return [f"Not connected to block {next(iter(state.blocks))}: {listing(loose)}."]
 
 
 def control_sequence(state: MachineState) -> str:

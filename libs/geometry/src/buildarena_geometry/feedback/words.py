@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from buildarena_geometry.poses import cross
+from buildarena_geometry.rotations import cross
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from buildarena_geometry.poses import Vector
+    from buildarena_geometry.rotations import Vector
 
 DOWN = (0.0, 0.0, -1.0)
 AXIS_TOLERANCE_DEG = 1e-6  # nearer than this to an axis of the world, a direction is that axis
@@ -78,7 +78,7 @@ def rolling(axle: Vector, *, flipped: bool) -> str:
     """
     tilt = math.degrees(math.asin(max(-1.0, min(1.0, axle[2]))))
     if abs(tilt) >= ROLLING_TILT_DEG:
-        # It turns about −axle, so seen from above an unflipped wheel facing up goes clockwise.
+        # It turns about -axle, so seen from above an unflipped wheel facing up goes clockwise.
         clockwise = (axle[2] > 0) != flipped
         return (
             f"spins {'clockwise' if clockwise else 'counterclockwise'} seen from above, can't roll"

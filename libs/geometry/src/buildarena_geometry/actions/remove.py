@@ -1,0 +1,85 @@
+"""Actions that take parts of a machine away, or all of it."""
+
+from dataclasses import replace
+
+from buildarena_geometry.blocks import Block, Connector
+from buildarena_geometry.changes import Change
+from buildarena_geometry.feedback import state as words
+from buildarena_geometry.feedback.words import listing
+from buildarena_geometry.outcomes import Cause
+from buildarena_geometry.parameters import BlockId, RefusalError
+from buildarena_geometry.state import MachineState
+
+from .lookups import part
+
+
+def remove_block(state: MachineState, block_id: BlockId) -> Change:
+    """Removes a block or connector; blocks that sit on it stay where they are.
+
+    Args:
+        block_id: Id of the block or connector.
+    """
+    gone = part(state, block_id)
+    if isinstance(gone, Connector):
+        kept = {key: link for key, link in state.connectors.items() if key != gone.id}
+        after = replace(state, connectors=kept)
+        return _removal(after, gone, ())
+    if gone.module.kind == "start":
+        raise RefusalError(
+            Cause.START_BLOCK,
+            f"{words.heading(gone)} can't be removed; reset starts anew.",
+        )
+    after, links = without(state, [gone])
+    return _removal(after, gone, links)
+
+
+def reset(state: MachineState) -> Change:
+    """Removes everything, so that the machine can be started anew."""
+    after = MachineState(catalogue=state.catalogue, available=state.available)
+    return Change(
+        after=after,
+        removed=(*state.blocks, *state.connectors),
+        told=lambda: "Everything is removed; ids start at 1 again.",
+    )
+
+
+def without(state: MachineState, gone: list[Block]) -> tuple[MachineState, tuple[str, ...]]:
+    """The state without some blocks and the connectors that end on them.
+
+    Returns:
+        The state, in which the faces they used are open and blocks that sat on them sit on nothing,
+        and the ids of the connectors that went too.
+    """
+    ids = {block.id for block in gone}
+    blocks = {key: block for key, block in state.blocks.items() if key not in ids}
+    occupants = dict(state.occupants)
+    for block in gone:
+        if block.mount is not None:
+            occupants.pop(block.mount, None)
+        for child in state.children(block):
+            if child.id in blocks:
+                blocks[child.id] = replace(child, mount=None, lost_mount=child.mount)
+        for face in block.module.faces:
+            occupants.pop((block.id, face.label), None)
+    links = tuple(
+        link.id for link in state.connectors.values() if link.start[0] in ids or link.end[0] in ids
+    )
+    connectors = {key: link for key, link in state.connectors.items() if key not in links}
+    return replace(state, blocks=blocks, occupants=occupants, connectors=connectors), links
+
+
+def told_removal(after: MachineState, links: tuple[str, ...]) -> list[str]:
+    """Sentences about the connectors a removal took along and the blocks that hang in the air."""
+    told = []
+    if links:
+        told.append(f"Connectors that ended on it went too: {listing(links)}.")
+    told.extend(words.detached(after))
+    return told
+
+
+def _removal(after: MachineState, gone: Block | Connector, links: tuple[str, ...]) -> Change:
+    return Change(
+        after=after,
+        removed=(gone.id, *links),
+        told=lambda: " ".join([f"Removed {words.title(gone)}.", *told_removal(after, links)]),
+    )

@@ -1,0 +1,63 @@
+"""Copies of arbitrary values that can be written as JSON wherever a machine is stored."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+LARGEST_INTEGER = 2**63 - 1  # databases and other languages read no larger one back
+_LONGEST_TEXT = 2_000  # characters; texts an action accepts are far shorter
+_DEEPEST = 8  # levels of lists and objects inside one another
+_WIDEST = 200  # entries of a list or object
+
+
+def is_storable(text: str) -> bool:
+    """Whether every database takes the text: without NUL characters and lone surrogates."""
+    return "\x00" not in text and not any("\ud800" <= char <= "\udfff" for char in text)
+
+
+def json_value(value: object, *, depth: int = 0) -> object:
+    """The value as JSON, with {"unreadable": …} in place of what is none or is too large to keep.
+
+    Args:
+        value: anything at all.
+        depth: how many lists and objects it lies inside.
+    """
+    if isinstance(value, str):
+        return _text(value)
+    if value is None or isinstance(value, bool | int | float):
+        return _number(value)
+    if depth < _DEEPEST and isinstance(value, Mapping | list | tuple) and len(value) <= _WIDEST:
+        return _container(value, depth + 1)
+    return _unreadable(type(value).__name__)
+
+
+def _text(text: str) -> object:
+    if len(text) > _LONGEST_TEXT or not is_storable(text):
+        return _unreadable(f"text of {len(text)} characters")
+    return str(text)
+
+
+def _number(number: bool | float | None) -> object:
+    if isinstance(number, float):
+        return float(number) if math.isfinite(number) else _unreadable(str(float(number)))
+    if isinstance(number, int) and abs(number) > LARGEST_INTEGER:
+        return _unreadable("huge number")
+    return number
+
+
+def _container(
+    value: Mapping[object, object] | list[object] | tuple[object, ...], depth: int
+) -> object:
+    if not isinstance(value, Mapping):
+        return [json_value(entry, depth=depth) for entry in value]
+    entries: dict[str, object] = {}
+    for key, entry in value.items():
+        if not isinstance(key, str) or not isinstance(_text(key), str):
+            return _unreadable("object with unreadable keys")
+        entries[str(key)] = json_value(entry, depth=depth)
+    return entries
+
+
+def _unreadable(what: str) -> dict[str, str]:
+    return {"unreadable": what}
