@@ -1,1 +1,17 @@
 """Tasks, scorers, statistics and leaderboard mathematics of BuildArena."""
+
+from buildarena_benchmark.errors import BenchmarkError, TaskError
+from buildarena_benchmark.scores import Score, failed_score, score
+from buildarena_benchmark.tasks.loading import builtin_tasks, load_task
+from buildarena_benchmark.tasks.task import Task
+
+__all__ = [
+    "BenchmarkError",
+    "Score",
+    "Task",
+    "TaskError",
+    "builtin_tasks",
+    "failed_score",
+    "load_task",
+    "score",
+]

@@ -1,1 +1,32 @@
-"""Simulate a machine in a scenario: structure loads, breaking, PyBullet and MuJoCo engines."""
+"""Simulate a machine in a scenario: structure loads, breaking, PyBullet and MuJoCo engines.
+
+Importing this package loads no engine, no pyarrow and no scipy; `simulate` does, when called.
+"""
+
+from buildarena_simulation.engines import ENGINES, engine_version
+from buildarena_simulation.errors import (
+    MachineNotSimulable,
+    SimulationError,
+    SimulationRoomError,
+    TrajectoryFormatError,
+    UnknownEngineError,
+)
+from buildarena_simulation.rollout import SIMULATION_VERSION, simulate
+from buildarena_simulation.scenario import Scenario
+from buildarena_simulation.trajectory import Break, JointPeak, Trajectory
+
+__all__ = [
+    "ENGINES",
+    "SIMULATION_VERSION",
+    "Break",
+    "JointPeak",
+    "MachineNotSimulable",
+    "Scenario",
+    "SimulationError",
+    "SimulationRoomError",
+    "Trajectory",
+    "TrajectoryFormatError",
+    "UnknownEngineError",
+    "engine_version",
+    "simulate",
+]

@@ -1,0 +1,9 @@
+"""Errors of the benchmark room."""
+
+
+class BenchmarkError(Exception):
+    """Base of every error this room raises."""
+
+
+class TaskError(BenchmarkError, ValueError):
+    """A task file is wrong; the message names line, field and, where there are any, valid choices."""

@@ -1,0 +1,55 @@
+"""Lift, levels 2 and 3: how high a rocket rises."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from buildarena_benchmark.scorers.series import speeds, starting_block
+from buildarena_benchmark.scorers.thrust import thrust_to_weight
+from buildarena_benchmark.scorers.verdict import Metric, Verdict, rounded
+from buildarena_benchmark.tasks.document import HeightScoring
+
+if TYPE_CHECKING:
+    from buildarena_geometry import Machine
+    from buildarena_simulation import Trajectory
+
+
+def judge(scoring: HeightScoring, machine: "Machine", trajectory: "Trajectory") -> Verdict:
+    """The indicator is the greatest height any tracked block reaches.
+
+    The trial succeeds if it exceeds a height and the rocket still rises: the mean height of its
+    highest block must grow from one window of time to the next.
+
+    Args:
+        scoring: Thresholds.
+        machine: Gives the mass.
+        trajectory: The trial.
+
+    Flags:
+        `twr_below_one`: success although the thrust is less than the weight.
+
+    Source: the paper, section "Evaluation"; thresholds as in the published evaluation.
+    """
+    time_s = trajectory.time_s
+    positions = trajectory.positions.astype(np.float64)
+    highest = positions[:, :, 2].max(axis=1)
+    early, late = (
+        highest[(time_s > start) & (time_s <= end)]
+        for start, end in (scoring.early_s, scoring.late_s)
+    )
+    rise = float(late.mean() - early.mean()) if len(early) and len(late) else 0.0
+    indicator = float(highest.max())
+    success = indicator > scoring.min_height and rise > scoring.min_rise
+    ratio, cannons = thrust_to_weight(machine, trajectory)
+    body = positions[:, starting_block(machine, trajectory)]
+    sideways = np.linalg.norm(body[:, :2] - body[0, :2], axis=1)
+    metrics: dict[str, Metric] = {
+        **cannons,
+        "thrust_to_weight": rounded(ratio),
+        "rise": rounded(rise),
+        "max_speed": rounded(speeds(time_s, positions).max(initial=0.0)),
+        "lateral_deviation": rounded(sideways.mean()),
+        "broken_joints": len(trajectory.breaks),
+    }
+    flags = ("twr_below_one",) if success and ratio < 1.0 else ()
+    return Verdict(success=success, indicator=rounded(indicator), metrics=metrics, flags=flags)

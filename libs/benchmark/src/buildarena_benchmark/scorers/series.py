@@ -1,0 +1,26 @@
+"""Series read from a trajectory that several scorers need."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from buildarena_geometry import Machine
+    from buildarena_simulation import Trajectory
+
+Series = NDArray[np.float64]
+
+
+def starting_block(machine: "Machine", trajectory: "Trajectory") -> int:
+    """Index of the machine's first starting block among the tracked blocks; 0 if none is tracked."""
+    for block in machine.blocks.values():
+        if block.module.kind == "start" and block.id in trajectory.block_ids:
+            return trajectory.block_ids.index(block.id)
+    return 0
+
+
+def speeds(time_s: Series, positions: Series) -> Series:
+    """Mean speed of each block between samples, (T - 1, N), units/s."""
+    steps = np.diff(time_s)[:, None]
+    return np.asarray(np.linalg.norm(np.diff(positions, axis=0), axis=2) / steps)

@@ -1,0 +1,146 @@
+"""Transport: how far a vehicle, or a cargo on it, is moved over the ground."""
+
+from itertools import combinations
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from buildarena_benchmark.scorers.series import Series, speeds, starting_block
+from buildarena_benchmark.scorers.verdict import Metric, Verdict, rounded
+from buildarena_benchmark.tasks.document import TransportScoring
+
+if TYPE_CHECKING:
+    from buildarena_geometry import Machine
+    from buildarena_simulation import Trajectory
+
+_SETTLED_S = 2.0
+"""Secondary metrics count from here on: cargo and wheels need a moment to settle."""
+
+_INTACT_SPREAD = 1.0
+"""Wheel-to-wheel distances of an intact vehicle vary by no more, units."""
+
+_RESTING = 1e-3
+"""Slower movement has no direction worth judging, units/s."""
+
+
+def judge(scoring: TransportScoring, machine: "Machine", trajectory: "Trajectory") -> Verdict:
+    """The indicator is the greatest horizontal distance of the subject from its start.
+
+    The trial succeeds if it exceeds the distance asked for, the machine has wheels enough and
+    nothing starts too high. A machine that nothing drives (no key bound, none pressed, nothing
+    powered) fails with an indicator of 0.
+
+    Args:
+        scoring: Thresholds and target.
+        machine: Gives wheels and bindings.
+        trajectory: The trial.
+
+    Flags:
+        `no_wheels`: success without any wheel. `start_too_high`: something started at or above the
+        limit.
+
+    Source: the paper, section "Evaluation"; thresholds as in the published evaluation.
+    """
+    path = _subject_path(scoring, machine, trajectory)
+    wheels = [b.id for b in machine.blocks.values() if b.module.kind == "wheel"]
+    if path is None or not _is_driven(machine, trajectory):
+        return Verdict(
+            success=False, indicator=0.0, metrics={"wheels": len(wheels), "driven": False}
+        )
+    indicator = float(np.linalg.norm(path[:, :2] - path[0, :2], axis=1).max())
+    start_height = (
+        float(path[0, 2])
+        if scoring.subject == "cargo"
+        else float(trajectory.positions[0, :, 2].max())
+    )
+    too_high = start_height >= scoring.max_start_height
+    reached = indicator > scoring.min_distance and len(wheels) >= scoring.min_wheels
+    flags = []
+    if reached and not wheels:
+        flags.append("no_wheels")
+    if too_high:
+        flags.append("start_too_high")
+    settled = trajectory.time_s >= _SETTLED_S
+    metrics: dict[str, Metric] = {
+        "wheels": len(wheels),
+        "driven": True,
+        "start_height": rounded(start_height),
+        "intact": _is_intact(trajectory, wheels),
+        "max_speed": rounded(speeds(trajectory.time_s, path[:, None]).max(initial=0.0)),
+        "broken_joints": len(trajectory.breaks),
+        **_path_metrics(trajectory.time_s[settled], path[settled, :2], scoring.target),
+    }
+    return Verdict(
+        success=reached and not too_high,
+        indicator=rounded(indicator),
+        metrics=metrics,
+        flags=tuple(flags),
+    )
+
+
+def _subject_path(
+    scoring: TransportScoring, machine: "Machine", trajectory: "Trajectory"
+) -> Series | None:
+    if scoring.subject == "cargo":
+        cargo = trajectory.cargo_position
+        return None if cargo is None else cargo.astype(np.float64)
+    return trajectory.positions[:, starting_block(machine, trajectory)].astype(np.float64)
+
+
+def _is_driven(machine: "Machine", trajectory: "Trajectory") -> bool:
+    """Whether any key that was pressed is bound to something that is powered."""
+    presses = trajectory.settings.get("effective_key_presses")
+    if presses is not None:
+        return int(presses) > 0
+    bound = {
+        key for block in machine.blocks.values() for keys in block.bindings.values() for key in keys
+    }
+    return any(press.key in bound for press in machine.control_sequence)
+
+
+def _is_intact(trajectory: "Trajectory", wheels: list[str]) -> bool:
+    tracked = [trajectory.block_ids.index(i) for i in wheels if i in trajectory.block_ids]
+    for first, second in combinations(tracked, 2):
+        apart = np.linalg.norm(
+            trajectory.positions[:, first].astype(np.float64) - trajectory.positions[:, second],
+            axis=1,
+        )
+        if apart.max() - apart.min() > _INTACT_SPREAD:
+            return False
+    return True
+
+
+def _path_metrics(time_s: Series, path: Series, target: tuple[float, float]) -> dict[str, Metric]:
+    """How well a horizontal path leads from its start to the target, weighted by time.
+
+    Args:
+        time_s: (T,) seconds.
+        path: (T, 2) units.
+        target: (2,) units, from the world's origin.
+    """
+    if len(path) < 2:  # noqa: PLR2004 - no step, no path
+        return {}
+    aim = np.array(target) - path[0]
+    distance = float(np.linalg.norm(aim)) or 1.0
+    aim = aim / distance
+    moved = np.diff(path, axis=0)
+    steps = np.diff(time_s)
+    along = (path - path[0]) @ aim
+    across = np.abs((path - path[0]) @ np.array([-aim[1], aim[0]]))
+    lengths = np.linalg.norm(moved, axis=1)
+    moving = lengths > _RESTING * steps
+    headings = (moved[moving] @ aim) / lengths[moving]
+    travelled = float(lengths.sum())
+    backward = np.minimum(np.diff(along), 0.0)
+    return {
+        "progress_ratio": rounded(along.max() / distance),
+        "direction_consistency": rounded(np.average(headings, weights=steps[moving]))
+        if moving.any()
+        else None,
+        "backtrack": rounded(-backward.sum() / distance),
+        "lateral_deviation": rounded(np.average((across[1:] + across[:-1]) / 2, weights=steps)),
+        "path_efficiency": rounded(np.linalg.norm(path[-1] - path[0]) / travelled)
+        if travelled > 0
+        else None,
+        "final_distance_ratio": rounded(np.linalg.norm(np.array(target) - path[-1]) / distance),
+    }

@@ -1,0 +1,93 @@
+"""Scores: one trial's verdict, and a trial that never was."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Final
+
+from buildarena_benchmark.scorers import height, support, thrust, transport
+from buildarena_benchmark.scorers.stability import is_unstable
+from buildarena_benchmark.scorers.verdict import Metric, Verdict
+
+if TYPE_CHECKING:
+    from buildarena_geometry import Machine
+    from buildarena_simulation import Trajectory
+
+    from buildarena_benchmark.tasks.task import Task
+
+_SCORERS: Final[Mapping[str, Callable[..., Verdict]]] = MappingProxyType(
+    {
+        "transport": transport.judge,
+        "support": support.judge,
+        "thrust": thrust.judge,
+        "height": height.judge,
+    }
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Score:
+    """What one trial of one machine is worth.
+
+    Attributes:
+        success: Whether the task's criterion is met.
+        indicator: The task's figure; see `Task.indicator`.
+        metrics: Parts, mass, cost and the category's secondary metrics; None where there is none.
+        flags: Signs that a success is not what it seems; see the scorers.
+    """
+
+    success: bool
+    indicator: float
+    metrics: Mapping[str, Metric]
+    flags: tuple[str, ...]
+
+
+def score(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Score:
+    """Scores one trial, whichever simulator ran it.
+
+    Args:
+        task: The task.
+        machine: The machine that was tried.
+        trajectory: Its trajectory in the task's scenario.
+
+    Returns:
+        The score; a rollout that blew up is flagged `unstable` and is never a success.
+    """
+    verdict = _SCORERS[task.scorer](task.scoring, machine, trajectory)
+    metrics = {**_machine_metrics(machine), **verdict.metrics}
+    if is_unstable(machine, trajectory):
+        return Score(
+            success=False,
+            indicator=0.0,
+            metrics=MappingProxyType(metrics),
+            flags=(*verdict.flags, "unstable"),
+        )
+    return Score(
+        success=verdict.success,
+        indicator=verdict.indicator,
+        metrics=MappingProxyType(metrics),
+        flags=verdict.flags,
+    )
+
+
+def failed_score(task: "Task", machine: "Machine | None" = None) -> Score:
+    """The score of a machine that was never finished, or cannot be simulated.
+
+    Args:
+        task: The task.
+        machine: What was built, if anything.
+
+    Returns:
+        No success and an indicator of 0; it counts in every average like any other score.
+    """
+    del task  # every task's failure looks the same; the argument keeps the call like `score`
+    metrics = _machine_metrics(machine) if machine is not None else {}
+    return Score(success=False, indicator=0.0, metrics=MappingProxyType(metrics), flags=())
+
+
+def _machine_metrics(machine: "Machine") -> dict[str, Metric]:
+    return {
+        "parts": machine.part_count,
+        "mass": round(float(machine.mass), 6),
+        "cost": machine.cost,
+    }

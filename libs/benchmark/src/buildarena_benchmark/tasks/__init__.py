@@ -1,0 +1,1 @@
+"""Tasks: what must be built, how it is tried and how it is scored."""

@@ -1,0 +1,84 @@
+"""A task as the rest of the service sees it."""
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final, Literal
+
+from buildarena_simulation import Scenario
+
+from buildarena_benchmark.tasks.document import Constraints, Indicator, Scoring, TaskDocument
+
+SCORER_VERSION: Final = 1
+"""Rises with every change of a scorer that can change a score; part of every task's version."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Task:
+    """What must be built, how it is tried and how it is scored.
+
+    Attributes:
+        name: Unique name, such as "support-1".
+        version: Hash of everything that can change a score: statement, constraints, scenario,
+            thresholds and the scorers' version. Which simulator ran is not part of it.
+        title: One line for people.
+        category: Group the task belongs to, such as "support".
+        level: Difficulty within the category, from 1.
+        statement: Markdown that tells a builder all that is needed.
+        constraints: What a machine may be made of.
+        scenario: What a machine is put through.
+        scoring: The scorer's name and thresholds.
+        indicator: The figure the task is ranked by.
+        difficulty: Weight of each difficulty dimension, 1 to 3; empty if not stated.
+    """
+
+    name: str
+    version: str
+    title: str
+    category: str
+    level: int
+    statement: str
+    constraints: Constraints
+    scenario: Scenario
+    scoring: Scoring
+    indicator: Indicator
+    difficulty: Mapping[str, int]
+
+    @property
+    def scorer(self) -> str:
+        """Name of the scorer."""
+        return self.scoring.name
+
+    @property
+    def control(self) -> Literal["agent", "held", "none"]:
+        """Who presses the keys."""
+        return self.scenario.control.mode
+
+
+def task_of(document: TaskDocument) -> Task:
+    """The task a validated document describes."""
+    weights = document.difficulty.model_dump() if document.difficulty else {}
+    return Task(
+        name=document.name,
+        version=_version_of(document),
+        title=document.title,
+        category=document.category,
+        level=document.level,
+        statement=document.statement.strip() + "\n",
+        constraints=document.constraints,
+        scenario=document.scenario,
+        scoring=document.scoring,
+        indicator=document.indicator,
+        difficulty=MappingProxyType(weights),
+    )
+
+
+def _version_of(document: TaskDocument) -> str:
+    content = document.model_dump(
+        mode="json", include={"statement", "constraints", "scenario", "scoring"}
+    )
+    content["scorer_version"] = SCORER_VERSION
+    text = json.dumps(content, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()[:12]

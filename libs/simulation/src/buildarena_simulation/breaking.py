@@ -1,0 +1,174 @@
+"""Breaking: the worst joint over its strength gives way, one per evaluation."""
+
+import numpy as np
+
+from buildarena_simulation.engines.base import Engine
+from buildarena_simulation.structure.clusters import Clusters, find_clusters
+from buildarena_simulation.structure.loads import LoadModel, PointForces
+from buildarena_simulation.structure.model import JOINT_KINDS, FloatArray, Structure
+from buildarena_simulation.structure.motion import Motion
+from buildarena_simulation.trajectory import Break, JointPeak
+
+from buildarena_simulation.constants import GRAVITY
+
+
+class BreakingModel:
+    """Follows a machine's loads and lets its joints break.
+
+    Args:
+        structure: The machine.
+        clusters: Its clusters at the start.
+        motion: Their motion at the start.
+        interval_s: Time between two evaluations, seconds.
+    """
+
+    def __init__(
+        self, structure: Structure, clusters: Clusters, motion: Motion, *, interval_s: float
+    ) -> None:
+        self._structure = structure
+        self._loads = LoadModel(structure, clusters, motion, interval_s=interval_s)
+        self._peaks = np.zeros((len(structure.members), 3))
+        self._rope_holds = np.ones(len(structure.ropes), dtype=bool)
+        self._rope_peaks = np.zeros(len(structure.ropes))
+        self.clusters = clusters
+        self.motion = motion
+        self.breaks: list[Break] = []
+
+    def follow(
+        self, engine: Engine, thrusts: FloatArray, *, time_s: float, cargo_mass: float | None
+    ) -> None:
+        """Evaluates the loads after one interval and breaks what is overloaded.
+
+        Args:
+            engine: The engine, which is given new bodies if the machine falls apart.
+            thrusts: (C,) recoil of each cannon during the interval, mass·unit/s².
+            time_s: Time now, seconds.
+            cargo_mass: Mass of the cargo now.
+        """
+        self.motion = engine.motion()
+        tensions = engine.rope_tensions()
+        forces = self._all_forces(engine.contacts(), thrusts, tensions)
+        loads = self._loads.evaluate(forces, self.motion)
+        seen = np.stack([loads.force, loads.moment, loads.ratio], axis=1)
+        self._peaks = np.maximum(self._peaks, seen)
+        self._break_ropes(engine, tensions, time_s, cargo_mass)
+        if not len(loads.ratio):
+            return
+        worst = int(np.argmax(loads.ratio))
+        if loads.ratio[worst] > 1.0:
+            self._log(
+                self._structure.members.names[worst],
+                JOINT_KINDS[self._structure.members.kind[worst]],
+                float(loads.ratio[worst]),
+                (time_s, cargo_mass),
+            )
+            self._loads.holds[worst] = False
+            self._fall_apart(engine)
+
+    def peaks(self) -> tuple[JointPeak, ...]:
+        """The largest load of every joint and rope so far."""
+        members, ropes = self._structure.members, self._structure.ropes
+        joints = [
+            JointPeak(
+                joint=name,
+                kind=JOINT_KINDS[kind],
+                force=round(float(force), 3),
+                moment=round(float(moment), 3),
+                ratio=round(float(ratio), 5),
+            )
+            for name, kind, (force, moment, ratio) in zip(
+                members.names, members.kind, self._peaks, strict=True
+            )
+        ]
+        winches = [
+            JointPeak(
+                joint=name,
+                kind="rope",
+                force=round(float(tension), 3),
+                moment=0.0,
+                ratio=round(float(tension / limit), 5),
+            )
+            for name, tension, limit in zip(ropes.names, self._rope_peaks, ropes.limit, strict=True)
+        ]
+        return (*joints, *winches)
+
+    def _all_forces(
+        self, contacts: PointForces, thrusts: FloatArray, tensions: FloatArray
+    ) -> PointForces:
+        """Contacts, thrust and ropes together."""
+        structure, clusters, motion = self._structure, self.clusters, self.motion
+        blocks, points, forces = [contacts.block], [contacts.point], [contacts.force]
+        if len(structure.cannons):
+            cannons = structure.cannons
+            c = clusters.cluster_of[cannons]
+            turn = motion.rotation[c]
+            blocks.append(cannons)
+            points.append(
+                motion.position[c] + np.einsum("kij,kj->ki", turn, structure.shown[cannons])
+            )
+            sprays = np.einsum("kij,kj->ki", turn, structure.directions[cannons])
+            forces.append(-thrusts[:, None] * sprays)
+        if len(structure.ropes):
+            start, end = rope_ends(structure, clusters, motion)
+            pull = end - start
+            pull *= (tensions / np.maximum(np.linalg.norm(pull, axis=1), 1e-9))[:, None]
+            blocks += [structure.ropes.first, structure.ropes.second]
+            points += [start, end]
+            forces += [pull, -pull]
+        return PointForces(
+            block=np.concatenate(blocks),
+            point=np.concatenate(points),
+            force=np.concatenate(forces),
+        )
+
+    def _break_ropes(
+        self, engine: Engine, tensions: FloatArray, time_s: float, cargo_mass: float | None
+    ) -> None:
+        ropes = self._structure.ropes
+        pull = tensions / GRAVITY
+        self._rope_peaks = np.maximum(self._rope_peaks, pull)
+        for r in np.flatnonzero(self._rope_holds & (pull > ropes.limit)):
+            self._rope_holds[r] = False
+            engine.drop_rope(int(r))
+            self._log(ropes.names[r], "rope", float(pull[r] / ropes.limit[r]), (time_s, cargo_mass))
+
+    def _log(self, joint: str, kind: str, ratio: float, when: tuple[float, float | None]) -> None:
+        time_s, cargo_mass = when
+        self.breaks.append(
+            Break(
+                time_s=round(time_s, 6),
+                joint=joint,
+                kind=kind,
+                ratio=round(ratio, 5),
+                cargo_mass=None if cargo_mass is None else round(cargo_mass, 6),
+            )
+        )
+
+    def _fall_apart(self, engine: Engine) -> None:
+        before = self.clusters
+        after = find_clusters(self._structure, self._loads.holds)
+        if not _same(before, after):
+            self.motion = self.motion.after_break(before, after)
+            self.clusters = after
+            engine.enter(after, self.motion)
+        self._loads.rebuild(after, self.motion)
+
+
+def rope_ends(
+    structure: Structure, clusters: Clusters, motion: Motion
+) -> tuple[FloatArray, FloatArray]:
+    """Both ends of every rope, each (R, 3), world frame, units."""
+    ropes = structure.ropes
+    ends = []
+    for block, point in ((ropes.first, ropes.first_point), (ropes.second, ropes.second_point)):
+        c = clusters.cluster_of[block]
+        ends.append(motion.position[c] + np.einsum("kij,kj->ki", motion.rotation[c], point))
+    return ends[0], ends[1]
+
+
+def _same(before: Clusters, after: Clusters) -> bool:
+    return (
+        len(before) == len(after)
+        and bool((before.cluster_of == after.cluster_of).all())
+        and bool((before.axle == after.axle).all())
+    )

@@ -1,0 +1,124 @@
+"""Constants of the game, with where each comes from.
+
+Lengths are in units (the edge of a small block), masses in mass units, times in seconds. Forces
+of joints are in mass·g (the weight of one mass unit is 1), moments in mass·g·unit, so that they do
+not depend on the value of g. `docs/physics.md` explains the calibration.
+"""
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+from types import MappingProxyType
+from typing import Final
+
+GRAVITY: Final = 32.81
+"""Downward acceleration, units/s². Source: public modding notes; other figures agree within 7 %."""
+
+SAMPLE_RATE_HZ: Final = 25
+"""Rate at which poses are recorded. Source: the paper, "Simulation Details"."""
+
+WHEEL_SPEED: Final = 100.0 * 2.0 * math.pi / 60.0
+"""Driven speed of a powered wheel, rad/s. Source: the paper, "Basic Modules" (100 rpm)."""
+
+WHEEL_LAG_RATE: Final = 16.0
+"""Rate of the first-order lag of a wheel's target speed, 1/s. Source: public modding notes."""
+
+WHEEL_TORQUE: Final = 20.0
+"""Torque limit of a wheel's motor, mass·g·unit. Fitted: the game's value is not public."""
+
+COLD_THRUST: Final = 1.6
+"""Recoil of a cannon that sprays cold water, mass·g. Source: the paper, "Basic Modules"."""
+
+HEATED_THRUST: Final = 1.6 * 8.6
+"""Recoil of a heated cannon, mass·g. Source: the paper, "Basic Modules" (x 8.6)."""
+
+FLAME_RADIUS: Final = 0.3
+"""Radius of a torch's flame, units. Source: the paper, "Basic Modules"."""
+
+FLAME_DISTANCE: Final = 1.0
+"""Distance from a torch's centre to its flame's centre, units. Source: as above."""
+
+CANNON_BULB_OFFSETS: Final = (-0.25, 0.5)
+"""Centres of the two spheres of a cannon's peanut shape along its pointing direction, units.
+
+With radius 0.5 they span inlet (-0.75) to outlet (+1.0) and leave a waist of radius 0.33. Fitted
+to the paper's remark that the body is narrower in the middle, so that a small flame there misses.
+"""
+
+CANNON_BULB_RADIUS: Final = 0.5
+"""Radius of the two spheres of a cannon's peanut shape, units."""
+
+COLLISION_MARGIN: Final = 0.02
+"""How much smaller a collision box's half-extents are than the block's, units.
+
+Fitted: full-size decks wedge between terrain walls with thousands of newtons.
+"""
+
+ANGULAR_DRAG: Final = 0.05
+"""Angular drag of a free-standing piece, 1/s. Source: public modding notes."""
+
+LINEAR_DRAG: Final = 0.2
+"""Linear drag of a free-standing piece, 1/s. Source: public modding notes."""
+
+FRICTION_TERRAIN: Final = 1.0
+"""Neutral, so that a contact with terrain or cargo takes the other body's coefficient."""
+
+FRICTION_BLOCK: Final = 0.7
+"""Friction coefficient of blocks. Fitted: cargo stays on a deck that wheels can accelerate."""
+
+FRICTION_WHEEL: Final = 0.6
+"""Friction coefficient of powered wheels. Source: public modding notes."""
+
+LOAD_FILTER_S: Final = 0.16
+"""Time constant of the low-pass filter on block wrenches, s. Fitted at g = 32.81."""
+
+MAX_PARTS: Final = 2000
+"""A machine with more blocks and connectors is not simulated."""
+
+
+class JointKind(StrEnum):
+    """How two blocks are held together; each kind has its own strength."""
+
+    ATTACHMENT = "attachment"
+    FAR_JOINT = "far_joint"
+    MOUNT = "mount"
+    AXLE = "axle"
+    BRACE = "brace"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Strength:
+    """The wrench at which a joint breaks.
+
+    Attributes:
+        force: Norm of the force a joint bears, mass·g.
+        moment: Norm of the moment a joint bears, mass·g·unit.
+        origin: Whether a public source states it, or it was fitted, and to what.
+    """
+
+    force: float
+    moment: float
+    origin: str
+
+
+JOINT_STRENGTH: Final = MappingProxyType(
+    {
+        JointKind.ATTACHMENT: Strength(
+            force=600.0,
+            moment=200.0,
+            origin="fitted to the one-shot bridge (1000) and the load ordering",
+        ),
+        JointKind.FAR_JOINT: Strength(
+            force=1067.0,
+            moment=355.0,
+            origin="force: 35,000 force units, public modding notes; moment: the attachment's ratio",
+        ),
+        JointKind.MOUNT: Strength(
+            force=1e5, moment=1e5, origin="public modding notes: practically never breaks"
+        ),
+        JointKind.AXLE: Strength(force=600.0, moment=200.0, origin="fitted, as an attachment"),
+        JointKind.BRACE: Strength(force=600.0, moment=200.0, origin="fitted, as an attachment"),
+    }
+)
+ROPE_STRENGTH: Final = 1000.0
+"""Tension at which a winch's rope gives way, mass·g. Fitted: not public."""

@@ -1,0 +1,166 @@
+"""The seam between the shared model and an engine.
+
+An engine builds bodies from clusters, steps them, and reports poses and contact forces. Loads,
+breaking, control, heating and recording are shared and know no engine.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from buildarena_simulation.scenario import TerrainBox
+from buildarena_simulation.structure.clusters import Clusters
+from buildarena_simulation.structure.loads import PointForces
+from buildarena_simulation.structure.model import FloatArray, Structure
+from buildarena_simulation.structure.motion import Motion
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CargoBox:
+    """The cargo at the start of a trial.
+
+    Attributes:
+        size: (3,) full extents, units.
+        position: (3,) its centre, world frame, units.
+        mass: Mass units.
+    """
+
+    size: FloatArray
+    position: FloatArray
+    mass: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class World:
+    """What an engine builds around the clusters.
+
+    Attributes:
+        structure: The machine.
+        ground: Whether the plane z = 0 is solid.
+        terrain: Fixed boxes.
+        cargo: The cargo, if there is one.
+        gravity: Downward acceleration, units/s².
+    """
+
+    structure: Structure
+    ground: bool
+    terrain: tuple[TerrainBox, ...]
+    cargo: CargoBox | None
+    gravity: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CargoPose:
+    """Where the cargo is.
+
+    Attributes:
+        position: (3,) its centre, world frame, units.
+        quaternion: (4,) world_from_cargo as (w, x, y, z).
+        velocity: (3,) world frame, units/s.
+    """
+
+    position: FloatArray
+    quaternion: FloatArray
+    velocity: FloatArray
+
+
+class Engine(Protocol):
+    """A rigid-body engine with one world in it. Not shared between threads."""
+
+    @property
+    def time_step_s(self) -> float:
+        """Length of one step, seconds; a sample interval is a whole number of steps."""
+
+    @property
+    def steps_per_evaluation(self) -> int:
+        """How many steps lie between two evaluations of the joint loads."""
+
+    @property
+    def settings(self) -> Mapping[str, float | int | str]:
+        """Everything about this engine's set-up that can change a trajectory."""
+
+    def enter(self, clusters: Clusters, motion: Motion) -> None:
+        """Puts the clusters into the world in place of those that were there."""
+
+    def set_cargo_mass(self, mass: float) -> None:
+        """Changes the cargo's mass and, in proportion, its inertia."""
+
+    def drop_rope(self, index: int) -> None:
+        """Takes a rope that gave way out of the world."""
+
+    def advance(self, wheel_speeds: FloatArray, thrusts: FloatArray) -> None:
+        """Steps the world.
+
+        Args:
+            wheel_speeds: (S, W) target of each wheel in each of S steps, rad/s about its outward
+                axis, relative to what it is mounted on.
+            thrusts: (C,) recoil of each cannon during these steps, mass·unit/s².
+        """
+
+    def contacts(self) -> PointForces:
+        """Contact and friction forces on the blocks in the last step."""
+
+    def rope_tensions(self) -> FloatArray:
+        """Tension of each rope in the last step, (R,), mass·unit/s²."""
+
+    def motion(self) -> Motion:
+        """Poses and velocities of the clusters now."""
+
+    def cargo(self) -> CargoPose:
+        """Pose of the cargo now; only in a world that has one."""
+
+    def close(self) -> None:
+        """Frees the engine's memory."""
+
+
+def principal_frames(clusters: Clusters) -> tuple[FloatArray, FloatArray]:
+    """Principal axes and moments of the clusters' inertias.
+
+    Returns:
+        machine_from_principal (C, 3, 3), right-handed, and the moments (C, 3).
+    """
+    # Rounding keeps the axes of a symmetric machine from following the last bits.
+    moments, axes = np.linalg.eigh(np.round(clusters.inertia, 12))
+    axes[np.linalg.det(axes) < 0, :, 2] *= -1
+    return axes, moments
+
+
+def quaternion_of(rotation: FloatArray) -> FloatArray:
+    """The quaternion (w, x, y, z), w >= 0, of a rotation matrix; (..., 3, 3) to (..., 4).
+
+    Source: the largest of the four squared components is found first, so no small number is
+    divided by (Shepperd's method).
+    """
+    r = np.asarray(rotation, dtype=np.float64)
+    trace = np.trace(r, axis1=-2, axis2=-1)
+    diagonal = np.diagonal(r, axis1=-2, axis2=-1)
+    squares = np.concatenate(
+        [1.0 + trace[..., None], 1.0 + 2.0 * diagonal - trace[..., None]], axis=-1
+    )
+    w_row = [
+        squares[..., 0],
+        r[..., 2, 1] - r[..., 1, 2],
+        r[..., 0, 2] - r[..., 2, 0],
+        r[..., 1, 0] - r[..., 0, 1],
+    ]
+    x_row = [w_row[1], squares[..., 1], r[..., 0, 1] + r[..., 1, 0], r[..., 0, 2] + r[..., 2, 0]]
+    y_row = [w_row[2], x_row[2], squares[..., 2], r[..., 1, 2] + r[..., 2, 1]]
+    z_row = [w_row[3], x_row[3], y_row[3], squares[..., 3]]
+    table = np.stack([np.stack(row, axis=-1) for row in (w_row, x_row, y_row, z_row)], axis=-2)
+    best = np.argmax(squares, axis=-1)
+    chosen = np.take_along_axis(table, best[..., None, None], axis=-2)[..., 0, :]
+    chosen = chosen / np.linalg.norm(chosen, axis=-1, keepdims=True)
+    return np.asarray(np.where(chosen[..., :1] < 0, -chosen, chosen))
+
+
+def rotation_of(quaternion: FloatArray) -> FloatArray:
+    """The rotation matrix of a unit quaternion (w, x, y, z); (..., 4) to (..., 3, 3)."""
+    w, x, y, z = np.moveaxis(np.asarray(quaternion, dtype=np.float64), -1, 0)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)

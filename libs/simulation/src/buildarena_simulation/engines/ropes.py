@@ -1,0 +1,92 @@
+"""Ropes for engines that have none of their own: a spring-damper as stiff as the step allows.
+
+A fixed stiffness diverges on small blocks; here it follows the effective mass between the rope's
+ends, so that the explicit step stays stable whatever hangs on it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from buildarena_simulation.breaking import rope_ends
+from buildarena_simulation.structure.clusters import Clusters
+from buildarena_simulation.structure.loads import PointForces
+from buildarena_simulation.structure.model import BoolArray, FloatArray, Structure
+from buildarena_simulation.structure.motion import Motion
+
+_STIFFNESS_SHARE = 0.2
+_DAMPING_SHARE = 0.4
+"""Shares of m/dt² and m/dt; an explicit step is stable below 1 each, with room for several ropes."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RopePulls:
+    """What the ropes do in one step.
+
+    Attributes:
+        tension: (R,) mass·unit/s².
+        forces: On both ends of every taut rope.
+    """
+
+    tension: FloatArray
+    forces: PointForces
+
+
+def rope_forces(
+    structure: Structure,
+    clusters: Clusters,
+    motion: Motion,
+    *,
+    alive: BoolArray,
+    time_step_s: float,
+) -> RopePulls:
+    """Tension of the ropes at the start of a step.
+
+    Args:
+        structure: The machine.
+        clusters: Its clusters.
+        motion: Their motion.
+        alive: (R,) which ropes hold.
+        time_step_s: Length of the step, seconds.
+    """
+    ropes = structure.ropes
+    start, end = rope_ends(structure, clusters, motion)
+    length = np.linalg.norm(end - start, axis=1)
+    along = (end - start) / np.maximum(length, 1e-9)[:, None]
+    first, second = clusters.cluster_of[ropes.first], clusters.cluster_of[ropes.second]
+    slip_first, give_first = _at_end(clusters, motion, first, start, along)
+    slip_second, give_second = _at_end(clusters, motion, second, end, along)
+    stretch, rate = length - ropes.length, slip_second - slip_first
+    mass = 1.0 / np.maximum(give_first + give_second, 1e-9)
+    # Several ropes on one body act together; each takes its share.
+    crowd = np.maximum(
+        np.bincount(first, minlength=len(clusters))[first],
+        np.bincount(second, minlength=len(clusters))[second],
+    )
+    mass = mass / crowd
+    pull = (
+        _STIFFNESS_SHARE * mass / time_step_s**2 * stretch
+        + _DAMPING_SHARE * mass / time_step_s * rate
+    )
+    taut = alive & (stretch > 0.0) & (first != second)
+    tension = np.where(taut, np.maximum(pull, 0.0), 0.0)
+    force = tension[:, None] * along
+    return RopePulls(
+        tension=tension,
+        forces=PointForces(
+            block=np.concatenate([ropes.first[taut], ropes.second[taut]]),
+            point=np.concatenate([start[taut], end[taut]]),
+            force=np.concatenate([force[taut], -force[taut]]),
+        ),
+    )
+
+
+def _at_end(
+    clusters: Clusters, motion: Motion, c: np.ndarray, point: FloatArray, along: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Speed along the rope of its end, and the velocity it gains per unit impulse, each (R,)."""
+    arm = point - motion.centers_of_mass(clusters)[c]
+    velocity = motion.velocity[c] + np.cross(motion.spin[c], arm)
+    lever = np.einsum("rji,rj->ri", motion.rotation[c], np.cross(arm, along))
+    turned = np.einsum("rij,rj->ri", np.linalg.inv(clusters.inertia[c]), lever)
+    return (velocity * along).sum(axis=1), 1.0 / clusters.mass[c] + (lever * turned).sum(axis=1)

@@ -1,0 +1,101 @@
+"""URDF text of one articulated piece.
+
+Each link's inertial frame is the principal frame of its cluster. A newline follows every tag: long
+URDF lines fail to parse.
+"""
+
+import numpy as np
+
+from buildarena_simulation.constants import COLLISION_MARGIN
+from buildarena_simulation.structure.clusters import Clusters
+from buildarena_simulation.structure.model import FloatArray, Shape, ShapeKind, Structure
+
+
+def urdf_of(
+    structure: Structure,
+    clusters: Clusters,
+    inside: list[int],
+    *,
+    axes: FloatArray,
+    moments: FloatArray,
+) -> str:
+    """The URDF of a piece whose hinges all stand at angle 0 in the machine frame.
+
+    Args:
+        structure: The machine.
+        clusters: Its clusters.
+        inside: The piece's clusters, its root first.
+        axes: (C, 3, 3) machine_from_principal.
+        moments: (C, 3) principal moments of inertia.
+    """
+    root = inside[0]
+    # A link's frame stands where its hinge is; the root's, at its centre of mass.
+    origins = {root: clusters.center_of_mass[root]}
+    lines = ['<robot name="piece">']
+    for link, c in enumerate(inside):
+        if link:
+            origins[c] = structure.positions[clusters.wheel[c]]
+        offset = axes[c].T @ (clusters.center_of_mass[c] - origins[c])
+        lines += [f'<link name="link {link}">', *_inertial(clusters.mass[c], moments[c], offset)]
+        for i in clusters.blocks[c]:
+            for shape in structure.parts[i].shapes:
+                place = axes[c].T @ (shape.center - origins[c])
+                lines += _collision(shape, place, axes[c].T @ shape.rotation)
+        lines.append("</link>")
+    for link, c in enumerate(inside[1:], 1):
+        parent = int(clusters.parent[c])
+        place = axes[parent].T @ (origins[c] - origins[parent])
+        axis = axes[c].T @ structure.directions[clusters.wheel[c]]
+        lines += [
+            f'<joint name="hinge {link}" type="continuous">',
+            f'<parent link="link {inside.index(parent)}"/>',
+            f'<child link="link {link}"/>',
+            _origin(place, axes[parent].T @ axes[c]),
+            f'<axis xyz="{_numbers(axis)}"/>',
+            "</joint>",
+        ]
+    lines.append("</robot>")
+    return "\n".join(lines) + "\n"
+
+
+def _inertial(mass: float, moments: FloatArray, offset: FloatArray) -> list[str]:
+    a, b, c = moments.tolist()
+    return [
+        "<inertial>",
+        f'<origin xyz="{_numbers(offset)}" rpy="0 0 0"/>',
+        f'<mass value="{float(mass)!r}"/>',
+        f'<inertia ixx="{a!r}" ixy="0" ixz="0" iyy="{b!r}" iyz="0" izz="{c!r}"/>',
+        "</inertial>",
+    ]
+
+
+def _collision(shape: Shape, place: FloatArray, rotation: FloatArray) -> list[str]:
+    half = shape.half_extents
+    if shape.kind is ShapeKind.CYLINDER:
+        form = f'<cylinder radius="{float(half[0])!r}" length="{float(2 * half[2])!r}"/>'
+    else:
+        form = f'<box size="{_numbers(2 * (half - COLLISION_MARGIN))}"/>'
+    return [
+        "<collision>",
+        _origin(place, rotation),
+        "<geometry>",
+        form,
+        "</geometry>",
+        "</collision>",
+    ]
+
+
+def _origin(place: FloatArray, rotation: FloatArray) -> str:
+    return f'<origin xyz="{_numbers(place)}" rpy="{_numbers(_roll_pitch_yaw(rotation))}"/>'
+
+
+def _roll_pitch_yaw(r: FloatArray) -> FloatArray:
+    """Fixed-axis angles of a rotation, R = Rz(yaw) · Ry(pitch) · Rx(roll)."""
+    pitch = np.arctan2(-r[2, 0], np.hypot(r[0, 0], r[1, 0]))
+    if np.hypot(r[0, 0], r[1, 0]) < 1e-9:  # noqa: PLR2004 - straight up or down: roll is free
+        return np.array([np.arctan2(-r[1, 2], r[1, 1]), pitch, 0.0])
+    return np.array([np.arctan2(r[2, 1], r[2, 2]), pitch, np.arctan2(r[1, 0], r[0, 0])])
+
+
+def _numbers(values: FloatArray) -> str:
+    return " ".join(repr(float(v)) for v in values)

@@ -1,0 +1,139 @@
+"""From a machine of the geometry library to the arrays the simulation works on."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from buildarena_simulation.constants import MAX_PARTS, JointKind
+from buildarena_simulation.control import Bindings
+from buildarena_simulation.errors import MachineNotSimulable
+from buildarena_simulation.structure.build import Link, Rope, build_structure
+from buildarena_simulation.structure.model import Part, Role, Shape, ShapeKind, Structure
+
+if TYPE_CHECKING:
+    from buildarena_geometry import Block, Joint, Machine
+
+_SMALL_WOODEN_BLOCK = 15
+"""Besiege's id of the one module whose far end grabs what it touches."""
+
+
+def structure_of(machine: "Machine") -> Structure:
+    """The structure of a machine.
+
+    Joints whose two sides were moved too far apart to hold are left out, so their blocks fall off.
+
+    Args:
+        machine: The machine.
+
+    Raises:
+        MachineNotSimulable: It has no blocks, or more parts than are simulated.
+    """
+    if not machine.blocks:
+        raise MachineNotSimulable("the machine has no blocks")
+    if machine.part_count > MAX_PARTS:
+        raise MachineNotSimulable(
+            f"the machine has {machine.part_count} parts; more than {MAX_PARTS} are not simulated"
+        )
+    parts = [_part(block) for block in machine.blocks.values()]
+    index = {part.id: i for i, part in enumerate(parts)}
+    links = [_link(joint, index, parts) for joint in machine.joints if joint.holds]
+    ropes, brace_mass = [], 0.0
+    for connector in machine.connectors.values():
+        first, second = index[connector.start[0]], index[connector.end[0]]
+        start, end = np.array(connector.start_point), np.array(connector.end_point)
+        name = f"{connector.module.name} {connector.id}"
+        if connector.module.name == "Winch":
+            ropes.append(
+                Rope(
+                    name=name,
+                    first=first,
+                    second=second,
+                    start=start,
+                    end=end,
+                    mass=connector.module.mass,
+                )
+            )
+        else:
+            brace_mass = connector.module.mass
+            links.append(
+                Link(
+                    name=name,
+                    first=first,
+                    second=second,
+                    kind=JointKind.BRACE,
+                    start=start,
+                    end=end,
+                )
+            )
+    return build_structure(parts, links, ropes, brace_mass=brace_mass)
+
+
+def bindings_of(machine: "Machine") -> Bindings:
+    """The keys of each block's actions, in the order of the machine's blocks."""
+    return [block.bindings for block in machine.blocks.values()]
+
+
+def _part(block: "Block") -> Part:
+    pose, module = block.world_from_block, block.module
+    rotation = np.array(pose.rotation)
+    shapes = tuple(_shape(solid, np.array(pose.position), rotation) for solid in module.body)
+    if not shapes:
+        raise MachineNotSimulable(f"block {block.id}: the module {module.name} has no body")
+    role = Role(module.kind)
+    shown = np.array(block.center)
+    direction = None
+    if role is Role.WHEEL:
+        direction = rotation[:, 2]
+    elif block.pointing is not None:
+        direction = np.array(block.pointing)
+    return Part(
+        id=block.id,
+        role=role,
+        mass=module.mass,
+        center=shapes[0].center if role is Role.WHEEL else shown,
+        shown=shown,
+        rotation=rotation,
+        shapes=shapes,
+        direction=direction,
+        flipped=block.flipped,
+        grabs=module.besiege_id == _SMALL_WOODEN_BLOCK,
+    )
+
+
+def _shape(solid: object, position: np.ndarray, rotation: np.ndarray) -> Shape:
+    from buildarena_geometry.modules import Cylinder
+
+    if isinstance(solid, Cylinder):
+        pose = solid.block_from_axis
+        half = np.array([solid.radius, solid.radius, solid.length / 2])
+        return Shape(
+            kind=ShapeKind.CYLINDER,
+            center=position + rotation @ np.array(pose.position),
+            rotation=rotation @ np.array(pose.rotation),
+            half_extents=half,
+        )
+    return Shape(
+        kind=ShapeKind.BOX,
+        center=position + rotation @ np.array(solid.center),
+        rotation=rotation,
+        half_extents=np.array(solid.size) / 2,
+    )
+
+
+def _link(joint: "Joint", index: dict[str, int], parts: list[Part]) -> Link:
+    base, part = index[joint.base], index[joint.part]
+    role = parts[part].role
+    kind = JointKind.ATTACHMENT
+    if role is Role.WHEEL:
+        kind = JointKind.AXLE
+    elif role in (Role.CANNON, Role.TORCH):
+        kind = JointKind.MOUNT
+    point = np.array(joint.point)
+    return Link(
+        name=f"{joint.base}-{joint.part}",
+        first=base,
+        second=part,
+        kind=kind,
+        start=point,
+        end=point,
+    )

@@ -1,0 +1,120 @@
+"""The trajectory's file format: one Parquet table, one row per instant.
+
+Columns `positions` and `quaternions` hold all tracked blocks of an instant, block after block; what
+is not a series (ids, joint peaks, breaks, settings) is JSON in the schema's metadata under the key
+`buildarena.trajectory`. `SCHEMA_VERSION` rises with every change that older readers cannot follow.
+"""
+
+import io
+import json
+from dataclasses import asdict
+from typing import Any, Final
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from buildarena_simulation.errors import TrajectoryFormatError
+from buildarena_simulation.trajectory import Break, JointPeak, Trajectory
+
+SCHEMA_VERSION: Final = 1
+_KEY: Final = b"buildarena.trajectory"
+_COMPRESSION_LEVEL: Final = 6
+
+
+def write_trajectory(trajectory: Trajectory) -> bytes:
+    """The bytes of a trajectory's file; equal trajectories give equal bytes."""
+    count = len(trajectory.time_s)
+    columns: dict[str, pa.Array] = {
+        "time_s": pa.array(trajectory.time_s),
+        "positions": _rows(trajectory.positions.reshape(count, -1)),
+        "quaternions": _rows(trajectory.quaternions.reshape(count, -1)),
+        "heated": _rows(trajectory.heated),
+    }
+    if trajectory.cargo_position is not None and trajectory.cargo_quaternion is not None:
+        columns["cargo_position"] = _rows(trajectory.cargo_position)
+        columns["cargo_quaternion"] = _rows(trajectory.cargo_quaternion)
+    if trajectory.cargo_mass is not None:
+        columns["cargo_mass"] = pa.array(trajectory.cargo_mass)
+    facts = {
+        "schema_version": SCHEMA_VERSION,
+        "block_ids": trajectory.block_ids,
+        "cannon_ids": trajectory.cannon_ids,
+        "cargo_size": trajectory.cargo_size,
+        "joint_peaks": [asdict(peak) for peak in trajectory.joint_peaks],
+        "breaks": [asdict(event) for event in trajectory.breaks],
+        "engine": trajectory.engine,
+        "engine_version": trajectory.engine_version,
+        "simulation_version": trajectory.simulation_version,
+        "settings": dict(trajectory.settings),
+    }
+    table = pa.table(columns).replace_schema_metadata({_KEY: json.dumps(facts).encode()})
+    floats = [
+        path
+        for name, path in (
+            ("time_s", "time_s"),
+            ("cargo_mass", "cargo_mass"),
+            ("positions", "positions.list.element"),
+            ("quaternions", "quaternions.list.element"),
+            ("cargo_position", "cargo_position.list.element"),
+            ("cargo_quaternion", "cargo_quaternion.list.element"),
+        )
+        if name in columns
+    ]
+    out = io.BytesIO()
+    pq.write_table(
+        table,
+        out,
+        compression="zstd",
+        compression_level=_COMPRESSION_LEVEL,
+        use_dictionary=False,
+        use_byte_stream_split=floats,
+        write_statistics=False,
+    )
+    return out.getvalue()
+
+
+def read_trajectory(data: bytes) -> dict[str, Any]:
+    """The fields of the trajectory a file holds.
+
+    Raises:
+        TrajectoryFormatError: The bytes are no trajectory of a schema this version reads.
+    """
+    try:
+        table = pq.read_table(io.BytesIO(data))
+        facts = json.loads(table.schema.metadata[_KEY])
+    except (pa.ArrowException, KeyError, TypeError, ValueError) as error:
+        raise TrajectoryFormatError(f"these bytes are no trajectory: {error}") from error
+    if facts.pop("schema_version") != SCHEMA_VERSION:
+        raise TrajectoryFormatError(f"only trajectories of schema {SCHEMA_VERSION} can be read")
+    columns = {name: table.column(name).combine_chunks() for name in table.column_names}
+    time_s = columns["time_s"].to_numpy()
+    count = len(time_s)
+    has_cargo = "cargo_position" in columns
+    facts.update(
+        time_s=time_s,
+        block_ids=tuple(facts["block_ids"]),
+        cannon_ids=tuple(facts["cannon_ids"]),
+        cargo_size=tuple(facts["cargo_size"]) if facts["cargo_size"] else None,
+        positions=_matrix(columns["positions"], count).reshape(count, -1, 3),
+        quaternions=_matrix(columns["quaternions"], count).reshape(count, -1, 4),
+        heated=_matrix(columns["heated"], count),
+        cargo_position=_matrix(columns["cargo_position"], count) if has_cargo else None,
+        cargo_quaternion=_matrix(columns["cargo_quaternion"], count) if has_cargo else None,
+        cargo_mass=columns["cargo_mass"].to_numpy() if "cargo_mass" in columns else None,
+        joint_peaks=tuple(JointPeak(**peak) for peak in facts["joint_peaks"]),
+        breaks=tuple(Break(**event) for event in facts["breaks"]),
+    )
+    return dict(facts)
+
+
+def _rows(matrix: NDArray[Any]) -> pa.Array:
+    values = pa.array(np.ascontiguousarray(matrix).reshape(-1))
+    offsets = np.arange(len(matrix) + 1, dtype=np.int32) * matrix.shape[1]
+    return pa.ListArray.from_arrays(pa.array(offsets), values)
+
+
+def _matrix(column: pa.ListArray, count: int) -> NDArray[Any]:
+    values = column.flatten().to_numpy(zero_copy_only=False)
+    return np.ascontiguousarray(values.reshape(count, -1))

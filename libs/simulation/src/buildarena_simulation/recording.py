@@ -1,0 +1,114 @@
+"""Collects a trial's samples and makes its trajectory."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from buildarena_simulation.control import heated_cannons
+from buildarena_simulation.engines.base import CargoPose, quaternion_of
+from buildarena_simulation.errors import MachineNotSimulable
+from buildarena_simulation.scenario import Scenario
+from buildarena_simulation.structure.clusters import Clusters
+from buildarena_simulation.structure.model import BoolArray, Structure
+from buildarena_simulation.structure.motion import Motion
+from buildarena_simulation.trajectory import (
+    Setting,
+    Trajectory,
+    rounded_positions,
+    rounded_quaternions,
+)
+
+if TYPE_CHECKING:
+    from buildarena_simulation.breaking import BreakingModel
+
+
+class Recorder:
+    """Keeps the samples of one trial.
+
+    Args:
+        structure: The machine.
+        scenario: What it is put through.
+
+    Raises:
+        MachineNotSimulable: The scenario tracks a block the machine does not have.
+    """
+
+    def __init__(self, structure: Structure, scenario: Scenario) -> None:
+        self._structure = structure
+        ids = structure.block_ids
+        wanted = ids if scenario.tracked_blocks == "all" else scenario.tracked_blocks
+        missing = [block for block in wanted if block not in ids]
+        if missing:
+            raise MachineNotSimulable(f"the machine has no block {missing[0]}, which is tracked")
+        self._ids = tuple(wanted)
+        self._tracked = np.array([ids.index(block) for block in wanted], dtype=np.int64)
+        count, cannons = scenario.sample_count, len(structure.cannons)
+        self._time_s = np.zeros(count)
+        self._positions = np.zeros((count, len(wanted), 3))
+        self._rotations = np.zeros((count, len(wanted), 3, 3))
+        self._heated = np.zeros((count, cannons), dtype=bool)
+        self._cargo_size = scenario.cargo.size if scenario.cargo else None
+        self._cargo_position = np.zeros((count, 3))
+        self._cargo_quaternion = np.zeros((count, 4))
+        self._cargo_mass = np.zeros(count)
+        self._row = 0
+        self.heated_now: BoolArray = np.zeros(cannons, dtype=bool)
+
+    def record(
+        self,
+        time_s: float,
+        motion: Motion,
+        clusters: Clusters,
+        cargo: CargoPose | None,
+        cargo_mass: float | None,
+    ) -> None:
+        """Keeps one instant, and finds which cannons are heated from here on."""
+        structure, row = self._structure, self._row
+        shown = motion.points(clusters, structure.shown)
+        turn = motion.rotation[clusters.cluster_of]
+        directions = np.einsum("nij,nj->ni", turn, structure.directions)
+        self.heated_now = heated_cannons(structure, shown, directions)
+        self._time_s[row] = time_s
+        self._positions[row] = shown[self._tracked]
+        self._rotations[row] = (turn @ structure.rotations)[self._tracked]
+        self._heated[row] = self.heated_now
+        if cargo is not None and cargo_mass is not None:
+            self._cargo_position[row] = cargo.position
+            self._cargo_quaternion[row] = cargo.quaternion
+            self._cargo_mass[row] = cargo_mass
+        self._row += 1
+
+    def finished(
+        self,
+        *,
+        breaking: "BreakingModel",
+        engine: str,
+        engine_version: str,
+        simulation_version: str,
+        settings: Mapping[str, Setting],
+    ) -> Trajectory:
+        """The trajectory of all samples kept."""
+        has_cargo = self._cargo_size is not None
+        quaternion = np.where(
+            self._cargo_quaternion[:, :1] < 0, -self._cargo_quaternion, self._cargo_quaternion
+        )
+        structure = self._structure
+        return Trajectory(
+            time_s=self._time_s,
+            block_ids=self._ids,
+            positions=rounded_positions(self._positions),
+            quaternions=rounded_quaternions(quaternion_of(self._rotations)),
+            cargo_position=rounded_positions(self._cargo_position) if has_cargo else None,
+            cargo_quaternion=rounded_quaternions(quaternion) if has_cargo else None,
+            cargo_mass=self._cargo_mass if has_cargo else None,
+            cargo_size=self._cargo_size,
+            cannon_ids=tuple(structure.block_ids[i] for i in structure.cannons),
+            heated=self._heated,
+            joint_peaks=breaking.peaks(),
+            breaks=tuple(breaking.breaks),
+            engine=engine,
+            engine_version=engine_version,
+            simulation_version=simulation_version,
+            settings=settings,
+        )

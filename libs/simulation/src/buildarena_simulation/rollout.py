@@ -1,0 +1,191 @@
+"""One trial: a machine put through a scenario by an engine."""
+
+import hashlib
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from buildarena_simulation.breaking import BreakingModel
+from buildarena_simulation.constants import GRAVITY, SAMPLE_RATE_HZ
+from buildarena_simulation.control import (
+    Bindings,
+    KeyHold,
+    heated_cannons,
+    plan_schedule,
+    recoil,
+)
+from buildarena_simulation.engines import create_engine, engine_version
+from buildarena_simulation.engines.base import Engine, World
+from buildarena_simulation.errors import SimulationError, SimulationRoomError
+from buildarena_simulation.machine import bindings_of, structure_of
+from buildarena_simulation.placement import cargo_at_start, place
+from buildarena_simulation.recording import Recorder
+from buildarena_simulation.scenario import Scenario
+from buildarena_simulation.structure.clusters import find_clusters
+from buildarena_simulation.structure.model import Structure
+from buildarena_simulation.structure.motion import at_rest
+from buildarena_simulation.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from buildarena_geometry import Machine
+
+SIMULATION_VERSION: Final = "1"
+"""Version of the shared model: rises with every change that can move a trajectory."""
+
+_PROGRESS_EVERY = 10
+
+
+def simulate(
+    machine: "Machine",
+    scenario: Scenario,
+    engine: str = "pybullet",
+    *,
+    controls: Sequence[KeyHold] | None = None,
+    on_progress: Callable[[float], None] | None = None,
+) -> Trajectory:
+    """Puts a machine through a scenario. The same input gives the same bytes.
+
+    Args:
+        machine: The machine.
+        scenario: What it is put through.
+        engine: Name of the engine; see `ENGINES`.
+        controls: A control sequence to use in place of the machine's own.
+        on_progress: Called now and then with the share of the trial that is done, 0 to 1.
+
+    Returns:
+        The trajectory.
+
+    Raises:
+        MachineNotSimulable: The machine is empty, unplaceable or too large; a failed trial.
+        UnknownEngineError: No engine has this name.
+        SimulationError: The simulator failed; never scored.
+    """
+    structure = structure_of(machine)
+    return simulate_structure(
+        structure,
+        scenario,
+        engine,
+        bindings=bindings_of(machine),
+        controls=machine.control_sequence if controls is None else controls,
+        on_progress=on_progress,
+    )
+
+
+def simulate_structure(
+    structure: Structure,
+    scenario: Scenario,
+    engine: str,
+    *,
+    bindings: Bindings = (),
+    controls: Sequence[KeyHold] = (),
+    on_progress: Callable[[float], None] | None = None,
+) -> Trajectory:
+    """Puts a structure through a scenario; see `simulate`.
+
+    Args:
+        structure: The machine as arrays.
+        scenario: What it is put through.
+        engine: Name of the engine.
+        bindings: (N,) the keys of each block's actions; may be empty if nothing is pressed.
+        controls: The control sequence.
+        on_progress: Called now and then with the share of the trial that is done.
+    """
+    position, rotation = place(structure, scenario.placement)
+    world = World(
+        structure=structure,
+        ground=True,
+        terrain=scenario.terrain,
+        cargo=cargo_at_start(structure, scenario.cargo, position, rotation),
+        gravity=GRAVITY,
+    )
+    adapter = create_engine(engine, world)
+    try:
+        trial = _Trial(structure, scenario, adapter, at=(position, rotation))
+        trial.run(bindings or [{}] * len(structure), controls, on_progress)
+        return trial.recorder.finished(
+            breaking=trial.breaking,
+            engine=engine,
+            engine_version=engine_version(engine),
+            simulation_version=SIMULATION_VERSION,
+            settings={
+                **adapter.settings,
+                "gravity": GRAVITY,
+                "scenario": hashlib.sha256(scenario.model_dump_json().encode()).hexdigest()[:16],
+            },
+        )
+    except SimulationRoomError:
+        raise
+    except Exception as error:
+        raise SimulationError(f"{engine} failed: {error}") from error
+    finally:
+        adapter.close()
+
+
+class _Trial:
+    """The state of one running trial."""
+
+    def __init__(
+        self,
+        structure: Structure,
+        scenario: Scenario,
+        engine: Engine,
+        *,
+        at: tuple[np.ndarray, np.ndarray],
+    ) -> None:
+        self._structure, self._scenario, self._engine = structure, scenario, engine
+        holds = np.ones(len(structure.members), dtype=bool)
+        clusters = find_clusters(structure, holds)
+        motion = at_rest(clusters, *at)
+        engine.enter(clusters, motion)
+        self._interval_s = engine.time_step_s * engine.steps_per_evaluation
+        self.breaking = BreakingModel(structure, clusters, motion, interval_s=self._interval_s)
+        self.recorder = Recorder(structure, scenario)
+
+    def run(
+        self,
+        bindings: Bindings,
+        controls: Sequence[KeyHold],
+        on_progress: Callable[[float], None] | None,
+    ) -> None:
+        engine, scenario = self._engine, self._scenario
+        per_sample = round(1 / (SAMPLE_RATE_HZ * engine.time_step_s))
+        chunks = range(0, per_sample, engine.steps_per_evaluation)
+        samples = scenario.sample_count - 1
+        schedule = plan_schedule(
+            self._structure,
+            bindings,
+            controls,
+            control=scenario.control,
+            step_count=samples * per_sample,
+            time_step_s=engine.time_step_s,
+        )
+        self._sample(0.0)
+        for sample in range(samples):
+            for offset in chunks:
+                first = sample * per_sample + offset
+                rows = slice(first, first + engine.steps_per_evaluation)
+                self._advance(schedule.wheel_speeds[rows], schedule.firing[first], first)
+            self._sample((sample + 1) / SAMPLE_RATE_HZ)
+            if on_progress and (sample % _PROGRESS_EVERY == 0 or sample + 1 == samples):
+                on_progress((sample + 1) / samples)
+
+    def _advance(self, wheel_speeds: np.ndarray, firing: np.ndarray, step: int) -> None:
+        engine, cargo = self._engine, self._scenario.cargo
+        time_s = step * engine.time_step_s
+        mass = cargo.mass_at(time_s) if cargo else None
+        if mass is not None:
+            engine.set_cargo_mass(mass)
+        thrusts = recoil(firing, self.recorder.heated_now)
+        engine.advance(wheel_speeds, thrusts)
+        self.breaking.follow(engine, thrusts, time_s=time_s + self._interval_s, cargo_mass=mass)
+
+    def _sample(self, time_s: float) -> None:
+        cargo = self._scenario.cargo
+        self.recorder.record(
+            time_s,
+            self.breaking.motion,
+            self.breaking.clusters,
+            self._engine.cargo() if cargo else None,
+            cargo.mass_at(time_s) if cargo else None,
+        )

@@ -1,0 +1,262 @@
+"""From parts and joints to the arrays of a `Structure`: masses, members, far joints."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from buildarena_simulation.constants import (
+    ANGULAR_DRAG,
+    JOINT_STRENGTH,
+    LINEAR_DRAG,
+    ROPE_STRENGTH,
+    JointKind,
+)
+from buildarena_simulation.structure.model import (
+    JOINT_KINDS,
+    FloatArray,
+    IntArray,
+    Members,
+    Part,
+    Role,
+    Ropes,
+    ShapeKind,
+    Structure,
+)
+
+_UNIT_STIFFNESS: Final = 1e4
+"""Only ratios of stiffness matter to the loads; this one keeps the matrix well scaled."""
+
+_JOINT_SPRINGS: Final = _UNIT_STIFFNESS * np.array([1.0, 0.32, 0.32, 0.054, 0.083, 0.083])
+"""Axial, two shears, torsion, two bendings of a unit cube's joint. Source: Euler-Bernoulli beam of
+square section, condensed to its midpoint, with a shear correction."""
+
+_BRACE_AXIAL: Final = 0.5 * _UNIT_STIFFNESS
+_BRACE_THICKNESS: Final = 0.4
+_FLUSH_TOLERANCE: Final = 0.05
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Link:
+    """A joint between two blocks of one machine.
+
+    Attributes:
+        name: Fit to be shown.
+        first: Index of one block.
+        second: Index of the other block.
+        kind: What kind of joint it is.
+        start: (3,) where it leaves the first block, machine frame, units.
+        end: (3,) where it reaches the second block; equals `start` unless it is a brace.
+    """
+
+    name: str
+    first: int
+    second: int
+    kind: JointKind
+    start: FloatArray
+    end: FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rope:
+    """A winch between two blocks; fields as in `Link`."""
+
+    name: str
+    first: int
+    second: int
+    start: FloatArray
+    end: FloatArray
+    mass: float
+
+
+def build_structure(
+    parts: Sequence[Part], links: Sequence[Link], ropes: Sequence[Rope], *, brace_mass: float
+) -> Structure:
+    """The structure of a machine; far joints are found here.
+
+    Args:
+        parts: The blocks, in creation order.
+        links: Attachments, axles and braces.
+        ropes: Winches.
+        brace_mass: Mass of one brace; half of it is carried by the block at each end.
+
+    Returns:
+        The structure, in the frame the parts are given in.
+    """
+    lumps: list[list[tuple[float, FloatArray]]] = [[] for _ in parts]
+    for link in links:
+        if link.kind is JointKind.BRACE:
+            lumps[link.first].append((brace_mass / 2, link.start))
+            lumps[link.second].append((brace_mass / 2, link.end))
+    for rope in ropes:
+        lumps[rope.first].append((rope.mass / 2, rope.start))
+        lumps[rope.second].append((rope.mass / 2, rope.end))
+    lumped = [_lump(part, extra) for part, extra in zip(parts, lumps, strict=True)]
+    directions = np.array(
+        [np.zeros(3) if part.direction is None else part.direction for part in parts]
+    )
+    return Structure(
+        parts=tuple(parts),
+        positions=np.array([part.center for part in parts]),
+        shown=np.array([part.shown for part in parts]),
+        rotations=np.array([part.rotation for part in parts]),
+        masses=np.array([mass for mass, _, _ in lumped]),
+        centers_of_mass=np.array([center for _, center, _ in lumped]),
+        inertias=np.array([inertia for _, _, inertia in lumped]),
+        members=_members(parts, [*links, *_far_joints(parts, links)]),
+        ropes=_ropes(ropes),
+        wheels=_indices(parts, Role.WHEEL),
+        cannons=_indices(parts, Role.CANNON),
+        torches=_indices(parts, Role.TORCH),
+        directions=directions,
+        linear_drag=LINEAR_DRAG
+        * np.array([part.mass / mass for part, (mass, _, _) in zip(parts, lumped, strict=True)]),
+        angular_drag=ANGULAR_DRAG
+        * np.array([0.0 if part.role is Role.WHEEL else 1.0 for part in parts]),
+    )
+
+
+def axis_frame(direction: FloatArray) -> FloatArray:
+    """A right-handed frame whose first axis points along a vector, (3, 3), columns are the axes."""
+    first = direction / np.linalg.norm(direction)
+    helper = np.array([0.0, 0.0, 1.0]) if abs(first[2]) < 0.9 else np.array([0.0, 1.0, 0.0])  # noqa: PLR2004 - any vector well off the axis will do
+    second = np.cross(helper, first)
+    second /= np.linalg.norm(second)
+    return np.column_stack([first, second, np.cross(first, second)])
+
+
+def _indices(parts: Sequence[Part], role: Role) -> IntArray:
+    return np.array([i for i, part in enumerate(parts) if part.role is role], dtype=np.int64)
+
+
+def _lump(
+    part: Part, extra: Sequence[tuple[float, FloatArray]]
+) -> tuple[float, FloatArray, FloatArray]:
+    mass = part.mass + sum(m for m, _ in extra)
+    center = (part.mass * part.center + sum((m * p for m, p in extra), np.zeros(3))) / mass
+    inertia = _own_inertia(part) + _point_inertia(part.mass, part.center - center)
+    for m, point in extra:
+        inertia += _point_inertia(m, point - center)
+    return mass, center, inertia
+
+
+def _own_inertia(part: Part) -> FloatArray:
+    """Inertia of a block about its own centre of mass, its mass spread evenly over its shapes."""
+    volumes = np.array([shape.volume for shape in part.shapes])
+    shares = volumes / volumes.sum()
+    middle = sum(
+        (s * shape.center for s, shape in zip(shares, part.shapes, strict=True)), np.zeros(3)
+    )
+    inertia = np.zeros((3, 3))
+    for share, shape in zip(shares, part.shapes, strict=True):
+        a, b, c = shape.half_extents
+        if shape.kind is ShapeKind.CYLINDER:
+            across = (3 * a**2 + (2 * c) ** 2) / 12
+            principal = np.array([across, across, a**2 / 2])
+        else:
+            principal = np.array([b**2 + c**2, a**2 + c**2, a**2 + b**2]) / 3
+        inertia += share * part.mass * (shape.rotation * principal) @ shape.rotation.T
+        inertia += _point_inertia(share * part.mass, shape.center - middle)
+    return inertia
+
+
+def _point_inertia(mass: float, r: FloatArray) -> FloatArray:
+    return np.asarray(mass * (r @ r * np.eye(3) - np.outer(r, r)))
+
+
+def _far_joints(parts: Sequence[Part], links: Sequence[Link]) -> list[Link]:
+    """Joints where a small block's far face lies flush on another block.
+
+    Source: public modding notes: small wooden blocks have a second joint at the far end that grabs
+    what it touches.
+    """
+    joined = {
+        frozenset((link.first, link.second)) for link in links if link.kind is not JointKind.BRACE
+    }
+    holders = [i for i, part in enumerate(parts) if part.role in (Role.START, Role.BLOCK)]
+    if not holders:
+        return []
+    bodies = [parts[i].shapes[0] for i in holders]
+    centers = np.array([body.center for body in bodies])
+    rotations = np.array([body.rotation for body in bodies])
+    halves = np.array([body.half_extents for body in bodies])
+    found = []
+    for i, part in enumerate(parts):
+        if not part.grabs:
+            continue
+        outward = part.rotation[:, 2]
+        tip = part.shapes[0].center + part.shapes[0].half_extents[2] * outward
+        local = np.einsum("nji,nj->ni", rotations, tip - centers)
+        facing = np.einsum("nji,j->ni", rotations, outward)
+        inside = (np.abs(local) <= halves + _FLUSH_TOLERANCE).all(axis=1)
+        # Flush: the tip lies on a face of the other block, whose normal is opposite to ours.
+        on_face = (np.abs(local + halves * np.sign(facing)) <= _FLUSH_TOLERANCE) & (
+            np.abs(facing) > 1.0 - 1e-3
+        )
+        for k in np.flatnonzero(inside & on_face.any(axis=1)):
+            j = holders[k]
+            if j != i and frozenset((i, j)) not in joined:
+                joined.add(frozenset((i, j)))
+                name = f"{part.id}~{parts[j].id}"
+                found.append(
+                    Link(name=name, first=i, second=j, kind=JointKind.FAR_JOINT, start=tip, end=tip)
+                )
+    return found
+
+
+def _members(parts: Sequence[Part], links: Sequence[Link]) -> Members:
+    frames, stiffness = [], []
+    for link in links:
+        if link.kind is JointKind.BRACE:
+            span = link.end - link.start
+            length = float(np.linalg.norm(span))
+            frames.append(axis_frame(span))
+            stiffness.append(_brace_springs(length))
+        else:
+            apart = parts[link.second].center - parts[link.first].center
+            if np.linalg.norm(apart) < 1e-9:  # noqa: PLR2004 - centres coincide: any axis will do
+                apart = parts[link.second].rotation[:, 2]
+            frames.append(axis_frame(apart))
+            stiffness.append(_JOINT_SPRINGS)
+    strengths = [JOINT_STRENGTH[link.kind] for link in links]
+    return Members(
+        names=tuple(link.name for link in links),
+        first=np.array([link.first for link in links], dtype=np.int64),
+        second=np.array([link.second for link in links], dtype=np.int64),
+        kind=np.array([JOINT_KINDS.index(link.kind) for link in links], dtype=np.int64),
+        point=np.array([(link.start + link.end) / 2 for link in links]).reshape(-1, 3),
+        frame=np.array(frames).reshape(-1, 3, 3),
+        stiffness=np.array(stiffness).reshape(-1, 6),
+        limits=np.array([(s.force, s.moment) for s in strengths]).reshape(-1, 2),
+    )
+
+
+def _brace_springs(length: float) -> FloatArray:
+    """Springs of a brace: an Euler-Bernoulli beam of square section, at its midpoint."""
+    bending = _BRACE_AXIAL * _BRACE_THICKNESS**2 / 12
+    span = max(length, 0.5)
+    return np.array(
+        [
+            _BRACE_AXIAL / span,
+            12 * bending / span**3,
+            12 * bending / span**3,
+            0.8 * bending / span,
+            bending / span,
+            bending / span,
+        ]
+    )
+
+
+def _ropes(ropes: Sequence[Rope]) -> Ropes:
+    first_point = np.array([rope.start for rope in ropes]).reshape(-1, 3)
+    second_point = np.array([rope.end for rope in ropes]).reshape(-1, 3)
+    return Ropes(
+        names=tuple(rope.name for rope in ropes),
+        first=np.array([rope.first for rope in ropes], dtype=np.int64),
+        second=np.array([rope.second for rope in ropes], dtype=np.int64),
+        first_point=first_point,
+        second_point=second_point,
+        length=np.linalg.norm(second_point - first_point, axis=1),
+        limit=np.full(len(ropes), ROPE_STRENGTH),
+    )

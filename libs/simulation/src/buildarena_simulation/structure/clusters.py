@@ -1,0 +1,238 @@
+"""Rigid clusters, the axles between them, and their mass properties.
+
+Blocks joined rigidly form a *cluster*; clusters joined by axles form an articulated *piece*, a
+tree whose root is its largest cluster.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from buildarena_simulation.constants import JointKind
+from buildarena_simulation.structure.model import (
+    JOINT_KINDS,
+    BoolArray,
+    FloatArray,
+    IntArray,
+    Structure,
+)
+
+_AXLE: Final = JOINT_KINDS.index(JointKind.AXLE)
+_COLLINEAR: Final = 1e-3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Clusters:
+    """How the blocks of a structure move together; C clusters, parents before children.
+
+    Attributes:
+        cluster_of: (N,) cluster of each block.
+        blocks: Per cluster, the indices of its blocks in ascending order.
+        parent: (C,) the cluster an axle hangs it on, -1 for a piece's root.
+        axle: (C,) the member that is this axle, -1 for a root.
+        wheel: (C,) the axle's wheel (block index), -1 for a root.
+        wheel_is_outer: (C,) whether the wheel belongs to this cluster rather than to its parent.
+        root: (C,) root cluster of its piece.
+        level: (C,) number of axles between it and its root.
+        mass: (C,) mass units.
+        center_of_mass: (C, 3) machine frame, units.
+        inertia: (C, 3, 3) about the centre of mass, machine frame axes.
+        linear_drag: (C,) mass-weighted mean over the cluster, 1/s.
+        angular_drag: (C,) mass-weighted mean over the cluster, 1/s.
+    """
+
+    cluster_of: IntArray
+    blocks: tuple[IntArray, ...]
+    parent: IntArray
+    axle: IntArray
+    wheel: IntArray
+    wheel_is_outer: BoolArray
+    root: IntArray
+    level: IntArray
+    mass: FloatArray
+    center_of_mass: FloatArray
+    inertia: FloatArray
+    linear_drag: FloatArray
+    angular_drag: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.blocks)
+
+    @property
+    def pieces(self) -> tuple[tuple[int, ...], ...]:
+        """Clusters of each piece, its root first."""
+        roots = np.flatnonzero(self.parent < 0)
+        return tuple(tuple(np.flatnonzero(self.root == root).tolist()) for root in roots)
+
+
+def find_clusters(structure: Structure, holds: BoolArray) -> Clusters:
+    """The clusters of a structure whose members partly hold.
+
+    An axle whose two sides are held together otherwise (a brace across it) is rigid. An axle that
+    closes a loop of clusters is redundant if it lies on the line of the axle it doubles; else the
+    loop cannot turn and is rigid.
+
+    Args:
+        structure: The machine.
+        holds: (M,) which members still hold.
+
+    Returns:
+        The clusters, ordered by piece (first block), parents before children.
+    """
+    members = structure.members
+    rigid = list(np.flatnonzero(holds & (members.kind != _AXLE)).tolist())
+    axles = np.flatnonzero(holds & (members.kind == _AXLE)).tolist()
+    while True:
+        groups = components(len(structure), ((members.first[k], members.second[k]) for k in rigid))
+        label = _labels(len(structure), groups)
+        open_axles = [k for k in axles if label[members.first[k]] != label[members.second[k]]]
+        tree, locked = _grow_trees(structure, groups, label, open_axles)
+        if not locked:
+            return _collect(structure, groups, tree)
+        rigid.extend(locked)
+
+
+def components(count: int, edges: Iterable[tuple[int, int]]) -> list[list[int]]:
+    """Connected components of a graph, each ascending, ordered by their smallest node."""
+    leader = list(range(count))
+
+    def find(i: int) -> int:
+        while leader[i] != i:
+            leader[i] = leader[leader[i]]
+            i = leader[i]
+        return i
+
+    for a, b in edges:
+        low, high = sorted((find(int(a)), find(int(b))))
+        leader[high] = low
+    groups: dict[int, list[int]] = {}
+    for i in range(count):
+        groups.setdefault(find(i), []).append(i)
+    return list(groups.values())
+
+
+def _labels(count: int, groups: Sequence[Sequence[int]]) -> list[int]:
+    label = [0] * count
+    for g, blocks in enumerate(groups):
+        for i in blocks:
+            label[i] = g
+    return label
+
+
+_Tree = list[tuple[int, int, int]]
+"""(group, parent group or -1, axle or -1), parents first."""
+
+
+def _grow_trees(
+    structure: Structure,
+    groups: Sequence[Sequence[int]],
+    label: Sequence[int],
+    axles: Sequence[int],
+) -> tuple[_Tree, list[int]]:
+    """Spanning trees of the groups along axles, and the axles that lock a loop."""
+    members = structure.members
+    edges = [(label[members.first[k]], label[members.second[k]]) for k in axles]
+    tree: _Tree = []
+    via: dict[int, int] = {}
+    for piece in components(len(groups), edges):
+        root = max(piece, key=lambda g: (len(groups[g]), -g))
+        reached = {root}
+        tree.append((root, -1, -1))
+        waiting = [root]
+        while waiting:
+            current = waiting.pop(0)
+            for k, (a, b) in zip(axles, edges, strict=True):
+                if current not in (a, b):
+                    continue
+                other = b if a == current else a
+                if other not in reached:
+                    reached.add(other)
+                    via[other] = k
+                    tree.append((other, current, k))
+                    waiting.append(other)
+    parent = {group: up for group, up, _ in tree}
+    locked = []
+    for k, (a, b) in zip(axles, edges, strict=True):
+        if via.get(a) == k or via.get(b) == k:
+            continue
+        doubled = via[a] if parent[a] == b else via[b] if parent[b] == a else None
+        if doubled is None or not _collinear(structure, k, doubled):
+            locked.extend([k, *_path(parent, via, a, b)])
+    return tree, locked
+
+
+def _path(parent: dict[int, int], via: dict[int, int], a: int, b: int) -> list[int]:
+    """Axles on the tree path between two groups."""
+    up_a, up_b = [a], [b]
+    for line in (up_a, up_b):
+        while parent[line[-1]] >= 0:
+            line.append(parent[line[-1]])
+    meeting = next(g for g in up_a if g in set(up_b))
+    return [via[g] for line in (up_a, up_b) for g in line[: line.index(meeting)]]
+
+
+def _collinear(structure: Structure, k: int, other: int) -> bool:
+    wheels = structure.members.second[[k, other]]
+    first, second = structure.directions[wheels]
+    apart = structure.positions[wheels[1]] - structure.positions[wheels[0]]
+    return bool(
+        np.linalg.norm(np.cross(first, second)) < _COLLINEAR
+        and np.linalg.norm(np.cross(first, apart)) < _COLLINEAR
+    )
+
+
+def _collect(structure: Structure, groups: Sequence[Sequence[int]], tree: _Tree) -> Clusters:
+    place = {group: c for c, (group, _, _) in enumerate(tree)}
+    blocks = tuple(np.array(groups[group], dtype=np.int64) for group, _, _ in tree)
+    parent = np.array([place.get(up, -1) for _, up, _ in tree], dtype=np.int64)
+    axle = np.array([k for _, _, k in tree], dtype=np.int64)
+    cluster_of = np.zeros(len(structure), dtype=np.int64)
+    for c, ids in enumerate(blocks):
+        cluster_of[ids] = c
+    root, level = np.arange(len(tree)), np.zeros(len(tree), dtype=np.int64)
+    for c, up in enumerate(parent):
+        if up >= 0:
+            root[c], level[c] = root[up], level[up] + 1
+    wheel = np.where(
+        axle >= 0, structure.members.second[axle] if len(structure.members) else -1, -1
+    )
+    mass, center, inertia = _mass_properties(structure, blocks)
+    return Clusters(
+        cluster_of=cluster_of,
+        blocks=blocks,
+        parent=parent,
+        axle=axle,
+        wheel=wheel,
+        wheel_is_outer=(wheel >= 0) & (cluster_of[wheel] == np.arange(len(tree))),
+        root=root,
+        level=level,
+        mass=mass,
+        center_of_mass=center,
+        inertia=inertia,
+        linear_drag=np.array([structure.linear_drag[i] @ structure.masses[i] for i in blocks])
+        / mass,
+        angular_drag=np.array([structure.angular_drag[i] @ structure.masses[i] for i in blocks])
+        / mass,
+    )
+
+
+def _mass_properties(
+    structure: Structure, clusters: Sequence[IntArray]
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    mass = np.array([structure.masses[ids].sum() for ids in clusters])
+    center = (
+        np.array([structure.masses[ids] @ structure.centers_of_mass[ids] for ids in clusters])
+        / mass[:, None]
+    )
+    inertia = np.empty((len(clusters), 3, 3))
+    for c, ids in enumerate(clusters):
+        r = structure.centers_of_mass[ids] - center[c]
+        m = structure.masses[ids]
+        inertia[c] = (
+            structure.inertias[ids].sum(axis=0)
+            + (m * (r * r).sum(axis=1)).sum() * np.eye(3)
+            - (m[:, None] * r).T @ r
+        )
+    return mass, center, inertia

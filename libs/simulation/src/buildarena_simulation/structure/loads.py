@@ -1,0 +1,228 @@
+"""Joint loads: from the wrenches on the blocks to the force and moment in every joint.
+
+Wrenches are in mass·g (moments in mass·g·unit), low-pass filtered in the axes of their piece's
+root cluster (not of a spinning wheel, where a steady load would look like a rotating one).
+`docs/physics.md` derives the equations.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from buildarena_simulation.constants import GRAVITY, LOAD_FILTER_S
+from buildarena_simulation.structure.clusters import Clusters
+from buildarena_simulation.structure.model import BoolArray, FloatArray, IntArray, Structure
+from buildarena_simulation.structure.motion import Motion
+from buildarena_simulation.structure.stiffness import StiffnessModel
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PointForces:
+    """Forces on blocks: contacts, friction, thrust, ropes; K of them.
+
+    Attributes:
+        block: (K,) block each acts on.
+        point: (K, 3) where it acts, world frame, units.
+        force: (K, 3) world frame, mass·unit/s².
+    """
+
+    block: IntArray
+    point: FloatArray
+    force: FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointLoads:
+    """What the joints bear at one moment.
+
+    Attributes:
+        force: (M,) norm of the force, mass·g; 0 for members that bear none.
+        moment: (M,) norm of the moment, mass·g·unit.
+        ratio: (M,) the larger of force and moment over its limit.
+    """
+
+    force: FloatArray
+    moment: FloatArray
+    ratio: FloatArray
+
+
+class LoadModel:
+    """Follows the joint loads of one machine through a trial.
+
+    Args:
+        structure: The machine.
+        clusters: Its clusters at the start.
+        motion: Their motion at the start.
+        interval_s: Time between two evaluations, seconds.
+    """
+
+    def __init__(
+        self, structure: Structure, clusters: Clusters, motion: Motion, *, interval_s: float
+    ) -> None:
+        self._structure = structure
+        self._stiffness = StiffnessModel(structure)
+        self._interval_s = interval_s
+        self._blend = 1.0 - math.exp(-interval_s / LOAD_FILTER_S)
+        self._wrenches = np.zeros((len(structure), 6))
+        self.holds: BoolArray = np.ones(len(structure.members), dtype=bool)
+        self._enter(clusters, motion)
+        self._inertial = np.zeros((len(clusters), 6))
+
+    def rebuild(self, clusters: Clusters, motion: Motion) -> None:
+        """Takes over the clusters left after a break; filtered loads are carried along."""
+        before = self._root_rotation[self._clusters.cluster_of]
+        source = np.array([self._clusters.cluster_of[ids[0]] for ids in clusters.blocks])
+        inertial_before = self._root_rotation[source]
+        inertial = self._inertial[source]
+        share = clusters.mass / self._clusters.mass[source]
+        self._enter(clusters, motion)
+        turn = self._root_rotation[clusters.cluster_of].transpose(0, 2, 1) @ before
+        self._wrenches = _turned(turn, self._wrenches)
+        turn = self._root_rotation.transpose(0, 2, 1) @ inertial_before
+        self._inertial = _turned(turn, inertial) * share[:, None]
+
+    def evaluate(self, forces: PointForces, motion: Motion) -> JointLoads:
+        """Joint loads after one more interval.
+
+        Args:
+            forces: Mean forces on the blocks over the interval, without gravity.
+            motion: The clusters' motion now.
+
+        Returns:
+            The loads of all members.
+        """
+        self._update(forces, motion)
+        clusters = self._clusters
+        relative = motion.rotation.transpose(0, 2, 1) @ self._root_rotation
+        wrenches = _turned(relative[clusters.cluster_of], self._wrenches)
+        count = len(self.holds)
+        force, moment = np.zeros(count), np.zeros(count)
+        self._add_axle_reactions(wrenches, relative, force, moment)
+        members = self._solver.solve(self._relieved(wrenches))
+        inside = self._solver.inside
+        force[inside] = np.sqrt((members[:, :3] ** 2).sum(axis=1))
+        moment[inside] = np.sqrt((members[:, 3:] ** 2).sum(axis=1))
+        limits = self._structure.members.limits
+        ratio = np.maximum(force / limits[:, 0], moment / limits[:, 1])
+        return JointLoads(force=force, moment=moment, ratio=ratio)
+
+    def _enter(self, clusters: Clusters, motion: Motion) -> None:
+        structure = self._structure
+        self._clusters = clusters
+        self._root_rotation = motion.rotation[clusters.root]
+        self._velocity, self._spin = motion.velocity, motion.spin
+        self._solver = self._stiffness.factorize(clusters, self.holds)
+        self._arm = structure.centers_of_mass - clusters.center_of_mass[clusters.cluster_of]
+        self._compliance = np.linalg.inv(clusters.inertia)
+        self._children = [
+            np.flatnonzero(clusters.level == level)
+            for level in range(int(clusters.level.max()), 0, -1)
+        ]
+
+    def _update(self, forces: PointForces, motion: Motion) -> None:
+        """Filters the wrenches on the blocks and the clusters' rates of momentum."""
+        structure, clusters = self._structure, self._clusters
+        self._root_rotation = motion.rotation[clusters.root]
+        centers = motion.points(clusters, structure.centers_of_mass)
+        world = _summed(forces, centers) / GRAVITY
+        world[:, 2] -= structure.masses
+        to_root = self._root_rotation.transpose(0, 2, 1)
+        local = _turned(to_root[clusters.cluster_of], world)
+        self._wrenches += self._blend * (local - self._wrenches)
+        rate = np.concatenate(
+            [
+                clusters.mass[:, None] * (motion.velocity - self._velocity),
+                np.einsum(
+                    "cij,cj->ci",
+                    motion.rotation @ clusters.inertia @ motion.rotation.transpose(0, 2, 1),
+                    motion.spin - self._spin,
+                ),
+            ],
+            axis=1,
+        ) / (self._interval_s * GRAVITY)
+        self._velocity, self._spin = motion.velocity, motion.spin
+        self._inertial += self._blend * (_turned(to_root, rate) - self._inertial)
+
+    def _add_axle_reactions(
+        self, wrenches: FloatArray, relative: FloatArray, force: FloatArray, moment: FloatArray
+    ) -> None:
+        """Adds what each axle transmits to its two blocks, outermost axles first.
+
+        The axle gives the outer cluster what its inertia needs and its other loads do not provide.
+
+        Args:
+            wrenches: (N, 6) on the blocks, each in its own cluster's axes; changed in place.
+            relative: (C, 3, 3) cluster_from_root.
+            force: (M,) filled in for the axles.
+            moment: (M,) filled in for the axles.
+        """
+        structure, clusters = self._structure, self._clusters
+        members = structure.members
+        inertial = _turned(relative, self._inertial)
+        for level in self._children:
+            total = self._cluster_totals(wrenches)[level]
+            needed = inertial[level] - total
+            axle = clusters.axle[level]
+            wheel_is_outer = clusters.wheel_is_outer[level]
+            outer = np.where(wheel_is_outer, members.second[axle], members.first[axle])
+            inner = np.where(wheel_is_outer, members.first[axle], members.second[axle])
+            hinge = structure.positions[clusters.wheel[level]]
+            transmitted = needed[:, :3]
+            at_hinge = needed[:, 3:] - np.cross(hinge - clusters.center_of_mass[level], transmitted)
+            wrenches[outer, :3] += transmitted
+            wrenches[outer, 3:] += at_hinge + np.cross(
+                hinge - structure.centers_of_mass[outer], transmitted
+            )
+            parent = clusters.parent[level]
+            turn = relative[parent] @ relative[level].transpose(0, 2, 1)
+            # The hinge is the same world point in both frames, on the axis both clusters share.
+            back = np.concatenate([transmitted, at_hinge], axis=1)
+            back = -_turned(turn, back)
+            arm = hinge - structure.centers_of_mass[inner]
+            back[:, 3:] += np.cross(arm, back[:, :3])
+            np.add.at(wrenches, inner, back)
+            axis = structure.directions[clusters.wheel[level]]
+            bending = at_hinge + np.cross(hinge - members.point[axle], transmitted)
+            bending -= (bending * axis).sum(axis=1)[:, None] * axis
+            force[axle] = np.sqrt((transmitted**2).sum(axis=1))
+            moment[axle] = np.sqrt((bending**2).sum(axis=1))
+
+    def _cluster_totals(self, wrenches: FloatArray) -> FloatArray:
+        """Resultant on each cluster about its centre of mass, (C, 6)."""
+        moments = wrenches[:, 3:] + np.cross(self._arm, wrenches[:, :3])
+        both = np.concatenate([wrenches[:, :3], moments], axis=1)
+        cluster_of, count = self._clusters.cluster_of, len(self._clusters)
+        return np.array([np.bincount(cluster_of, both[:, k], minlength=count) for k in range(6)]).T
+
+    def _relieved(self, wrenches: FloatArray) -> FloatArray:
+        """Wrenches less what accelerates the blocks (inertia relief): m·(a + α × r) and I·α."""
+        structure, clusters = self._structure, self._clusters
+        total = self._cluster_totals(wrenches)
+        a = total[:, :3] / clusters.mass[:, None]
+        alpha = np.einsum("cij,cj->ci", self._compliance, total[:, 3:])
+        a, alpha = a[clusters.cluster_of], alpha[clusters.cluster_of]
+        relieved = wrenches.copy()
+        relieved[:, :3] -= structure.masses[:, None] * (a + np.cross(alpha, self._arm))
+        relieved[:, 3:] -= np.einsum("nij,nj->ni", structure.inertias, alpha)
+        return relieved
+
+
+def _summed(forces: PointForces, centers: FloatArray) -> FloatArray:
+    """Wrench on each block about its centre of mass, (N, 6), world frame."""
+    moments = np.cross(forces.point - centers[forces.block], forces.force)
+    both = np.concatenate([forces.force, moments], axis=1)
+    return np.array(
+        [np.bincount(forces.block, both[:, k], minlength=len(centers)) for k in range(6)]
+    ).T
+
+
+def _turned(rotations: FloatArray, wrenches: FloatArray) -> FloatArray:
+    """Each wrench (K, 6) turned by its rotation (K, 3, 3)."""
+    return np.concatenate(
+        [
+            np.einsum("kij,kj->ki", rotations, wrenches[:, :3]),
+            np.einsum("kij,kj->ki", rotations, wrenches[:, 3:]),
+        ],
+        axis=1,
+    )

@@ -1,0 +1,73 @@
+"""Where the clusters are and how they move, and how that is carried over a break."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from buildarena_simulation.structure.clusters import Clusters
+from buildarena_simulation.structure.model import FloatArray, Structure
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Motion:
+    """Poses and velocities of C clusters, world frame.
+
+    Attributes:
+        position: (C, 3) of the machine frame's origin, carried along by the cluster, units.
+        rotation: (C, 3, 3) world_from_machine.
+        velocity: (C, 3) of the cluster's centre of mass, units/s.
+        spin: (C, 3) angular velocity, rad/s.
+    """
+
+    position: FloatArray
+    rotation: FloatArray
+    velocity: FloatArray
+    spin: FloatArray
+
+    def block_positions(self, structure: Structure, clusters: Clusters) -> FloatArray:
+        """Centres of mass of all blocks without connectors, (N, 3), world frame, units."""
+        return self.points(clusters, structure.positions)
+
+    def points(self, clusters: Clusters, points: FloatArray) -> FloatArray:
+        """World position of one machine-frame point per block, (N, 3)."""
+        c = clusters.cluster_of
+        return np.asarray(self.position[c] + np.einsum("nij,nj->ni", self.rotation[c], points))
+
+    def centers_of_mass(self, clusters: Clusters) -> FloatArray:
+        """Centres of mass of the clusters, (C, 3), world frame, units."""
+        return np.asarray(
+            self.position + np.einsum("cij,cj->ci", self.rotation, clusters.center_of_mass)
+        )
+
+    def after_break(self, old: Clusters, new: Clusters) -> "Motion":
+        """The same motion, told for the clusters left after a break.
+
+        Poses stay; each new cluster's centre of mass keeps the velocity the old cluster had there
+        (v + ω × r), so linear and angular momentum stay as they were.
+        """
+        source = np.array([old.cluster_of[ids[0]] for ids in new.blocks])
+        rotation, spin = self.rotation[source], self.spin[source]
+        arm = np.einsum("cij,cj->ci", rotation, new.center_of_mass - old.center_of_mass[source])
+        return Motion(
+            position=self.position[source],
+            rotation=rotation,
+            velocity=self.velocity[source] + np.cross(spin, arm),
+            spin=spin,
+        )
+
+
+def at_rest(clusters: Clusters, position: FloatArray, rotation: FloatArray) -> Motion:
+    """All clusters at rest, the machine frame put at one pose.
+
+    Args:
+        clusters: The clusters.
+        position: (3,) world position of the machine frame's origin, units.
+        rotation: (3, 3) world_from_machine.
+    """
+    count = len(clusters)
+    return Motion(
+        position=np.tile(position, (count, 1)),
+        rotation=np.tile(rotation, (count, 1, 1)),
+        velocity=np.zeros((count, 3)),
+        spin=np.zeros((count, 3)),
+    )

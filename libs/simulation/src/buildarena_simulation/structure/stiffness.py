@@ -1,0 +1,127 @@
+"""Direct stiffness: from nodal wrenches to the forces in the joints.
+
+Every block is a node of six degrees of freedom, every joint six springs at its midpoint. All
+clusters are solved at once: the first block of each is its ground, whose reaction vanishes because
+the loads are self-equilibrated.
+"""
+
+import numpy as np
+
+from buildarena_simulation.structure.clusters import Clusters
+from buildarena_simulation.structure.model import BoolArray, FloatArray, IntArray, Structure
+
+
+class StiffnessModel:
+    """Springs of a structure's members, ready to be factorised for any set of clusters.
+
+    Args:
+        structure: The machine; its machine frame is the frame of every wrench here.
+    """
+
+    def __init__(self, structure: Structure) -> None:
+        members = structure.members
+        count = len(members)
+        self._node_count = len(structure)
+        self._first, self._second = members.first, members.second
+        frame = members.frame.transpose(0, 2, 1)
+        strain = np.zeros((count, 6, 12))
+        for side, nodes, sign in ((0, members.first, -1.0), (6, members.second, 1.0)):
+            arm = members.point - structure.centers_of_mass[nodes]
+            strain[:, :3, side : side + 3] = sign * frame
+            strain[:, :3, side + 3 : side + 6] = -sign * frame @ _cross_matrices(arm)
+            strain[:, 3:, side + 3 : side + 6] = sign * frame
+        self._stress = members.stiffness[:, :, None] * strain
+        self._element = strain.transpose(0, 2, 1) @ self._stress
+
+    def factorize(self, clusters: Clusters, holds: BoolArray) -> "MemberForces":
+        """The solver for one set of clusters.
+
+        Args:
+            clusters: The clusters.
+            holds: (M,) which members still hold.
+        """
+        from scipy.sparse import coo_matrix  # noqa: PLC0415 - heavy, and only simulations need it
+        from scipy.sparse.linalg import splu  # noqa: PLC0415
+
+        inside = np.flatnonzero(
+            holds & (clusters.cluster_of[self._first] == clusters.cluster_of[self._second])
+        )
+        grounds = np.array([ids[0] for ids in clusters.blocks])
+        free = np.ones(self._node_count, dtype=bool)
+        free[grounds] = False
+        dof = np.full((self._node_count, 6), -1, dtype=np.int64)
+        dof[free] = np.arange(6 * int(free.sum())).reshape(-1, 6)
+        if not len(inside) or not free.any():
+            return MemberForces(inside=inside, free=free, stress=self._stress[inside], solver=None)
+        rows = np.concatenate([dof[self._first[inside]], dof[self._second[inside]]], axis=1)
+        i = np.repeat(rows, 12, axis=1).reshape(-1)
+        j = np.tile(rows, (1, 12)).reshape(-1)
+        kept = (i >= 0) & (j >= 0)
+        size = 6 * int(free.sum())
+        matrix = coo_matrix(
+            (self._element[inside].reshape(-1)[kept], (i[kept], j[kept])), shape=(size, size)
+        ).tocsc()
+        solver = splu(
+            matrix,
+            permc_spec="MMD_AT_PLUS_A",
+            diag_pivot_thresh=0.0,
+            options={"SymmetricMode": True},
+        )
+        return MemberForces(
+            inside=inside,
+            free=free,
+            stress=self._stress[inside],
+            solver=solver,
+            first=self._first[inside],
+            second=self._second[inside],
+        )
+
+
+class MemberForces:
+    """A factorised stiffness matrix; maps self-equilibrated wrenches to member forces.
+
+    Attributes:
+        inside: (K,) indices of the members it tells of: those within one cluster.
+    """
+
+    def __init__(  # noqa: D417 - an inner product of `StiffnessModel.factorize`
+        self,
+        *,
+        inside: IntArray,
+        free: BoolArray,
+        stress: FloatArray,
+        solver: object,
+        first: IntArray | None = None,
+        second: IntArray | None = None,
+    ) -> None:
+        self.inside = inside
+        self._free = free
+        self._stress = stress
+        self._solver = solver
+        self._first, self._second = first, second
+
+    def solve(self, wrenches: FloatArray) -> FloatArray:
+        """Forces and moments in the members.
+
+        Args:
+            wrenches: (N, 6) force and moment on each block about its centre of mass, machine frame,
+                self-equilibrated within each cluster.
+
+        Returns:
+            (K, 6) force and moment in each member at its midpoint, member frame.
+        """
+        if self._solver is None:
+            return np.zeros((len(self.inside), 6))
+        displacement = np.zeros_like(wrenches)
+        displacement[self._free] = self._solver.solve(wrenches[self._free].reshape(-1)).reshape(
+            -1, 6
+        )
+        ends = np.concatenate([displacement[self._first], displacement[self._second]], axis=1)
+        return np.asarray((self._stress @ ends[:, :, None])[:, :, 0])
+
+
+def _cross_matrices(vectors: FloatArray) -> FloatArray:
+    """Matrices of the cross product with each vector, (K, 3, 3)."""
+    x, y, z = vectors.T
+    zero = np.zeros_like(x)
+    return np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)

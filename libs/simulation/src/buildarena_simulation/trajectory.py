@@ -1,0 +1,146 @@
+"""What a trial leaves behind: poses at 25 Hz, cargo, heating, joint peaks and breaks."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Final, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+Setting = float | int | str
+
+POSE_GRAIN: Final = 2.0**-14
+"""Positions are multiples of this (6e-5 units), so that they compress well and round-trip."""
+
+QUATERNION_GRAIN: Final = 2.0**-18
+"""Components of quaternions are multiples of this (4e-6)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointPeak:
+    """The largest load a joint bore while it held.
+
+    Attributes:
+        joint: What it joins: "1-2", "brace 7", …
+        kind: What kind of joint it is.
+        force: Largest force, mass·g.
+        moment: Largest moment, mass·g·unit.
+        ratio: Largest share of its strength, 1 at a break.
+    """
+
+    joint: str
+    kind: str
+    force: float
+    moment: float
+    ratio: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Break:
+    """A joint that broke.
+
+    Attributes:
+        time_s: When, seconds.
+        joint: What it joined.
+        kind: What kind of joint it was.
+        ratio: Its load over its strength.
+        cargo_mass: Mass of the cargo at that time, mass units; None without cargo.
+    """
+
+    time_s: float
+    joint: str
+    kind: str
+    ratio: float
+    cargo_mass: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Trajectory:
+    """The rollout of one trial: T instants, N tracked blocks, C cannons.
+
+    Positions are the points shown to models as the blocks' positions; with a block's quaternion
+    (world_from_block) they give its pose: the block's root lies at
+    `position - rotation @ module.center`. Arrays are read-only.
+
+    Attributes:
+        time_s: (T,) float64, seconds.
+        block_ids: (N,) ids of the tracked blocks.
+        positions: (T, N, 3) float32, world frame, units.
+        quaternions: (T, N, 4) float32, world_from_block as (w, x, y, z).
+        cargo_position: (T, 3) float32, the cargo's centre; None without cargo.
+        cargo_quaternion: (T, 4) float32; None without cargo.
+        cargo_mass: (T,) float64, mass units; None without cargo.
+        cargo_size: (3,) full extents, units; None without cargo.
+        cannon_ids: (C,) ids of all cannons.
+        heated: (T, C) bool, which cannons a flame touches.
+        joint_peaks: One per joint.
+        breaks: In order of time.
+        engine: Name of the engine.
+        engine_version: Version of the engine's library.
+        simulation_version: Version of the shared model.
+        settings: Everything about the set-up that can change a trajectory.
+    """
+
+    time_s: NDArray[np.float64]
+    block_ids: tuple[str, ...]
+    positions: NDArray[np.float32]
+    quaternions: NDArray[np.float32]
+    cargo_position: NDArray[np.float32] | None
+    cargo_quaternion: NDArray[np.float32] | None
+    cargo_mass: NDArray[np.float64] | None
+    cargo_size: tuple[float, float, float] | None
+    cannon_ids: tuple[str, ...]
+    heated: NDArray[np.bool_]
+    joint_peaks: tuple[JointPeak, ...]
+    breaks: tuple[Break, ...]
+    engine: str
+    engine_version: str
+    simulation_version: str
+    settings: Mapping[str, Setting]
+
+    def __post_init__(self) -> None:
+        """Checks that the arrays fit together, and closes them."""
+        count, blocks = len(self.time_s), len(self.block_ids)
+        wanted: dict[str, tuple[int, ...]] = {
+            "positions": (count, blocks, 3),
+            "quaternions": (count, blocks, 4),
+            "cargo_position": (count, 3),
+            "cargo_quaternion": (count, 4),
+            "cargo_mass": (count,),
+            "heated": (count, len(self.cannon_ids)),
+        }
+        for name, shape in wanted.items():
+            array = getattr(self, name)
+            if array is not None and array.shape != shape:
+                raise ValueError(f"{name} has shape {array.shape}, expected {shape}")
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if isinstance(value, np.ndarray):
+                value.setflags(write=False)
+
+    def to_parquet(self) -> bytes:
+        """The trajectory as a Parquet file (zstd, byte-stream split)."""
+        from buildarena_simulation.parquet import write_trajectory  # noqa: PLC0415 - pyarrow is heavy
+
+        return write_trajectory(self)
+
+    @classmethod
+    def from_parquet(cls, data: bytes) -> Self:
+        """The trajectory a Parquet file holds.
+
+        Raises:
+            TrajectoryFormatError: The bytes are no trajectory of a schema this version reads.
+        """
+        from buildarena_simulation.parquet import read_trajectory  # noqa: PLC0415 - pyarrow is heavy
+
+        return cls(**read_trajectory(data))
+
+
+def rounded_positions(positions: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Positions as they are stored."""
+    return (np.round(positions / POSE_GRAIN) * POSE_GRAIN).astype(np.float32)
+
+
+def rounded_quaternions(quaternions: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Quaternions as they are stored."""
+    return (np.round(quaternions / QUATERNION_GRAIN) * QUATERNION_GRAIN).astype(np.float32)
