@@ -1,1 +1,56 @@
-"""What BuildArena keeps: tables, repositories and artifacts."""
+"""What BuildArena keeps: tables, repositories and artifacts.
+
+Postgres is the truth about jobs; the artifact store keeps the large results by content hash.
+Rows leave this room as frozen dataclasses, never as database objects.
+"""
+
+from buildarena_store.artifacts import ArtifactInfo, ArtifactStore
+from buildarena_store.database import Database
+from buildarena_store.errors import (
+    ArtifactMissingError,
+    SchemaVersionError,
+    StaleLeaseError,
+    StoreError,
+    UnknownIdError,
+)
+from buildarena_store.events import Event, Events
+from buildarena_store.jobs import Job, JobKey, Jobs, NewJob
+from buildarena_store.journal import Journal, JournalEntry, Usage
+from buildarena_store.leases import Lease, Leases
+from buildarena_store.results import JobScore, Results
+from buildarena_store.rollouts import RolloutRecord, RolloutRequest, Rollouts
+from buildarena_store.sweeps import NewSweep, Sweep, SweepProgress, Sweeps
+from buildarena_store.workers import WorkerInfo, Workers
+
+__all__ = [
+    "ArtifactInfo",
+    "ArtifactMissingError",
+    "ArtifactStore",
+    "Database",
+    "Event",
+    "Events",
+    "Job",
+    "JobKey",
+    "JobScore",
+    "Jobs",
+    "Journal",
+    "JournalEntry",
+    "Lease",
+    "Leases",
+    "NewJob",
+    "NewSweep",
+    "Results",
+    "RolloutRecord",
+    "RolloutRequest",
+    "Rollouts",
+    "SchemaVersionError",
+    "StaleLeaseError",
+    "StoreError",
+    "Sweep",
+    "SweepProgress",
+    "Sweeps",
+    "UnknownIdError",
+    "Usage",
+    "WorkerInfo",
+    "Workers",
+]

@@ -1,0 +1,95 @@
+"""The API as the command line sees it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from typing import Any
+
+import httpx
+
+from buildarena_cli.errors import CommandError
+
+TIMEOUT_S = 60.0
+PATIENCE_S = 60.0
+"""How long a watching command puts up with a service that is being restarted."""
+
+
+class Client:
+    """Sends requests and turns problems into CommandErrors.
+
+    Args:
+        url: Where the API is, for example ``http://127.0.0.1:8321``.
+    """
+
+    def __init__(self, url: str) -> None:
+        self.url = url.rstrip("/")
+        self._http = httpx.Client(
+            base_url=self.url, timeout=TIMEOUT_S, transport=httpx.HTTPTransport(retries=2)
+        )
+
+    def get(self, path: str, **params: Any) -> Any:
+        """The JSON answer to a GET; parameters that are None are left out."""
+        given = {name: value for name, value in params.items() if value is not None}
+        return self._answer("GET", path, params=given).json()
+
+    def get_bytes(self, path: str) -> bytes:
+        """The bytes of a GET."""
+        return self._answer("GET", path).content
+
+    def post(self, path: str, body: Mapping[str, Any]) -> Any:
+        """The JSON answer to a POST."""
+        return self._answer("POST", path, json=dict(body)).json()
+
+    def get_patiently(self, path: str) -> Any:
+        """As get, but waits while the service is unreachable or says 503."""
+        deadline = time.monotonic() + PATIENCE_S
+        while True:
+            try:
+                return self.get(path)
+            except UnreachableError:
+                if time.monotonic() > deadline:
+                    raise
+                time.sleep(0.5)
+
+    def close(self) -> None:
+        """Closes the connections."""
+        self._http.close()
+
+    def _answer(self, method: str, path: str, **options: Any) -> httpx.Response:
+        try:
+            response = self._http.request(method, path, **options)
+        except httpx.InvalidURL as error:
+            raise CommandError(f"{self.url!r} is no URL: {error}") from error
+        except httpx.TransportError as error:
+            raise UnreachableError(
+                f"no BuildArena answers at {self.url} ({error}): start it with `buildarena up`, "
+                "or name another with --url or BUILDARENA_URL"
+            ) from error
+        if response.status_code == httpx.codes.SERVICE_UNAVAILABLE and path != "/v1/health":
+            raise UnreachableError(_problem(response))
+        if response.is_error and path != "/v1/health":
+            raise CommandError(_problem(response))
+        return response
+
+
+class UnreachableError(CommandError):
+    """The service does not answer now; it may later."""
+
+
+def _problem(response: httpx.Response) -> str:
+    try:
+        problem = response.json()
+        errors = problem["errors"]
+        detail = str(problem["detail"])
+    except (ValueError, KeyError, TypeError):
+        return f"HTTP {response.status_code} from {response.url}"
+    if not errors:
+        return detail
+    lines = []
+    for error in errors:
+        line = f"{error['field']}: {error['message']}"
+        if error["choices"]:
+            line += f"; choose from {', '.join(error['choices'])}"
+        lines.append(line)
+    return "\n".join(lines)

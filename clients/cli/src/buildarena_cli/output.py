@@ -1,0 +1,63 @@
+"""What commands print: JSON for programs, tables that fit the terminal for people."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+console = Console(highlight=False)
+error_console = Console(stderr=True, highlight=False)
+
+
+def print_json(value: Any) -> None:
+    """One JSON document on standard output."""
+    console.file.write(json.dumps(value, indent=2, ensure_ascii=False) + "\n")
+
+
+def number(value: float | None, digits: int = 1) -> str:
+    """A number for people; a dash for nothing."""
+    return "–" if value is None else f"{value:,.{digits}f}"
+
+
+def percent(value: float | None) -> str:
+    """A share for people."""
+    return "–" if value is None else f"{100 * value:.0f} %"
+
+
+def leaderboard_tables(board: dict[str, Any]) -> list[Table]:
+    """One table for each task of a leaderboard answer."""
+    tables = []
+    for task in board["tasks"]:
+        table = Table(title=f"{task['task']} · {task['indicator']}", title_justify="left")
+        table.add_column("#", justify="right")
+        table.add_column("model", overflow="fold")
+        for name in (
+            "success",
+            "95 % interval",
+            "indicator",
+            "parts",
+            "requests",
+            "tokens out",
+            "USD",
+        ):
+            table.add_column(name, justify="right")
+        for place, row in enumerate(task["rows"], start=1):
+            interval = "–"
+            if row["success_low"] is not None:
+                interval = f"{100 * row['success_low']:.0f}–{100 * row['success_high']:.0f} %"
+            table.add_row(
+                str(place),
+                row["model"] + (" (baseline)" if row["baseline"] else ""),
+                f"{row['successes']}/{row['trials']}",
+                interval,
+                number(row["indicator_mean"]),
+                number(row["parts_mean"]),
+                number(row["requests_mean"]),
+                number(row["output_tokens_mean"], 0),
+                number(row["cost_usd_mean"], 3),
+            )
+        tables.append(table)
+    return tables

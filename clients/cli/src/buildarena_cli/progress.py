@@ -1,0 +1,86 @@
+"""Watching a sweep: live bars on a terminal, plain lines elsewhere."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+from buildarena_cli.client import Client
+from buildarena_cli.errors import DONE, PARTIAL
+from buildarena_cli.output import console
+
+POLL_S = 0.3
+PLAIN_POLL_S = 2.0
+FAULTS = ("errored", "cancelled")
+
+
+def watch_sweep(client: Client, sweep_id: str) -> dict[str, Any]:
+    """Shows a sweep's progress until every job has ended.
+
+    Returns:
+        The sweep as the API shows it then.
+    """
+    return _watch_bars(client, sweep_id) if console.is_terminal else _watch_lines(client, sweep_id)
+
+
+def exit_code(sweep: dict[str, Any]) -> int:
+    """0 when every job was scored, 3 when some errored or were cancelled."""
+    outcomes = sweep["progress"]["outcomes"]
+    return PARTIAL if any(outcomes.get(name) for name in FAULTS) else DONE
+
+
+def _watch_bars(client: Client, sweep_id: str) -> dict[str, Any]:
+    bars = Progress(
+        TextColumn("{task.description:<24}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TextColumn("{task.fields[note]}"),
+        console=console,
+    )
+    with bars:
+        built = bars.add_task("machines built", total=None, note="")
+        scored = bars.add_task("jobs scored", total=None, note="")
+        while True:
+            sweep: dict[str, Any] = client.get_patiently(f"/v1/sweeps/{sweep_id}")
+            progress = sweep["progress"]
+            stages = progress["stages"]
+            building = sum(n for name, n in stages.items() if name.startswith("construct"))
+            bars.update(
+                built,
+                total=progress["total"],
+                completed=progress["total"] - building,
+                note=f"{progress['requests']:,} requests",
+            )
+            bars.update(
+                scored,
+                total=progress["total"],
+                completed=progress["done"],
+                note=f"${progress['cost_usd']:.2f}  {_outcomes(progress)}",
+            )
+            if progress["done"] == progress["total"]:
+                return sweep
+            time.sleep(POLL_S)
+
+
+def _watch_lines(client: Client, sweep_id: str) -> dict[str, Any]:
+    shown = ""
+    while True:
+        sweep: dict[str, Any] = client.get_patiently(f"/v1/sweeps/{sweep_id}")
+        progress = sweep["progress"]
+        line = (
+            f"{progress['done']}/{progress['total']} jobs ended, "
+            f"{progress['requests']:,} requests, ${progress['cost_usd']:.2f}  {_outcomes(progress)}"
+        )
+        if line != shown:
+            console.print(line, soft_wrap=True)
+            shown = line
+        if progress["done"] == progress["total"]:
+            return sweep
+        time.sleep(PLAIN_POLL_S if progress["done"] else POLL_S)
+
+
+def _outcomes(progress: dict[str, Any]) -> str:
+    return ", ".join(f"{count} {name}" for name, count in sorted(progress["outcomes"].items()))

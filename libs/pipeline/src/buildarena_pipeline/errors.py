@@ -1,0 +1,67 @@
+"""What can go wrong on the road of a job."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+
+class PipelineError(Exception):
+    """Base of all errors that the pipeline raises itself."""
+
+
+class StartupError(PipelineError):
+    """A process can't start; the message is one sentence that says why and what to do."""
+
+
+class PassingFaultError(PipelineError):
+    """An infrastructure fault that another attempt may not meet: never scored, retried.
+
+    Attributes:
+        reason: Its class, for example ``provider_outage``.
+        delay_s: How long to wait before the next attempt.
+    """
+
+    def __init__(self, message: str, *, reason: str, delay_s: float = 0.0) -> None:
+        super().__init__(message)
+        self.reason = reason
+        self.delay_s = delay_s
+
+
+class PermanentFaultError(PipelineError):
+    """An infrastructure fault that no other attempt can mend: the job ends as errored.
+
+    Attributes:
+        reason: Its class, for example ``bad_credentials``.
+    """
+
+    def __init__(self, message: str, *, reason: str) -> None:
+        super().__init__(message)
+        self.reason = reason
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FieldError:
+    """One thing wrong with a submission.
+
+    Attributes:
+        field: Where, for example ``tasks[1]``.
+        message: What is wrong.
+        choices: What would have been valid, where that can be listed.
+    """
+
+    field: str
+    message: str
+    choices: Sequence[str] = ()
+
+
+class SubmissionError(PipelineError):
+    """A submission was refused; nothing of it was stored.
+
+    Attributes:
+        errors: Everything that is wrong with it.
+    """
+
+    def __init__(self, errors: Sequence[FieldError]) -> None:
+        super().__init__("; ".join(f"{error.field}: {error.message}" for error in errors))
+        self.errors = tuple(errors)

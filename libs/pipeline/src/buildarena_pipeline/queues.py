@@ -1,0 +1,96 @@
+"""Queues: Celery messages that only say "look at this job".
+
+Messages are acknowledged when they are received. Losing one costs seconds, because the sweeper
+announces waiting jobs again; so nothing rests on the broker's redelivery.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import structlog
+from celery import Celery
+from kombu.exceptions import OperationalError
+from redis.exceptions import RedisError
+
+LOOK = "buildarena.look"
+"""Name of the one message kind; its arguments are the queue's name and a job id."""
+
+CONSTRUCT = "construct"
+BATCH = 200
+"""Messages kept waiting per queue; more are sent as workers take them."""
+
+log = structlog.get_logger(__name__)
+
+
+def simulate_queue(engine: str) -> str:
+    """The queue of a simulator."""
+    return f"simulate.{engine}"
+
+
+def celery_app(broker_url: str) -> Celery:
+    """The Celery application of every process, without a result backend."""
+    app = Celery("buildarena", broker=broker_url)
+    app.conf.update(
+        task_ignore_result=True,
+        task_acks_late=False,
+        task_create_missing_queues=True,
+        worker_prefetch_multiplier=1,
+        worker_hijack_root_logger=False,
+        worker_send_task_events=False,
+        worker_enable_remote_control=False,
+        broker_connection_retry=True,
+        broker_connection_retry_on_startup=True,
+        broker_connection_max_retries=None,
+        broker_transport_options={
+            "socket_connect_timeout": 2,
+            "socket_timeout": 10,
+            "max_retries": 1,
+            "interval_start": 0,
+            "interval_max": 0.2,
+        },
+    )
+    return app
+
+
+class Queues:
+    """Sends messages and counts those that wait.
+
+    Args:
+        broker_url: ``redis://…`` of a Redis or Valkey server.
+    """
+
+    def __init__(self, broker_url: str) -> None:
+        self.app = celery_app(broker_url)
+
+    def announce(self, queue: str, job_ids: Sequence[str]) -> bool:
+        """Tells a queue's workers of jobs, as well as it can.
+
+        Returns:
+            False when the broker could not be reached; the sweeper will try again.
+        """
+        try:
+            with self.app.producer_pool.acquire(block=True) as producer:
+                for job_id in job_ids:
+                    self.app.send_task(
+                        LOOK, args=(queue, job_id), queue=queue, producer=producer, retry=False
+                    )
+        except (OperationalError, RedisError, OSError) as error:
+            log.warning("broker_unreachable", queue=queue, error=str(error))
+            self.app.pool.force_close_all()
+            return False
+        return True
+
+    def waiting(self, queue: str) -> int | None:
+        """Messages that no worker has taken, or None when the broker can't be reached."""
+        try:
+            with self.app.connection_for_read() as connection:
+                channel = connection.default_channel
+                return int(channel.client.llen(queue))
+        except (OperationalError, RedisError, OSError) as error:
+            log.warning("broker_unreachable", queue=queue, error=str(error))
+            return None
+
+    def close(self) -> None:
+        """Closes the connections to the broker."""
+        self.app.close()

@@ -1,0 +1,78 @@
+"""Settings of all processes, read from ``BUILDARENA_*`` once in main and passed down."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import Field
+from pydantic_settings import BaseSettings, SettingsConfigDict
+
+DEFAULT_PORT = 8321
+
+
+class Settings(BaseSettings):
+    """What an operator can set. Each field is the environment variable ``BUILDARENA_<FIELD>``."""
+
+    model_config = SettingsConfigDict(env_prefix="BUILDARENA_", extra="ignore")
+
+    data: Annotated[Path, Field(description="Folder of databases, artifacts and logs")] = Path(
+        ".buildarena"
+    )
+    database_url: Annotated[
+        str | None, Field(description="Postgres to use instead of the embedded one")
+    ] = None
+    broker_url: Annotated[
+        str | None, Field(description="Redis or Valkey to use instead of the embedded one")
+    ] = None
+    artifacts_url: Annotated[
+        str | None, Field(description="Folder or bucket URL of artifacts; default DATA/artifacts")
+    ] = None
+    host: Annotated[str, Field(description="Address the API binds to")] = "127.0.0.1"
+    port: Annotated[int, Field(description="Port of the API", ge=0, le=65535)] = DEFAULT_PORT
+    models_file: Annotated[
+        Path | None, Field(description="YAML of further models, added to the built-in registry")
+    ] = None
+    lease_s: Annotated[float, Field(description="Lease without heartbeat, seconds", gt=1)] = 15.0
+    max_faults: Annotated[
+        int, Field(description="Infrastructure faults before a job is given up", ge=1)
+    ] = 8
+    sessions_per_worker: Annotated[
+        int, Field(description="Construction sessions one worker runs at once", ge=1)
+    ] = 32
+    simulations_per_worker: Annotated[
+        int, Field(description="Simulations one worker runs at once", ge=1)
+    ] = 2
+    max_sweep_jobs: Annotated[int, Field(description="Largest sweep accepted", ge=1)] = 100_000
+    log_level: Annotated[str, Field(description="debug, info, warning or error")] = "info"
+
+    @property
+    def artifacts_location(self) -> str:
+        """Where artifacts are kept."""
+        return self.artifacts_url or str(self.data.absolute() / "artifacts")
+
+    def required_database_url(self) -> str:
+        """The database's URL.
+
+        Raises:
+            ValueError: It was not set.
+        """
+        if self.database_url is None:
+            raise ValueError(
+                "BUILDARENA_DATABASE_URL is not set: start this process through `buildarena up`, "
+                "or set it to postgresql://user:password@host:port/name"
+            )
+        return self.database_url
+
+    def required_broker_url(self) -> str:
+        """The broker's URL.
+
+        Raises:
+            ValueError: It was not set.
+        """
+        if self.broker_url is None:
+            raise ValueError(
+                "BUILDARENA_BROKER_URL is not set: start this process through `buildarena up`, "
+                "or set it to redis://:password@host:port/0"
+            )
+        return self.broker_url

@@ -1,0 +1,79 @@
+"""What people submit: one job, or a sweep over tasks x models x seeds."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, StrictInt, model_validator
+
+MAX_SEED = 2**53 - 1
+"""Largest seed: every JSON reader keeps integers up to here exact."""
+
+Seed = Annotated[StrictInt, Field(ge=0, le=MAX_SEED)]
+Name = Annotated[str, Field(min_length=1, max_length=200)]
+
+
+class Decoding(BaseModel):
+    """How a model's replies are sampled. The defaults are the paper's."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    temperature: Annotated[float | None, Field(ge=0, le=2)] = 0.5
+    top_p: Annotated[float | None, Field(gt=0, le=1)] = 0.7
+    max_tokens: Annotated[int | None, Field(ge=1, le=1_000_000)] = None
+
+
+class Limits(BaseModel):
+    """What one job's session may use; a session that reaches one ends as ``limit``."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    max_requests: Annotated[int | None, Field(ge=1)] = None
+    max_tokens: Annotated[int | None, Field(ge=1, description="Input and output together")] = None
+    max_cost_usd: Annotated[float | None, Field(gt=0)] = None
+    max_seconds: Annotated[float | None, Field(gt=0)] = None
+
+
+class _Variant(BaseModel):
+    """What makes a track, and the limits of its sessions."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    workflow: Name = "five-role"
+    simulator: Name = "pybullet"
+    prompts: Name = "default"
+    decoding: Decoding = Decoding()
+    limits: Limits = Limits()
+
+
+class JobSpec(_Variant):
+    """One job: a task, a model and a seed."""
+
+    task: Name
+    model: Name
+    seed: Seed = 0
+
+
+class SweepSpec(_Variant):
+    """A matrix of jobs: every task with every model and every seed."""
+
+    name: Annotated[str, Field(min_length=1, max_length=200)] = "sweep"
+    tasks: Annotated[list[Name], Field(min_length=1, max_length=1000)]
+    models: Annotated[list[Name], Field(min_length=1, max_length=1000)]
+    seeds: Annotated[list[Seed] | None, Field(min_length=1, max_length=100_000)] = None
+    samples: Annotated[
+        StrictInt | None, Field(ge=1, le=100_000, description="Seeds 0 … samples-1")
+    ] = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _seeds_or_samples(cls, data: Any) -> Any:
+        if isinstance(data, dict) and data.get("seeds") is not None and "samples" in data:
+            raise ValueError("give either seeds or samples, not both")
+        return data
+
+    def all_seeds(self) -> list[int]:
+        """The seeds, each once, in their order; the paper's 64 samples by default."""
+        if self.seeds is not None:
+            return list(dict.fromkeys(self.seeds))
+        return list(range(64 if self.samples is None else self.samples))

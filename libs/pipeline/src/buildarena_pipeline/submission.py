@@ -1,0 +1,184 @@
+"""Submissions: from what people ask for to jobs in the database, all of them or none."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from buildarena_benchmark import builtin_tasks
+from buildarena_pipeline.context import Context
+from buildarena_pipeline.errors import FieldError, SubmissionError
+from buildarena_pipeline.models import ModelRegistry
+from buildarena_pipeline.prompt_packs import pack_names
+from buildarena_pipeline.queues import CONSTRUCT
+from buildarena_pipeline.specs import Decoding, JobSpec, SweepSpec
+from buildarena_pipeline.sweeper import announce_waiting
+from buildarena_pipeline.tracks import SIMULATORS, WORKFLOWS, make_track
+from buildarena_store import Job, JobKey, NewJob, NewSweep, Sweep
+from buildarena_store.ids import content_hash, new_id
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Submitted:
+    """A sweep that was accepted.
+
+    Attributes:
+        sweep: The sweep.
+        jobs: How many jobs it has.
+        added: How many of them are new; the others were there before.
+    """
+
+    sweep: Sweep
+    jobs: int
+    added: int
+
+
+class Submissions:
+    """Checks and stores submissions.
+
+    Args:
+        context: The process' connections.
+        registry: The models that can be named.
+    """
+
+    def __init__(self, context: Context, registry: ModelRegistry) -> None:
+        self._context = context
+        self._registry = registry
+
+    def submit_job(self, spec: JobSpec) -> tuple[Job, bool]:
+        """Stores a job and announces it.
+
+        Returns:
+            The job, and whether it is new: an equal job is never done twice.
+
+        Raises:
+            SubmissionError: Something of it is unknown; nothing was stored.
+        """
+        new = self.plan(
+            SweepSpec(
+                tasks=[spec.task],
+                models=[spec.model],
+                seeds=[spec.seed],
+                **spec.model_dump(exclude={"task", "model", "seed"}),
+            ),
+            fields={"tasks[0]": "task", "models[0]": "model"},
+        )
+        with self._context.database.transaction() as connection:
+            added = self._context.jobs.add(new, connection=connection)
+        announce_waiting(self._context, CONSTRUCT)
+        return self._context.jobs.get(new[0].key.job_id), added > 0
+
+    def submit_sweep(
+        self, spec: SweepSpec, *, owner: str | None = None, request_key: str | None = None
+    ) -> Submitted:
+        """Stores a sweep with its jobs and announces them.
+
+        Raises:
+            SubmissionError: Something of it is unknown; nothing was stored.
+        """
+        new = self.plan(spec)
+        document = spec.model_dump(mode="json", exclude_none=True)
+        sweep = NewSweep(
+            id=new_id("sweep"),
+            name=spec.name,
+            spec=document,
+            owner=owner,
+            request_key=request_key,
+            request_hash=content_hash(document),
+        )
+        with self._context.database.transaction() as connection:
+            added = self._context.jobs.add(new, connection=connection)
+            self._context.sweeps.add(sweep, [job.key.job_id for job in new], connection=connection)
+        announce_waiting(self._context, CONSTRUCT)
+        return Submitted(sweep=self._context.sweeps.get(sweep.id), jobs=len(new), added=added)
+
+    def plan(self, spec: SweepSpec, *, fields: dict[str, str] | None = None) -> list[NewJob]:
+        """The jobs that a sweep consists of, without storing anything.
+
+        Args:
+            spec: The sweep.
+            fields: Other names for fields in error messages.
+
+        Raises:
+            SubmissionError: Something of it is unknown, or it is too large.
+        """
+        self._check(spec, fields or {})
+        tasks = builtin_tasks()
+        track = make_track(spec.workflow, spec.simulator, spec.prompts)
+        track_config = track.as_config()
+        limits = spec.limits.model_dump(exclude_none=True)
+        seeds = spec.all_seeds()
+        new = []
+        for task_name in dict.fromkeys(spec.tasks):
+            for model_name in dict.fromkeys(spec.models):
+                config = model_config(self._registry, model_name, spec.decoding)
+                config_hash = content_hash(config)
+                new += [
+                    NewJob(
+                        key=JobKey(
+                            task=task_name,
+                            task_version=tasks[task_name].version,
+                            model_hash=config_hash,
+                            track=track.id,
+                            seed=seed,
+                        ),
+                        model=model_name,
+                        model_config=config,
+                        track_config=track_config,
+                        limits=limits,
+                    )
+                    for seed in seeds
+                ]
+        return new
+
+    def _check(self, spec: SweepSpec, fields: dict[str, str]) -> None:
+        errors = [
+            *_unknown("tasks", "task", spec.tasks, builtin_tasks()),
+            *_unknown("models", "model", spec.models, self._registry.models),
+            *_unknown("workflow", "workflow", [spec.workflow], WORKFLOWS),
+            *_unknown("simulator", "simulator", [spec.simulator], SIMULATORS),
+            *_unknown("prompts", "prompt pack", [spec.prompts], pack_names()),
+        ]
+        size = len(set(spec.tasks)) * len(set(spec.models)) * len(spec.all_seeds())
+        largest = self._context.settings.max_sweep_jobs
+        if size > largest:
+            message = f"the sweep has {size:,} jobs; the largest accepted has {largest:,}"
+            errors.append(FieldError(field="seeds", message=message))
+        if errors:
+            raise SubmissionError(
+                [
+                    FieldError(
+                        field=fields.get(error.field, error.field),
+                        message=error.message,
+                        choices=error.choices,
+                    )
+                    for error in errors
+                ]
+            )
+
+
+def model_config(registry: ModelRegistry, name: str, decoding: Decoding) -> dict[str, Any]:
+    """Everything about a model that can change what it replies."""
+    entry = registry.models[name]
+    return {
+        "name": entry.name,
+        "provider": entry.provider,
+        "model": entry.model,
+        "decoding": decoding.model_dump(exclude_none=True),
+    }
+
+
+def _unknown(
+    field: str, kind: str, names: Sequence[str], known: Collection[str]
+) -> list[FieldError]:
+    several = field.endswith("s") and field != "prompts"
+    return [
+        FieldError(
+            field=f"{field}[{index}]" if several else field,
+            message=f"there is no {kind} {name!r}",
+            choices=sorted(known),
+        )
+        for index, name in enumerate(names)
+        if name not in known
+    ]

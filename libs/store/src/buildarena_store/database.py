@@ -1,0 +1,104 @@
+"""The connection to Postgres and the schema's version."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from alembic import command
+from alembic.config import Config
+from alembic.script import ScriptDirectory
+from sqlalchemy import Connection, Engine, create_engine, inspect, text
+
+from buildarena_store.errors import SchemaVersionError
+
+MIGRATION_LOCK = 0x6275696C64  # "build": two processes that migrate at once take turns
+
+
+def migrations_folder() -> Path:
+    """Where the Alembic chain lies: in the wheel, or at the root of the source tree."""
+    packaged = Path(__file__).parent / "_migrations"
+    return packaged if packaged.exists() else Path(__file__).parents[4] / "migrations"
+
+
+def alembic_config(url: str) -> Config:
+    """The Alembic settings for a database, without any ini file."""
+    config = Config()
+    config.set_main_option("script_location", str(migrations_folder()))
+    config.attributes["url"] = url
+    return config
+
+
+def expected_schema() -> str:
+    """The newest revision of the chain: what this code was written for."""
+    head = ScriptDirectory.from_config(alembic_config("")).get_current_head()
+    if head is None:
+        raise SchemaVersionError(f"no migrations in {migrations_folder()}")
+    return head
+
+
+class Database:
+    """A pool of connections to one Postgres database.
+
+    Args:
+        url: ``postgresql://user:password@host:port/name``.
+        pool_size: Connections kept open; as many again may open for a moment.
+    """
+
+    def __init__(self, url: str, *, pool_size: int = 5) -> None:
+        self.url = url.replace("postgresql://", "postgresql+psycopg://", 1)
+        self.engine: Engine = create_engine(
+            self.url,
+            pool_size=pool_size,
+            max_overflow=pool_size,
+            pool_pre_ping=True,
+            pool_recycle=1800,
+            connect_args={"connect_timeout": 5, "application_name": "buildarena"},
+        )
+
+    @contextmanager
+    def transaction(self) -> Iterator[Connection]:
+        """A connection whose work is committed at the end, or undone when an error leaves it."""
+        with self.engine.begin() as connection:
+            yield connection
+
+    def migrate(self) -> str:
+        """Brings the schema to the newest revision; safe to run from several processes at once.
+
+        Returns:
+            The revision the database has now.
+        """
+        with self.engine.connect() as connection:
+            connection.execute(text("SELECT pg_advisory_lock(:key)"), {"key": MIGRATION_LOCK})
+            try:
+                command.upgrade(alembic_config(self.url), "head")
+            finally:
+                connection.execute(text("SELECT pg_advisory_unlock(:key)"), {"key": MIGRATION_LOCK})
+                connection.rollback()
+        return expected_schema()
+
+    def schema(self) -> str | None:
+        """The revision the database has, or None when it was never migrated."""
+        with self.engine.connect() as connection:
+            if not inspect(connection).has_table("alembic_version"):
+                return None
+            row = connection.execute(text("SELECT version_num FROM alembic_version")).first()
+            return None if row is None else str(row[0])
+
+    def require_schema(self) -> None:
+        """Checks that the database fits this code.
+
+        Raises:
+            SchemaVersionError: Its revision is another one; the message says what to do.
+        """
+        found, wanted = self.schema(), expected_schema()
+        if found != wanted:
+            raise SchemaVersionError(
+                f"the database has schema {found or 'none'}, this program needs {wanted}: "
+                "run `buildarena migrate` with the program's version that is to be used"
+            )
+
+    def close(self) -> None:
+        """Closes all connections."""
+        self.engine.dispose()

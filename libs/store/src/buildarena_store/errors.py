@@ -1,0 +1,36 @@
+"""What can go wrong in the store."""
+
+
+class StoreError(Exception):
+    """Base of all errors that the store raises itself."""
+
+
+class UnknownIdError(StoreError):
+    """No row has the id that was asked for.
+
+    Attributes:
+        kind: What was looked for, for example ``job``.
+        id: The id that nobody has.
+    """
+
+    def __init__(self, kind: str, id_: str) -> None:
+        super().__init__(f"there is no {kind} {id_!r}")
+        self.kind = kind
+        self.id = id_
+
+
+class StaleLeaseError(StoreError):
+    """A write came from an owner whose lease on the job is over; nothing was written."""
+
+    def __init__(self, job_id: str, token: int) -> None:
+        super().__init__(f"lease {token} on job {job_id} is over; its write was refused")
+        self.job_id = job_id
+        self.token = token
+
+
+class ArtifactMissingError(StoreError):
+    """The artifact store does not hold, or no longer holds intact, the bytes of a hash."""
+
+
+class SchemaVersionError(StoreError):
+    """The database's schema is not the one this code was written for."""

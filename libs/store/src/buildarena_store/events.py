@@ -1,0 +1,78 @@
+"""Events: what happened to jobs and sweeps, in order, for progress streams."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any
+
+from sqlalchemy import Connection, func, insert, or_, select
+
+from buildarena_store.database import Database
+from buildarena_store.tables import events, sweep_jobs
+
+now = func.clock_timestamp()
+"""The database's clock: workers' own clocks are never compared."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Event:
+    """Something that happened; ids grow in the order of writing."""
+
+    id: int
+    job_id: str | None
+    sweep_id: str | None
+    kind: str
+    data: Mapping[str, Any]
+    at: datetime
+
+
+def record_jobs(
+    connection: Connection, job_ids: Sequence[str], kind: str, data: Mapping[str, Any]
+) -> None:
+    """Writes one event for each job, in the transaction that made it true."""
+    if job_ids:
+        rows = [{"job_id": job_id, "kind": kind, "data": dict(data)} for job_id in job_ids]
+        connection.execute(insert(events), rows)
+
+
+def record_sweep(connection: Connection, sweep_id: str, kind: str, data: Mapping[str, Any]) -> None:
+    """Writes one event of a sweep."""
+    connection.execute(insert(events).values(sweep_id=sweep_id, kind=kind, data=dict(data)))
+
+
+class Events:
+    """Reads events after a given one."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def after(
+        self,
+        last_id: int,
+        *,
+        job_id: str | None = None,
+        sweep_id: str | None = None,
+        limit: int = 1000,
+    ) -> list[Event]:
+        """Events of a job, or of a sweep and its jobs, or of everything, in order.
+
+        Args:
+            last_id: Only events with greater ids.
+            job_id: Only this job's.
+            sweep_id: Only this sweep's own and its jobs'.
+            limit: Rows at the most.
+        """
+        query = select(events).where(events.c.id > last_id)
+        if job_id is not None:
+            query = query.where(events.c.job_id == job_id)
+        if sweep_id is not None:
+            members = select(sweep_jobs.c.job_id).where(sweep_jobs.c.sweep_id == sweep_id)
+            query = query.where(or_(events.c.sweep_id == sweep_id, events.c.job_id.in_(members)))
+        query = query.order_by(events.c.id).limit(limit)
+        with self._database.transaction() as connection:
+            return [
+                Event(**{name: getattr(row, name) for name in Event.__dataclass_fields__})
+                for row in connection.execute(query)
+            ]

@@ -1,0 +1,330 @@
+"""Leases: who may work on a job, and the writes that only the holder may make.
+
+Every claim raises the job's fencing token. A write names its token; when the job has a newer
+one, or is no longer running, nothing is written and StaleLeaseError is raised. All times are
+the database's, so a worker with a wrong clock does no harm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import timedelta
+from typing import Any
+
+from sqlalchemy import ColumnElement, Connection, case, insert, literal, select, true, update
+
+from buildarena_store import events
+from buildarena_store.database import Database
+from buildarena_store.errors import StaleLeaseError
+from buildarena_store.jobs import JOB_COLUMNS, Job, job_from_row
+from buildarena_store.tables import attempts, jobs
+
+RENUDGE_AFTER = timedelta(seconds=10)
+"""A queued job whose message may have been lost is announced again after this time."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Lease:
+    """The right to work on a job.
+
+    Attributes:
+        job: The job as it was when claimed.
+        owner: The worker's id.
+        token: The fencing token that goes with every write.
+    """
+
+    job: Job
+    owner: str
+    token: int
+
+
+class Leases:
+    """Claims, renews, hands over and ends leases.
+
+    Args:
+        database: Where the jobs are.
+        duration_s: How long a lease lasts without a heartbeat.
+        max_faults: Infrastructure faults after which a job is given up as errored.
+    """
+
+    def __init__(
+        self, database: Database, *, duration_s: float = 15.0, max_faults: int = 8
+    ) -> None:
+        self._database = database
+        self.duration = timedelta(seconds=duration_s)
+        self._max_faults = max_faults
+
+    def claim(self, queue: str, *, owner: str, hint: str | None = None) -> Lease | None:
+        """Takes a waiting job of a queue: a recovered one first, then the hinted, then the oldest.
+
+        Args:
+            queue: Queue name.
+            owner: The worker's id.
+            hint: The job that a message named.
+
+        Returns:
+            The lease, or None when nothing waits.
+        """
+        preferences: list[ColumnElement[bool]] = [jobs.c.faults > 0]
+        if hint is not None:
+            preferences.append(jobs.c.id == hint)
+        preferences.append(true())
+        with self._database.transaction() as connection:
+            for preference in preferences:
+                lease = self._claim_one(connection, queue, owner, preference)
+                if lease is not None:
+                    return lease
+        return None
+
+    def _claim_one(
+        self, connection: Connection, queue: str, owner: str, preference: ColumnElement[bool]
+    ) -> Lease | None:
+        waiting = (
+            select(jobs.c.id)
+            .where(
+                jobs.c.state == "queued",
+                jobs.c.queue == queue,
+                jobs.c.available_at <= events.now,
+                preference,
+            )
+            .order_by(jobs.c.created_at, jobs.c.id)
+            .limit(1)
+            .with_for_update(skip_locked=True)
+            .scalar_subquery()
+        )
+        row = connection.execute(
+            update(jobs)
+            .where(jobs.c.id == waiting)
+            .values(
+                state="running",
+                lease_owner=owner,
+                lease_token=jobs.c.lease_token + 1,
+                lease_expires_at=events.now + self.duration,
+                started_at=case((jobs.c.started_at.is_(None), events.now), else_=jobs.c.started_at),
+            )
+            .returning(*JOB_COLUMNS)
+        ).first()
+        if row is None:
+            return None
+        job = job_from_row(row)
+        connection.execute(
+            insert(attempts).values(
+                job_id=job.id, token=job.lease_token, stage=job.stage, worker=owner
+            )
+        )
+        events.record_jobs(connection, [job.id], "running", {"stage": job.stage, "worker": owner})
+        return Lease(job=job, owner=owner, token=job.lease_token)
+
+    def heartbeat(self, leases: Sequence[Lease]) -> set[str]:
+        """Renews leases.
+
+        Returns:
+            Ids of the jobs whose lease is still ours; work on the others must stop.
+        """
+        if not leases:
+            return set()
+        held = [
+            (jobs.c.id == lease.job.id) & (jobs.c.lease_token == lease.token) for lease in leases
+        ]
+        condition = held[0]
+        for other in held[1:]:
+            condition = condition | other
+        with self._database.transaction() as connection:
+            rows = connection.execute(
+                update(jobs)
+                .where(jobs.c.state == "running", condition)
+                .values(lease_expires_at=events.now + self.duration)
+                .returning(jobs.c.id)
+            )
+            return {row.id for row in rows}
+
+    def advance(
+        self,
+        lease: Lease,
+        *,
+        connection: Connection,
+        result: str = "done",
+        note: str | None = None,
+        **values: Any,
+    ) -> None:
+        """Ends the lease and writes the job's next place, both or neither.
+
+        Args:
+            lease: The lease that ends.
+            connection: The transaction that also holds what belongs to this step.
+            result: How this hold ended: ``done``, ``fault``, ``handed_back``.
+            note: A sentence for people, kept with the attempt.
+            values: The job's columns to set, ``state`` among them.
+
+        Raises:
+            StaleLeaseError: The lease is over; the transaction must be undone.
+        """
+        changed = connection.execute(
+            update(jobs)
+            .where(*_held(lease))
+            .values(lease_owner=None, lease_expires_at=None, **values)
+        )
+        if changed.rowcount != 1:
+            raise StaleLeaseError(lease.job.id, lease.token)
+        _end_attempt(connection, lease.job.id, lease.token, result, note)
+        shown = {name: values[name] for name in ("stage", "outcome", "reason") if values.get(name)}
+        events.record_jobs(connection, [lease.job.id], str(values["state"]), shown)
+
+    def queue_again(
+        self, lease: Lease, *, stage: str, queue: str, connection: Connection, **values: Any
+    ) -> None:
+        """Passes the job on to a stage, there to be claimed afresh; faults are forgiven."""
+        self.advance(
+            lease,
+            connection=connection,
+            state="queued",
+            stage=stage,
+            queue=queue,
+            faults=0,
+            nudged_at=None,
+            available_at=events.now,
+            **values,
+        )
+
+    def hand_back(self, lease: Lease) -> None:
+        """Gives up the work without fault, for example when a worker shuts down."""
+        with self._database.transaction() as connection:
+            self.advance(
+                lease, connection=connection, result="handed_back", state="queued", nudged_at=None
+            )
+
+    def fault(self, lease: Lease, detail: str, *, delay_s: float = 0.0, reason: str) -> bool:
+        """Records an infrastructure fault: the job waits for another attempt, or is given up.
+
+        Args:
+            lease: The lease that ends.
+            detail: What happened, for people.
+            delay_s: How long the job waits before it may be claimed again.
+            reason: The class of the fault, for the dead-letter view.
+
+        Returns:
+            True when the job will be tried again.
+        """
+        again = lease.job.faults + 1 < self._max_faults
+        with self._database.transaction() as connection:
+            if again:
+                self.advance(
+                    lease,
+                    connection=connection,
+                    result="fault",
+                    note=detail,
+                    state="queued",
+                    faults=lease.job.faults + 1,
+                    nudged_at=None,
+                    available_at=events.now + timedelta(seconds=delay_s),
+                    detail=detail,
+                )
+            else:
+                self.give_up(lease, detail, reason=reason, connection=connection)
+        return again
+
+    def give_up(self, lease: Lease, detail: str, *, reason: str, connection: Connection) -> None:
+        """Ends the job as errored: outside every average, and kept in the dead-letter view."""
+        self.advance(
+            lease,
+            connection=connection,
+            result="fault",
+            note=detail,
+            state="done",
+            outcome="errored",
+            reason=reason,
+            faults=lease.job.faults + 1,
+            finished_at=events.now,
+            detail=detail,
+        )
+
+    def recover(self) -> list[str]:
+        """Re-queues jobs whose lease ran out, and gives up those that keep losing their workers.
+
+        Returns:
+            Ids of the jobs that wait again.
+        """
+        last = jobs.c.faults + 1 >= self._max_faults
+        with self._database.transaction() as connection:
+            lost = (
+                select(jobs.c.id)
+                .where(jobs.c.state == "running", jobs.c.lease_expires_at < events.now)
+                .with_for_update(skip_locked=True)
+            )
+            rows = connection.execute(
+                update(jobs)
+                .where(jobs.c.id.in_(lost.scalar_subquery()))
+                .values(
+                    state=case((last, "done"), else_="queued"),
+                    outcome=case((last, literal("errored")), else_=None),
+                    reason=case((last, literal("lost_worker")), else_=None),
+                    detail=case(
+                        (last, literal("its workers were lost again and again")), else_=None
+                    ),
+                    finished_at=case((last, events.now), else_=None),
+                    faults=jobs.c.faults + 1,
+                    lease_owner=None,
+                    lease_expires_at=None,
+                    nudged_at=None,
+                    available_at=events.now,
+                )
+                .returning(jobs.c.id, jobs.c.state, jobs.c.lease_token, jobs.c.stage)
+            ).all()
+            for row in rows:
+                _end_attempt(connection, row.id, row.lease_token, "lost", "no heartbeat came")
+                shown: Mapping[str, str] = {"stage": row.stage, "why": "lost worker"}
+                events.record_jobs(connection, [row.id], row.state, shown)
+        return [row.id for row in rows if row.state == "queued"]
+
+    def to_announce(self, queue: str, limit: int) -> list[str]:
+        """Waiting jobs that no message speaks of, oldest first; they are marked as announced."""
+        with self._database.transaction() as connection:
+            silent = (
+                select(jobs.c.id)
+                .where(
+                    jobs.c.state == "queued",
+                    jobs.c.queue == queue,
+                    jobs.c.available_at <= events.now,
+                    jobs.c.nudged_at.is_(None) | (jobs.c.nudged_at < events.now - RENUDGE_AFTER),
+                )
+                .order_by((jobs.c.faults > 0).desc(), jobs.c.created_at, jobs.c.id)
+                .limit(limit)
+                .with_for_update(skip_locked=True)
+            )
+            rows = connection.execute(
+                update(jobs)
+                .where(jobs.c.id.in_(silent.scalar_subquery()))
+                .values(nudged_at=events.now)
+                .returning(jobs.c.id)
+            )
+            return [row.id for row in rows]
+
+
+def _held(lease: Lease) -> tuple[ColumnElement[bool], ...]:
+    return (
+        jobs.c.id == lease.job.id,
+        jobs.c.lease_token == lease.token,
+        jobs.c.state == "running",
+    )
+
+
+def require_held(connection: Connection, lease: Lease, **values: Any) -> None:
+    """Writes job columns while the lease goes on, or refuses.
+
+    Raises:
+        StaleLeaseError: The lease is over.
+    """
+    changed = connection.execute(update(jobs).where(*_held(lease)).values(**values))
+    if changed.rowcount != 1:
+        raise StaleLeaseError(lease.job.id, lease.token)
+
+
+def _end_attempt(
+    connection: Connection, job_id: str, token: int, result: str, detail: str | None
+) -> None:
+    connection.execute(
+        update(attempts)
+        .where(attempts.c.job_id == job_id, attempts.c.token == token)
+        .values(ended_at=events.now, result=result, detail=detail)
+    )

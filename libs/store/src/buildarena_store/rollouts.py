@@ -1,0 +1,105 @@
+"""Rollouts: simulations that a session asked for, and what they scored."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any
+
+from sqlalchemy import Connection, insert, select, update
+
+from buildarena_store import events
+from buildarena_store.database import Database
+from buildarena_store.tables import rollouts
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RolloutRequest:
+    """A simulation to be done.
+
+    Attributes:
+        number: Place among the job's rollouts, from 0.
+        final: True when the job ends with this rollout's score.
+        engine: Simulator name.
+        machine_hash: Artifact hash of the machine document.
+        controls: The key presses of this rollout, or None for the task's own.
+    """
+
+    number: int
+    final: bool
+    engine: str
+    machine_hash: str
+    controls: Sequence[Mapping[str, Any]] | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RolloutRecord:
+    """A rollout as the database has it; the score is None until it was simulated.
+
+    Attributes:
+        trace: The tracked body at 1 Hz, rows of time, x, y, z (seconds, units, world frame).
+        wall_s: How long the simulation took; the other names are those of the columns.
+    """
+
+    number: int
+    final: bool
+    engine: str
+    machine_hash: str
+    controls: Sequence[Mapping[str, Any]] | None
+    success: bool | None
+    indicator: float | None
+    metrics: Mapping[str, Any] | None
+    flags: Sequence[str] | None
+    trajectory_hash: str | None
+    trace: Sequence[Sequence[float]] | None
+    versions: Mapping[str, Any] | None
+    wall_s: float | None
+    created_at: datetime
+    finished_at: datetime | None
+
+
+class Rollouts:
+    """Keeps rollouts. Writes take the transaction that also moves the job."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def request(self, job_id: str, request: RolloutRequest, *, connection: Connection) -> None:
+        """Adds a rollout that is to be simulated."""
+        controls = None if request.controls is None else [dict(press) for press in request.controls]
+        connection.execute(
+            insert(rollouts).values(
+                job_id=job_id,
+                number=request.number,
+                final=request.final,
+                engine=request.engine,
+                machine_hash=request.machine_hash,
+                controls=controls,
+            )
+        )
+
+    def complete(self, job_id: str, number: int, *, connection: Connection, **values: Any) -> None:
+        """Writes a rollout's score and trajectory."""
+        connection.execute(
+            update(rollouts)
+            .where(rollouts.c.job_id == job_id, rollouts.c.number == number)
+            .values(finished_at=events.now, **values)
+        )
+
+    def read(self, job_id: str, *, connection: Connection | None = None) -> list[RolloutRecord]:
+        """All rollouts of a job in their order.
+
+        Args:
+            job_id: The job.
+            connection: A transaction whose own writes are to be seen.
+        """
+        query = select(rollouts).where(rollouts.c.job_id == job_id).order_by(rollouts.c.number)
+        with nullcontext(connection) if connection else self._database.transaction() as reader:
+            return [
+                RolloutRecord(
+                    **{name: getattr(row, name) for name in RolloutRecord.__dataclass_fields__}
+                )
+                for row in reader.execute(query)
+            ]

@@ -1,0 +1,253 @@
+"""The tables. One job is one row; its unique key makes a result impossible to have twice."""
+
+from __future__ import annotations
+
+from sqlalchemy import (
+    BigInteger,
+    Boolean,
+    Column,
+    DateTime,
+    Double,
+    ForeignKey,
+    Identity,
+    Index,
+    Integer,
+    LargeBinary,
+    MetaData,
+    Numeric,
+    Table,
+    Text,
+    UniqueConstraint,
+    func,
+    text,
+)
+from sqlalchemy.dialects.postgresql import JSONB
+
+metadata = MetaData(
+    naming_convention={
+        "pk": "pk_%(table_name)s",
+        "uq": "uq_%(table_name)s_%(column_0_N_name)s",
+        "ix": "ix_%(table_name)s_%(column_0_N_name)s",
+        "fk": "fk_%(table_name)s_%(column_0_N_name)s",
+    }
+)
+
+
+def _time(name: str, *, now: bool = False) -> Column[object]:
+    return Column(
+        name,
+        DateTime(timezone=True),
+        nullable=not now,
+        server_default=func.clock_timestamp() if now else None,
+    )
+
+
+def _count(name: str) -> Column[int]:
+    return Column(name, BigInteger, nullable=False, server_default=text("0"))
+
+
+jobs = Table(
+    "jobs",
+    metadata,
+    Column("id", Text, primary_key=True),
+    # What the job is: these columns never change.
+    Column("task", Text, nullable=False),
+    Column("task_version", Text, nullable=False),
+    Column("model", Text, nullable=False),
+    Column("model_hash", Text, nullable=False),
+    Column("model_config", JSONB, nullable=False),
+    Column("track", Text, nullable=False),
+    Column("track_config", JSONB, nullable=False),
+    Column("seed", BigInteger, nullable=False),
+    Column("limits", JSONB, nullable=False, server_default=text("'{}'::jsonb")),
+    # Where it is.
+    Column("stage", Text, nullable=False),
+    Column("queue", Text, nullable=False),
+    Column("state", Text, nullable=False),
+    Column("outcome", Text),
+    Column("reason", Text),
+    Column("detail", Text),
+    Column("faults", Integer, nullable=False, server_default=text("0")),
+    Column("lease_owner", Text),
+    Column("lease_token", BigInteger, nullable=False, server_default=text("0")),
+    _time("lease_expires_at"),
+    _time("available_at", now=True),
+    _time("nudged_at"),
+    # What it scored.
+    Column("success", Boolean),
+    Column("indicator", Double),
+    Column("metrics", JSONB),
+    Column("flags", JSONB),
+    Column("manifest", JSONB),
+    # What it cost.
+    _count("requests"),
+    _count("input_tokens"),
+    _count("output_tokens"),
+    _count("cached_tokens"),
+    _count("reasoning_tokens"),
+    Column("cost_usd", Numeric(14, 6), nullable=False, server_default=text("0")),
+    _count("actions"),
+    _count("refused_actions"),
+    Column("refusals", JSONB),
+    _time("created_at", now=True),
+    _time("started_at"),
+    _time("finished_at"),
+    UniqueConstraint("task", "task_version", "model_hash", "track", "seed"),
+)
+Index(
+    "ix_jobs_waiting",
+    jobs.c.queue,
+    jobs.c.created_at,
+    jobs.c.id,
+    postgresql_where=jobs.c.state == "queued",
+)
+Index(
+    "ix_jobs_recovered",
+    jobs.c.queue,
+    postgresql_where=(jobs.c.state == "queued") & (jobs.c.faults > 0),
+)
+Index("ix_jobs_leased", jobs.c.lease_expires_at, postgresql_where=jobs.c.state == "running")
+Index("ix_jobs_board", jobs.c.track, jobs.c.task, jobs.c.model)
+Index("ix_jobs_newest", jobs.c.created_at.desc(), jobs.c.id)
+
+sweeps = Table(
+    "sweeps",
+    metadata,
+    Column("id", Text, primary_key=True),
+    Column("name", Text, nullable=False),
+    Column("spec", JSONB, nullable=False),
+    Column("state", Text, nullable=False),
+    Column("owner", Text),
+    Column("request_key", Text, unique=True),
+    Column("request_hash", Text),
+    _time("created_at", now=True),
+)
+
+sweep_jobs = Table(
+    "sweep_jobs",
+    metadata,
+    Column("sweep_id", Text, ForeignKey("sweeps.id", ondelete="CASCADE"), primary_key=True),
+    Column("job_id", Text, ForeignKey("jobs.id"), primary_key=True),
+    Index("ix_sweep_jobs_job", "job_id"),
+)
+
+attempts = Table(
+    "attempts",
+    metadata,
+    Column("job_id", Text, ForeignKey("jobs.id"), primary_key=True),
+    Column("token", BigInteger, primary_key=True),
+    Column("stage", Text, nullable=False),
+    Column("worker", Text, nullable=False),
+    _time("started_at", now=True),
+    _time("ended_at"),
+    Column("result", Text),
+    Column("detail", Text),
+)
+
+journal = Table(
+    "journal",
+    metadata,
+    Column("job_id", Text, ForeignKey("jobs.id"), primary_key=True),
+    Column("sequence", Integer, primary_key=True),
+    Column("token", BigInteger, nullable=False),
+    Column("stage", Text, nullable=False),
+    Column("role", Text, nullable=False),
+    Column("request_hash", Text, nullable=False),
+    Column("reply", JSONB, nullable=False),
+    _count("input_tokens"),
+    _count("output_tokens"),
+    _count("cached_tokens"),
+    _count("reasoning_tokens"),
+    Column("cost_usd", Numeric(14, 6), nullable=False, server_default=text("0")),
+    Column("latency_s", Double, nullable=False),
+    Column("tries", Integer, nullable=False, server_default=text("1")),
+    Column("provider_request_id", Text),
+    _time("created_at", now=True),
+)
+
+rollouts = Table(
+    "rollouts",
+    metadata,
+    Column("job_id", Text, ForeignKey("jobs.id"), primary_key=True),
+    Column("number", Integer, primary_key=True),
+    Column("final", Boolean, nullable=False),
+    Column("engine", Text, nullable=False),
+    Column("machine_hash", Text, nullable=False),
+    Column("controls", JSONB),
+    Column("success", Boolean),
+    Column("indicator", Double),
+    Column("metrics", JSONB),
+    Column("flags", JSONB),
+    Column("trajectory_hash", Text),
+    Column("trace", JSONB),
+    Column("versions", JSONB),
+    Column("wall_s", Double),
+    _time("created_at", now=True),
+    _time("finished_at"),
+)
+
+artifacts = Table(
+    "artifacts",
+    metadata,
+    Column("hash", Text, primary_key=True),
+    Column("media_type", Text, nullable=False),
+    Column("size", BigInteger, nullable=False),
+    _time("created_at", now=True),
+)
+
+job_artifacts = Table(
+    "job_artifacts",
+    metadata,
+    Column("job_id", Text, ForeignKey("jobs.id"), primary_key=True),
+    Column("name", Text, primary_key=True),
+    Column("hash", Text, ForeignKey("artifacts.hash"), nullable=False),
+)
+
+tasks = Table(
+    "tasks",
+    metadata,
+    Column("name", Text, primary_key=True),
+    Column("version", Text, primary_key=True),
+    Column("document", Text, nullable=False),
+    Column("owner", Text),
+    _time("created_at", now=True),
+)
+
+events = Table(
+    "events",
+    metadata,
+    Column("id", BigInteger, Identity(), primary_key=True),
+    Column("job_id", Text),
+    Column("sweep_id", Text),
+    Column("kind", Text, nullable=False),
+    Column("data", JSONB, nullable=False),
+    _time("at", now=True),
+)
+Index("ix_events_job", events.c.job_id, events.c.id)
+Index("ix_events_sweep", events.c.sweep_id, events.c.id)
+
+workers = Table(
+    "workers",
+    metadata,
+    Column("id", Text, primary_key=True),
+    Column("kind", Text, nullable=False),
+    Column("queues", JSONB, nullable=False),
+    Column("host", Text, nullable=False),
+    Column("pid", Integer, nullable=False),
+    Column("versions", JSONB, nullable=False),
+    _time("started_at", now=True),
+    _time("seen_at", now=True),
+    Column("peak_memory_bytes", BigInteger),
+)
+
+api_keys = Table(
+    "api_keys",
+    metadata,
+    Column("id", Text, primary_key=True),
+    Column("name", Text, nullable=False),
+    Column("digest", LargeBinary, nullable=False, unique=True),
+    Column("scopes", JSONB, nullable=False),
+    _time("created_at", now=True),
+    _time("expires_at"),
+    _time("revoked_at"),
+)

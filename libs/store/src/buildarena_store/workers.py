@@ -1,0 +1,100 @@
+"""Workers: which processes serve which queues, and when they were last seen."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from typing import Any
+
+from sqlalchemy import delete, select
+from sqlalchemy.dialects.postgresql import insert
+
+from buildarena_store import events
+from buildarena_store.database import Database
+from buildarena_store.tables import workers
+
+FORGOTTEN_AFTER = timedelta(hours=1)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WorkerInfo:
+    """A worker process.
+
+    Attributes:
+        id: ``kind@host:pid``.
+        kind: ``construct`` or ``simulate``.
+        queues: Queues it serves.
+        host: Its machine.
+        pid: Its process id there.
+        versions: Versions of what it runs.
+        started_at: When it first reported.
+        seen_at: When it last reported.
+        alive: Whether it reported within the last 15 seconds, by the database's clock.
+        peak_memory_bytes: The most memory it and its children ever had, if it says so.
+    """
+
+    id: str
+    kind: str
+    queues: Sequence[str]
+    host: str
+    pid: int
+    versions: Mapping[str, Any]
+    started_at: datetime
+    seen_at: datetime
+    alive: bool
+    peak_memory_bytes: int | None
+
+
+class Workers:
+    """The register of workers."""
+
+    def __init__(self, database: Database, *, alive_for_s: float = 15.0) -> None:
+        self._database = database
+        self._alive_for = timedelta(seconds=alive_for_s)
+
+    def report(
+        self,
+        *,
+        worker_id: str,
+        kind: str,
+        queues: Sequence[str],
+        host: str,
+        pid: int,
+        versions: Mapping[str, Any],
+        peak_memory_bytes: int | None = None,
+    ) -> None:
+        """Says that a worker is alive; forgets those that have not spoken for an hour."""
+        row = {
+            "kind": kind,
+            "queues": list(queues),
+            "host": host,
+            "pid": pid,
+            "versions": dict(versions),
+            "peak_memory_bytes": peak_memory_bytes,
+        }
+        statement = insert(workers).values(id=worker_id, **row)
+        with self._database.transaction() as connection:
+            connection.execute(
+                statement.on_conflict_do_update(
+                    index_elements=["id"], set_={**row, "seen_at": events.now}
+                )
+            )
+            connection.execute(
+                delete(workers).where(workers.c.seen_at < events.now - FORGOTTEN_AFTER)
+            )
+
+    def leave(self, worker_id: str) -> None:
+        """Strikes a worker that shuts down off the register."""
+        with self._database.transaction() as connection:
+            connection.execute(delete(workers).where(workers.c.id == worker_id))
+
+    def all(self) -> list[WorkerInfo]:
+        """Every known worker, the most recently seen first."""
+        alive = (workers.c.seen_at > events.now - self._alive_for).label("alive")
+        query = select(workers, alive).order_by(workers.c.seen_at.desc())
+        with self._database.transaction() as connection:
+            return [
+                WorkerInfo(**{name: getattr(row, name) for name in WorkerInfo.__dataclass_fields__})
+                for row in connection.execute(query)
+            ]

@@ -1,0 +1,43 @@
+"""Starts the API: ``python -m buildarena_api``."""
+
+from __future__ import annotations
+
+import sys
+
+import uvicorn
+
+from buildarena_api.app import create_app
+from buildarena_pipeline.context import open_context
+from buildarena_pipeline.errors import StartupError
+from buildarena_pipeline.logs import set_up_logs
+from buildarena_pipeline.models import load_registry
+from buildarena_pipeline.settings import Settings
+from buildarena_store import SchemaVersionError
+
+POOL_SIZE = 10
+
+
+def main() -> None:
+    """Serves the API until it is told to stop."""
+    settings = Settings()
+    set_up_logs(settings.log_level)
+    try:
+        registry = load_registry(settings.models_file)
+        context = open_context(settings, pool_size=POOL_SIZE)
+        context.database.require_schema()
+    except (StartupError, SchemaVersionError, ValueError) as error:
+        sys.exit(f"api: {error}")
+    try:
+        uvicorn.run(
+            create_app(context, registry),
+            host=settings.host,
+            port=settings.port,
+            log_config=None,
+            access_log=False,
+            timeout_graceful_shutdown=5,
+        )
+    finally:
+        context.close()
+
+
+main()

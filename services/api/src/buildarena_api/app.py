@@ -1,0 +1,51 @@
+"""The FastAPI application."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+from fastapi import FastAPI
+
+from buildarena_api import catalogue, health, jobs, leaderboard, sweeps
+from buildarena_api.problems import add_problem_handlers
+from buildarena_pipeline import __version__
+from buildarena_pipeline.context import Context
+from buildarena_pipeline.models import ModelRegistry
+from buildarena_pipeline.sweeper import Sweeper
+
+DESCRIPTION = """Find out whether language models can engineer: submit task x model x seed jobs,
+watch machines being built and simulated, and read the leaderboard. Errors are RFC 9457 problem
+details that name the field and the valid choices."""
+
+
+def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
+    """The application on top of a process' connections.
+
+    Args:
+        context: Connections; they stay the caller's to close.
+        registry: The models that jobs can name.
+    """
+    sweeper = Sweeper(context)
+
+    @asynccontextmanager
+    async def lifespan(_: FastAPI) -> AsyncIterator[None]:
+        sweeper.start()
+        yield
+        sweeper.stop()
+
+    app = FastAPI(
+        title="BuildArena",
+        version=__version__,
+        description=DESCRIPTION,
+        lifespan=lifespan,
+        docs_url="/docs",
+        redoc_url=None,
+        license_info={"name": "Apache-2.0", "identifier": "Apache-2.0"},
+    )
+    app.state.context = context
+    app.state.registry = registry
+    add_problem_handlers(app)
+    for room in (jobs, sweeps, leaderboard, catalogue, health):
+        app.include_router(room.router)
+    return app

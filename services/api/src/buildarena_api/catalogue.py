@@ -1,0 +1,80 @@
+"""Routes of what can be named in a submission: tasks, models, modules."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter
+from pydantic import BaseModel, Field
+
+from buildarena_api.dependencies import RegistryDep
+from buildarena_benchmark import builtin_tasks
+from buildarena_geometry import load_catalogue
+
+router = APIRouter(prefix="/v1", tags=["catalogue"])
+
+
+class TaskView(BaseModel):
+    """A task that jobs can name."""
+
+    name: str = Field(examples=["support-1"])
+    version: str = Field(description="Content hash of all that can change a score")
+    title: str
+    category: str
+    level: int
+    statement: str = Field(description="What the model is told")
+    indicator: str
+    unit: str
+
+
+class ModelView(BaseModel):
+    """A model that jobs can name."""
+
+    name: str = Field(examples=["openai/gpt-5"])
+    provider: str
+    model: str = Field(description="The provider's own name of the snapshot")
+    baseline: bool
+
+
+class ModuleView(BaseModel):
+    """A module that machines are made of."""
+
+    name: str
+    kind: str
+    mass: float
+    cost: float
+    description: str
+
+
+@router.get("/tasks")
+def list_tasks() -> list[TaskView]:
+    """Lists the tasks."""
+    return [
+        TaskView(
+            name=task.name,
+            version=task.version,
+            title=task.title,
+            category=task.category,
+            level=task.level,
+            statement=task.statement,
+            indicator=task.indicator,
+            unit=task.unit,
+        )
+        for task in builtin_tasks().values()
+    ]
+
+
+@router.get("/models")
+def list_models(registry: RegistryDep) -> list[ModelView]:
+    """Lists the models of the registry."""
+    return [
+        ModelView(name=m.name, provider=m.provider, model=m.model, baseline=m.baseline)
+        for m in registry.models.values()
+    ]
+
+
+@router.get("/modules")
+def list_modules() -> list[ModuleView]:
+    """Lists the basic modules."""
+    return [
+        ModuleView(name=m.name, kind=m.kind, mass=m.mass, cost=m.cost, description=m.description)
+        for m in load_catalogue().values()
+    ]

@@ -1,0 +1,150 @@
+"""Errors as RFC 9457 problem details: what went wrong, in which field, and what would be valid."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from http import HTTPStatus
+from typing import Any
+
+import structlog
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import JSONResponse
+from pydantic import BaseModel, Field
+from sqlalchemy.exc import OperationalError
+from starlette.exceptions import HTTPException
+
+from buildarena_pipeline.errors import SubmissionError
+from buildarena_store import ArtifactMissingError, UnknownIdError
+
+PROBLEM_JSON = "application/problem+json"
+
+log = structlog.get_logger(__name__)
+
+
+class FieldProblem(BaseModel):
+    """One thing that is wrong with a request."""
+
+    field: str = Field(description="Where, for example tasks[1]", examples=["tasks[0]"])
+    message: str = Field(examples=["there is no task 'support-9'"])
+    choices: list[str] = Field(default=[], description="What would be valid, where known")
+
+
+class Problem(BaseModel):
+    """RFC 9457 problem details."""
+
+    type: str = Field(default="about:blank", examples=["about:blank"])
+    title: str = Field(examples=["Unprocessable Content"])
+    status: int = Field(examples=[422])
+    detail: str = Field(examples=["tasks[0]: there is no task 'support-9'"])
+    errors: list[FieldProblem] = []
+
+
+class ProblemError(Exception):
+    """Answers the request with a problem.
+
+    Attributes:
+        status: HTTP status.
+        detail: What went wrong, for people.
+        errors: Field errors.
+        headers: Headers of the answer.
+    """
+
+    def __init__(
+        self,
+        status: int,
+        detail: str,
+        *,
+        errors: Sequence[FieldProblem] = (),
+        headers: dict[str, str] | None = None,
+    ) -> None:
+        super().__init__(detail)
+        self.status = status
+        self.detail = detail
+        self.errors = list(errors)
+        self.headers = headers
+
+
+def problem_responses(*statuses: int) -> dict[int | str, dict[str, Any]]:
+    """OpenAPI entries of the problems that an operation answers with."""
+    return {
+        status: {
+            "model": Problem,
+            "description": HTTPStatus(status).phrase,
+            "content": {PROBLEM_JSON: {"schema": {"$ref": "#/components/schemas/Problem"}}},
+        }
+        for status in statuses
+    }
+
+
+def _answer(
+    status: int,
+    detail: str,
+    errors: Sequence[FieldProblem] = (),
+    headers: dict[str, str] | None = None,
+) -> JSONResponse:
+    problem = Problem(
+        title=HTTPStatus(status).phrase, status=status, detail=detail, errors=list(errors)
+    )
+    return JSONResponse(
+        problem.model_dump(), status_code=status, media_type=PROBLEM_JSON, headers=headers
+    )
+
+
+def add_problem_handlers(app: FastAPI) -> None:
+    """Makes every error of the app a problem."""
+
+    @app.exception_handler(ProblemError)
+    async def on_problem(_: Request, error: ProblemError) -> JSONResponse:
+        return _answer(error.status, error.detail, error.errors, error.headers)
+
+    @app.exception_handler(SubmissionError)
+    async def on_submission(_: Request, error: SubmissionError) -> JSONResponse:
+        errors = [
+            FieldProblem(field=e.field, message=e.message, choices=list(e.choices))
+            for e in error.errors
+        ]
+        return _answer(422, str(error), errors)
+
+    @app.exception_handler(RequestValidationError)
+    async def on_invalid(_: Request, error: RequestValidationError) -> JSONResponse:
+        errors = [
+            FieldProblem(field=_field(entry["loc"]), message=entry["msg"])
+            for entry in error.errors()
+        ]
+        detail = "; ".join(f"{entry.field}: {entry.message}" for entry in errors)
+        return _answer(422, detail, errors)
+
+    @app.exception_handler(UnknownIdError)
+    async def on_unknown(_: Request, error: UnknownIdError) -> JSONResponse:
+        return _answer(404, str(error))
+
+    @app.exception_handler(ArtifactMissingError)
+    async def on_missing(_: Request, error: ArtifactMissingError) -> JSONResponse:
+        return _answer(404, str(error))
+
+    @app.exception_handler(HTTPException)
+    async def on_http(_: Request, error: HTTPException) -> JSONResponse:
+        headers = dict(error.headers) if error.headers else None
+        return _answer(error.status_code, str(error.detail), headers=headers)
+
+    @app.exception_handler(OperationalError)
+    async def on_database(_: Request, error: OperationalError) -> JSONResponse:
+        log.warning("database_unreachable", error=str(error).splitlines()[0])
+        return _answer(
+            503, "the database can't be reached; nothing was stored", headers={"Retry-After": "2"}
+        )
+
+    @app.exception_handler(Exception)
+    async def on_bug(request: Request, error: Exception) -> JSONResponse:
+        log.error("unexpected", path=request.url.path, exc_info=error)
+        return _answer(500, "something went wrong here; it is in the log")
+
+
+def _field(location: Sequence[str | int]) -> str:
+    """``("body", "tasks", 1)`` as ``tasks[1]``."""
+    parts = [part for part in location if part not in {"body", "query", "path", "header"}]
+    text = ""
+    for part in parts:
+        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else str(part)
+    return text or str(location[0])

@@ -1,0 +1,138 @@
+"""What the API answers with."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from buildarena_store import Job, SweepProgress
+
+Outcome = Literal["success", "unsuccessful", "construction_failed", "limit", "errored", "cancelled"]
+
+
+class _Answer(BaseModel):
+    model_config = ConfigDict(from_attributes=True)
+
+
+class UsageView(_Answer):
+    """What a job's session used."""
+
+    requests: int
+    input_tokens: int
+    output_tokens: int
+    cached_tokens: int
+    reasoning_tokens: int
+    cost_usd: float
+
+
+class AttemptView(_Answer):
+    """One worker's hold on a job."""
+
+    token: int = Field(description="Fencing token: grows with every hold")
+    stage: str
+    worker: str
+    started_at: datetime
+    ended_at: datetime | None
+    result: str | None = Field(description="done, lost, fault or handed_back")
+    detail: str | None
+
+
+class JobView(_Answer):
+    """A job: one task x model x seed on one track."""
+
+    id: str = Field(examples=["job_5f2b0c8e4d1a9b7c3e60"])
+    task: str = Field(examples=["support-1"])
+    task_version: str
+    model: str = Field(examples=["builtin/expert"])
+    track: str
+    seed: int
+    state: Literal["queued", "running", "done"]
+    stage: Literal["construct", "simulate"]
+    outcome: Outcome | None = Field(description="How it ended; null while it goes on")
+    reason: str | None = Field(description="Class of the failure, if any")
+    detail: str | None
+    success: bool | None
+    indicator: float | None = Field(description="The task's performance indicator")
+    metrics: dict[str, Any] | None
+    flags: list[str] | None
+    usage: UsageView
+    actions: int
+    refused_actions: int
+    refusals: dict[str, int] | None = Field(description="Refused actions by class")
+    faults: int = Field(description="Infrastructure faults at the present stage")
+    created_at: datetime
+    started_at: datetime | None
+    finished_at: datetime | None
+
+    @staticmethod
+    def of(job: Job) -> JobView:
+        """The view of a job."""
+        return JobView.model_validate(
+            {
+                **{name: getattr(job, name, None) for name in JobView.model_fields},
+                "usage": UsageView.model_validate(job),
+            }
+        )
+
+
+class JobDetail(JobView):
+    """A job with its manifest, attempts and artifacts."""
+
+    manifest: dict[str, Any] | None = Field(description="Versions of what can change the score")
+    attempts: list[AttemptView]
+    artifacts: dict[str, str] = Field(description="SHA-256 of each artifact by name")
+
+
+class JobPage(_Answer):
+    """Some jobs, newest first."""
+
+    jobs: list[JobView]
+    next_cursor: str | None = Field(description="Give it as `cursor` to get the next page")
+
+
+class ProgressView(_Answer):
+    """How far a sweep is."""
+
+    total: int
+    done: int
+    stages: dict[str, int] = Field(
+        description="Jobs that go on, by stage and state", examples=[{"construct running": 2}]
+    )
+    outcomes: dict[str, int] = Field(description="Ended jobs by outcome", examples=[{"success": 4}])
+    requests: int
+    input_tokens: int
+    output_tokens: int
+    cost_usd: float
+
+    @staticmethod
+    def of(progress: SweepProgress) -> ProgressView:
+        """The view of a sweep's progress."""
+        return ProgressView.model_validate(progress)
+
+
+class SweepView(_Answer):
+    """A sweep with its progress."""
+
+    id: str = Field(examples=["sweep_0a1b2c3d4e5f60718293"])
+    name: str
+    state: str = Field(description="active, paused, cancelled, or done when every job has ended")
+    created_at: datetime
+    spec: dict[str, Any]
+    progress: ProgressView
+
+
+class SweepAccepted(_Answer):
+    """A sweep that was accepted."""
+
+    id: str
+    jobs: int = Field(description="Jobs it consists of")
+    added: int = Field(description="Jobs that are new; the others had been submitted before")
+
+
+class SweepPage(_Answer):
+    """Some sweeps, newest first."""
+
+    sweeps: list[SweepView]
+    next_cursor: str | None

@@ -1,0 +1,154 @@
+"""The simulate stage: runs a job's waiting rollout, keeps its trajectory, and moves the job on."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from buildarena_benchmark import Score, Task, failed_score, score
+from buildarena_geometry import KeyPress, Machine
+from buildarena_pipeline.context import Context
+from buildarena_pipeline.errors import PassingFaultError, PermanentFaultError
+from buildarena_pipeline.queues import CONSTRUCT
+from buildarena_pipeline.scoring import best_rollout, rollout_score, task_of
+from buildarena_simulation import (
+    SIMULATION_VERSION,
+    MachineNotSimulable,
+    SimulationError,
+    Trajectory,
+    engine_version,
+    simulate,
+)
+from buildarena_store import (
+    ArtifactInfo,
+    ArtifactMissingError,
+    Lease,
+    RolloutRecord,
+    StaleLeaseError,
+)
+
+PARQUET = "application/vnd.apache.parquet"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Done:
+    """A rollout that was simulated, or that could not be because of the machine."""
+
+    score: Score
+    trajectory: ArtifactInfo | None
+    trace: Sequence[Sequence[float]]
+    wall_s: float
+
+
+class SimulateHandler:
+    """Runs rollouts.
+
+    Args:
+        context: The process' connections.
+    """
+
+    def __init__(self, context: Context) -> None:
+        self._context = context
+
+    def __call__(self, lease: Lease, still_held: Callable[[], bool]) -> None:
+        """Simulates the job's waiting rollout; the job ends, or goes back to its session."""
+        context, job = self._context, lease.job
+        waiting = [r for r in context.rollouts.read(job.id) if r.finished_at is None]
+        if not waiting:
+            raise PermanentFaultError("no rollout waits", reason="no_rollout")
+        request = waiting[0]
+        done = self._simulate(task_of(job), request, lambda: _require(lease, still_held))
+        values = {
+            "success": done.score.success,
+            "indicator": done.score.indicator,
+            "metrics": dict(done.score.metrics),
+            "flags": list(done.score.flags),
+            "trajectory_hash": None if done.trajectory is None else done.trajectory.hash,
+            "trace": [list(row) for row in done.trace],
+            "versions": {
+                "simulation": SIMULATION_VERSION,
+                "engine": request.engine,
+                "engine_version": engine_version(request.engine),
+            },
+            "wall_s": done.wall_s,
+        }
+        with context.database.transaction() as connection:
+            if done.trajectory is not None:
+                context.results.attach(
+                    job.id, f"trajectory-{request.number}", done.trajectory, connection=connection
+                )
+            context.rollouts.complete(job.id, request.number, connection=connection, **values)
+            if request.final:
+                records = context.rollouts.read(job.id, connection=connection)
+                final = rollout_score(job, best_rollout(records))
+                context.results.finish(lease, final, connection=connection)
+            else:
+                context.leases.queue_again(
+                    lease, stage="construct", queue=CONSTRUCT, connection=connection
+                )
+        if not request.final:
+            context.queues.announce(CONSTRUCT, [job.id])
+
+    def _simulate(
+        self, task: Task, request: RolloutRecord, require_held: Callable[[], None]
+    ) -> _Done:
+        started = time.perf_counter()
+        machine = self._machine(request.machine_hash)
+        try:
+            trajectory = simulate(
+                machine,
+                task.scenario,
+                engine=request.engine,
+                controls=_controls(request.controls),
+                on_progress=lambda _: require_held(),
+            )
+        except MachineNotSimulable:
+            return _Done(
+                score=failed_score(task, machine),
+                trajectory=None,
+                trace=(),
+                wall_s=time.perf_counter() - started,
+            )
+        except SimulationError as error:
+            raise PassingFaultError(str(error), reason="simulator_fault", delay_s=2.0) from error
+        kept = self._context.artifacts.put(trajectory.to_parquet(), PARQUET)
+        return _Done(
+            score=score(task, machine, trajectory),
+            trajectory=kept,
+            trace=_trace(trajectory),
+            wall_s=time.perf_counter() - started,
+        )
+
+    def _machine(self, digest: str) -> Machine:
+        try:
+            document: dict[str, Any] = json.loads(self._context.artifacts.get(digest))
+        except ArtifactMissingError as error:
+            raise PassingFaultError(str(error), reason="artifact_missing", delay_s=5.0) from error
+        return Machine.from_document(document)
+
+
+def _controls(presses: Sequence[Any] | None) -> tuple[KeyPress, ...] | None:
+    return None if presses is None else tuple(KeyPress(**press) for press in presses)
+
+
+def _require(lease: Lease, still_held: Callable[[], bool]) -> None:
+    if not still_held():
+        raise StaleLeaseError(lease.job.id, lease.token)
+
+
+def _trace(trajectory: Trajectory) -> list[list[float]]:
+    """The tracked body at 1 Hz: the cargo where there is one, else the first block."""
+    times = trajectory.time_s
+    track = trajectory.cargo_position
+    if track is None:
+        track = trajectory.positions[:, 0]
+    rows = []
+    last = -1
+    for time_s, point in zip(times, track, strict=True):
+        if int(time_s + 1e-9) > last:
+            last = int(time_s + 1e-9)
+            rows.append([round(float(value), 3) for value in (time_s, *point)])
+    return rows

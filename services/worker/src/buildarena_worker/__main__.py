@@ -1,0 +1,43 @@
+"""Starts a construct worker: ``python -m buildarena_worker``."""
+
+from __future__ import annotations
+
+import sys
+
+from buildarena_geometry import FEEDBACK_VERSION
+from buildarena_geometry import __version__ as geometry_version
+from buildarena_pipeline.context import Context
+from buildarena_pipeline.errors import StartupError
+from buildarena_pipeline.models import load_registry
+from buildarena_pipeline.queues import CONSTRUCT
+from buildarena_pipeline.settings import Settings
+from buildarena_pipeline.stages import StageHandler
+from buildarena_pipeline.worker_process import WorkerSpec, run_worker
+from buildarena_worker.construct import ConstructHandler
+
+
+def main() -> None:
+    """Serves the construct queue until it is told to stop."""
+    settings = Settings()
+    try:
+        registry = load_registry(settings.models_file)
+
+        def make_handler(context: Context) -> StageHandler:
+            return ConstructHandler(context, registry)
+
+        run_worker(
+            WorkerSpec(
+                kind="construct",
+                queues=[CONSTRUCT],
+                pool="threads",
+                concurrency=settings.sessions_per_worker,
+                make_handler=make_handler,
+                versions={"geometry": geometry_version, "feedback": FEEDBACK_VERSION},
+            ),
+            settings,
+        )
+    except StartupError as error:
+        sys.exit(f"construct worker: {error}")
+
+
+main()

@@ -1,0 +1,53 @@
+"""Built-in models: they need no key and play through the same requests, tools and journal.
+
+They are functions of what a model can read in a request, so they can also stand behind a
+provider's wire format. They are baselines, marked as such on leaderboards.
+"""
+
+from __future__ import annotations
+
+from decimal import Decimal
+
+from buildarena_pipeline.errors import PermanentFaultError
+from buildarena_store import Usage
+from buildarena_worker.builtin import expert, idle, random_builder
+from buildarena_worker.messages import Reply, Request
+from buildarena_worker.session_io import Answer
+
+MODELS = {"expert": expert.reply, "random": random_builder.reply, "idle": idle.reply}
+CHARACTERS_PER_TOKEN = 4
+"""A common rule of thumb for English text; built-in models have no tokenizer."""
+
+
+class BuiltinClient:
+    """Answers requests by a built-in model.
+
+    Args:
+        name: ``expert``, ``random`` or ``idle``.
+
+    Raises:
+        PermanentFaultError: There is no such model.
+    """
+
+    def __init__(self, name: str) -> None:
+        if name not in MODELS:
+            raise PermanentFaultError(
+                f"no built-in model {name!r}; there are {', '.join(MODELS)}", reason="unknown_model"
+            )
+        self._reply = MODELS[name]
+
+    def complete(self, request: Request) -> Answer:
+        """The model's reply; tokens are estimated from the length of the texts, at no cost."""
+        reply = self._reply(request)
+        usage = Usage(
+            requests=1,
+            input_tokens=sum(len(message.text) for message in request.messages)
+            // CHARACTERS_PER_TOKEN,
+            output_tokens=max(1, _length(reply) // CHARACTERS_PER_TOKEN),
+            cost_usd=Decimal(),
+        )
+        return Answer(reply=reply, usage=usage, latency_s=0.0)
+
+
+def _length(reply: Reply) -> int:
+    return len(reply.text) + sum(len(call.name) + len(str(call.arguments)) for call in reply.calls)

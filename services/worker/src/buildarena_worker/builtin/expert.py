@@ -1,0 +1,98 @@
+"""The expert: a scripted engineer with designs of our own. Its scores are a reference.
+
+It plays every role like any model: it reads the request, finds how far the work is, and says or
+does the next thing.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from functools import lru_cache
+
+from buildarena_worker.builtin.designs import DESIGNS
+from buildarena_worker.builtin.designs.design import Action, Design
+from buildarena_worker.builtin.reading import Situation, read_situation
+from buildarena_worker.messages import Reply, Request, ToolCall
+
+DONE = "TERMINATE"
+
+
+def reply(request: Request) -> Reply:
+    """The next thing to say or do; an objection to tasks it has no design for."""
+    situation = read_situation(request)
+    if situation.task not in DESIGNS:
+        return Reply(text=f"I have no design for {situation.task or 'this task'}. {DONE}")
+    design = _design(situation.task, request.seed)
+    speakers = {
+        "planner": lambda: Reply(text=_plan(design)),
+        "drafter": lambda: Reply(text=_drawing(design, situation)),
+        "reviewer": lambda: Reply(text=DONE),
+        "guidance": lambda: _guide(design, situation),
+        "builder": lambda: _act(_script(design, situation), situation.own_actions),
+        "engineer": lambda: _act(_whole_script(design), situation.own_actions),
+        "controller": lambda: Reply(text=json.dumps(design.control)),
+    }
+    speak = speakers.get(situation.role)
+    return speak() if speak else Reply(text=DONE)
+
+
+@lru_cache(maxsize=64)
+def _design(task: str, seed: int) -> Design:
+    return DESIGNS[task](seed)
+
+
+def _plan(design: Design) -> str:
+    parts = "".join(
+        f"<sub_structure><name>{name}</name><description>{part.description}</description>"
+        f"<assembly>{len(part.actions)} actions</assembly></sub_structure>\n"
+        for name, part in design.parts.items()
+    )
+    return (
+        f"<building_plan>\n<overall_structure>{design.overall}</overall_structure>\n"
+        f"<sub_structures>\n{parts}</sub_structures>\n</building_plan>"
+    )
+
+
+def _script(design: Design, situation: Situation) -> Sequence[Action]:
+    if situation.assembling:
+        return design.assembly
+    part = design.parts.get(situation.part or "")
+    if part is None:
+        return _whole_script(design)
+    return part.refinements if situation.refining else part.actions
+
+
+def _whole_script(design: Design) -> Sequence[Action]:
+    """Everything in one go, for workflows without sub-structures."""
+    part = next(iter(design.parts.values()))
+    return (*part.actions, *part.refinements)
+
+
+def _drawing(design: Design, situation: Situation) -> str:
+    steps = "\n".join(
+        f"{number}. {_spelled(action)}"
+        for number, action in enumerate(_script(design, situation), start=1)
+    )
+    return f"Drawing of {situation.part}, in building order:\n{steps}"
+
+
+def _guide(design: Design, situation: Situation) -> Reply:
+    script = _script(design, situation)
+    done = situation.builder_turns
+    if done >= len(script):
+        return Reply(text=DONE)
+    return Reply(text=f"Step {done + 1} of {len(script)}: {_spelled(script[done])}")
+
+
+def _act(script: Sequence[Action], done: int) -> Reply:
+    if done >= len(script):
+        return Reply(text=DONE)
+    name, arguments = script[done]
+    call = ToolCall(id=f"call_{done + 1}", name=name, arguments=dict(arguments))
+    return Reply(text="", calls=(call,))
+
+
+def _spelled(action: Action) -> str:
+    name, arguments = action
+    return f"{name} " + ", ".join(f"{key} {value}" for key, value in arguments.items() if value)

@@ -1,0 +1,11 @@
+"""The idle model: it ends whatever it is asked to do. Its scores are the floor."""
+
+from __future__ import annotations
+
+from buildarena_worker.messages import Reply, Request
+
+
+def reply(request: Request) -> Reply:
+    """Always the word that ends a stage."""
+    del request
+    return Reply(text="TERMINATE")

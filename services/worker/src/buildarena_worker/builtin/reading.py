@@ -1,0 +1,67 @@
+"""What a built-in model reads in a request: which role it plays, in what, and how far it is."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from buildarena_worker.messages import Request
+
+_ROLE = re.compile(r"^# Role: (\S+)", re.MULTILINE)
+_TASK = re.compile(r"^# Task: (\S+)", re.MULTILINE)
+_PART = re.compile(r"^## (?:Sub-structure|Refinement of): (.+)$", re.MULTILINE)
+_ASSEMBLY = re.compile(r"^## Assembly$", re.MULTILINE)
+_REFINEMENT = re.compile(r"^## Refinement of: ", re.MULTILINE)
+_BUILDER = re.compile(r"^\[builder\] ", re.MULTILINE)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Situation:
+    """A request as a built-in model understands it.
+
+    Attributes:
+        role: Role from the system message, "" when it names none.
+        task: Task name.
+        part: Sub-structure it is about, if any.
+        assembling: Whether the sub-structures are being put together.
+        refining: Whether a built machine is being corrected.
+        own_turns: Replies that this role gave before.
+        own_actions: Tools that this role called before.
+        builder_turns: Replies of the builder that this role heard of.
+        last_text: What was said last.
+    """
+
+    role: str
+    task: str
+    part: str | None
+    assembling: bool
+    refining: bool
+    own_turns: int
+    own_actions: int
+    builder_turns: int
+    last_text: str
+
+
+def read_situation(request: Request) -> Situation:
+    """Finds the cues that our prompts carry in their headings."""
+    system = "\n".join(m.text for m in request.messages if m.role == "system")
+    heard = [m.text for m in request.messages if m.role == "user"]
+    opening = heard[0] if heard else ""
+    own = [m for m in request.messages if m.role == "assistant"]
+    part = _PART.search(opening)
+    return Situation(
+        role=_first(_ROLE, system),
+        task=_first(_TASK, opening),
+        part=part.group(1).strip() if part else None,
+        assembling=_ASSEMBLY.search(opening) is not None,
+        refining=_REFINEMENT.search(opening) is not None,
+        own_turns=len(own),
+        own_actions=sum(len(m.calls) for m in own),
+        builder_turns=sum(len(_BUILDER.findall(text)) for text in heard),
+        last_text=request.messages[-1].text if request.messages else "",
+    )
+
+
+def _first(pattern: re.Pattern[str], text: str) -> str:
+    found = pattern.search(text)
+    return found.group(1) if found else ""

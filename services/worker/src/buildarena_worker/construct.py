@@ -1,0 +1,172 @@
+"""The construct stage: runs or resumes a job's session, and moves the job on."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+
+from buildarena_benchmark import failed_score
+from buildarena_geometry import Machine
+from buildarena_pipeline.context import Context
+from buildarena_pipeline.errors import PermanentFaultError
+from buildarena_pipeline.models import ModelRegistry
+from buildarena_pipeline.prompt_packs import PromptPack, load_pack
+from buildarena_pipeline.queues import simulate_queue
+from buildarena_pipeline.scoring import job_manifest, rollout_score, task_of
+from buildarena_store import (
+    Job,
+    JobScore,
+    JournalEntry,
+    Lease,
+    RolloutRequest,
+    StaleLeaseError,
+)
+from buildarena_worker.errors import (
+    ConstructionFailedError,
+    JournalMismatchError,
+    LeaseLostError,
+    LimitReachedError,
+)
+from buildarena_worker.llm import ModelClients
+from buildarena_worker.session import Session
+from buildarena_worker.session_io import SessionIO, SuspendedError
+from buildarena_worker.workflow.base import SessionEnd, run_session
+from buildarena_worker.workflow.registry import find_workflow
+
+JSON = "application/json"
+
+
+class ConstructHandler:
+    """Runs construction sessions.
+
+    Args:
+        context: The process' connections.
+        registry: Models and providers.
+    """
+
+    def __init__(self, context: Context, registry: ModelRegistry) -> None:
+        self._context = context
+        self._clients = ModelClients(registry)
+
+    def __call__(self, lease: Lease, still_held: Callable[[], bool]) -> None:
+        """Runs the job's session as far as it gets: to a simulation, or to its end."""
+        job = lease.job
+        task = task_of(job)
+        pack = _pack_of(job)
+        io = SessionIO(
+            client=self._clients.for_config(job.model_config),
+            entries=self._context.journal.read(job.id),
+            rollouts=self._context.rollouts.read(job.id),
+            append=lambda entry: self._append(lease, entry),
+            still_held=still_held,
+            limits=job.limits,
+        )
+        session = Session(task=task, seed=job.seed, model_config=job.model_config, pack=pack, io=io)
+        try:
+            end = run_session(session, find_workflow(str(job.track_config["workflow"])))
+        except SuspendedError as suspended:
+            self._suspend(lease, session, suspended)
+        except ConstructionFailedError as failure:
+            self._fail(lease, session, "construction_failed", failure.reason, str(failure))
+        except LimitReachedError as limit:
+            self._fail(lease, session, "limit", limit.limit, str(limit))
+        except LeaseLostError as lost:
+            raise StaleLeaseError(job.id, lease.token) from lost
+        except JournalMismatchError as mismatch:
+            raise PermanentFaultError(str(mismatch), reason="journal_mismatch") from mismatch
+        else:
+            self._finish(lease, session, end)
+
+    def _append(self, lease: Lease, entry: JournalEntry) -> None:
+        self._context.journal.append(lease, entry)
+
+    def _suspend(self, lease: Lease, session: Session, suspended: SuspendedError) -> None:
+        """Keeps the machine and hands the job to its simulator, all in one transaction."""
+        context, job = self._context, lease.job
+        machine = context.artifacts.put(_machine_json(suspended.machine), JSON)
+        transcript = context.artifacts.put(session.transcript.to_json(), JSON)
+        engine = str(job.track_config["simulator"])
+        controls = None
+        if suspended.controls is not None:
+            controls = [
+                {"time_s": press.time_s, "key": press.key, "hold_for_s": press.hold_for_s}
+                for press in suspended.controls
+            ]
+        request = RolloutRequest(
+            number=suspended.number,
+            final=suspended.final,
+            engine=engine,
+            machine_hash=machine.hash,
+            controls=controls,
+        )
+        queue = simulate_queue(engine)
+        with context.database.transaction() as connection:
+            context.results.attach(job.id, "machine", machine, connection=connection)
+            context.results.attach(job.id, "transcript", transcript, connection=connection)
+            context.rollouts.request(job.id, request, connection=connection)
+            context.leases.queue_again(
+                lease,
+                stage="simulate",
+                queue=queue,
+                connection=connection,
+                **_counts(session),
+            )
+        context.queues.announce(queue, [job.id])
+
+    def _fail(self, lease: Lease, session: Session, outcome: str, reason: str, detail: str) -> None:
+        """Scores a session that ended without a simulation; what it built is kept."""
+        failed = failed_score(session.task, session.machine)
+        score = JobScore(
+            outcome=outcome,
+            success=False,
+            indicator=failed.indicator,
+            metrics=failed.metrics,
+            flags=failed.flags,
+            reason=reason,
+            detail=detail,
+            manifest=job_manifest(lease.job, None),
+        )
+        self._write_end(lease, session, score)
+
+    def _finish(self, lease: Lease, session: Session, end: SessionEnd) -> None:
+        self._write_end(lease, session, rollout_score(lease.job, end.best))
+
+    def _write_end(self, lease: Lease, session: Session, score: JobScore) -> None:
+        context, job = self._context, lease.job
+        transcript = context.artifacts.put(session.transcript.to_json(), JSON)
+        machine = None
+        if session.machine is not None and session.machine.started:
+            machine = context.artifacts.put(_machine_json(session.machine), JSON)
+        with context.database.transaction() as connection:
+            context.results.attach(job.id, "transcript", transcript, connection=connection)
+            if machine is not None:
+                context.results.attach(job.id, "machine", machine, connection=connection)
+            context.results.finish(lease, score, connection=connection, **_counts(session))
+
+
+def _counts(session: Session) -> dict[str, object]:
+    refusals = session.transcript.refusals
+    return {
+        "actions": session.transcript.actions,
+        "refused_actions": sum(refusals.values()),
+        "refusals": refusals,
+    }
+
+
+def _machine_json(machine: Machine) -> bytes:
+    return json.dumps(
+        machine.to_document(), ensure_ascii=False, sort_keys=True, separators=(",", ":")
+    ).encode()
+
+
+def _pack_of(job: Job) -> PromptPack:
+    """The job's prompt pack, as long as it is still the one that the job was submitted with."""
+    pack = load_pack(str(job.track_config["prompts"]))
+    wanted = job.track_config["prompts_digest"]
+    if pack.digest != wanted:
+        raise PermanentFaultError(
+            f"prompt pack {pack.name!r} has changed since the job was submitted: submit it again "
+            "to run it on the new track",
+            reason="prompts_changed",
+        )
+    return pack

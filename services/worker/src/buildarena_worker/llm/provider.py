@@ -1,0 +1,217 @@
+"""Models behind a provider's HTTP API.
+
+All requests of a process run on one event loop in a thread of its own; sessions, which are plain
+threads, wait for their answers there.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import random
+import threading
+import time
+from collections.abc import Mapping
+from functools import cache
+from typing import Any
+
+import structlog
+from pydantic_ai.direct import model_request
+from pydantic_ai.exceptions import (
+    ContentFilterError,
+    ModelAPIError,
+    ModelAuthenticationError,
+    ModelContextWindowExceededError,
+    ModelHTTPError,
+    ModelNotFoundError,
+    ModelQuotaExceededError,
+    UnexpectedModelBehavior,
+)
+from pydantic_ai.messages import ModelResponse
+from pydantic_ai.models import Model
+from pydantic_ai.settings import ModelSettings
+
+from buildarena_pipeline.errors import PassingFaultError, PermanentFaultError
+from buildarena_pipeline.models import ModelEntry, ProviderEntry
+from buildarena_store import Usage
+from buildarena_worker.llm.prices import price_usd
+from buildarena_worker.llm.retries import RetryPolicy
+from buildarena_worker.llm.wire import from_wire, request_parameters, to_wire
+from buildarena_worker.messages import Reply, Request
+from buildarena_worker.session_io import Answer
+
+log = structlog.get_logger(__name__)
+
+OUTAGE_DELAY_S = 30.0
+"""How long a job waits after its provider failed through all retries."""
+RETRIED_STATUS = frozenset({408, 409, 425, 429, 500, 502, 503, 504, 520, 522, 524, 529})
+
+
+@cache
+def _loop() -> asyncio.AbstractEventLoop:
+    loop = asyncio.new_event_loop()
+    threading.Thread(target=loop.run_forever, name="model-requests", daemon=True).start()
+    return loop
+
+
+class ProviderClient:
+    """Asks one model of one provider.
+
+    Args:
+        entry: The model.
+        provider: How its provider is reached.
+        policy: How often and how long to try.
+    """
+
+    def __init__(
+        self, entry: ModelEntry, provider: ProviderEntry, policy: RetryPolicy | None = None
+    ) -> None:
+        self._entry = entry
+        self._policy = policy or RetryPolicy()
+        self._model = _make_model(entry, provider)
+        self._rng = random.Random()  # noqa: S311 - spreads retries, guards nothing
+
+    def complete(self, request: Request) -> Answer:
+        """Asks the model, with the policy's retries.
+
+        Raises:
+            PassingFaultError: The provider failed through all tries.
+            PermanentFaultError: The provider refuses the key, the model or the account.
+        """
+        return asyncio.run_coroutine_threadsafe(self._complete(request), _loop()).result()
+
+    async def _complete(self, request: Request) -> Answer:
+        started = time.monotonic()
+        messages, parameters = to_wire(request.messages), request_parameters(request.tools)
+        settings = self._settings(request)
+        for tries in range(1, self._policy.tries + 1):
+            try:
+                response = await asyncio.wait_for(
+                    model_request(
+                        self._model,
+                        messages,
+                        model_settings=settings,
+                        model_request_parameters=parameters,
+                    ),
+                    timeout=self._policy.timeout_s,
+                )
+            except ModelContextWindowExceededError as error:
+                return _own_failure("context_overflow", str(error), started, tries)
+            except ContentFilterError as error:
+                return _own_failure("content_filter", str(error), started, tries)
+            except (ModelAPIError, UnexpectedModelBehavior, TimeoutError, OSError) as error:
+                _raise_if_permanent(error, self._entry)
+                if tries == self._policy.tries:
+                    raise PassingFaultError(
+                        f"{self._entry.name}: {tries} tries failed, the last with "
+                        f"{type(error).__name__}: {_first_line(error)}",
+                        reason="provider_outage",
+                        delay_s=OUTAGE_DELAY_S,
+                    ) from error
+                wait_s = self._policy.wait_s(tries, _headers(error), self._rng)
+                log.info("model_retry", model=self._entry.name, tries=tries, wait_s=wait_s)
+                await asyncio.sleep(wait_s)
+            else:
+                return self._answer(response, time.monotonic() - started, tries)
+        raise AssertionError("the last try returns or raises")
+
+    def _settings(self, request: Request) -> ModelSettings:
+        decoding: Mapping[str, Any] = request.model_config["decoding"]
+        settings = ModelSettings(seed=request.seed)
+        if "temperature" in decoding:
+            settings["temperature"] = decoding["temperature"]
+        if "top_p" in decoding:
+            settings["top_p"] = decoding["top_p"]
+        if "max_tokens" in decoding:
+            settings["max_tokens"] = decoding["max_tokens"]
+        if request.tools:
+            settings["parallel_tool_calls"] = False
+        return settings
+
+    def _answer(self, response: ModelResponse, latency_s: float, tries: int) -> Answer:
+        used = response.usage
+        reasoning = int(used.details.get("reasoning_tokens", 0)) if used.details else 0
+        cost = price_usd(
+            self._entry,
+            input_tokens=used.input_tokens,
+            output_tokens=used.output_tokens,
+            cached_tokens=used.cache_read_tokens,
+        )
+        usage = Usage(
+            requests=1,
+            input_tokens=used.input_tokens,
+            output_tokens=used.output_tokens,
+            cached_tokens=used.cache_read_tokens,
+            reasoning_tokens=reasoning,
+            cost_usd=cost,
+        )
+        return Answer(
+            reply=from_wire(response),
+            usage=usage,
+            latency_s=latency_s,
+            tries=tries,
+            provider_request_id=response.provider_response_id,
+        )
+
+
+def _make_model(entry: ModelEntry, provider: ProviderEntry) -> Model:
+    key = "none" if provider.key is None else os.environ.get(provider.key, "")
+    if not key:
+        raise PermanentFaultError(
+            f"{entry.name} needs the API key in {provider.key}, which is not set on the worker",
+            reason="missing_key",
+        )
+    if provider.wire == "openai":
+        from openai import AsyncOpenAI
+        from pydantic_ai.models.openai import OpenAIChatModel
+        from pydantic_ai.providers.openai import OpenAIProvider
+
+        client = AsyncOpenAI(base_url=provider.base_url, api_key=key, max_retries=0)
+        return OpenAIChatModel(entry.model, provider=OpenAIProvider(openai_client=client))
+    if provider.wire == "anthropic":
+        from anthropic import AsyncAnthropic
+        from pydantic_ai.models.anthropic import AnthropicModel
+        from pydantic_ai.providers.anthropic import AnthropicProvider
+
+        anthropic = AsyncAnthropic(base_url=provider.base_url, api_key=key, max_retries=0)
+        return AnthropicModel(entry.model, provider=AnthropicProvider(anthropic_client=anthropic))
+    from pydantic_ai.models.google import GoogleModel
+    from pydantic_ai.providers.google import GoogleProvider
+
+    return GoogleModel(
+        entry.model, provider=GoogleProvider(api_key=key, base_url=provider.base_url)
+    )
+
+
+def _own_failure(finish: str, detail: str, started: float, tries: int) -> Answer:
+    reply = Reply(text="", finish=finish)
+    log.info("model_failure", finish=finish, detail=detail.splitlines()[0] if detail else "")
+    return Answer(
+        reply=reply, usage=Usage(requests=1), latency_s=time.monotonic() - started, tries=tries
+    )
+
+
+def _raise_if_permanent(error: Exception, entry: ModelEntry) -> None:
+    reasons: tuple[tuple[type[Exception], str], ...] = (
+        (ModelAuthenticationError, "bad_credentials"),
+        (ModelNotFoundError, "model_not_found"),
+        (ModelQuotaExceededError, "quota_exceeded"),
+    )
+    for kind, reason in reasons:
+        if isinstance(error, kind):
+            raise PermanentFaultError(
+                f"{entry.name}: {_first_line(error)}", reason=reason
+            ) from error
+    if isinstance(error, ModelHTTPError) and error.status_code not in RETRIED_STATUS:
+        raise PermanentFaultError(
+            f"{entry.name}: HTTP {error.status_code}: {_first_line(error)}",
+            reason="request_refused",
+        ) from error
+
+
+def _headers(error: Exception) -> Mapping[str, str] | None:
+    return error.headers if isinstance(error, ModelHTTPError) else None
+
+
+def _first_line(error: Exception) -> str:
+    return (str(error).splitlines() or [type(error).__name__])[0][:500]

@@ -1,0 +1,128 @@
+"""Messages between a session and a model, in our own neutral form.
+
+The form is what journals keep and request hashes are made of, so it does not change when a
+provider's or a library's does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from buildarena_store.ids import content_hash
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ToolCall:
+    """A tool that a model wants to use.
+
+    Attributes:
+        id: Ties the call to its result.
+        name: Tool name, as the model spelled it.
+        arguments: What the model gave: an object, or any text that is no JSON object.
+    """
+
+    id: str
+    name: str
+    arguments: Any
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Message:
+    """One message of a conversation.
+
+    Attributes:
+        role: ``system``, ``user``, ``assistant`` or ``tool``.
+        text: What is said, or a tool's answer.
+        calls: Tools that an assistant message uses.
+        call_id: The call that a tool message answers.
+        tool: The tool that a tool message comes from.
+    """
+
+    role: str
+    text: str
+    calls: Sequence[ToolCall] = ()
+    call_id: str | None = None
+    tool: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tool:
+    """A tool that a model may use.
+
+    Attributes:
+        name: Its name.
+        description: What it does, for the model.
+        parameters: JSON schema of its arguments.
+    """
+
+    name: str
+    description: str
+    parameters: Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Request:
+    """What is sent to a model.
+
+    Attributes:
+        model_config: The job's model configuration.
+        messages: The conversation.
+        tools: Tools that may be used.
+        seed: The job's seed, sent where providers take one.
+    """
+
+    model_config: Mapping[str, Any]
+    messages: Sequence[Message]
+    tools: Sequence[Tool] = ()
+    seed: int = 0
+
+    @property
+    def hash(self) -> str:
+        """SHA-256 of everything in it."""
+        return content_hash(
+            {
+                "model": dict(self.model_config),
+                "messages": [_plain(message) for message in self.messages],
+                "tools": [[tool.name, tool.description, tool.parameters] for tool in self.tools],
+                "seed": self.seed,
+            }
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reply:
+    """What a model answered.
+
+    Attributes:
+        text: What it said.
+        calls: Tools it wants to use.
+        finish: Why it stopped: ``stop``, ``length``, ``tool_call``, ``content_filter``, ``error``.
+    """
+
+    text: str
+    calls: Sequence[ToolCall] = field(default_factory=tuple)
+    finish: str = "stop"
+
+    def to_json(self) -> dict[str, Any]:
+        """The form that journals keep."""
+        return {
+            "text": self.text,
+            "calls": [[call.id, call.name, call.arguments] for call in self.calls],
+            "finish": self.finish,
+        }
+
+    @staticmethod
+    def from_json(data: Mapping[str, Any]) -> Reply:
+        """A reply from a journal."""
+        calls = tuple(
+            ToolCall(id=id_, name=name, arguments=arguments)
+            for id_, name, arguments in data["calls"]
+        )
+        return Reply(text=data["text"], calls=calls, finish=data["finish"])
+
+
+def _plain(message: Message) -> list[Any]:
+    calls = [[call.id, call.name, call.arguments] for call in message.calls]
+    return [message.role, message.text, calls, message.call_id]

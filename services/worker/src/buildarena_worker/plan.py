@@ -1,0 +1,78 @@
+"""Building plans: the planner's answer, read leniently, because models write loose XML."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+PARTS = (
+    "description",
+    "components",
+    "assembly",
+    "motion_control",
+    "function",
+    "design_requirements",
+)
+
+
+class PlanError(ValueError):
+    """The text holds no plan; the message tells the model what is missing."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SubStructure:
+    """A part of the machine that is built on its own.
+
+    Attributes:
+        name: Unique in its plan.
+        text: What the plan says of it.
+    """
+
+    name: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plan:
+    """What is to be built."""
+
+    overall: str
+    sub_structures: Sequence[SubStructure]
+
+
+def read_plan(text: str) -> Plan:
+    """Finds the plan in a reply; what stands around it is ignored.
+
+    Raises:
+        PlanError: Something of its form is missing.
+    """
+    body = _last(text, "building_plan")
+    if body is None:
+        raise PlanError("there is no <building_plan> … </building_plan>")
+    blocks = re.findall(r"<sub_structure>(.*?)</sub_structure>", body, re.DOTALL)
+    if not blocks:
+        raise PlanError("there is no <sub_structure> … </sub_structure> in it")
+    overall = _last(body, "overall_structure")
+    if overall is None:
+        raise PlanError("there is no <overall_structure> … </overall_structure> in it")
+    found = []
+    for number, block in enumerate(blocks, start=1):
+        name = _last(block, "name")
+        if not name:
+            raise PlanError(f"sub-structure {number} has no <name>")
+        parts = [(part, _last(block, part)) for part in PARTS]
+        told = "\n".join(f"- {part.replace('_', ' ')}: {said}" for part, said in parts if said)
+        if not told:
+            raise PlanError(f"sub-structure {name!r} says nothing but its name")
+        found.append(SubStructure(name=name, text=told))
+    names = [sub_structure.name for sub_structure in found]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise PlanError(f"the name {twice[0]!r} stands for several sub-structures")
+    return Plan(overall=overall, sub_structures=tuple(found))
+
+
+def _last(text: str, tag: str) -> str | None:
+    found = re.findall(rf"<{tag}>(.*?)</{tag}>", text, re.DOTALL)
+    return found[-1].strip() if found else None

@@ -1,0 +1,112 @@
+"""A session: one model, playing all roles, builds one machine for one task."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from buildarena_benchmark import Task
+from buildarena_geometry import Machine
+from buildarena_pipeline.prompt_packs import PromptPack
+from buildarena_store import JournalEntry
+from buildarena_worker.errors import ConstructionFailedError
+from buildarena_worker.messages import Message, Reply, Request, Tool
+from buildarena_worker.session_io import SessionIO
+from buildarena_worker.transcript import ActionRecord, Transcript, Turn
+
+
+class Session:
+    """The state that a workflow's steps share.
+
+    Args:
+        task: What is to be built.
+        seed: The job's seed.
+        model_config: The job's model configuration.
+        pack: The sentences to use.
+        io: Where answers come from.
+    """
+
+    def __init__(
+        self,
+        *,
+        task: Task,
+        seed: int,
+        model_config: Mapping[str, Any],
+        pack: PromptPack,
+        io: SessionIO,
+    ) -> None:
+        self.task = task
+        self.seed = seed
+        self.pack = pack
+        self.io = io
+        self.transcript = Transcript()
+        self.machine: Machine | None = None
+        self._model_config = model_config
+
+    def ask(
+        self, messages: Sequence[Message], tools: Sequence[Tool], *, stage: str, role: str
+    ) -> tuple[Reply, JournalEntry]:
+        """The model's reply to a conversation."""
+        request = Request(
+            model_config=self._model_config, messages=messages, tools=tools, seed=self.seed
+        )
+        entry = self.io.ask(request, stage=stage, role=role)
+        return Reply.from_json(entry.reply), entry
+
+    def record(
+        self,
+        *,
+        stage: str,
+        sub_structure: str | None,
+        role: str,
+        reply: Reply,
+        entry: JournalEntry,
+        actions: Sequence[ActionRecord] = (),
+    ) -> None:
+        """Adds a turn to the transcript."""
+        self.transcript.turns.append(
+            Turn(
+                index=len(self.transcript.turns),
+                stage=stage,
+                sub_structure=sub_structure,
+                role=role,
+                text=reply.text,
+                actions=tuple(actions),
+                finish=reply.finish,
+                input_tokens=entry.usage.input_tokens,
+                output_tokens=entry.usage.output_tokens,
+                cost_usd=str(entry.usage.cost_usd),
+                latency_s=entry.latency_s,
+                tries=entry.tries,
+            )
+        )
+
+    def check_machine(self, machine: Machine) -> None:
+        """Compares a finished machine with the task's constraints.
+
+        Raises:
+            ConstructionFailedError: It breaks one, or there is no machine.
+        """
+        self.machine = machine
+        constraints = self.task.constraints
+        if not machine.started:
+            raise ConstructionFailedError("empty_machine", "no machine was started")
+        if len(machine.blocks) == 1 and not machine.connectors:
+            raise ConstructionFailedError(
+                "empty_machine", "the machine is nothing but its starting block"
+            )
+        if constraints.max_blocks is not None and machine.part_count > constraints.max_blocks:
+            raise ConstructionFailedError(
+                "constraint_violated",
+                f"the machine has {machine.part_count} parts, "
+                f"the task allows {constraints.max_blocks}",
+            )
+        used = {
+            part.module.name for part in (*machine.blocks.values(), *machine.connectors.values())
+        }
+        allowed = {*constraints.modules, "Starting Block"}
+        if constraints.modules and not used <= allowed:
+            raise ConstructionFailedError(
+                "constraint_violated",
+                f"{min(used - allowed)} is not among the task's modules",
+            )

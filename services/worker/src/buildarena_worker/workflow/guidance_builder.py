@@ -1,0 +1,26 @@
+"""The workflow without planning: guidance and builder alone. Source: the paper's ablation."""
+
+from __future__ import annotations
+
+from buildarena_geometry import Machine
+from buildarena_worker.machine_tools import modules_text
+from buildarena_worker.plan import SubStructure
+from buildarena_worker.session import Session
+from buildarena_worker.workflow.base import require_started
+from buildarena_worker.workflow.stages import build_stage, refine_stage
+
+
+class GuidanceBuilder:
+    """Guidance designs as it goes; the builder acts."""
+
+    name = "guidance-builder"
+
+    def build(self, session: Session) -> Machine:
+        """Builds the machine of the session's task as one structure."""
+        task = session.task
+        told = f"{task.statement}\n\nModules\n\n{modules_text(task.constraints.modules)}"
+        part = SubStructure(name="machine", text=told)
+        machine = build_stage(session, part, told)
+        require_started(machine)
+        refine_stage(session, machine, part, told)
+        return machine
