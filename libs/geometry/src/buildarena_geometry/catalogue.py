@@ -12,12 +12,12 @@ import json
 from functools import cache
 from importlib import resources
 from pathlib import Path
-from typing import Any, cast
+from typing import cast
 
 from .errors import CatalogueError
 from .modules import KINDS, Box, Catalogue, Cylinder, Face, Kind, Landmark, Module, Solid
 from .poses import Pose
-from .reading import Fields, Reader
+from .reading import Reader
 from .rotations import ORIGIN, dot, from_axes
 
 CATALOGUE_VERSION = 1
@@ -110,13 +110,6 @@ def _module(entry: Reader) -> Module:
     fields = entry.fields(required=_REQUIRED, optional=_OPTIONAL)
     kind = cast("Kind", fields["kind"].choice(KINDS))
     besiege = fields["besiege"].fields(required=("id", "data"))
-    optional: dict[str, Any] = {
-        "faces": tuple(_face(face) for face in _list(fields, "faces")),
-        "colliders": tuple(_solid(solid) for solid in _list(fields, "colliders")),
-        "body": tuple(_solid(solid) for solid in _list(fields, "body")),
-        "landmarks": tuple(_landmark(mark) for mark in _list(fields, "landmarks")),
-        "actions": tuple(action.text(longest=60) for action in _list(fields, "actions")),
-    }
     module = Module(
         name=name,
         besiege_id=besiege["id"].integer(least=0),
@@ -124,11 +117,15 @@ def _module(entry: Reader) -> Module:
         mass=fields["mass"].number(above=0),
         cost=fields["cost"].integer(least=0),
         size=fields["size"].vector() if fields.has("size") else None,
-        center=fields["center"].vector() if fields.has("center") else ORIGIN,
+        center=fields["center"].vector() if "center" in fields else ORIGIN,
+        faces=tuple(map(_face, fields.items("faces"))),
+        colliders=tuple(map(_solid, fields.items("colliders"))),
+        body=tuple(map(_solid, fields.items("body"))),
         pointing=fields["pointing"].direction() if fields.has("pointing") else None,
+        landmarks=tuple(map(_landmark, fields.items("landmarks"))),
+        actions=tuple(action.text(longest=60) for action in fields.items("actions")),
         description=fields["description"].text(),
-        besiege_data=tuple(_besiege_entry(item) for item in besiege["data"].items()),
-        **optional,
+        besiege_data=tuple(map(_besiege_entry, besiege["data"].items())),
     )
     _check_sense(module, entry)
     return module
@@ -148,10 +145,6 @@ def _check_sense(module: Module, entry: Reader) -> None:
         raise CatalogueError(f"{entry.where}: a {module.kind} needs a size and colliders")
 
 
-def _list(fields: Fields, name: str) -> list[Reader]:
-    return list(fields[name].items()) if fields.has(name) else []
-
-
 def _face(entry: Reader) -> Face:
     fields = entry.fields(required=("label", "center", "normal", "x_axis"))
     normal, x_axis = fields["normal"].direction(), fields["x_axis"].direction()
@@ -167,6 +160,8 @@ def _solid(entry: Reader) -> Solid:
     if shape["shape"].choice(("box", "cylinder")) == "box":
         if not all(low < high for low, high in zip(start, end, strict=True)):
             shape["to"].fail(f"three numbers, each larger than in {list(start)}")
+        if "radius" in shape:
+            shape["radius"].fail("no radius: a box has none")
         return Box(lowest=start, highest=end)
     if start == end:
         shape["to"].fail("another point than `from`")
@@ -175,7 +170,7 @@ def _solid(entry: Reader) -> Solid:
 
 def _landmark(entry: Reader) -> Landmark:
     fields = entry.fields(required=("name", "along"), optional=("radius",))
-    radius = fields["radius"].number(above=0) if fields.has("radius") else None
+    radius = fields["radius"].number(above=0) if "radius" in fields else None
     name = fields["name"].text(longest=60)
     return Landmark(name=name, along=fields["along"].number(), radius=radius)
 

@@ -80,11 +80,15 @@ class Reader:
 
     def integer(self, *, least: int | None = None) -> int:
         """The value as a whole number."""
-        if not isinstance(self.value, int) or isinstance(self.value, bool):
+        value = self.value
+        # JSON has one kind of number: 2.0 is as whole as 2.
+        if isinstance(value, float) and value.is_integer():
+            value = int(value)
+        if not isinstance(value, int) or isinstance(value, bool):
             self.fail("a whole number")
-        if least is not None and self.value < least:
+        if least is not None and value < least:
             self.fail(f"a whole number of at least {least}")
-        return self.value
+        return value
 
     def number(self, *, least: float | None = None, above: float | None = None) -> float:
         """The value as a finite number."""
@@ -131,6 +135,13 @@ class Fields:
     def __getitem__(self, name: str) -> Reader:
         where = f"{self.reader.where}.{name}"
         return Reader(value=self.values.get(name), where=where, error=self.reader.error)
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.values
+
+    def items(self, name: str) -> list[Reader]:
+        """The entries of a list that may be left out."""
+        return list(self[name].items()) if name in self else []
 
     def has(self, name: str) -> bool:
         """Whether the field is there and not null."""

@@ -51,7 +51,7 @@ def start(
     return Change(
         after=after,
         placed=(block.id,),
-        told=lambda: f"Started. {words.block_details(after, block)}",
+        told=lambda: f"Started. {words.placement(after, block)}",
     )
 
 
@@ -102,7 +102,7 @@ def attach_block_to(
         after=after,
         placed=(block.id,),
         attempt=f"A {module.name} on face {face} of block {base.id}",
-        told=lambda: f"Attached. {words.block_details(after, block)}",
+        told=lambda: f"Attached. {words.placement(after, block)}",
     )
 
 

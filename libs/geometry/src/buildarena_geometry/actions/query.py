@@ -12,7 +12,7 @@ from .lookups import part
 
 
 def get_machine_summary(state: MachineState) -> Change:
-    """Lists all blocks and connectors, without their faces."""
+    """Lists the parts: id, module, base/face it sits on, center [east, north, up], and its use."""
     return _answer(state, lambda: words.summary(state))
 
 

@@ -62,9 +62,14 @@ def faces(state: MachineState, block: Block) -> str:
     return f"Faces: {'; '.join(told)}."
 
 
+def placement(state: MachineState, block: Block) -> str:
+    """A block with its faces: what a model has to know to build on."""
+    return f"{block_line(state, block)}.\n{faces(state, block)}"
+
+
 def block_details(state: MachineState, block: Block) -> str:
     """Everything a model can ask about one block."""
-    lines = [block_line(state, block) + ".", faces(state, block)]
+    lines = [placement(state, block)]
     bound = [f"{action} {listing(keys)}" for action, keys in block.bindings.items()]
     if bound:
         lines.append(f"Keys: {'; '.join(bound)}.")
@@ -139,11 +144,6 @@ def loosened(state: MachineState, moved: Iterable[str]) -> list[str]:
                 f"({number(joint.offset)} apart){verdict}."
             )
     return told
-
-
-def placed(block: Block) -> str:
-    """Where a block is and what it does there, after it moved."""
-    return ", ".join([f"at {point(block.center_xyz)}", *_use(block)])
 
 
 def _use(block: Block) -> list[str]:

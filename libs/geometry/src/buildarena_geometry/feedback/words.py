@@ -32,8 +32,8 @@ def point(vector: Vector, decimals: int = 2) -> str:
 
 
 def plain(value: float) -> str:
-    """The number with as few digits as say it to a hundredth: "3.65", "2"."""
-    return number(value).rstrip("0").rstrip(".")
+    """The number with as few digits as say it: "3.65", "2"."""
+    return f"{value + 0.0:.6g}"
 
 
 def caption(direction: Vector) -> str:
@@ -79,14 +79,12 @@ def rolling(axle: Vector, *, flipped: bool) -> str:
     tilt = math.degrees(math.asin(max(-1.0, min(1.0, axle[2]))))
     if abs(tilt) >= ROLLING_TILT_DEG:
         # It turns about -axle, so seen from above an unflipped wheel facing up goes clockwise.
-        clockwise = (axle[2] > 0) != flipped
-        return (
-            f"spins {'clockwise' if clockwise else 'counterclockwise'} seen from above, can't roll"
-        )
+        sense = "clockwise" if (axle[2] > 0) != flipped else "counterclockwise"
+        return f"too flat to roll, forward spins it {sense} seen from above"
     x, y, _ = cross(axle, DOWN)
     sign = (-1.0 if flipped else 1.0) / math.hypot(x, y)
     camber = "" if abs(tilt) < AXIS_TOLERANCE_DEG else f", camber {number(tilt, 1)}°"
-    return f"rolls {caption((x * sign, y * sign, 0.0))}{camber}"
+    return f"forward rolls it {caption((x * sign, y * sign, 0.0))}{camber}"
 
 
 def _bearing(azimuth: float) -> str:
