@@ -6,6 +6,7 @@ BIN := $(VENV)/bin
 PACKAGES := libs/geometry libs/simulation libs/benchmark libs/store libs/pipeline services/api services/worker services/simworker clients/cli
 CODE := $(addsuffix /src,$(PACKAGES)) migrations tests
 STAMP := $(VENV)/.installed
+WORKERS ?= $(shell nproc)
 
 .PHONY: help install demo up test check lock clean
 
@@ -23,8 +24,28 @@ $(STAMP): requirements.lock $(addsuffix /pyproject.toml,$(PACKAGES))
 	$$UV pip install --quiet --python $(BIN)/python --no-deps --no-build-isolation $(addprefix -e ,$(PACKAGES))
 	@touch $@
 
+demo: $(STAMP) ## One small sweep from start to leaderboard; stops everything in the end
+	@$(BIN)/buildarena demo
+
+up: $(STAMP) ## The whole service on this machine until Ctrl-C
+	@$(BIN)/buildarena up
+
+test: check ## Lints, types, import rules and all tests
+	@$(BIN)/pytest -n $(WORKERS) --dist worksteal
+
+check: $(STAMP) ## Lints, types and import rules alone
+	@$(BIN)/ruff format --check --quiet $(CODE)
+	@$(BIN)/ruff check --quiet $(CODE)
+	@$(BIN)/mypy --no-error-summary $(addsuffix /src,$(PACKAGES)) migrations/env.py
+	@$(BIN)/lint-imports --no-cache | tail -n 3
+
+clean: ## Removes the environment, caches and local data
+	rm -rf $(VENV) $(VENV)-uv .buildarena .mypy_cache .ruff_cache .pytest_cache .hypothesis
+
 lock: ## Compiles requirements.lock anew
 	$(PYTHON) -m uv pip compile --quiet --universal --generate-hashes --all-extras --no-annotate \
 		$(foreach p,$(PACKAGES),--no-emit-package $(subst /,-,buildarena-$(notdir $(p)))) \
 		--custom-compile-command "make lock" -o requirements.lock \
 		$(addsuffix /pyproject.toml,$(PACKAGES)) requirements-dev.in
+
+-include mk/*.mk

@@ -19,12 +19,12 @@ def print_json(value: Any) -> None:
 
 def number(value: float | None, digits: int = 1) -> str:
     """A number for people; a dash for nothing."""
-    return "–" if value is None else f"{value:,.{digits}f}"
+    return "-" if value is None else f"{value:,.{digits}f}"
 
 
 def percent(value: float | None) -> str:
     """A share for people."""
-    return "–" if value is None else f"{100 * value:.0f} %"
+    return "-" if value is None else f"{100 * value:.0f} %"
 
 
 def leaderboard_tables(board: dict[str, Any]) -> list[Table]:
@@ -45,9 +45,9 @@ def leaderboard_tables(board: dict[str, Any]) -> list[Table]:
         ):
             table.add_column(name, justify="right")
         for place, row in enumerate(task["rows"], start=1):
-            interval = "–"
+            interval = "-"
             if row["success_low"] is not None:
-                interval = f"{100 * row['success_low']:.0f}–{100 * row['success_high']:.0f} %"
+                interval = f"{100 * row['success_low']:.0f}-{100 * row['success_high']:.0f} %"
             table.add_row(
                 str(place),
                 row["model"] + (" (baseline)" if row["baseline"] else ""),

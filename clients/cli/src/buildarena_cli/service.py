@@ -6,7 +6,7 @@ import shutil
 import signal
 import threading
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from pydantic import ValidationError
@@ -82,9 +82,9 @@ def migrate() -> None:
 
 
 def _settings(data: Path | None, port: int | None) -> Settings:
-    given = {name: v for name, v in {"data": data, "port": port}.items() if v is not None}
+    given: dict[str, Any] = {"data": data, "port": port}
     try:
-        return Settings(**given)
+        return Settings(**{name: value for name, value in given.items() if value is not None})
     except ValidationError as error:
         first = error.errors()[0]
         name = "_".join(str(part) for part in first["loc"])

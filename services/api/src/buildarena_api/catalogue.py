@@ -55,8 +55,8 @@ def list_tasks() -> list[TaskView]:
             category=task.category,
             level=task.level,
             statement=task.statement,
-            indicator=task.indicator,
-            unit=task.unit,
+            indicator=task.indicator.name,
+            unit=task.indicator.unit,
         )
         for task in builtin_tasks().values()
     ]

@@ -11,7 +11,6 @@ from pydantic import BaseModel, Field
 from sqlalchemy.exc import SQLAlchemyError
 
 from buildarena_api.dependencies import ContextDep
-from buildarena_api.problems import problem_responses
 from buildarena_pipeline.context import Context
 from buildarena_pipeline.queues import CONSTRUCT, simulate_queue
 from buildarena_pipeline.tracks import SIMULATORS
@@ -39,7 +38,7 @@ class Health(BaseModel):
 
 @router.get(
     "/health",
-    responses={503: {"model": Health, "description": "down"}} | problem_responses(),
+    responses={503: {"model": Health, "description": "down"}},
 )
 def health(context: ContextDep, response: Response) -> Health:
     """Checks database, broker, workers and disk. Answers 503 when jobs can't be accepted."""

@@ -89,8 +89,8 @@ def leaderboard(
     boards = [
         TaskBoard(
             task=name,
-            indicator=tasks[name].indicator if name in tasks else "indicator",
-            unit=tasks[name].unit if name in tasks else "",
+            indicator=tasks[name].indicator.name if name in tasks else "indicator",
+            unit=tasks[name].indicator.unit if name in tasks else "",
             rows=[
                 Row.model_validate(
                     {

@@ -64,7 +64,7 @@ def drive(session: Session, machine: Machine) -> RolloutRecord:
             trajectory = _spelled(record.trace or ())
             result = (
                 f"{'success' if record.success else 'no success'}, "
-                f"{task.indicator} {record.indicator:.2f}"
+                f"{task.indicator.name} {record.indicator:.2f} {task.indicator.unit}"
             )
         also = pack.say(
             "control_again",

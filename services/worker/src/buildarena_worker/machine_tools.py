@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from buildarena_geometry import Machine, Refused, tool_definitions
+from buildarena_geometry import Machine, Refused, load_catalogue, tool_definitions
 from buildarena_worker.dialogue import Act
 from buildarena_worker.messages import Tool, ToolCall
 from buildarena_worker.transcript import ActionRecord
@@ -67,19 +67,17 @@ def acting_on(machine: Machine) -> Act:
     return act
 
 
-def modules_text(names: Sequence[str] = ()) -> str:
+def modules_text(names: Sequence[str] | None = None) -> str:
     """The module list for people and models, generated from the catalogue.
 
     Args:
         names: Only these modules; all that can be built by default.
     """
-    from buildarena_geometry import load_catalogue
-
     lines = []
     for module in load_catalogue().values():
-        if module.kind in {"start", "cargo"} or (names and module.name not in names):
+        if module.kind in {"start", "cargo"} or (names is not None and module.name not in names):
             continue
-        size = " x ".join(f"{edge:g}" for edge in module.size) if module.kind != "connector" else ""
-        facts = f"{size}, mass {module.mass:g}" if size else f"connector, mass {module.mass:g}"
+        size = "connector" if module.size is None else " x ".join(f"{e:g}" for e in module.size)
+        facts = f"{size}, mass {module.mass:g}"
         lines.append(f"- {module.name} ({facts}): {module.description}")
     return "\n".join(lines)

@@ -101,11 +101,10 @@ class Session:
                 f"the machine has {machine.part_count} parts, "
                 f"the task allows {constraints.max_blocks}",
             )
-        used = {
-            part.module.name for part in (*machine.blocks.values(), *machine.connectors.values())
-        }
-        allowed = {*constraints.modules, "Starting Block"}
-        if constraints.modules and not used <= allowed:
+        used = {block.module.name for block in machine.blocks.values()}
+        used |= {connector.module.name for connector in machine.connectors.values()}
+        allowed = {*(constraints.modules or used), "Starting Block"}
+        if not used <= allowed:
             raise ConstructionFailedError(
                 "constraint_violated",
                 f"{min(used - allowed)} is not among the task's modules",

@@ -95,7 +95,7 @@ class Sketch:
         block_id = self.at(base)
         face = self.face(block_id, direction)
         self.do("attach_block_to", base_block=block_id, face=face, new_block=module, note=note)
-        return next(reversed(self.machine.blocks))
+        return list(self.machine.blocks)[-1]
 
     def connect(
         self,
