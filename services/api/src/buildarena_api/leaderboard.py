@@ -79,7 +79,7 @@ def leaderboard(
                     outcome=job.outcome,
                     success=bool(job.success),
                     indicator=job.indicator or 0.0,
-                    parts=(job.metrics or {}).get("part_count"),
+                    parts=(job.metrics or {}).get("parts"),
                     requests=job.requests,
                     input_tokens=job.input_tokens,
                     output_tokens=job.output_tokens,

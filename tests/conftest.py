@@ -1,0 +1,97 @@
+"""One Postgres and one Valkey a run, one database per test worker, empty for each test."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+from redis import Redis
+from sqlalchemy import create_engine, text
+
+from buildarena_pipeline.context import Context, open_context
+from buildarena_pipeline.embedded import EmbeddedPostgres, EmbeddedValkey
+from buildarena_pipeline.settings import Settings
+from buildarena_store import Database
+from buildarena_store.tables import metadata
+
+TEMPLATE = "buildarena_template"
+SERVERS = pytest.StashKey[ExitStack]()
+VALKEY_DATABASES = 16
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    if hasattr(config, "workerinput") or config.option.collectonly:
+        return
+    with ExitStack() as stack:
+        folder = Path(tempfile.mkdtemp(prefix="buildarena-tests-"))
+        stack.callback(shutil.rmtree, folder, ignore_errors=True)
+        folder.chmod(0o755)  # Postgres runs as nobody when the tests run as root
+        postgres = EmbeddedPostgres(folder / "pg", folder / "pg.log", durable=False)
+        stack.callback(postgres.stop, postgres.start())
+        valkey = EmbeddedValkey(folder / "valkey", folder / "valkey.log")
+        stack.callback(valkey.stop, valkey.start())
+        template = Database(postgres.url.replace("/postgres", f"/{TEMPLATE}"))
+        _execute(postgres.url, f"CREATE DATABASE {TEMPLATE}")
+        template.migrate()
+        template.close()
+        os.environ["TEST_POSTGRES_URL"] = postgres.url
+        os.environ["TEST_VALKEY_URL"] = valkey.url
+        config.stash[SERVERS] = stack.pop_all()
+
+
+def pytest_unconfigure(config: pytest.Config) -> None:
+    stack = config.stash.get(SERVERS, None)
+    if stack is not None:
+        stack.close()
+
+
+def _execute(url: str, statement: str) -> None:
+    engine = create_engine(
+        url.replace("postgresql://", "postgresql+psycopg://"), isolation_level="AUTOCOMMIT"
+    )
+    with engine.connect() as connection:
+        connection.execute(text(statement))
+    engine.dispose()
+
+
+@pytest.fixture(scope="session")
+def database_url(worker_id: str) -> Iterator[str]:
+    """A migrated database of this test worker's own."""
+    server, name = os.environ["TEST_POSTGRES_URL"], f"test_{worker_id}"
+    _execute(server, f"CREATE DATABASE {name} TEMPLATE {TEMPLATE}")
+    yield server.replace("/postgres", f"/{name}")
+    _execute(server, f"DROP DATABASE {name} WITH (FORCE)")
+
+
+@pytest.fixture(scope="session")
+def broker_url(worker_id: str) -> str:
+    """A Valkey database of this test worker's own."""
+    number = 0 if worker_id == "master" else 1 + int(worker_id.removeprefix("gw"))
+    assert number < VALKEY_DATABASES
+    return os.environ["TEST_VALKEY_URL"].removesuffix("/0") + f"/{number}"
+
+
+@pytest.fixture
+def settings(database_url: str, broker_url: str, tmp_path: Path) -> Settings:
+    """Settings that name the test servers and a folder of this test's own."""
+    return Settings(
+        database_url=database_url, broker_url=broker_url, data=tmp_path / "data", lease_s=2.0
+    )
+
+
+@pytest.fixture
+def context(settings: Settings) -> Iterator[Context]:
+    """Connections to an empty database and an empty broker."""
+    context = open_context(settings)
+    names = ", ".join(table.name for table in metadata.sorted_tables)
+    with context.database.transaction() as connection:
+        connection.execute(text(f"TRUNCATE {names} RESTART IDENTITY CASCADE"))
+    with Redis.from_url(settings.required_broker_url()) as valkey:
+        valkey.flushdb()
+    yield context
+    context.close()

@@ -1,0 +1,225 @@
+from __future__ import annotations
+
+import pytest
+
+from buildarena_store import Usage
+from buildarena_worker.errors import (
+    ConstructionFailedError,
+    JournalMismatchError,
+    LeaseLostError,
+    LimitReachedError,
+)
+from buildarena_worker.messages import Message, Reply, Request, ToolCall
+from buildarena_worker.session_io import Answer
+
+
+class Scripted:
+    """A model that says given things in turn, then one thing for ever."""
+
+    def __init__(self, *replies: Reply, last: Reply | None = None) -> None:
+        self.replies = list(replies)
+        self.last = last or Reply(text="TERMINATE")
+        self.requests: list[Request] = []
+
+    def complete(self, request: Request) -> Answer:
+        self.requests.append(request)
+        reply = self.replies.pop(0) if self.replies else self.last
+        usage = Usage(requests=1, input_tokens=10, output_tokens=5)
+        return Answer(reply=reply, usage=usage, latency_s=1.0)
+
+
+def call(name: str, /, **arguments: object) -> Reply:
+    return Reply(text="", calls=(ToolCall(id="c1", name=name, arguments=arguments),))
+
+
+START = call("start", init_shift=[0, 0, 0], init_rotation=[0, 0, 0], note="")
+PLAN = Reply(
+    text="""Here you are. <building_plan><overall_structure>a & b < c</overall_structure>
+<sub_structures><sub_structure><name>one</name><description>a block</description></sub_structure>
+</sub_structures></building_plan>"""
+)
+
+
+def test_the_expert_builds_the_same_bridge_in_every_run(play) -> None:
+    first, second = play(seed=1), play(seed=1)
+    assert first.suspended is not None
+    assert first.suspended.machine.to_document() == second.suspended.machine.to_document()
+    assert first.entries == second.entries
+    assert first.session.transcript.refusals == {}
+
+
+def test_seeds_vary_the_expert_s_design(play) -> None:
+    documents = [play(seed=seed).suspended.machine.to_document() for seed in (0, 1)]
+    assert documents[0] != documents[1]
+
+
+@pytest.mark.parametrize("workflow", ["five-role", "guidance-builder", "builder"])
+def test_every_workflow_leads_the_expert_to_a_machine(play, workflow) -> None:
+    played = play(workflow=workflow)
+    assert played.suspended is not None, played.failure
+    assert played.suspended.machine.part_count > 20
+
+
+def test_the_idle_model_builds_nothing(play) -> None:
+    failure = play("builtin/idle").failure
+    assert isinstance(failure, ConstructionFailedError)
+    assert failure.reason == "plan_unreadable"
+
+
+def test_the_random_model_makes_legal_and_illegal_moves(play) -> None:
+    played = [play("builtin/random", seed=seed) for seed in range(6)]
+    actions = sum(p.session.transcript.actions for p in played)
+    refused = sum(sum(p.session.transcript.refusals.values()) for p in played)
+    assert 0 < refused < actions
+
+
+def test_a_session_resumes_from_any_point_of_its_journal(play) -> None:
+    whole = play(workflow="guidance-builder")
+    wanted = whole.suspended.machine.to_document()
+    for kept in range(0, len(whole.entries), 17):
+        resumed = play(workflow="guidance-builder", entries=whole.entries[:kept])
+        assert resumed.suspended.machine.to_document() == wanted
+        assert resumed.entries == whole.entries
+        assert resumed.session.transcript == whole.session.transcript
+
+
+def test_a_finished_session_replays_without_a_model(play) -> None:
+    whole = play()
+    replayed = play(entries=whole.entries, offline=True)
+    assert replayed.suspended.machine.to_document() == whole.suspended.machine.to_document()
+
+
+def test_a_journal_of_another_session_is_refused(play) -> None:
+    other = play("builtin/random").entries
+    failure = play(entries=other).failure
+    assert isinstance(failure, JournalMismatchError)
+
+
+def test_the_reply_is_journalled_before_it_is_used(play) -> None:
+    def fail(entry: object) -> None:
+        raise ConnectionError("the database is gone")
+
+    played = play(append=fail)
+    assert isinstance(played.failure, ConnectionError)
+    assert played.session.transcript.turns == []
+
+
+def test_a_lost_lease_stops_the_session_before_it_pays(play) -> None:
+    model = Scripted()
+    failure = play(client=model, still_held=lambda: False).failure
+    assert isinstance(failure, LeaseLostError)
+    assert model.requests == []
+
+
+@pytest.mark.parametrize(
+    ("limits", "requests"),
+    [({"max_requests": 3}, 3), ({"max_tokens": 40}, 3), ({"max_seconds": 4}, 4)],
+)
+def test_limits_stop_a_session_within_one_request(play, limits, requests) -> None:
+    played = play(workflow="builder", client=Scripted(last=START), limits=limits)
+    assert isinstance(played.failure, LimitReachedError)
+    assert played.failure.limit in limits
+    assert len(played.entries) == requests
+
+
+def test_an_unreadable_plan_gets_one_more_try(play) -> None:
+    model = Scripted(Reply(text="I would rather not."), PLAN)
+    played = play(client=model)
+    assert "there is no <building_plan>" in model.requests[1].messages[-1].text
+    assert [turn.stage for turn in played.session.transcript.turns][:3] == ["plan", "plan", "draft"]
+
+
+def test_too_many_sub_structures_fail_the_plan(play) -> None:
+    part = "<sub_structure><name>{}</name><function>x</function></sub_structure>"
+    text = PLAN.text.replace("</sub_structures>", part.format("two") + "</sub_structures>")
+    failure = play(client=Scripted(Reply(text=text))).failure
+    assert isinstance(failure, ConstructionFailedError)
+    assert failure.reason == "constraint_violated"
+    assert "2 sub-structures, the task allows 1" in str(failure)
+
+
+@pytest.mark.parametrize("role", ["reviewer", "guidance"])
+def test_an_objection_ends_the_session(play, role) -> None:
+    objection = call("raise_objection", reason="no rope")
+    draft = Reply(text="a drawing")
+    replies = [PLAN, draft, objection]
+    if role == "guidance":
+        replies = [PLAN, draft, Reply(text="TERMINATE"), draft, START, objection]
+    failure = play(client=Scripted(*replies)).failure
+    assert isinstance(failure, ConstructionFailedError)
+    assert failure.reason == "objection"
+    assert str(failure) == f"{role}: no rope"
+
+
+def test_parallel_calls_are_refused_and_do_nothing(play) -> None:
+    twice = Reply(text="", calls=(*START.calls, ToolCall(id="c2", name="reset", arguments={})))
+    model = Scripted(twice)
+    played = play(workflow="builder", client=model)
+    (first, *_) = played.session.transcript.turns
+    assert [action.reason for action in first.actions] == ["parallel_calls"] * 2
+    assert not played.session.machine.started
+    answers = [m for m in model.requests[1].messages if m.role == "tool"]
+    assert [m.call_id for m in answers] == ["c1", "c2"]
+
+
+@pytest.mark.parametrize(
+    ("reply", "reason"),
+    [
+        (call("fly", height=3), "unknown_action"),
+        (
+            Reply(text="", calls=(ToolCall(id="c", name="start", arguments="no json"),)),
+            "malformed_arguments",
+        ),
+        (
+            Reply(text="", calls=(ToolCall(id="c", name="start", arguments=[1]),)),
+            "malformed_arguments",
+        ),
+        (
+            call("attach_block_to", base_block="1", face="A", new_block="Torch", note=""),
+            "initialization_absent",
+        ),
+    ],
+)
+def test_bad_tool_calls_are_refused_with_one_class(play, reply, reason) -> None:
+    played = play(workflow="builder", client=Scripted(reply))
+    assert played.session.transcript.refusals == {reason: 1}
+
+
+def test_an_empty_reply_is_heard_as_no_answer(play) -> None:
+    model = Scripted(
+        PLAN, Reply(text="drawing"), Reply(text="TERMINATE"), Reply(text="drawing"), Reply(text="")
+    )
+    play(client=model)
+    assert model.requests[5].messages[-1].text.endswith("[builder] (no answer)")
+
+
+def test_roles_see_the_thread_from_their_own_side(play) -> None:
+    model = Scripted(
+        PLAN,
+        Reply(text="drawing"),
+        Reply(text="TERMINATE"),
+        Reply(text="final"),
+        START,
+        Reply(text="Go on."),
+        START,
+    )
+    play(client=model)
+    builder, guidance = model.requests[6].messages, model.requests[5].messages
+    assert [m.role for m in builder] == ["system", "user", "assistant", "tool", "user"]
+    assert builder[-1] == Message(role="user", text="[guidance] Go on.")
+    assert [m.role for m in guidance] == ["system", "user"]
+    assert "[builder] start(" in guidance[-1].text
+
+
+def test_a_machine_of_one_block_is_no_machine(play) -> None:
+    failure = play(workflow="builder", client=Scripted(START)).failure
+    assert isinstance(failure, ConstructionFailedError)
+    assert failure.reason == "empty_machine"
+
+
+def test_endless_talk_meets_the_turn_limit(play) -> None:
+    talk = Reply(text="Let me think.")
+    played = play(workflow="builder", client=Scripted(last=talk))
+    assert isinstance(played.failure, ConstructionFailedError)
+    assert played.failure.reason == "turn_limit"
+    assert len(played.entries) == 300
