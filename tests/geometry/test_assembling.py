@@ -1,0 +1,196 @@
+"""Whole machines as parts of an assembly."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from buildarena_geometry import Machine, RefusalClass, replay
+
+
+@pytest.fixture
+def assembly(build):
+    deck = build(("1", "A", "Small Wooden Block"), ("2", "E", "Powered Wheel"))
+    deck.act(
+        "connect_blocks",
+        {"block_a": "1", "face_a": "C", "block_b": "2", "face_b": "C", "connector": "Brace"},
+    )
+    deck.act("flip_spin", {"block_id": "3"})
+    tower = build(("1", "C", "Small Wooden Block"))
+    return Machine(available={"deck": deck, "tower": tower})
+
+
+def add(machine, name, **more):
+    return machine.act("add_machine", {"machine_id": name, **more})
+
+
+def test_blocks_of_a_sub_structure_carry_its_letter(assembly):
+    outcome = add(assembly, "deck")
+    assert outcome.ok
+    assert list(assembly.blocks) == ["A_1", "A_2", "A_3"]
+    assert list(assembly.connectors) == ["A_4"]
+    assert assembly.blocks["A_3"].mount == ("A_2", "E")
+    assert assembly.blocks["A_3"].flipped
+    assert assembly.connectors["A_4"].start == ("A_1", "C")
+    assert [joint.part for joint in assembly.joints] == ["A_2", "A_3"]
+
+
+def test_the_same_machine_can_be_added_twice_and_letters_are_never_used_again(assembly):
+    add(assembly, "tower")
+    add(assembly, "tower", init_shift=[5, 0, 0])
+    assert assembly.act("remove_machine", {"machine_index": "A"}).ok
+    add(assembly, "tower", init_shift=[10, 0, 0])
+    assert list(assembly.sub_structures) == ["B", "C"]
+
+
+def test_a_refused_machine_uses_no_letter_up(assembly):
+    add(assembly, "tower")
+    outcome = add(assembly, "deck")
+    assert outcome.reason == RefusalClass.OVERLAP
+    assert ("B_1", "A_1") in outcome.overlaps
+    assert add(assembly, "deck", init_shift=[0, 9, 0]).ok
+    assert "B_1" in assembly.blocks
+
+
+@pytest.mark.parametrize(
+    ("rotation", "east", "north", "up"),
+    [
+        ([90, 0, 0], "south", "east", "up"),  # yaw: north to east
+        ([0, 90, 0], "east", "down", "north"),  # pitch: north down
+        ([0, 0, 90], "down", "north", "east"),  # roll: up to east
+    ],
+)
+def test_yaw_pitch_and_roll_turn_as_they_are_said_to(assembly, rotation, east, north, up):
+    directions = {
+        "east": (1, 0, 0),
+        "north": (0, 1, 0),
+        "south": (0, -1, 0),
+        "up": (0, 0, 1),
+        "down": (0, 0, -1),
+    }
+    add(assembly, "tower", init_rotation=rotation)
+    turned = assembly.blocks["A_1"].world_from_block.rotation
+    wanted = np.array([directions[name] for name in (east, north, up)]).T
+    assert np.allclose(turned, wanted)
+
+
+def test_motions_compose_exactly_about_the_starting_block(assembly):
+    add(assembly, "deck", init_shift=[1, 2, 3], init_rotation=[30, 20, 10])
+    before = assembly.copy()
+    center = assembly.blocks["A_1"].center
+    for _ in range(4):
+        assert assembly.act("rotate_machine", {"machine_index": "A", "rotation": [90, 0, 0]}).ok
+        assert np.allclose(assembly.blocks["A_1"].center, center)
+    for block_id, block in before.blocks.items():
+        now = assembly.blocks[block_id].world_from_block
+        assert np.allclose(now.position, block.world_from_block.position)
+        assert np.allclose(now.rotation, block.world_from_block.rotation)
+
+
+def test_what_is_attached_later_moves_along_and_connectors_follow(assembly):
+    add(assembly, "deck")
+    add(assembly, "tower", init_shift=[0, 6, 0])
+    torch = {"base_block": "A_1", "face": "B", "new_block": "Torch"}
+    assert assembly.act("attach_block_to", torch).changed == ("1",)
+    assembly.act(
+        "connect_blocks",
+        {"block_a": "A_1", "face_a": "E", "block_b": "B_1", "face_b": "F", "connector": "Winch"},
+    )
+    assembly.act("twist_block", {"block_id": "A_3", "angle": 30})
+    before = assembly.copy()
+    assert assembly.act("shift_machine", {"machine_index": "A", "position": [0, -2, 1]}).ok
+    for block_id in ("1", "A_1", "A_2", "A_3"):
+        moved = assembly.blocks[block_id].center - before.blocks[block_id].center
+        assert np.allclose(moved, (0, -2, 1))
+    link = assembly.connectors["2"]
+    assert np.allclose(link.start_point, assembly.blocks["A_1"].face_center("E"))
+    assert np.allclose(link.end_point, before.connectors["2"].end_point)
+    assert np.allclose(link.world_from_connector.position, link.start_point)
+    assert np.allclose(link.world_from_connector.apply(link.span), link.end_point)
+
+
+def test_a_motion_into_another_sub_structure_is_rolled_back_completely(assembly):
+    add(assembly, "tower")
+    add(assembly, "deck", init_shift=[0, 4, 0])
+    before = assembly.copy()
+    outcome = assembly.act("shift_machine", {"machine_index": "B", "position": [0, -4, 0]})
+    assert outcome.reason == RefusalClass.OVERLAP
+    assert assembly == before
+
+
+def test_removing_a_sub_structure_takes_what_was_attached_to_it(assembly):
+    add(assembly, "deck")
+    add(assembly, "tower", init_shift=[0, 6, 0])
+    assembly.act("attach_block_to", {"base_block": "A_1", "face": "B", "new_block": "Torch"})
+    assembly.act(
+        "connect_blocks",
+        {"block_a": "A_1", "face_a": "E", "block_b": "B_1", "face_b": "F", "connector": "Brace"},
+    )
+    assert assembly.detached == ()
+    outcome = assembly.act("remove_machine", {"machine_index": "A"})
+    assert outcome.ok
+    assert list(assembly.blocks) == ["B_1", "B_2"]
+    assert not assembly.connectors
+    assert add(assembly, "deck").ok, "its place is free again"
+
+
+def test_sub_structures_that_nothing_joins_are_told(assembly):
+    add(assembly, "deck")
+    add(assembly, "tower", init_shift=[0, 6, 0])
+    assert assembly.detached == ("B_1", "B_2")
+    summary = assembly.act("get_machine_summary").text
+    assert "Not connected to block A_1: B_1, B_2." in summary
+
+
+@pytest.mark.parametrize("name", ["shift_machine", "rotate_machine", "remove_machine"])
+def test_an_unknown_letter_is_refused_with_the_known_ones(assembly, name):
+    add(assembly, "tower")
+    argument = {"shift_machine": "position", "rotate_machine": "rotation"}.get(name)
+    arguments = {"machine_index": "Q"} | ({argument: [0, 0, 0]} if argument else {})
+    outcome = assembly.act(name, arguments)
+    assert outcome.reason == RefusalClass.UNKNOWN_SUB_STRUCTURE
+    assert "Sub-structures: A." in outcome.text
+
+
+def test_unknown_and_empty_machines_can_not_be_added():
+    assembly = Machine(available={"hull": Machine()})
+    assert add(assembly, "wing").reason == RefusalClass.UNKNOWN_SUB_STRUCTURE
+    assert add(assembly, "hull").reason == RefusalClass.UNKNOWN_SUB_STRUCTURE
+
+
+def test_an_assembly_begins_with_a_machine_and_not_with_a_starting_block(assembly):
+    assert assembly.act("start").reason == RefusalClass.UNKNOWN_ACTION
+    torch = {"base_block": "A_1", "face": "B", "new_block": "Torch"}
+    refused = assembly.act("attach_block_to", torch)
+    assert refused.reason == RefusalClass.INITIALIZATION_ABSENT
+    assert "add_machine" in refused.text
+
+
+def test_later_changes_to_a_source_do_not_reach_the_assembly(build):
+    source = build()
+    assembly = Machine(available={"source": source})
+    source.act("attach_block_to", {"base_block": "1", "face": "A", "new_block": "Torch"})
+    add(assembly, "source")
+    assert list(assembly.blocks) == ["A_1"]
+
+
+def test_an_assembly_survives_its_document_and_its_log(assembly):
+    add(assembly, "deck", init_rotation=[15, 0, 0])
+    add(assembly, "tower", init_shift=[0, 6, 0])
+    assembly.act("attach_block_to", {"base_block": "B_1", "face": "B", "new_block": "Torch"})
+    assembly.act("shift_machine", {"machine_index": "B", "position": [0, 1, 0]})
+    assert replay(assembly.log) == assembly
+    document = json.loads(json.dumps(assembly.to_document()))
+    restored = Machine.from_document(document)
+    assert restored == assembly
+    assert restored.available == assembly.available
+    assert replay(restored.log) == assembly
+
+
+def test_the_twenty_seventh_sub_structure_is_called_aa(build):
+    assembly = Machine(available={"cube": build()})
+    for index in range(28):
+        assert add(assembly, "cube", init_shift=[2 * index, 0, 0]).ok
+    assert list(assembly.sub_structures)[25:] == ["Z", "AA", "AB"]

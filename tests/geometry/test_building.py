@@ -1,0 +1,218 @@
+"""Attaching, connecting and removing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from buildarena_geometry import Cause, Machine, RefusalClass, load_catalogue
+
+ATTACHABLE = load_catalogue().attachable
+
+
+def attach(machine, base, face, module, **more):
+    arguments = {"base_block": base, "face": face, "new_block": module, **more}
+    return machine.act("attach_block_to", arguments)
+
+
+def connect(machine, block_a, face_a, block_b, face_b, connector="Brace"):
+    return machine.act(
+        "connect_blocks",
+        {
+            "block_a": block_a,
+            "face_a": face_a,
+            "block_b": block_b,
+            "face_b": face_b,
+            "connector": connector,
+        },
+    )
+
+
+def test_an_unrotated_starting_block_has_the_worlds_axes_and_faces():
+    machine = Machine()
+    machine.act("start", {"init_shift": [1, 2, 3], "note": "a test"})
+    block = machine.blocks["1"]
+    assert np.allclose(block.center, (1, 2, 3))
+    assert np.allclose(block.world_from_block.rotation, np.eye(3))
+    normals = {face.label: face.normal for face in block.module.faces}
+    assert normals["A"] == pytest.approx((1, 0, 0))  # east
+    assert normals["C"] == pytest.approx((0, 0, 1))  # up
+    assert normals["E"] == pytest.approx((0, 1, 0))  # north
+    assert block.note == "a test"
+
+
+@pytest.mark.parametrize("module", ATTACHABLE)
+@pytest.mark.parametrize("face", "ABCDEF")
+def test_a_new_block_touches_its_base_face_and_points_away_from_it(build, module, face):
+    machine = build(("1", face, module))
+    base, part = machine.blocks["1"], machine.blocks["2"]
+    assert part.mount == ("1", face)
+    assert np.allclose(part.world_from_block.position, base.face_center(face))
+    assert np.allclose(part.axis_xyz, base.face_normal(face))
+
+
+@pytest.mark.parametrize(
+    ("face", "torch", "cannon"),
+    [
+        ("A", (0, 0, 1), (0, 0, -1)),
+        ("B", (0, 0, 1), (0, 0, -1)),
+        ("E", (0, 0, 1), (0, 0, -1)),
+        ("F", (0, 0, -1), (0, 0, 1)),
+        ("C", (0, -1, 0), (0, 1, 0)),
+    ],
+)
+def test_torches_and_cannons_point_as_in_besiege(build, face, torch, cannon):
+    assert np.allclose(build(("1", face, "Torch")).blocks["2"].pointing, torch)
+    assert np.allclose(build(("1", face, "Water Cannon")).blocks["2"].pointing, cannon)
+
+
+def test_only_the_face_it_sits_on_is_taken_and_faces_that_touch_a_neighbour_stay_open(build):
+    machine = build(("1", "A", "Small Wooden Block"), ("1", "C", "Small Wooden Block"))
+    machine.act("attach_block_to", {"base_block": "2", "face": "A", "new_block": "Torch"})
+    state = machine.state
+    assert state.free_faces(machine.blocks["1"]) == ["B", "D", "E", "F"]
+    assert "F" not in state.free_faces(machine.blocks["2"])
+
+
+def test_ids_count_from_one_and_a_refused_attach_uses_none_up(build):
+    machine = build()
+    assert not attach(machine, "1", "Z", "Torch").ok
+    assert attach(machine, "1", "A", "Torch").changed == ("2",)
+    assert not attach(machine, "1", "A", "Torch").ok
+    assert machine.act("remove_block", {"block_id": 2}).ok
+    assert attach(machine, 1, "A", "Torch").changed == ("3",)
+
+
+def test_an_overlap_names_every_pair_and_leaves_no_trace(build):
+    block = "Small Wooden Block"
+    machine = build(("1", "A", block), ("2", "E", block), ("1", "C", block), ("3", "C", block))
+    before = machine.copy()
+    outcome = attach(machine, "2", "C", "Powered Wheel")
+    assert outcome.reason == RefusalClass.OVERLAP
+    assert set(outcome.overlaps) == {("6", "4"), ("6", "5")}
+    assert "block 4" in outcome.text
+    assert "block 5" in outcome.text
+    assert machine == before
+    assert attach(machine, "2", "C", block).changed == ("6",)
+
+
+def test_wheels_side_by_side_overlap(build):
+    machine = build(("1", "A", "Small Wooden Block"), ("1", "C", "Powered Wheel"))
+    assert attach(machine, "2", "C", "Powered Wheel").overlaps == (("4", "3"),)
+
+
+@pytest.mark.parametrize(("gap", "fits"), [(0.0, True), (-1e-7, True), (-1e-4, False)])
+def test_blocks_may_touch_and_not_overlap(build, gap, fits):
+    machine = build(("1", "A", "Small Wooden Block"), ("2", "E", "Small Wooden Block"))
+    # The starting block ends at 0.4, the small block begins at 0.5: 0.1 closes the gap.
+    outcome = machine.act("shift_block", {"block_id": "2", "shift_real": [-0.1 + gap, 0, 0]})
+    assert outcome.ok is fits
+
+
+@pytest.mark.parametrize(
+    ("arguments", "cause"),
+    [
+        (("1", "a", "Torch"), Cause.NO_SUCH_FACE),
+        (("2", "A", "Torch"), Cause.NO_SUCH_FACE),
+        (("3", "A", "Torch"), Cause.NO_SUCH_FACE),
+        (("1", "A", "Torch"), Cause.FACE_OCCUPIED),
+        (("9", "A", "Torch"), Cause.NO_SUCH_BLOCK),
+        (("1", "B", "Brace"), Cause.CONNECTOR_MISUSE),
+        (("1", "B", "Starting Block"), Cause.UNKNOWN_MODULE),
+        (("1", "B", "Ballast"), Cause.UNKNOWN_MODULE),
+        (("1", "B", "torch"), Cause.UNKNOWN_MODULE),
+    ],
+)
+def test_an_attach_that_makes_no_sense_is_refused_with_its_cause(build, arguments, cause):
+    machine = build(("1", "A", "Torch"))
+    assert connect(machine, "1", "C", "1", "E").ok  # connector 3 has no faces either
+    assert attach(machine, *arguments).cause is cause
+
+
+def test_a_connector_joins_faces_and_leaves_them_open(build):
+    machine = build(("1", "A", "Small Wooden Block"))
+    assert connect(machine, "1", "C", "2", "C", "Winch").ok
+    link = machine.connectors["3"]
+    assert link.start == ("1", "C")
+    assert np.allclose(link.start_point, machine.blocks["1"].face_center("C"))
+    assert np.allclose(link.end_point, machine.blocks["2"].face_center("C"))
+    assert "C" in machine.state.free_faces(machine.blocks["1"])
+    assert connect(machine, "1", "A", "2", "E").ok, "taken faces may be connected"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [
+        (("1", "A", "2", "F"), RefusalClass.EXCESS_CONNECTION),
+        (("2", "F", "1", "A"), RefusalClass.EXCESS_CONNECTION),
+        (("1", "C", "1", "C"), RefusalClass.TOO_CLOSE),
+        (("1", "C", "2", "C", "Torch"), RefusalClass.CONNECTOR_MISUSE),
+        (("1", "C", "2", "C", "Rope"), RefusalClass.MODULE_RESTRICTION),
+        (("1", "C", "3", "A"), RefusalClass.FACE_PRESENCE),
+        (("1", "C", "2", "Q"), RefusalClass.FACE_PRESENCE),
+        (("7", "C", "2", "A"), RefusalClass.BLOCK_PRESENCE),
+    ],
+)
+def test_a_connection_that_makes_no_sense_is_refused(build, arguments, reason):
+    machine = build(("1", "A", "Small Wooden Block"), ("1", "B", "Torch"))
+    assert connect(machine, *arguments).reason is reason
+
+
+def test_connector_ends_follow_the_blocks_they_sit_on(build):
+    machine = build(("1", "A", "Small Wooden Block"), ("2", "E", "Small Wooden Block"))
+    connect(machine, "1", "C", "3", "C")
+    before = machine.connectors["4"].end_point
+    assert machine.act("shift_block", {"block_id": "3", "shift_real": [0.2, 0, 0.3]}).ok
+    assert np.allclose(machine.connectors["4"].end_point, before + (0.2, 0, 0.3))
+    assert np.allclose(machine.connectors["4"].start_point, (0, 0, 0.5))
+
+
+def test_removing_a_block_opens_its_faces_takes_its_connectors_and_names_what_hangs_loose(build):
+    machine = build(
+        ("1", "A", "Small Wooden Block"),
+        ("2", "E", "Small Wooden Block"),
+        ("3", "E", "Torch"),
+    )
+    connect(machine, "1", "C", "2", "C")
+    outcome = machine.act("remove_block", {"block_id": "2"})
+    assert outcome.ok
+    assert set(outcome.changed) == {"2", "5"}
+    assert not machine.connectors
+    assert machine.detached == ("3", "4")
+    assert "5" in outcome.text
+    assert "3, 4" in outcome.text
+    assert machine.state.free_faces(machine.blocks["1"]) == list("ABCDEF")
+    assert machine.state.free_faces(machine.blocks["3"]) == ["A", "B", "C", "D", "F"]
+    assert machine.blocks["3"].mount is None
+    assert machine.blocks["3"].lost_mount == ("2", "E")
+
+
+def test_a_connector_keeps_loose_blocks_connected(build):
+    machine = build(("1", "A", "Small Wooden Block"), ("2", "E", "Small Wooden Block"))
+    connect(machine, "1", "C", "3", "C")
+    machine.act("remove_block", {"block_id": "2"})
+    assert machine.detached == ()
+    machine.act("remove_block", {"block_id": "4"})
+    assert machine.detached == ("3",)
+
+
+def test_reset_begins_anew_and_stays_in_the_log(build):
+    machine = build(("1", "A", "Torch"))
+    assert machine.act("reset").ok
+    assert not machine.started
+    assert machine.act("start").ok
+    assert attach(machine, "1", "A", "Torch").ok
+    assert [record.name for record in machine.log].count("reset") == 1
+    assert machine == build(("1", "A", "Torch"))
+
+
+def test_nothing_is_built_before_the_start_and_nothing_is_started_twice():
+    machine = Machine()
+    assert attach(machine, "1", "A", "Torch").reason == RefusalClass.INITIALIZATION_ABSENT
+    machine.act("start")
+    assert machine.act("start").reason == RefusalClass.MULTIPLE_INITIALIZATION
+
+
+def test_the_starting_block_stays(build):
+    outcome = build().act("remove_block", {"block_id": "1"})
+    assert outcome.cause is Cause.START_BLOCK
