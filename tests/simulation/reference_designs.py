@@ -87,6 +87,36 @@ class Draft:
             connector=connector,
         )
 
+    def aim(self, block: str, direction: Direction) -> None:
+        """Twists a cannon or torch by quarter turns until it points a way."""
+        for angle in (0, 90, 180, 270):
+            trial = self.machine.copy()
+            if angle and not trial.act("twist_block", {"block_id": block, "angle": angle}).ok:
+                continue
+            pointing = trial.blocks[block].pointing
+            if pointing is not None and pointing @ np.array(direction, dtype=float) > 0.999:
+                if angle:
+                    self.do("twist_block", block_id=block, angle=angle)
+                return
+        raise ValueError(f"block {block} cannot point towards {direction}")
+
+    def cannon(self, base: str, face: Direction, spray: Direction) -> str:
+        made = self.attach(base, face, CANNON)
+        self.aim(made, spray)
+        return made
+
+    def torch(self, base: str, face: Direction, flame: Direction) -> str:
+        made = self.attach(base, face, TORCH)
+        self.aim(made, flame)
+        return made
+
+    def wheel(self, base: str, face: Direction) -> str:
+        """A wheel on an east or west face that rolls north when it spins forward."""
+        made = self.attach(base, face, WHEEL)
+        if face == WEST:
+            self.do("flip_spin", block_id=made)
+        return made
+
     def bind(self, block: str, action: str, key: str) -> None:
         self.do("add_control_key", block_id=block, action=action, new_key=key)
 
@@ -177,6 +207,171 @@ def deck(
 def one_shot_bridge() -> Actions:
     """The bridge of the paper's one-shot example, which is reported to carry 1000."""
     return deck(5, 7, cross=True, rails=True, pillars=5)
+
+
+# Vehicles
+
+
+def car(
+    length: int = 5,
+    track: int = 1,
+    *,
+    axles: int = 2,
+    deck_half: tuple[int, int] | None = None,
+    rails: bool = True,
+    bound: bool = True,
+    drive: Sequence[tuple[str, float, float]] = (("UpArrow", 1.0, 20.0),),
+) -> Actions:
+    """A spine along north-south with cross members, a wheel at each of their ends.
+
+    UpArrow and DownArrow drive it, LeftArrow and RightArrow turn it on the spot.
+
+    Args:
+        length: Odd number of blocks in the spine.
+        track: Blocks between the spine and a wheel.
+        axles: Number of cross members, 2 or 3.
+        deck_half: Half-width and half-length of a deck above it, in blocks; None for no deck.
+        rails: Whether a rail runs round the deck.
+        bound: Whether keys are bound to the wheels.
+        drive: Key, time and duration of each press.
+    """
+    draft = Draft()
+    middle = draft.start()
+    front = draft.row(middle, NORTH, length // 2)[-1]
+    back = draft.row(middle, SOUTH, length // 2)[-1]
+    right, left = [], []
+    for base in (front, back, middle)[:axles]:
+        for side, wheels in ((EAST, right), (WEST, left)):
+            end = ([base, *draft.row(base, side, track)])[-1]
+            wheels.append(draft.wheel(end, side))
+    if deck_half is not None:
+        _deck_on(draft, middle, deck_half, rails=rails)
+    if bound:
+        for wheels, turn in ((right, "LeftArrow"), (left, "RightArrow")):
+            back_turn = "RightArrow" if turn == "LeftArrow" else "LeftArrow"
+            for wheel in wheels:
+                draft.bind(wheel, "spinning_forward", "UpArrow")
+                draft.bind(wheel, "spinning_backward", "DownArrow")
+                draft.bind(wheel, "spinning_forward", turn)
+                draft.bind(wheel, "spinning_backward", back_turn)
+        for key, time, hold_for in drive:
+            draft.press(key, time, hold_for)
+    return draft.actions
+
+
+def _deck_on(draft: Draft, base: str, half: tuple[int, int], *, rails: bool) -> None:
+    across, along = half
+    grid = {(0, 0): draft.attach(base, UP)}
+    for sign, way in ((1, NORTH), (-1, SOUTH)):
+        for y, block in enumerate(draft.row(grid[0, 0], way, along), 1):
+            grid[0, sign * y] = block
+    for y in range(-along, along + 1):
+        for sign, way in ((1, EAST), (-1, WEST)):
+            for x, block in enumerate(draft.row(grid[0, y], way, across), 1):
+                grid[sign * x, y] = block
+    if rails:
+        for (x, y), block in grid.items():
+            if abs(x) == across or abs(y) == along:
+                draft.attach(block, UP)
+
+
+def stool(height: int = 3) -> Actions:
+    """A block with wheels lying flat on top: nothing that turns touches the ground."""
+    draft = Draft()
+    middle = draft.start()
+    arms = [draft.row(middle, way, 2)[-1] for way in (EAST, WEST, NORTH, SOUTH)]
+    for arm in arms:
+        draft.row(arm, DOWN, height)
+        wheel = draft.attach(arm, UP, WHEEL)
+        draft.bind(wheel, "spinning_forward", "UpArrow")
+    draft.press("UpArrow", 1.0, 20.0)
+    return draft.actions
+
+
+def cart() -> Actions:
+    """Two driven wheels beside the starting block and a tail that drags on the ground."""
+    draft = Draft()
+    middle = draft.start()
+    for side in (EAST, WEST):
+        draft.bind(draft.wheel(middle, side), "spinning_forward", "UpArrow")
+    draft.row(middle, SOUTH, 3)
+    draft.press("UpArrow", 1.0, 20.0)
+    return draft.actions
+
+
+# Rockets
+
+SIDES = (EAST, WEST, NORTH, SOUTH)
+
+
+def rocket(
+    sides: Sequence[Direction] = SIDES,
+    *,
+    heated: bool = True,
+    cargo_blocks: int = 0,
+    skew: bool = False,
+) -> Actions:
+    """Cannons round the starting block that spray down, each with a torch two blocks below.
+
+    Args:
+        sides: On which sides of the starting block a cannon sits.
+        heated: Whether there are torches.
+        cargo_blocks: Blocks on top, as dead weight.
+        skew: Whether three blocks hang out to the east, so that it tips.
+    """
+    draft = Draft()
+    middle = draft.start()
+    for side in sides:
+        draft.cannon(middle, side, DOWN)
+    low = draft.row(middle, DOWN, 2)[-1]
+    if heated:
+        for side in sides:
+            draft.torch(low, side, UP)
+    top = draft.row(middle, UP, max(cargo_blocks, 1 if skew else 0))
+    if skew:
+        draft.row(top[-1], EAST, 3)
+    for block in draft.machine.blocks.values():
+        if block.module.kind == "cannon":
+            draft.bind(block.id, "hold_to_fire", "Alpha1")
+    return draft.actions
+
+
+def paired_engine() -> Actions:
+    """Two cannons side by side share one torch."""
+    draft = Draft()
+    middle = draft.start()
+    draft.cannon(middle, EAST, DOWN)
+    side = draft.attach(middle, NORTH)
+    draft.cannon(side, EAST, DOWN)
+    low = draft.row(middle, DOWN, 2)[-1]
+    torch = draft.torch(low, EAST, UP)
+    draft.do("shift_block", block_id=torch, shift_real=[0, 0.5, 0])
+    for block in draft.machine.blocks.values():
+        if block.module.kind == "cannon":
+            draft.bind(block.id, "hold_to_fire", "Alpha1")
+    return draft.actions
+
+
+def rocket_assembly() -> tuple[dict[str, Actions], Actions]:
+    """Four engines braced to a frame: the sub-structures by name, and the assembly's log."""
+    engine = rocket((EAST, WEST))
+    draft = Draft()
+    middle = draft.start()
+    for side in SIDES:
+        draft.row(middle, side, 2)
+    parts = {"engine": engine, "frame": draft.actions}
+    available = {name: replayed(actions) for name, actions in parts.items()}
+    whole = Draft(available)
+    whole.do("add_machine", machine_id="frame", init_shift=[0, 0, 2])
+    whole.do("add_machine", machine_id="engine", init_shift=[0, 0, 0])
+    frame, engine_start = "A_1", "B_1"
+    for side in (NORTH, SOUTH):
+        whole.link(frame, side, engine_start, side)
+    whole.link(frame, DOWN, engine_start, UP)
+    arms = [block for block in whole.machine.blocks if block.startswith("A_") and block != frame]
+    for arm in arms[1::2]:
+        whole.link(arm, DOWN, engine_start, NORTH)
+    return parts, whole.actions
 
 
 def replayed(

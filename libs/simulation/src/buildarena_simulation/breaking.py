@@ -4,7 +4,8 @@ import numpy as np
 
 from buildarena_simulation.engines.base import Engine
 from buildarena_simulation.structure.clusters import Clusters, find_clusters
-from buildarena_simulation.structure.loads import LoadModel, PointForces
+from buildarena_simulation.structure.contacts import PointForces, evenly_shared
+from buildarena_simulation.structure.loads import LoadModel
 from buildarena_simulation.structure.model import JOINT_KINDS, FloatArray, Structure
 from buildarena_simulation.structure.motion import Motion
 from buildarena_simulation.trajectory import Break, JointPeak
@@ -47,7 +48,8 @@ class BreakingModel:
         """
         self.motion = engine.motion()
         tensions = engine.rope_tensions()
-        forces = self._all_forces(engine.contacts(), thrusts, tensions)
+        contacts = evenly_shared(engine.contacts(), self.clusters.cluster_of)
+        forces = self._all_forces(contacts, thrusts, tensions)
         loads = self._loads.evaluate(forces, self.motion)
         seen = np.stack([loads.force, loads.moment, loads.ratio], axis=1)
         self._peaks = np.maximum(self._peaks, seen)

@@ -60,6 +60,13 @@ ANGULAR_DRAG: Final = 0.05
 LINEAR_DRAG: Final = 0.2
 """Linear drag of a free-standing piece, 1/s. Source: public modding notes."""
 
+MAX_SPIN: Final = 30.0
+"""Fastest spin of a free piece, rad/s; wheels on their axles may spin faster.
+
+Ours: game engines bound spin likewise; it keeps the explicit gyroscopic terms of a tumbling rocket
+from gaining energy.
+"""
+
 FRICTION_TERRAIN: Final = 1.0
 """Neutral, so that a contact with terrain or cargo takes the other body's coefficient."""
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from buildarena_simulation.scenario import TerrainBox
 from buildarena_simulation.structure.clusters import Clusters
-from buildarena_simulation.structure.loads import PointForces
+from buildarena_simulation.structure.contacts import ContactForces
 from buildarena_simulation.structure.model import FloatArray, Structure
 from buildarena_simulation.structure.motion import Motion
 
@@ -99,7 +99,7 @@ class Engine(Protocol):
             thrusts: (C,) recoil of each cannon during these steps, mass·unit/s².
         """
 
-    def contacts(self) -> PointForces:
+    def contacts(self) -> ContactForces:
         """Contact and friction forces on the blocks in the last step."""
 
     def rope_tensions(self) -> FloatArray:

@@ -10,11 +10,12 @@ from buildarena_simulation.constants import (
     FRICTION_BLOCK,
     FRICTION_TERRAIN,
     FRICTION_WHEEL,
+    MAX_SPIN,
     WHEEL_TORQUE,
 )
 from buildarena_simulation.engines.base import CargoPose, World, principal_frames, quaternion_of
 from buildarena_simulation.structure.clusters import Clusters
-from buildarena_simulation.structure.loads import PointForces
+from buildarena_simulation.structure.contacts import ContactForces
 from buildarena_simulation.structure.model import FloatArray, Role, ShapeKind
 from buildarena_simulation.structure.motion import Motion
 
@@ -110,6 +111,7 @@ class MujocoEngine:
             for row in wheel_speeds:
                 data.ctrl[self._hinge_actuators] = self._hinge_targets(row)
                 mujoco.mj_step(model, data)
+        self._limit_spin()
         self._contacts = self._read_contacts()
         self._tensions = self._read_tensions()
         # A step leaves the kinematics of its beginning behind; bring them up to its end.
@@ -117,7 +119,7 @@ class MujocoEngine:
         mujoco.mj_comPos(model, data)
         mujoco.mj_comVel(model, data)
 
-    def contacts(self) -> PointForces:
+    def contacts(self) -> ContactForces:
         return self._contacts
 
     def rope_tensions(self) -> FloatArray:
@@ -342,6 +344,8 @@ class MujocoEngine:
         self._thrust_actuators = np.array(
             [model.actuator(f"cannon {i}").id for i in self._structure.cannons], dtype=int
         )
+        free = [model.joint(f"free {piece[0]}").dofadr[0] for piece in clusters.pieces]
+        self._spin_dofs = np.array(free)[:, None] + np.arange(3, 6)
         self._tendon_of = {
             int(r): model.tendon(f"rope {r}").id for r in np.flatnonzero(self._rope_alive)
         }
@@ -382,21 +386,35 @@ class MujocoEngine:
     def _hinge_targets(self, speeds: FloatArray) -> FloatArray:
         return np.asarray(speeds[self._hinge_wheels] * self._hinge_signs)
 
-    def _read_contacts(self) -> PointForces:
+    def _limit_spin(self) -> None:
+        """Slows pieces that spin faster than any part of the game may."""
+        spins = self._data.qvel[self._spin_dofs]
+        speeds = np.sqrt((spins * spins).sum(axis=1))
+        if speeds.max(initial=0.0) > MAX_SPIN:
+            scale = np.minimum(1.0, MAX_SPIN / np.maximum(speeds, 1e-9))
+            self._data.qvel[self._spin_dofs] = spins * scale[:, None]
+
+    def _read_contacts(self) -> ContactForces:
         data = self._data
         contact, count = data.contact, data.ncon
         address = contact.efc_address[:count]
         active = np.flatnonzero(address >= 0)
-        blocks = self._block_of_geom[contact.geom[active]]
+        geoms = contact.geom[active]
+        blocks = self._block_of_geom[geoms]
         address = address[active]
         components = data.efc_force[address[:, None] + np.arange(3)]
         frames = contact.frame[active].reshape(-1, 3, 3)
         # MuJoCo's contact force acts on the second geom.
         force = np.einsum("kj,kji->ki", components, frames)
-        point = contact.pos[active]
+        point, normal = contact.pos[active], frames[:, 0]
+        bodies = self._model.geom_bodyid[geoms]
         first, second = blocks[:, 0] >= 0, blocks[:, 1] >= 0
-        return PointForces(
-            block=np.concatenate([blocks[first, 0], blocks[second, 1]]),
+        block = np.concatenate([blocks[first, 0], blocks[second, 1]])
+        return ContactForces(
+            block=block,
+            other=np.concatenate([bodies[first, 1], bodies[second, 0]]),
+            weight=np.ones(len(block)),
+            normal=np.concatenate([-normal[first], normal[second]]),
             point=np.concatenate([point[first], point[second]]),
             force=np.concatenate([-force[first], force[second]]),
         )

@@ -21,6 +21,7 @@ from buildarena_simulation.constants import (
     FRICTION_BLOCK,
     FRICTION_TERRAIN,
     FRICTION_WHEEL,
+    MAX_SPIN,
     WHEEL_TORQUE,
 )
 from buildarena_simulation.engines.base import (
@@ -33,7 +34,7 @@ from buildarena_simulation.engines.base import (
 from buildarena_simulation.engines.ropes import rope_forces
 from buildarena_simulation.engines.urdf import urdf_of
 from buildarena_simulation.structure.clusters import Clusters
-from buildarena_simulation.structure.loads import PointForces
+from buildarena_simulation.structure.contacts import ContactForces
 from buildarena_simulation.structure.model import FloatArray, Role, ShapeKind
 from buildarena_simulation.structure.motion import Motion
 
@@ -54,6 +55,9 @@ def _stdout_to_stderr() -> Iterator[None]:
 with _stdout_to_stderr():
     import pybullet
 
+_Push = tuple[int, int, list[float], list[float]]
+_Drag = tuple[int, list[float], list[float]]
+
 _TIME_STEP_S = 1 / 250
 _STEPS_PER_EVALUATION = 5
 _ITERATIONS = 50
@@ -61,6 +65,9 @@ _RESIDUAL = 1e-9
 _SPEED_CAP = 1e5
 _TIE = 0.02
 """A contact within this distance of several blocks is shared among them, units."""
+_TOUCHING = 0.005
+"""Points nearer than this touch, though the solver may have given them no force, units."""
+_ORIGIN = (0.0, 0.0, 0.0)
 _GROUND_REACH = 2000.0
 
 
@@ -121,17 +128,32 @@ class PyBulletEngine:
         self._rope_alive[index] = False
 
     def advance(self, wheel_speeds: FloatArray, thrusts: FloatArray) -> None:
+        client = self._client
+        pushes, drags = self._steady_pushes(thrusts)
         last: FloatArray | None = None
         for row in wheel_speeds:
-            if last is None or (row != last).any():
+            if len(self._place_of_wheel) and (last is None or (row != last).any()):
                 self._drive(row)
                 last = row
-            self._push(thrusts)
-            pybullet.stepSimulation(physicsClientId=self._client)
-            self._motion = self._read_motion()
+            for body, link, force, point in pushes:
+                pybullet.applyExternalForce(
+                    body, link, force, point, pybullet.LINK_FRAME, physicsClientId=client
+                )
+            for body, drag, spin_drag in drags:
+                pybullet.applyExternalForce(
+                    body, -1, drag, _ORIGIN, pybullet.LINK_FRAME, physicsClientId=client
+                )
+                pybullet.applyExternalTorque(
+                    body, -1, spin_drag, pybullet.LINK_FRAME, physicsClientId=client
+                )
+            if self._rope_alive.any():
+                self._pull_ropes()
+            pybullet.stepSimulation(physicsClientId=client)
+        self._motion = self._read_motion()
+        self._limit_spin()
         self._contacts = self._read_contacts()
 
-    def contacts(self) -> PointForces:
+    def contacts(self) -> ContactForces:
         return self._contacts
 
     def rope_tensions(self) -> FloatArray:
@@ -279,6 +301,7 @@ class PyBulletEngine:
             for piece in self._pieces
             for link, c in enumerate(piece.inside)
         }
+        self._address = {c: key for key, c in self._cluster_of_link.items()}
         self._shapes = []
         for blocks in clusters.blocks:
             owned = [(i, shape) for i in blocks for shape in parts[i].shapes]
@@ -310,52 +333,65 @@ class PyBulletEngine:
                     physicsClientId=self._client,
                 )
 
-    def _push(self, thrusts: FloatArray) -> None:
-        """Drag, thrust and ropes as external forces of the next step."""
+    def _steady_pushes(self, thrusts: FloatArray) -> tuple[list[_Push], list[_Drag]]:
+        """Thrust and drag for the steps until the next evaluation, in the links' own frames.
+
+        Returns:
+            Body, link, force and point of each thrust; body, force and torque of each piece's drag,
+            from its velocity now (drag changes little within a few steps).
+        """
         motion, clusters, structure = self._motion, self._clusters, self._structure
-        centers = motion.centers_of_mass(clusters)
-        for piece in self._pieces:
-            root = piece.inside[0]
-            self._apply(root, -piece.drag * motion.velocity[root], centers[root])
-            turn = motion.rotation[root] @ self._axes[root]
-            torque = turn @ (self._moments[root] * (turn.T @ motion.spin[root]))
-            pybullet.applyExternalTorque(
-                piece.body,
-                -1,
-                (-piece.spin_drag * torque).tolist(),
-                pybullet.WORLD_FRAME,
-                physicsClientId=self._client,
-            )
+        pushes = []
         for cannon, thrust in zip(structure.cannons, thrusts, strict=True):
             if thrust:
                 c = int(clusters.cluster_of[cannon])
-                turn = motion.rotation[c]
-                point = motion.position[c] + turn @ structure.shown[cannon]
-                self._apply(c, -thrust * (turn @ structure.directions[cannon]), point)
-        if self._rope_alive.any():
-            pulls = rope_forces(
-                structure, clusters, motion, alive=self._rope_alive, time_step_s=_TIME_STEP_S
-            )
-            self._tensions = pulls.tension
-            for block, point, force in zip(
-                pulls.forces.block, pulls.forces.point, pulls.forces.force, strict=True
-            ):
-                self._apply(int(clusters.cluster_of[block]), force, point)
+                to_link = self._axes[c].T
+                arm = structure.shown[cannon] - clusters.center_of_mass[c]
+                force = -thrust * (to_link @ structure.directions[cannon])
+                pushes.append((*self._address[c], force.tolist(), (to_link @ arm).tolist()))
+        drags = []
+        for piece in self._pieces:
+            root = piece.inside[0]
+            to_link = (motion.rotation[root] @ self._axes[root]).T
+            force = -piece.drag * (to_link @ motion.velocity[root])
+            torque = -piece.spin_drag * self._moments[root] * (to_link @ motion.spin[root])
+            drags.append((piece.body, force.tolist(), torque.tolist()))
+        return pushes, drags
 
-    def _apply(self, cluster: int, force: FloatArray, point: FloatArray) -> None:
-        body, link = self._address[cluster]
-        pybullet.applyExternalForce(
-            body,
-            link,
-            force.tolist(),
-            point.tolist(),
-            pybullet.WORLD_FRAME,
-            physicsClientId=self._client,
+    def _pull_ropes(self) -> None:
+        structure, clusters = self._structure, self._clusters
+        pulls = rope_forces(
+            structure,
+            clusters,
+            self._read_motion(),
+            alive=self._rope_alive,
+            time_step_s=_TIME_STEP_S,
         )
+        self._tensions = pulls.tension
+        forces = pulls.forces
+        for block, point, force in zip(forces.block, forces.point, forces.force, strict=True):
+            body, link = self._address[int(clusters.cluster_of[block])]
+            pybullet.applyExternalForce(
+                body,
+                link,
+                force.tolist(),
+                point.tolist(),
+                pybullet.WORLD_FRAME,
+                physicsClientId=self._client,
+            )
 
-    @property
-    def _address(self) -> dict[int, tuple[int, int]]:
-        return {c: key for key, c in self._cluster_of_link.items()}
+    def _limit_spin(self) -> None:
+        """Slows pieces that spin faster than any part of the game may."""
+        for piece in self._pieces:
+            root = piece.inside[0]
+            speed = float(np.linalg.norm(self._motion.spin[root]))
+            if speed > MAX_SPIN:
+                pybullet.resetBaseVelocity(
+                    piece.body,
+                    self._motion.velocity[root].tolist(),
+                    (self._motion.spin[root] * (MAX_SPIN / speed)).tolist(),
+                    physicsClientId=self._client,
+                )
 
     def _read_motion(self) -> Motion:
         """Poses and velocities of all clusters, children by way of their hinges' angles."""
@@ -404,51 +440,55 @@ class PyBulletEngine:
             + np.cross(spin[c], center - point)
         )
 
-    def _read_contacts(self) -> PointForces:
+    def _read_contacts(self) -> ContactForces:
         rows: dict[int, list[tuple[float, ...]]] = {}
         links = self._cluster_of_link
         for contact in pybullet.getContactPoints(physicsClientId=self._client):
-            normal = contact[9]
-            if normal == 0.0:
+            push = contact[9]
+            if push == 0.0 and contact[8] > _TOUCHING:
                 continue
             n, f1, d1, f2, d2 = contact[7], contact[10], contact[11], contact[12], contact[13]
             # The normal points from the second body to the first.
-            force = tuple(n[k] * normal + d1[k] * f1 + d2[k] * f2 for k in range(3))
+            force = tuple(n[k] * push + d1[k] * f1 + d2[k] * f2 for k in range(3))
             first = links.get((contact[1], contact[3]))
-            if first is not None:
-                rows.setdefault(first, []).append((*contact[5], *force))
             second = links.get((contact[2], contact[4]))
+            if first is not None:
+                other = -contact[2] - 1 if second is None else second
+                rows.setdefault(first, []).append((*contact[5], *force, *n, other))
             if second is not None:
-                rows.setdefault(second, []).append((*contact[6], *(-f for f in force)))
+                other = -contact[1] - 1 if first is None else first
+                back = (*(-f for f in force), *(-v for v in n))
+                rows.setdefault(second, []).append((*contact[6], *back, other))
         found = [self._to_blocks(c, np.array(table)) for c, table in sorted(rows.items())]
-        return PointForces(
+        return ContactForces(
             block=np.concatenate([np.zeros(0, dtype=np.int64), *(f.block for f in found)]),
+            other=np.concatenate([np.zeros(0, dtype=np.int64), *(f.other for f in found)]),
+            weight=np.concatenate([np.zeros(0), *(f.weight for f in found)]),
+            normal=np.concatenate([np.zeros((0, 3)), *(f.normal for f in found)]),
             point=np.concatenate([np.zeros((0, 3)), *(f.point for f in found)]),
             force=np.concatenate([np.zeros((0, 3)), *(f.force for f in found)]),
         )
 
-    def _to_blocks(self, c: int, table: FloatArray) -> PointForces:
+    def _to_blocks(self, c: int, table: FloatArray) -> ContactForces:
         """Gives each contact on a cluster to the nearest block; ties share it.
 
         PyBullet's contacts name the link but not the shape within it.
         """
         shapes, motion = self._shapes[c], self._motion
-        points, forces = table[:, :3], table[:, 3:]
-        if len(shapes.block) == 1:
-            return PointForces(
-                block=np.repeat(shapes.block, len(points)), point=points, force=forces
-            )
-        local = (points - motion.position[c]) @ motion.rotation[c]
+        local = (table[:, :3] - motion.position[c]) @ motion.rotation[c]
         apart = local[:, None] - shapes.center[None]
         outside = np.abs(np.einsum("ksj,sji->ksi", apart, shapes.rotation)) - shapes.half[None]
         distance = np.sqrt((np.maximum(outside, 0.0) ** 2).sum(axis=2))
         near = distance <= distance.min(axis=1)[:, None] + _TIE
-        share = near / near.sum(axis=1)[:, None]
-        which, shape = np.nonzero(near)
-        return PointForces(
+        weight = near / near.sum(axis=1)[:, None]
+        row, shape = np.nonzero(near)
+        return ContactForces(
             block=shapes.block[shape],
-            point=points[which],
-            force=forces[which] * share[which, shape][:, None],
+            other=table[row, 9].astype(np.int64),
+            weight=weight[row, shape],
+            normal=table[row, 6:9],
+            point=table[row, :3],
+            force=table[row, 3:6] * weight[row, shape][:, None],
         )
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from buildarena_simulation.breaking import rope_ends
 from buildarena_simulation.structure.clusters import Clusters
-from buildarena_simulation.structure.loads import PointForces
+from buildarena_simulation.structure.contacts import PointForces
 from buildarena_simulation.structure.model import BoolArray, FloatArray, Structure
 from buildarena_simulation.structure.motion import Motion
 

@@ -12,24 +12,10 @@ import numpy as np
 
 from buildarena_simulation.constants import GRAVITY, LOAD_FILTER_S
 from buildarena_simulation.structure.clusters import Clusters
-from buildarena_simulation.structure.model import BoolArray, FloatArray, IntArray, Structure
+from buildarena_simulation.structure.contacts import PointForces
+from buildarena_simulation.structure.model import BoolArray, FloatArray, Structure
 from buildarena_simulation.structure.motion import Motion
 from buildarena_simulation.structure.stiffness import StiffnessModel
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PointForces:
-    """Forces on blocks: contacts, friction, thrust, ropes; K of them.
-
-    Attributes:
-        block: (K,) block each acts on.
-        point: (K, 3) where it acts, world frame, units.
-        force: (K, 3) world frame, mass·unit/s².
-    """
-
-    block: IntArray
-    point: FloatArray
-    force: FloatArray
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
