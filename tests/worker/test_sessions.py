@@ -96,7 +96,7 @@ def test_a_journal_of_another_session_is_refused(play) -> None:
 
 
 def test_the_reply_is_journalled_before_it_is_used(play) -> None:
-    def fail(entry: object) -> None:
+    def fail(_: object) -> None:
         raise ConnectionError("the database is gone")
 
     played = play(append=fail)

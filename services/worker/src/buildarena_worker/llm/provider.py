@@ -11,7 +11,7 @@ import os
 import random
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Coroutine, Mapping
 from functools import cache
 from typing import Any
 
@@ -19,13 +19,11 @@ import structlog
 from pydantic_ai.direct import model_request
 from pydantic_ai.exceptions import (
     ContentFilterError,
-    ModelAPIError,
     ModelAuthenticationError,
     ModelContextWindowExceededError,
     ModelHTTPError,
     ModelNotFoundError,
     ModelQuotaExceededError,
-    UnexpectedModelBehavior,
 )
 from pydantic_ai.messages import ModelResponse
 from pydantic_ai.models import Model
@@ -68,7 +66,8 @@ class ProviderClient:
     ) -> None:
         self._entry = entry
         self._policy = policy or RetryPolicy()
-        self._model = _make_model(entry, provider)
+        self._wire = provider.wire
+        self._model, self._close = _make_model(entry, provider)
         self._rng = random.Random()  # noqa: S311 - spreads retries, guards nothing
 
     def complete(self, request: Request) -> Answer:
@@ -79,6 +78,10 @@ class ProviderClient:
             PermanentFaultError: The provider refuses the key, the model or the account.
         """
         return asyncio.run_coroutine_threadsafe(self._complete(request), _loop()).result()
+
+    def close(self) -> None:
+        """Closes the connections to the provider."""
+        asyncio.run_coroutine_threadsafe(self._close(), _loop()).result()
 
     async def _complete(self, request: Request) -> Answer:
         started = time.monotonic()
@@ -99,7 +102,7 @@ class ProviderClient:
                 return _own_failure("context_overflow", str(error), started, tries)
             except ContentFilterError as error:
                 return _own_failure("content_filter", str(error), started, tries)
-            except (ModelAPIError, UnexpectedModelBehavior, TimeoutError, OSError) as error:
+            except Exception as error:
                 _raise_if_permanent(error, self._entry)
                 if tries == self._policy.tries:
                     raise PassingFaultError(
@@ -124,7 +127,7 @@ class ProviderClient:
             settings["top_p"] = decoding["top_p"]
         if "max_tokens" in decoding:
             settings["max_tokens"] = decoding["max_tokens"]
-        if request.tools:
+        if request.tools and self._wire != "google":  # Google has no such setting
             settings["parallel_tool_calls"] = False
         return settings
 
@@ -154,7 +157,10 @@ class ProviderClient:
         )
 
 
-def _make_model(entry: ModelEntry, provider: ProviderEntry) -> Model:
+def _make_model(
+    entry: ModelEntry, provider: ProviderEntry
+) -> tuple[Model, Callable[[], Coroutine[Any, Any, None]]]:
+    """The provider's model in pydantic-ai, and how to close its connections."""
     key = "none" if provider.key is None else os.environ.get(provider.key, "")
     if not key:
         raise PermanentFaultError(
@@ -167,20 +173,24 @@ def _make_model(entry: ModelEntry, provider: ProviderEntry) -> Model:
         from pydantic_ai.providers.openai import OpenAIProvider
 
         client = AsyncOpenAI(base_url=provider.base_url, api_key=key, max_retries=0)
-        return OpenAIChatModel(entry.model, provider=OpenAIProvider(openai_client=client))
+        model = OpenAIChatModel(entry.model, provider=OpenAIProvider(openai_client=client))
+        return model, client.close
     if provider.wire == "anthropic":
         from anthropic import AsyncAnthropic
         from pydantic_ai.models.anthropic import AnthropicModel
         from pydantic_ai.providers.anthropic import AnthropicProvider
 
         anthropic = AsyncAnthropic(base_url=provider.base_url, api_key=key, max_retries=0)
-        return AnthropicModel(entry.model, provider=AnthropicProvider(anthropic_client=anthropic))
+        return AnthropicModel(
+            entry.model, provider=AnthropicProvider(anthropic_client=anthropic)
+        ), anthropic.close
+    from httpx2 import AsyncClient
     from pydantic_ai.models.google import GoogleModel
     from pydantic_ai.providers.google import GoogleProvider
 
-    return GoogleModel(
-        entry.model, provider=GoogleProvider(api_key=key, base_url=provider.base_url)
-    )
+    http = AsyncClient(timeout=None)  # the retry policy's own timeout rules
+    google = GoogleProvider(api_key=key, base_url=provider.base_url, http_client=http)
+    return GoogleModel(entry.model, provider=google), http.aclose
 
 
 def _own_failure(finish: str, detail: str, started: float, tries: int) -> Answer:

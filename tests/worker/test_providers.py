@@ -1,0 +1,150 @@
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import pytest
+from provider_standin import ProviderStandIn
+
+from buildarena_pipeline.errors import PassingFaultError, PermanentFaultError
+from buildarena_pipeline.models import ModelEntry, Price, ProviderEntry
+from buildarena_store import Usage
+from buildarena_worker.llm.provider import ProviderClient
+from buildarena_worker.llm.retries import RetryPolicy
+from buildarena_worker.messages import Message, Reply, Request, ToolCall
+
+QUICK = RetryPolicy(tries=5, first_wait_s=0.01, longest_wait_s=0.05, timeout_s=2.0)
+PRICE = Price(input=2.0, output=8.0, cached=0.5)
+WIRES = ["openai", "anthropic", "google"]
+
+
+@pytest.fixture
+def client(monkeypatch) -> Iterator[Callable[..., ProviderClient]]:
+    """Makes clients of a stand-in and closes them."""
+    monkeypatch.setenv("STANDIN_KEY", "secret")
+    made: list[ProviderClient] = []
+
+    def make(
+        standin: ProviderStandIn, wire: str = "openai", policy: RetryPolicy = QUICK
+    ) -> ProviderClient:
+        base = f"{standin.url}/v1" if wire == "openai" else standin.url
+        entry = ModelEntry(name=f"{wire}/standin", provider=wire, model="standin", price=PRICE)
+        provider = ProviderEntry(wire=wire, base_url=base, key="STANDIN_KEY")
+        made.append(ProviderClient(entry, provider, policy))
+        return made[-1]
+
+    yield make
+    for one in made:
+        one.close()
+
+
+def ask(text: str = "hello") -> Request:
+    return Request(
+        model_config={"decoding": {"temperature": 0.5, "top_p": 0.7}},
+        messages=[Message(role="system", text="# Role: x"), Message(role="user", text=text)],
+        seed=3,
+    )
+
+
+@pytest.mark.parametrize("wire", WIRES)
+def test_a_whole_session_over_http_equals_the_one_played_inside(play, wire, client) -> None:
+    with ProviderStandIn() as standin:
+        over_http = play(client=client(standin, wire), workflow="five-role")
+    inside = play(workflow="five-role")
+    assert over_http.suspended is not None, over_http.failure
+    assert over_http.suspended.machine.to_document() == inside.suspended.machine.to_document()
+    used = sum((entry.usage for entry in over_http.entries), Usage())
+    counts = standin.counts
+    assert used.requests == counts.requests == counts.answered
+    assert used.input_tokens == counts.input_tokens
+    assert used.output_tokens == counts.output_tokens
+    assert used.cached_tokens == counts.cached_tokens
+    wanted = (
+        2.0 * (counts.input_tokens - counts.cached_tokens)
+        + 0.5 * counts.cached_tokens
+        + 8.0 * counts.output_tokens
+    ) / 1e6
+    assert float(used.cost_usd) == pytest.approx(wanted, abs=1e-6 * counts.requests)
+
+
+FAULTS = [
+    (wire, fault)
+    for wire in WIRES
+    for fault in ("429", "500", "503", "drop", "garbage")
+    # An answer without a candidate is a legal one in Google's format: an empty reply.
+    if (wire, fault) != ("google", "garbage")
+]
+
+
+@pytest.mark.parametrize(("wire", "fault"), FAULTS)
+def test_passing_faults_are_retried(wire, fault, client) -> None:
+    with ProviderStandIn("idle", fault=lambda n: fault if n < 2 else None) as standin:
+        answer = client(standin, wire).complete(ask())
+    assert answer.reply.text == "TERMINATE"
+    assert answer.tries == 3
+    assert answer.usage.requests == 1
+
+
+def test_retries_are_bounded(client) -> None:
+    with (
+        ProviderStandIn("idle", fault=lambda _: "500") as standin,
+        pytest.raises(PassingFaultError, match="5 tries failed") as caught,
+    ):
+        client(standin).complete(ask())
+    assert standin.counts.requests == 5
+    assert caught.value.reason == "provider_outage"
+
+
+def test_a_silent_provider_times_out(client) -> None:
+    policy = RetryPolicy(tries=2, first_wait_s=0.01, timeout_s=0.3)
+    with ProviderStandIn("idle", fault=lambda n: "slow" if n == 0 else None) as standin:
+        answer = client(standin, policy=policy).complete(ask())
+    assert answer.tries == 2
+
+
+@pytest.mark.parametrize(
+    ("fault", "reason"), [("401", "bad_credentials"), ("404", "model_not_found")]
+)
+def test_refusals_that_stay_are_not_retried(fault, reason, client) -> None:
+    with (
+        ProviderStandIn("idle", fault=lambda _: fault) as standin,
+        pytest.raises(PermanentFaultError) as caught,
+    ):
+        client(standin).complete(ask())
+    assert standin.counts.requests == 1
+    assert caught.value.reason in {reason, "request_refused"}
+    assert "secret" not in str(caught.value)
+
+
+def test_a_missing_key_is_named() -> None:
+    entry = ModelEntry(name="x/y", provider="x", model="y")
+    provider = ProviderEntry(wire="openai", base_url="http://127.0.0.1:9", key="NO_SUCH_KEY")
+    with pytest.raises(PermanentFaultError, match="NO_SUCH_KEY"):
+        ProviderClient(entry, provider)
+
+
+def test_decoding_and_seed_go_over_the_wire(client) -> None:
+    with ProviderStandIn("idle") as standin:
+        client(standin).complete(ask())
+    (body,) = standin.counts.bodies
+    assert (body["temperature"], body["top_p"], body["seed"]) == (0.5, 0.7, 3)
+
+
+def test_arguments_that_are_no_json_reach_the_session_as_text(client) -> None:
+    def respond(_: Request) -> Reply:
+        return Reply(text="", calls=(ToolCall(id="c", name="start", arguments=[1, "x"]),))
+
+    with ProviderStandIn(respond=respond) as standin:
+        answer = client(standin).complete(ask())
+    (call,) = answer.reply.calls
+    assert call.arguments == [1, "x"]
+
+
+def test_retry_after_is_honoured_within_bounds() -> None:
+    import random
+
+    policy, rng = RetryPolicy(longest_wait_s=60), random.Random(1)
+    assert policy.wait_s(1, {"retry-after": "7"}, rng) == 7
+    assert policy.wait_s(1, {"retry-after": "900"}, rng) == 60
+    assert policy.wait_s(1, {"retry-after-ms": "250"}, rng) == 0.25
+    assert all(4 <= policy.wait_s(4, None, rng) <= 8 for _ in range(20))
+    assert policy.wait_s(20, {"retry-after": "soon"}, rng) <= 60
