@@ -73,7 +73,7 @@ def test_the_center_follows_a_shift(build):
     machine = build(("1", "E", "Water Cannon"))
     before = machine.blocks["2"].center
     shift(machine, "2", 0.1, 0.2, 0.3)
-    assert np.allclose(machine.blocks["2"].center, before + (0.1, 0.2, 0.3))
+    assert np.allclose(machine.blocks["2"].center - before, (0.1, 0.2, 0.3))
 
 
 @pytest.mark.parametrize("offset", [(0.51, 0, 0), (0, -0.6, 0), (0, 0, 7)])
@@ -99,7 +99,7 @@ def test_a_connector_turns_in_its_own_frame_and_keeps_its_ends(build):
     assert shift(machine, "3", 0, 0, 0.2).ok
     after = machine.connectors["3"]
     assert (after.start_xyz, after.end_xyz) == (before.start_xyz, before.end_xyz)
-    assert np.allclose(after.world_from_connector.position, before.start_point + (0, 0, 0.2))
+    assert np.allclose(after.world_from_connector.position - before.start_point, (0, 0, 0.2))
 
 
 def test_flipping_reverses_a_wheel_and_nothing_else(build):

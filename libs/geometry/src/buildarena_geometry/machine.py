@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Self
 from .catalogue import load_catalogue
 from .changes import Change
 from .collision import CollisionWorld
+from .documents import machine_document
 from .feedback.words import listing
 from .json_values import json_value
 from .log import ActionLog, ActionRecord
@@ -220,8 +221,6 @@ class Machine:
 
     def to_document(self) -> dict[str, Any]:
         """The machine and its log as JSON values; `from_document` reads them back."""
-        from .documents import machine_document
-
         return machine_document(self)
 
     @classmethod
@@ -235,7 +234,7 @@ class Machine:
         Raises:
             DocumentError: it is not a machine; the message names the entry.
         """
-        from .documents import read_machine
+        from .document_reading import read_machine
 
         return read_machine(document, catalogue=catalogue)
 

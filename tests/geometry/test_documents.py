@@ -1,0 +1,168 @@
+"""Machine documents: what they hold, and what they refuse."""
+
+from __future__ import annotations
+
+import copy
+import json
+import math
+import random
+
+import pytest
+
+from buildarena_geometry import DOCUMENT_VERSION, DocumentError, Machine
+
+
+@pytest.fixture
+def machine(build):
+    built = build(
+        ("1", "A", "Small Wooden Block"),
+        ("2", "E", "Powered Wheel"),
+        ("1", "C", "Water Cannon"),
+        ("1", "B", "Torch"),
+    )
+    for name, arguments in (
+        (
+            "connect_blocks",
+            {"block_a": "1", "face_a": "E", "block_b": "2", "face_b": "D", "connector": "Brace"},
+        ),
+        ("twist_block", {"block_id": "5", "angle": 33.3}),
+        ("flip_spin", {"block_id": "3"}),
+        ("change_control_key", {"block_id": "4", "action": "hold_to_fire", "new_key": "Alpha1"}),
+        ("add_control_sequence", {"time": 0.5, "key": "Alpha1", "hold_for": 2}),
+        ("twist_block", {"block_id": "1", "angle": 1}),
+    ):
+        built.act(name, arguments)
+    return built
+
+
+def test_a_document_tells_version_parts_joints_sequence_and_log(machine):
+    document = machine.to_document()
+    assert document["version"] == DOCUMENT_VERSION
+    assert [block["id"] for block in document["blocks"]] == ["1", "2", "3", "4", "5"]
+    assert document["joints"][0] == {"base": "1", "face": "A", "part": "2", "holds": True}
+    assert document["connectors"][0]["end"] == ["2", "D"]
+    assert document["blocks"][3]["bindings"] == {"hold_to_fire": ["Alpha1"]}
+    assert document["control_sequence"] == [{"time_s": 0.5, "key": "Alpha1", "hold_for_s": 2.0}]
+    assert document["log"][-1]["reason"] == "block_presence"
+    json.dumps(document, allow_nan=False)
+
+
+def test_an_empty_machine_has_a_document_too():
+    assert Machine.from_document(Machine().to_document()) == Machine()
+
+
+def test_a_machine_and_its_copy_go_their_own_ways(machine):
+    twin = machine.copy()
+    assert twin == machine
+    machine.act("remove_block", {"block_id": "5"})
+    assert twin != machine
+    assert "5" in twin.blocks
+    assert twin.act("attach_block_to", {"base_block": "1", "face": "D", "new_block": "Torch"}).ok
+
+
+def change(path, value):
+    def apply(document):
+        *parents, last = path
+        for key in parents:
+            document = document[key]
+        document[last] = value
+
+    return apply
+
+
+def drop(path):
+    def apply(document):
+        *parents, last = path
+        for key in parents:
+            document = document[key]
+        del document[last]
+
+    return apply
+
+
+@pytest.mark.parametrize(
+    ("spoil", "message"),
+    [
+        (change(["version"], 99), "document.version: expected version 1"),
+        (drop(["log"]), "document: log is missing"),
+        (change(["colour"], "red"), "there is no field 'colour'"),
+        (change(["blocks"], {}), "document.blocks: expected a list"),
+        (change(["blocks", 1, "id"], 2), r"blocks\[1\].id: expected a text"),
+        (change(["blocks", 1, "id"], "1"), r"blocks\[1\].id: a block '1' exists already"),
+        (change(["blocks", 1, "module"], "Brick"), r"blocks\[1\].module: expected one of"),
+        (change(["blocks", 1, "module"], "Brace"), r"blocks\[1\].module: expected one of"),
+        (
+            change(["blocks", 1, "mount"], ["9", "A"]),
+            r"blocks\[1\].mount: there is no block '9' before",
+        ),
+        (change(["blocks", 1, "mount"], ["1", "Q"]), r"block 1 has no face 'Q'; its faces: A, B"),
+        (change(["blocks", 1, "mount"], ["3", "E"]), "there is no block '3' before it"),
+        (change(["blocks", 1, "mount"], ["1"]), r"blocks\[1\].mount: expected a block's id and"),
+        (change(["blocks", 0, "mount"], ["2", "A"]), "a starting block sits on nothing"),
+        (change(["blocks", 3, "mount"], ["1", "A"]), "face A of block 1 is used twice"),
+        (change(["blocks", 3, "mount"], ["2", "F"]), "face F of block 2 is used twice"),
+        (change(["blocks", 1, "position"], [0, 0]), r"blocks\[1\].position: expected 3 numbers"),
+        (change(["blocks", 1, "position"], [0, 0, math.nan]), "expected a finite number"),
+        (change(["blocks", 1, "position"], [0, 0, 1e9]), "expected a position within"),
+        (change(["blocks", 1, "quaternion"], [1, 1, 0, 0]), "a quaternion of length 1"),
+        (change(["blocks", 1, "flipped"], True), "a Small Wooden Block does not spin"),
+        (change(["blocks", 1, "bindings"], {"fly": []}), "has no such action"),
+        (change(["blocks", 3, "bindings", "hold_to_fire"], ["W"]), "expected one of UpArrow"),
+        (change(["blocks", 1, "position"], [0, 0, 0]), "blocks 1 and 2 overlap"),
+        (change(["blocks", 0, "module"], "Small Wooden Block"), "expected 1 starting block"),
+        (change(["blocks", 1, "structure"], "A"), "block 2 is of an unknown sub-structure"),
+        (change(["connectors", 0, "id"], "2"), "a part '2' exists already"),
+        (change(["connectors", 0, "module"], "Torch"), "expected one of Brace, Winch"),
+        (change(["connectors", 0, "end"], ["7", "A"]), r"connectors\[0\].end: there is no block"),
+        (change(["control_sequence", 0, "key"], "W"), r"control_sequence\[0\].key: expected one"),
+        (change(["control_sequence", 0, "time_s"], -1), "expected a number of at least 0"),
+        (change(["control_sequence", 0, "hold_for_s"], 0), "expected a number above 0"),
+        (change(["next_id"], 3), "expected a number above every id"),
+        (change(["log", 0, "reason"], "bad luck"), r"log\[0\].reason: expected one of"),
+        (change(["available"], []), "document.available: expected an object"),
+        (change(["available"], {"x": 1}), "document.available.x: expected an object"),
+    ],
+)
+def test_a_spoilt_document_is_refused_with_the_place_and_what_belongs_there(
+    machine, spoil, message
+):
+    document = json.loads(json.dumps(machine.to_document()))
+    spoil(document)
+    with pytest.raises(DocumentError, match=message):
+        Machine.from_document(document)
+
+
+@pytest.mark.parametrize("document", [None, [], "machine", 3, {}, {"version": 1}])
+def test_what_is_no_document_at_all_is_refused(document):
+    with pytest.raises(DocumentError, match="document"):
+        Machine.from_document(document)
+
+
+def test_documents_with_random_damage_are_read_or_refused_and_nothing_else(machine):
+    rng = random.Random(7)
+    whole = json.loads(json.dumps(machine.to_document()))
+    junk = [None, True, -1, 10**400, 0.5, math.nan, "", "1", "\x00", [], [[]], {}, {"": None}]
+    refused = 0
+    for _ in range(3000):
+        document = copy.deepcopy(whole)
+        for _ in range(rng.choice([1, 1, 1, 3])):
+            spoil(rng, document, rng.choice(junk))
+        try:
+            Machine.from_document(document)
+        except DocumentError:
+            refused += 1
+    assert refused > 1500
+
+
+def spoil(rng, node, value):
+    """Puts the value somewhere into the document."""
+    while True:
+        keys = list(node) if isinstance(node, dict) else list(range(len(node)))
+        if not keys:
+            return
+        key = rng.choice(keys)
+        child = node[key]
+        if not isinstance(child, dict | list) or not child or rng.random() < 0.2:
+            node[key] = value
+            return
+        node = child
