@@ -7,7 +7,8 @@ from buildarena_simulation.structure.clusters import Clusters, find_clusters
 from buildarena_simulation.structure.contacts import PointForces, evenly_shared
 from buildarena_simulation.structure.loads import LoadModel
 from buildarena_simulation.structure.model import JOINT_KINDS, FloatArray, Structure
-from buildarena_simulation.structure.motion import Motion
+from buildarena_simulation.structure.motion import Motion, rope_ends
+from buildarena_simulation.structure.vectors import turned
 from buildarena_simulation.trajectory import Break, JointPeak
 
 from buildarena_simulation.constants import GRAVITY
@@ -106,9 +107,9 @@ class BreakingModel:
             turn = motion.rotation[c]
             blocks.append(cannons)
             points.append(
-                motion.position[c] + np.einsum("kij,kj->ki", turn, structure.shown[cannons])
+                motion.position[c] + turned(turn, structure.shown[cannons])
             )
-            sprays = np.einsum("kij,kj->ki", turn, structure.directions[cannons])
+            sprays = turned(turn, structure.directions[cannons])
             forces.append(-thrusts[:, None] * sprays)
         if len(structure.ropes):
             start, end = rope_ends(structure, clusters, motion)
@@ -154,18 +155,6 @@ class BreakingModel:
             self.clusters = after
             engine.enter(after, self.motion)
         self._loads.rebuild(after, self.motion)
-
-
-def rope_ends(
-    structure: Structure, clusters: Clusters, motion: Motion
-) -> tuple[FloatArray, FloatArray]:
-    """Both ends of every rope, each (R, 3), world frame, units."""
-    ropes = structure.ropes
-    ends = []
-    for block, point in ((ropes.first, ropes.first_point), (ropes.second, ropes.second_point)):
-        c = clusters.cluster_of[block]
-        ends.append(motion.position[c] + np.einsum("kij,kj->ki", motion.rotation[c], point))
-    return ends[0], ends[1]
 
 
 def _same(before: Clusters, after: Clusters) -> bool:

@@ -12,6 +12,7 @@ from buildarena_simulation.scenario import Scenario
 from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.model import BoolArray, Structure
 from buildarena_simulation.structure.motion import Motion
+from buildarena_simulation.structure.vectors import turned
 from buildarena_simulation.trajectory import (
     Setting,
     Trajectory,
@@ -67,7 +68,7 @@ class Recorder:
         structure, row = self._structure, self._row
         shown = motion.points(clusters, structure.shown)
         turn = motion.rotation[clusters.cluster_of]
-        directions = np.einsum("nij,nj->ni", turn, structure.directions)
+        directions = turned(turn, structure.directions)
         self.heated_now = heated_cannons(structure, shown, directions)
         self._time_s[row] = time_s
         self._positions[row] = shown[self._tracked]

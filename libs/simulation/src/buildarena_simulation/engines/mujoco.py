@@ -14,10 +14,12 @@ from buildarena_simulation.constants import (
     WHEEL_TORQUE,
 )
 from buildarena_simulation.engines.base import CargoPose, World, principal_frames, quaternion_of
+from buildarena_simulation.engines.jolts import JoltWatch
 from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.contacts import ContactForces
 from buildarena_simulation.structure.model import FloatArray, Role, ShapeKind
 from buildarena_simulation.structure.motion import Motion
+from buildarena_simulation.structure.vectors import cross, turned
 
 _TIME_STEP_S = 0.01
 _STEPS_PER_EVALUATION = 4
@@ -103,16 +105,17 @@ class MujocoEngine:
     def advance(self, wheel_speeds: FloatArray, thrusts: FloatArray) -> None:
         model, data = self._model, self._data
         data.ctrl[self._thrust_actuators] = thrusts
-        if not len(self._hinge_wheels) or (wheel_speeds[0] == wheel_speeds[-1]).all():
+        jolts = JoltWatch(len(wheel_speeds), gravity=self._world.gravity, time_step_s=_TIME_STEP_S)
+        velocity = data.qvel[self._free_dofs]
+        for row in wheel_speeds:
             if len(self._hinge_wheels):
-                data.ctrl[self._hinge_actuators] = self._hinge_targets(wheel_speeds[0])
-            mujoco.mj_step(model, data, nstep=len(wheel_speeds))
-        else:
-            for row in wheel_speeds:
                 data.ctrl[self._hinge_actuators] = self._hinge_targets(row)
-                mujoco.mj_step(model, data)
+            mujoco.mj_step(model, data)
+            before, velocity = velocity, data.qvel[self._free_dofs]
+            if jolts.wants_reading(velocity - before):
+                jolts.take(self._read_contacts())
         self._limit_spin()
-        self._contacts = self._read_contacts()
+        self._contacts = jolts.mean()
         self._tensions = self._read_tensions()
         # A step leaves the kinematics of its beginning behind; bring them up to its end.
         mujoco.mj_kinematics(model, data)
@@ -132,9 +135,9 @@ class MujocoEngine:
         spin = data.cvel[bodies, :3]
         anchor = data.subtree_com[self._model.body_rootid[bodies]]
         return Motion(
-            position=center - np.einsum("cij,cj->ci", rotation, self._clusters.center_of_mass),
+            position=center - turned(rotation, self._clusters.center_of_mass),
             rotation=rotation,
-            velocity=data.cvel[bodies, 3:] + np.cross(spin, center - anchor),
+            velocity=data.cvel[bodies, 3:] + cross(spin, center - anchor),
             spin=spin.copy(),
         )
 
@@ -345,6 +348,9 @@ class MujocoEngine:
             [model.actuator(f"cannon {i}").id for i in self._structure.cannons], dtype=int
         )
         free = [model.joint(f"free {piece[0]}").dofadr[0] for piece in clusters.pieces]
+        self._free_dofs = np.array(free)[:, None] + np.arange(3)
+        if self._world.cargo is not None:
+            self._free_dofs = np.concatenate([np.arange(3)[None], self._free_dofs])
         self._spin_dofs = np.array(free)[:, None] + np.arange(3, 6)
         self._tendon_of = {
             int(r): model.tendon(f"rope {r}").id for r in np.flatnonzero(self._rope_alive)
@@ -405,7 +411,7 @@ class MujocoEngine:
         components = data.efc_force[address[:, None] + np.arange(3)]
         frames = contact.frame[active].reshape(-1, 3, 3)
         # MuJoCo's contact force acts on the second geom.
-        force = np.einsum("kj,kji->ki", components, frames)
+        force = turned(frames.transpose(0, 2, 1), components)
         point, normal = contact.pos[active], frames[:, 0]
         bodies = self._model.geom_bodyid[geoms]
         first, second = blocks[:, 0] >= 0, blocks[:, 1] >= 0

@@ -31,12 +31,14 @@ from buildarena_simulation.engines.base import (
     quaternion_of,
     rotation_of,
 )
+from buildarena_simulation.engines.jolts import JoltWatch
 from buildarena_simulation.engines.ropes import rope_forces
 from buildarena_simulation.engines.urdf import urdf_of
 from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.contacts import ContactForces
 from buildarena_simulation.structure.model import FloatArray, Role, ShapeKind
 from buildarena_simulation.structure.motion import Motion
+from buildarena_simulation.structure.vectors import cross
 
 
 @contextlib.contextmanager
@@ -59,10 +61,12 @@ _Push = tuple[int, int, list[float], list[float]]
 _Drag = tuple[int, list[float], list[float]]
 
 _TIME_STEP_S = 1 / 250
-_STEPS_PER_EVALUATION = 5
+_STEPS_PER_EVALUATION = 10
 _ITERATIONS = 50
 _RESIDUAL = 1e-9
 _SPEED_CAP = 1e5
+_CANDIDATES = 16
+"""Blocks considered for one contact: more than can meet in a point."""
 _TIE = 0.02
 """A contact within this distance of several blocks is shared among them, units."""
 _TOUCHING = 0.005
@@ -130,9 +134,11 @@ class PyBulletEngine:
     def advance(self, wheel_speeds: FloatArray, thrusts: FloatArray) -> None:
         client = self._client
         pushes, drags = self._steady_pushes(thrusts)
+        jolts = JoltWatch(len(wheel_speeds), gravity=self._world.gravity, time_step_s=_TIME_STEP_S)
+        velocity = self._free_velocities()
         last: FloatArray | None = None
         for row in wheel_speeds:
-            if len(self._place_of_wheel) and (last is None or (row != last).any()):
+            if len(row) and (last is None or (row != last).any()):
                 self._drive(row)
                 last = row
             for body, link, force, point in pushes:
@@ -149,9 +155,12 @@ class PyBulletEngine:
             if self._rope_alive.any():
                 self._pull_ropes()
             pybullet.stepSimulation(physicsClientId=client)
-        self._motion = self._read_motion()
+            before, velocity = velocity, self._free_velocities()
+            if jolts.wants_reading(velocity - before):
+                self._motion = self._read_motion()
+                jolts.take(self._read_contacts())
         self._limit_spin()
-        self._contacts = self._read_contacts()
+        self._contacts = jolts.mean()
 
     def contacts(self) -> ContactForces:
         return self._contacts
@@ -301,6 +310,9 @@ class PyBulletEngine:
             for piece in self._pieces
             for link, c in enumerate(piece.inside)
         }
+        self._free_bodies = [piece.body for piece in self._pieces]
+        if self._world.cargo is not None:
+            self._free_bodies.append(self._cargo)
         self._address = {c: key for key, c in self._cluster_of_link.items()}
         self._shapes = []
         for blocks in clusters.blocks:
@@ -380,6 +392,15 @@ class PyBulletEngine:
                 physicsClientId=self._client,
             )
 
+    def _free_velocities(self) -> FloatArray:
+        """Velocity of every piece and of the cargo, (K, 3), units/s."""
+        return np.array(
+            [
+                pybullet.getBaseVelocity(body, physicsClientId=self._client)[0]
+                for body in self._free_bodies
+            ]
+        )
+
     def _limit_spin(self) -> None:
         """Slows pieces that spin faster than any part of the game may."""
         for piece in self._pieces:
@@ -436,8 +457,8 @@ class PyBulletEngine:
         center = position[c] + rotation[c] @ clusters.center_of_mass[c]
         velocity[c] = (
             velocity[parent]
-            + np.cross(spin[parent], point - parent_center)
-            + np.cross(spin[c], center - point)
+            + cross(spin[parent], point - parent_center)
+            + cross(spin[c], center - point)
         )
 
     def _read_contacts(self) -> ContactForces:
@@ -476,19 +497,21 @@ class PyBulletEngine:
         """
         shapes, motion = self._shapes[c], self._motion
         local = (table[:, :3] - motion.position[c]) @ motion.rotation[c]
-        apart = local[:, None] - shapes.center[None]
-        outside = np.abs(np.einsum("ksj,sji->ksi", apart, shapes.rotation)) - shapes.half[None]
-        distance = np.sqrt((np.maximum(outside, 0.0) ** 2).sum(axis=2))
+        candidates = shapes.nearest(local)
+        apart = local[:, None] - shapes.center[candidates]
+        along = np.abs((apart[:, :, None] @ shapes.rotation[candidates])[:, :, 0])
+        outside = np.maximum(along - shapes.half[candidates], 0.0)
+        distance = np.sqrt((outside * outside).sum(axis=2))
         near = distance <= distance.min(axis=1)[:, None] + _TIE
         weight = near / near.sum(axis=1)[:, None]
-        row, shape = np.nonzero(near)
+        row, column = np.nonzero(near)
         return ContactForces(
-            block=shapes.block[shape],
+            block=shapes.block[candidates[row, column]],
             other=table[row, 9].astype(np.int64),
-            weight=weight[row, shape],
+            weight=weight[row, column],
             normal=table[row, 6:9],
             point=table[row, :3],
-            force=table[row, 3:6] * weight[row, shape][:, None],
+            force=table[row, 3:6] * weight[row, column][:, None],
         )
 
 
@@ -531,6 +554,14 @@ class _ShapeTable:
         self, *, block: np.ndarray, center: FloatArray, rotation: FloatArray, half: FloatArray
     ) -> None:
         self.block, self.center, self.rotation, self.half = block, center, rotation, half
+
+    def nearest(self, points: FloatArray) -> np.ndarray:
+        """The few shapes whose centres are nearest to each point, (K, up to _CANDIDATES)."""
+        count = len(self.block)
+        if count <= _CANDIDATES:
+            return np.broadcast_to(np.arange(count), (len(points), count))
+        squares = (self.center * self.center).sum(axis=1) - 2.0 * points @ self.center.T
+        return np.argpartition(squares, _CANDIDATES, axis=1)[:, :_CANDIDATES]
 
 
 def _turn_about(axis: FloatArray, angle: float) -> FloatArray:

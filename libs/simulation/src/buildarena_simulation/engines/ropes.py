@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from buildarena_simulation.breaking import rope_ends
 from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.contacts import PointForces
 from buildarena_simulation.structure.model import BoolArray, FloatArray, Structure
-from buildarena_simulation.structure.motion import Motion
+from buildarena_simulation.structure.motion import Motion, rope_ends
+from buildarena_simulation.structure.vectors import cross, turned
 
 _STIFFNESS_SHARE = 0.2
 _DAMPING_SHARE = 0.4
@@ -86,7 +86,7 @@ def _at_end(
 ) -> tuple[FloatArray, FloatArray]:
     """Speed along the rope of its end, and the velocity it gains per unit impulse, each (R,)."""
     arm = point - motion.centers_of_mass(clusters)[c]
-    velocity = motion.velocity[c] + np.cross(motion.spin[c], arm)
-    lever = np.einsum("rji,rj->ri", motion.rotation[c], np.cross(arm, along))
-    turned = np.einsum("rij,rj->ri", np.linalg.inv(clusters.inertia[c]), lever)
+    velocity = motion.velocity[c] + cross(motion.spin[c], arm)
+    lever = turned(motion.rotation[c].transpose(0, 2, 1), cross(arm, along))
+    turned = turned(np.linalg.inv(clusters.inertia[c]), lever)
     return (velocity * along).sum(axis=1), 1.0 / clusters.mass[c] + (lever * turned).sum(axis=1)

@@ -6,17 +6,21 @@ patch keeps its resultant and gets the spread of least squares, the one an even 
 between the bodies would give.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
 from buildarena_simulation.structure.model import FloatArray, IntArray
+from buildarena_simulation.structure.vectors import cross, summed_by
 
 _NORMAL_GRID: Final = 4.0
 """Normals are told apart by their components rounded to quarters."""
 
 _ROUNDS: Final = 4
+_LINE_TOLERANCE: Final = 1e-6
+"""Points in a line bear no moment about it; this share of the spread keeps that solvable."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,6 +59,24 @@ class ContactForces:
     force: FloatArray
 
 
+def mean_contacts(readings: Sequence[tuple[float, ContactForces]]) -> ContactForces:
+    """The mean of several readings.
+
+    Args:
+        readings: Share of the time each stands for, and the reading.
+    """
+    if len(readings) == 1:
+        return readings[0][1]
+    return ContactForces(
+        block=np.concatenate([reading.block for _, reading in readings]),
+        other=np.concatenate([reading.other for _, reading in readings]),
+        weight=np.concatenate([share * reading.weight for share, reading in readings]),
+        normal=np.concatenate([reading.normal for _, reading in readings]),
+        point=np.concatenate([reading.point for _, reading in readings]),
+        force=np.concatenate([share * reading.force for share, reading in readings]),
+    )
+
+
 def evenly_shared(contacts: ContactForces, cluster_of: IntArray) -> PointForces:
     """The contacts with each patch's force spread evenly.
 
@@ -66,46 +88,67 @@ def evenly_shared(contacts: ContactForces, cluster_of: IntArray) -> PointForces:
         contacts: As reported.
         cluster_of: (N,) cluster of each block.
     """
-    force = contacts.force.copy()
-    if len(force) > 1:
-        way = np.round(contacts.normal * _NORMAL_GRID).astype(np.int64)
-        keys = np.column_stack([cluster_of[contacts.block], contacts.other, way])
-        _, patch = np.unique(keys, axis=0, return_inverse=True)
-        order = np.argsort(patch, kind="stable")
-        edges = np.flatnonzero(np.diff(patch[order])) + 1
-        for rows in np.split(order, edges):
-            if len(rows) > 1:
-                force[rows] = _spread(
-                    contacts.point[rows],
-                    force[rows],
-                    contacts.weight[rows],
-                    contacts.normal[rows].mean(axis=0),
-                )
-    return PointForces(block=contacts.block, point=contacts.point, force=force)
+    block, point, force = contacts.block, contacts.point, contacts.force
+    if len(block) > 1:
+        patch, count = _patches(contacts, cluster_of)
+        force = _spread(contacts, patch, count)
+    return PointForces(block=block, point=point, force=force)
 
 
-def _spread(
-    point: FloatArray, force: FloatArray, weight: FloatArray, normal: FloatArray
-) -> FloatArray:
-    middle = point.mean(axis=0)
-    arm = point - middle
-    total = force.sum(axis=0)
-    moment = np.cross(arm, force).sum(axis=0)
-    kept = weight.copy()
+def _patches(contacts: ContactForces, cluster_of: IntArray) -> tuple[IntArray, int]:
+    """Patch of each contact, and how many there are."""
+    way = np.round(contacts.normal * _NORMAL_GRID).astype(np.int64) + 8
+    key = cluster_of[contacts.block]
+    for digit, base in ((contacts.other + 2**20, 2**22), *((way[:, k], 16) for k in range(3))):
+        key = key * base + digit
+    _, patch = np.unique(key, return_inverse=True)
+    return patch, int(patch.max()) + 1
+
+
+def _spread(contacts: ContactForces, patch: IntArray, count: int) -> FloatArray:
+    anchor = np.empty((count, 3))
+    anchor[patch] = contacts.point
+    x = contacts.point - anchor[patch]
+    normal = summed_by(patch, contacts.normal, count)
+    load = summed_by(
+        patch, np.concatenate([contacts.force, cross(x, contacts.force)], axis=1), count
+    )
+    total, moment = load[:, :3], load[:, 3:]
+    weight = contacts.weight
     for _ in range(_ROUNDS):
-        whole = kept.sum()
-        center = kept @ arm / whole
-        r = arm - center
-        lever = kept * (r * r).sum(axis=1)
-        inertia = lever.sum() * np.eye(3) - (kept[:, None] * r).T @ r
-        rest = moment - np.cross(center, total)
-        # A single point, or points in a line, bear no moment about themselves.
-        b = np.linalg.pinv(inertia, rcond=1e-6, hermitian=True) @ rest
-        spread = kept[:, None] * (total / whole + np.cross(b, r))
-        pulling = spread @ normal < 0.0
+        spread = _even(x, weight, patch, total, moment)
+        pulling = (spread * normal[patch]).sum(axis=1) < 0.0
         if not pulling.any():
-            return np.asarray(spread)
-        kept = np.where(pulling, 0.0, kept)
-        if not kept.any():
-            return force
-    return force
+            return spread
+        kept = np.where(pulling, 0.0, weight)
+        whole = np.bincount(patch, kept, minlength=count)
+        # A patch that would lose all its points stays as it was.
+        weight = np.where(whole[patch] > 0.0, kept, weight)
+    return spread
+
+
+def _even(
+    x: FloatArray, weight: FloatArray, patch: IntArray, total: FloatArray, moment: FloatArray
+) -> FloatArray:
+    """Forces w·(a + b × r) of given resultants.
+
+    Args:
+        x: (K, 3) points from an anchor of their patch, units.
+        weight: (K,) of each point.
+        patch: (K,) patch of each point.
+        total: (P, 3) resultant force of each patch.
+        moment: (P, 3) resultant moment of each patch about its anchor.
+    """
+    count = len(total)
+    sums = summed_by(patch, np.column_stack([weight, weight[:, None] * x]), count)
+    whole = sums[:, :1]
+    center = sums[:, 1:] / whole
+    r = x - center[patch]
+    second = summed_by(
+        patch, (weight[:, None, None] * r[:, :, None] * r[:, None, :]).reshape(-1, 9), count
+    ).reshape(-1, 3, 3)
+    trace = np.trace(second, axis1=1, axis2=2)[:, None, None]
+    inertia = (1.0 + _LINE_TOLERANCE) * trace * np.eye(3) - second + 1e-12 * np.eye(3)
+    rest = moment - cross(center, total)
+    b = np.linalg.solve(inertia, rest[:, :, None])[:, :, 0]
+    return np.asarray(weight[:, None] * ((total / whole)[patch] + cross(b[patch], r)))

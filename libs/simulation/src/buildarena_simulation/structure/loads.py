@@ -16,6 +16,7 @@ from buildarena_simulation.structure.contacts import PointForces
 from buildarena_simulation.structure.model import BoolArray, FloatArray, Structure
 from buildarena_simulation.structure.motion import Motion
 from buildarena_simulation.structure.stiffness import StiffnessModel
+from buildarena_simulation.structure.vectors import cross, summed_by, turned, turned_wrenches
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,9 +65,9 @@ class LoadModel:
         share = clusters.mass / self._clusters.mass[source]
         self._enter(clusters, motion)
         turn = self._root_rotation[clusters.cluster_of].transpose(0, 2, 1) @ before
-        self._wrenches = _turned(turn, self._wrenches)
+        self._wrenches = turned_wrenches(turn, self._wrenches)
         turn = self._root_rotation.transpose(0, 2, 1) @ inertial_before
-        self._inertial = _turned(turn, inertial) * share[:, None]
+        self._inertial = turned_wrenches(turn, inertial) * share[:, None]
 
     def evaluate(self, forces: PointForces, motion: Motion) -> JointLoads:
         """Joint loads after one more interval.
@@ -81,7 +82,7 @@ class LoadModel:
         self._update(forces, motion)
         clusters = self._clusters
         relative = motion.rotation.transpose(0, 2, 1) @ self._root_rotation
-        wrenches = _turned(relative[clusters.cluster_of], self._wrenches)
+        wrenches = turned_wrenches(relative[clusters.cluster_of], self._wrenches)
         count = len(self.holds)
         force, moment = np.zeros(count), np.zeros(count)
         self._add_axle_reactions(wrenches, relative, force, moment)
@@ -111,16 +112,19 @@ class LoadModel:
         structure, clusters = self._structure, self._clusters
         self._root_rotation = motion.rotation[clusters.root]
         centers = motion.points(clusters, structure.centers_of_mass)
-        world = _summed(forces, centers) / GRAVITY
+        moments = cross(forces.point - centers[forces.block], forces.force)
+        world = summed_by(
+            forces.block, np.concatenate([forces.force, moments], axis=1), len(structure)
+        )
+        world /= GRAVITY
         world[:, 2] -= structure.masses
         to_root = self._root_rotation.transpose(0, 2, 1)
-        local = _turned(to_root[clusters.cluster_of], world)
+        local = turned_wrenches(to_root[clusters.cluster_of], world)
         self._wrenches += self._blend * (local - self._wrenches)
         rate = np.concatenate(
             [
                 clusters.mass[:, None] * (motion.velocity - self._velocity),
-                np.einsum(
-                    "cij,cj->ci",
+                turned(
                     motion.rotation @ clusters.inertia @ motion.rotation.transpose(0, 2, 1),
                     motion.spin - self._spin,
                 ),
@@ -128,7 +132,7 @@ class LoadModel:
             axis=1,
         ) / (self._interval_s * GRAVITY)
         self._velocity, self._spin = motion.velocity, motion.spin
-        self._inertial += self._blend * (_turned(to_root, rate) - self._inertial)
+        self._inertial += self._blend * (turned_wrenches(to_root, rate) - self._inertial)
 
     def _add_axle_reactions(
         self, wrenches: FloatArray, relative: FloatArray, force: FloatArray, moment: FloatArray
@@ -145,7 +149,7 @@ class LoadModel:
         """
         structure, clusters = self._structure, self._clusters
         members = structure.members
-        inertial = _turned(relative, self._inertial)
+        inertial = turned_wrenches(relative, self._inertial)
         for level in self._children:
             total = self._cluster_totals(wrenches)[level]
             needed = inertial[level] - total
@@ -155,60 +159,39 @@ class LoadModel:
             inner = np.where(wheel_is_outer, members.first[axle], members.second[axle])
             hinge = structure.positions[clusters.wheel[level]]
             transmitted = needed[:, :3]
-            at_hinge = needed[:, 3:] - np.cross(hinge - clusters.center_of_mass[level], transmitted)
+            at_hinge = needed[:, 3:] - cross(hinge - clusters.center_of_mass[level], transmitted)
             wrenches[outer, :3] += transmitted
-            wrenches[outer, 3:] += at_hinge + np.cross(
+            wrenches[outer, 3:] += at_hinge + cross(
                 hinge - structure.centers_of_mass[outer], transmitted
             )
             parent = clusters.parent[level]
             turn = relative[parent] @ relative[level].transpose(0, 2, 1)
             # The hinge is the same world point in both frames, on the axis both clusters share.
             back = np.concatenate([transmitted, at_hinge], axis=1)
-            back = -_turned(turn, back)
+            back = -turned_wrenches(turn, back)
             arm = hinge - structure.centers_of_mass[inner]
-            back[:, 3:] += np.cross(arm, back[:, :3])
+            back[:, 3:] += cross(arm, back[:, :3])
             np.add.at(wrenches, inner, back)
             axis = structure.directions[clusters.wheel[level]]
-            bending = at_hinge + np.cross(hinge - members.point[axle], transmitted)
+            bending = at_hinge + cross(hinge - members.point[axle], transmitted)
             bending -= (bending * axis).sum(axis=1)[:, None] * axis
             force[axle] = np.sqrt((transmitted**2).sum(axis=1))
             moment[axle] = np.sqrt((bending**2).sum(axis=1))
 
     def _cluster_totals(self, wrenches: FloatArray) -> FloatArray:
         """Resultant on each cluster about its centre of mass, (C, 6)."""
-        moments = wrenches[:, 3:] + np.cross(self._arm, wrenches[:, :3])
+        moments = wrenches[:, 3:] + cross(self._arm, wrenches[:, :3])
         both = np.concatenate([wrenches[:, :3], moments], axis=1)
-        cluster_of, count = self._clusters.cluster_of, len(self._clusters)
-        return np.array([np.bincount(cluster_of, both[:, k], minlength=count) for k in range(6)]).T
+        return summed_by(self._clusters.cluster_of, both, len(self._clusters))
 
     def _relieved(self, wrenches: FloatArray) -> FloatArray:
         """Wrenches less what accelerates the blocks (inertia relief): m·(a + α × r) and I·α."""
         structure, clusters = self._structure, self._clusters
         total = self._cluster_totals(wrenches)
         a = total[:, :3] / clusters.mass[:, None]
-        alpha = np.einsum("cij,cj->ci", self._compliance, total[:, 3:])
+        alpha = turned(self._compliance, total[:, 3:])
         a, alpha = a[clusters.cluster_of], alpha[clusters.cluster_of]
         relieved = wrenches.copy()
-        relieved[:, :3] -= structure.masses[:, None] * (a + np.cross(alpha, self._arm))
-        relieved[:, 3:] -= np.einsum("nij,nj->ni", structure.inertias, alpha)
+        relieved[:, :3] -= structure.masses[:, None] * (a + cross(alpha, self._arm))
+        relieved[:, 3:] -= turned(structure.inertias, alpha)
         return relieved
-
-
-def _summed(forces: PointForces, centers: FloatArray) -> FloatArray:
-    """Wrench on each block about its centre of mass, (N, 6), world frame."""
-    moments = np.cross(forces.point - centers[forces.block], forces.force)
-    both = np.concatenate([forces.force, moments], axis=1)
-    return np.array(
-        [np.bincount(forces.block, both[:, k], minlength=len(centers)) for k in range(6)]
-    ).T
-
-
-def _turned(rotations: FloatArray, wrenches: FloatArray) -> FloatArray:
-    """Each wrench (K, 6) turned by its rotation (K, 3, 3)."""
-    return np.concatenate(
-        [
-            np.einsum("kij,kj->ki", rotations, wrenches[:, :3]),
-            np.einsum("kij,kj->ki", rotations, wrenches[:, 3:]),
-        ],
-        axis=1,
-    )

@@ -6,6 +6,7 @@ import numpy as np
 
 from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.model import FloatArray, Structure
+from buildarena_simulation.structure.vectors import cross, turned
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,12 +32,12 @@ class Motion:
     def points(self, clusters: Clusters, points: FloatArray) -> FloatArray:
         """World position of one machine-frame point per block, (N, 3)."""
         c = clusters.cluster_of
-        return np.asarray(self.position[c] + np.einsum("nij,nj->ni", self.rotation[c], points))
+        return np.asarray(self.position[c] + turned(self.rotation[c], points))
 
     def centers_of_mass(self, clusters: Clusters) -> FloatArray:
         """Centres of mass of the clusters, (C, 3), world frame, units."""
         return np.asarray(
-            self.position + np.einsum("cij,cj->ci", self.rotation, clusters.center_of_mass)
+            self.position + turned(self.rotation, clusters.center_of_mass)
         )
 
     def after_break(self, old: Clusters, new: Clusters) -> "Motion":
@@ -47,11 +48,11 @@ class Motion:
         """
         source = np.array([old.cluster_of[ids[0]] for ids in new.blocks])
         rotation, spin = self.rotation[source], self.spin[source]
-        arm = np.einsum("cij,cj->ci", rotation, new.center_of_mass - old.center_of_mass[source])
+        arm = turned(rotation, new.center_of_mass - old.center_of_mass[source])
         return Motion(
             position=self.position[source],
             rotation=rotation,
-            velocity=self.velocity[source] + np.cross(spin, arm),
+            velocity=self.velocity[source] + cross(spin, arm),
             spin=spin,
         )
 
@@ -71,3 +72,15 @@ def at_rest(clusters: Clusters, position: FloatArray, rotation: FloatArray) -> M
         velocity=np.zeros((count, 3)),
         spin=np.zeros((count, 3)),
     )
+
+
+def rope_ends(
+    structure: Structure, clusters: Clusters, motion: Motion
+) -> tuple[FloatArray, FloatArray]:
+    """Both ends of every rope, each (R, 3), world frame, units."""
+    ropes = structure.ropes
+    ends = []
+    for block, point in ((ropes.first, ropes.first_point), (ropes.second, ropes.second_point)):
+        c = clusters.cluster_of[block]
+        ends.append(motion.position[c] + turned(motion.rotation[c], point))
+    return ends[0], ends[1]
