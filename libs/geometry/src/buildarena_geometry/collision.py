@@ -47,17 +47,21 @@ class CollisionWorld:
             blocks: new blocks, or blocks of the world in new places.
 
         Returns:
-            The pairs (given block, block of the world), each once, in no particular order.
+            The pairs (given block, block of the world), each once, in the order of the given blocks
+            and then in that in which the world's were placed.
         """
         candidates = list(blocks)
         moving = {block.id for block in candidates}
-        pairs: dict[tuple[str, str], None] = {}
+        pairs: list[tuple[str, str]] = []
         for block in candidates:
-            for solid in block.module.colliders:
-                for other in self._touched_by(solid, block.world_from_block):
-                    if other not in moving:
-                        pairs[block.id, other] = None
-        return list(pairs)
+            touched = {
+                other
+                for solid in block.module.colliders
+                for other in self._touched_by(solid, block.world_from_block)
+            } - moving
+            if touched:
+                pairs.extend((block.id, other) for other in self._objects if other in touched)
+        return pairs
 
     def place(self, blocks: Iterable[Block]) -> None:
         """Takes blocks in, or moves those it has to where they are now."""

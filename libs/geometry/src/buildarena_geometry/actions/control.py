@@ -6,7 +6,7 @@ from buildarena_geometry.blocks import KeyPress
 from buildarena_geometry.changes import Change
 from buildarena_geometry.feedback import state as words
 from buildarena_geometry.feedback.words import listing
-from buildarena_geometry.keys import KEYS
+from buildarena_geometry.keys import KEYS, KEYS_IN_WORDS
 from buildarena_geometry.outcomes import Cause
 from buildarena_geometry.parameters import BlockId, Index, Key, Name, Number, RefusalError, shown
 from buildarena_geometry.state import MachineState
@@ -89,7 +89,7 @@ def reset_control_sequence(state: MachineState) -> Change:
 def _bind(state: MachineState, block_id: str, action: str, key: str, *, keep: bool) -> Change:
     part(state, block_id)
     if key not in KEYS:
-        raise RefusalError(Cause.BAD_KEY, f"There is no key {shown(key)}. Keys: {listing(KEYS)}.")
+        raise RefusalError(Cause.BAD_KEY, f"There is no key {shown(key)}. Keys: {KEYS_IN_WORDS}.")
     block = powered(state, block_id, action)
     had = block.bindings.get(action, ()) if keep else ()
     keys = had if key in had else (*had, key)

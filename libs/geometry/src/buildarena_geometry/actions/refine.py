@@ -77,7 +77,7 @@ def flip_spin(state: MachineState, block_id: BlockId) -> Change:
     return Change(
         after=after,
         touched=(block.id,),
-        told=lambda: f"Flipped. {words.block_line(after, block)}.",
+        told=lambda: f"Flipped. {words.place_line(block)}.",
     )
 
 
@@ -98,7 +98,7 @@ def _move(state: MachineState, block: Block, pose: Pose, how: str) -> Change:
         placed=(block.id,),
         attempt=f"{words.heading(block)} {how}",
         told=lambda: " ".join(
-            [f"Moved. {words.block_line(after, moved)}.", *words.loosened(after, [block.id])]
+            [f"Moved. {words.place_line(moved)}.", *words.loosened(after, [block.id])]
         ),
     )
 

@@ -28,6 +28,15 @@ def heading(part: Block | Connector) -> str:
 
 def block_line(state: MachineState, block: Block) -> str:
     """A block in one line, without its faces."""
+    joint = state.joint(block)
+    broken = (
+        "" if joint is None or joint.holds else f", joint broken ({number(joint.offset)} apart)"
+    )
+    return f"{place_line(block)}{broken}{_note(block.note)}"
+
+
+def place_line(block: Block) -> str:
+    """A block in one line: what it sits on, where it is and what it does there."""
     facts = [f"{block.id} {block.module.name}"]
     if block.mount is not None:
         facts.append(f"on {block.mount[0]}/{block.mount[1]}")
@@ -35,10 +44,7 @@ def block_line(state: MachineState, block: Block) -> str:
         facts.append("on nothing")
     facts.append(f"at {point(block.center_xyz)}")
     facts.extend(_use(block))
-    joint = state.joint(block)
-    if joint is not None and not joint.holds:
-        facts.append(f"joint broken ({plain(joint.offset)} apart)")
-    return ", ".join(facts) + _note(block.note)
+    return ", ".join(facts)
 
 
 def connector_line(link: Connector) -> str:
