@@ -8,7 +8,7 @@ CODE := $(addsuffix /src,$(PACKAGES)) migrations tests
 STAMP := $(VENV)/.installed
 WORKERS ?= $(shell nproc)
 
-.PHONY: help install demo up test check lock clean
+.PHONY: help install demo up test check lock clean openapi
 
 help: ## Lists the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 20
@@ -41,6 +41,9 @@ check: $(STAMP) ## Lints, types and import rules alone
 
 clean: ## Removes the environment, caches and local data
 	rm -rf $(VENV) $(VENV)-uv .buildarena .mypy_cache .ruff_cache .pytest_cache .hypothesis
+
+openapi: $(STAMP) ## Writes the API's contract anew, after a wanted change
+	@$(BIN)/python -m buildarena_api.contract > tests/data/openapi.json
 
 lock: ## Compiles requirements.lock anew
 	$(PYTHON) -m uv pip compile --quiet --universal --generate-hashes --all-extras --no-annotate \

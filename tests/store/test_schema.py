@@ -12,7 +12,7 @@ def test_the_migrations_make_the_tables_that_the_code_knows(context: Context) ->
     command.check(alembic_config(context.database.url))
 
 
-def test_another_schema_is_refused_with_advice(context: Context, database_url: str) -> None:
+def test_another_schema_is_refused_with_advice(database_url: str) -> None:
     database = Database(database_url)
     database.require_schema()
     with database.transaction() as connection:

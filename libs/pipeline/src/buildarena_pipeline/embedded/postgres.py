@@ -18,12 +18,13 @@ from buildarena_pipeline.embedded.server import (
     free_port,
     secret_in,
     stop_process,
-    wait_until_answers,
+    wait_until_ready,
 )
 from buildarena_pipeline.errors import StartupError
 from buildarena_pipeline.processes import die_with_parent
 
 UNPRIVILEGED = "nobody"
+STATE_LINE = 7
 SETTINGS = {
     "listen_addresses": LOOPBACK,
     "unix_socket_directories": "",
@@ -79,8 +80,7 @@ class EmbeddedPostgres:
             settings |= {"fsync": "off", "synchronous_commit": "off", "full_page_writes": "off"}
         options = [f"--{name}={value}" for name, value in settings.items()]
         process = self._run([str(self._bin / "postgres"), "-D", str(self._data), *options])
-        wait_until_answers(self.name, process, self._port, self._log_file)
-        self._wait_until_ready(process)
+        wait_until_ready(self.name, process, lambda: self._serves(process), self._log_file)
         return process
 
     def stop(self, process: subprocess.Popen[bytes]) -> None:
@@ -132,23 +132,14 @@ class EmbeddedPostgres:
                 preexec_fn=lambda: die_with_parent(signal.SIGINT),  # noqa: PLW1509 - one system call
             )
 
-    def _wait_until_ready(self, process: subprocess.Popen[bytes]) -> None:
-        ready = [
-            str(self._bin / "pg_isready"),
-            "-q",
-            "-h",
-            LOOPBACK,
-            "-p",
-            str(self._port),
-            "-t",
-            "30",
-        ]
-        for _ in range(600):
-            if process.poll() is not None:
-                break
-            if subprocess.run(ready, check=False, cwd="/").returncode == 0:
-                return
-        raise StartupError(f"Postgres did not become ready (see {self._log_file})")
+    def _serves(self, process: subprocess.Popen[bytes]) -> bool:
+        """Reads the server's own lock file: its first line is the pid, its eighth the state."""
+        try:
+            lines = (self._data / "postmaster.pid").read_text().split("\n")
+        except OSError:
+            return False
+        state = lines[STATE_LINE].strip() if len(lines) > STATE_LINE else ""
+        return lines[0] == str(process.pid) and state == "ready"
 
 
 def _unprivileged() -> _Account:

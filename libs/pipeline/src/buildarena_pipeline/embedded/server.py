@@ -7,6 +7,7 @@ import secrets
 import socket
 import subprocess
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Protocol
 
@@ -46,22 +47,30 @@ def secret_in(path: Path) -> str:
     return secret
 
 
-def wait_until_answers(
-    name: str, process: subprocess.Popen[bytes], port: int, log_file: Path
+def wait_until_ready(
+    name: str, process: subprocess.Popen[bytes], ready: Callable[[], bool], log_file: Path
 ) -> None:
-    """Waits until a port accepts connections.
+    """Waits until a server says that it is ready.
+
+    Args:
+        name: For messages.
+        process: The server.
+        ready: Asks whether this very process serves; another one on its port does not count.
+        log_file: Where the server writes what it does.
 
     Raises:
-        StartupError: The process ended, or did not answer in time.
+        StartupError: The process ended, or was not ready in time; it is gone then.
     """
     deadline = time.monotonic() + READY_WITHIN_S
     while time.monotonic() < deadline:
         if process.poll() is not None:
             raise StartupError(f"{name} ended at once: {last_line(log_file)} (see {log_file})")
-        with contextlib.suppress(OSError), socket.create_connection((LOOPBACK, port), timeout=1):
+        if ready():
             return
         time.sleep(0.02)
-    raise StartupError(f"{name} did not answer within {READY_WITHIN_S:.0f} s (see {log_file})")
+    process.kill()
+    process.wait()
+    raise StartupError(f"{name} was not ready within {READY_WITHIN_S:.0f} s (see {log_file})")
 
 
 def last_line(log_file: Path) -> str:

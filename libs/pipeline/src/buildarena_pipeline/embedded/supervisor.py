@@ -121,6 +121,9 @@ class Supervisor:
                 f"{DEATHS_WITHIN_S:.0f} s, last with exit code {code}"
             )
             return
+        # The first restart is immediate; a process that goes on dying is given more and more time.
+        if self._stop.wait(LOOK_EVERY_S * (2 ** (len(managed.deaths) - 1) - 1)):
+            return
         try:
             managed.process = managed.start()
         except (StartupError, OSError) as error:

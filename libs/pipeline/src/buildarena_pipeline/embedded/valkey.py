@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
 import signal
 import subprocess
 from pathlib import Path
+
+from redis import Redis
+from redis.exceptions import RedisError
 
 from buildarena_pipeline.embedded.server import (
     LOOPBACK,
     free_port,
     secret_in,
     stop_process,
-    wait_until_answers,
+    wait_until_ready,
 )
 from buildarena_pipeline.errors import StartupError
 from buildarena_pipeline.processes import die_with_parent
@@ -52,8 +56,13 @@ class EmbeddedValkey:
                 start_new_session=True,
                 preexec_fn=die_with_parent,  # noqa: PLW1509 - one system call
             )
-        wait_until_answers(self.name, process, self._port, self._log_file)
+        wait_until_ready(self.name, process, lambda: self._serves(process), self._log_file)
         return process
+
+    def _serves(self, process: subprocess.Popen[bytes]) -> bool:
+        with contextlib.suppress(RedisError), Redis.from_url(self.url, retry=None) as client:
+            return int(client.info("server")["process_id"]) == process.pid
+        return False
 
     def stop(self, process: subprocess.Popen[bytes]) -> None:
         """Asks it to save and end."""

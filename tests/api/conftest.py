@@ -1,0 +1,22 @@
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+from starlette.testclient import TestClient
+
+from buildarena_api.app import create_app
+from buildarena_pipeline.context import Context
+from buildarena_pipeline.models import load_registry
+
+
+@pytest.fixture
+def api(context: Context) -> Iterator[TestClient]:
+    """The API in this process, on the real database and broker."""
+    with TestClient(create_app(context, load_registry()), raise_server_exceptions=False) as client:
+        yield client
+
+
+@pytest.fixture
+def sweep() -> dict[str, object]:
+    return {"tasks": ["support-1"], "models": ["builtin/idle"], "seeds": [0, 1]}

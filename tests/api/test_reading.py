@@ -1,0 +1,85 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from buildarena_store import JobScore
+
+GOLDEN = Path(__file__).parent.parent / "data" / "openapi.json"
+
+
+def end_job(context, *, outcome: str = "success", indicator: float = 100.0) -> str:
+    lease = context.leases.claim("construct", owner="w")
+    score = JobScore(
+        outcome=outcome, success=outcome == "success", indicator=indicator, metrics={"parts": 7}
+    )
+    with context.database.transaction() as connection:
+        if outcome == "errored":
+            context.leases.give_up(lease, "gone", reason="lost_worker", connection=connection)
+        else:
+            context.results.finish(lease, score, connection=connection)
+    return lease.job.id
+
+
+def test_an_empty_leaderboard_is_an_empty_page(api) -> None:
+    assert api.get("/v1/leaderboard").json() == {"track": None, "tracks": [], "tasks": []}
+
+
+def test_the_leaderboard_counts_scored_jobs_and_shows_errored_ones(api, context, sweep) -> None:
+    api.post("/v1/sweeps", json={**sweep, "seeds": [0, 1, 2]})
+    for outcome in ("success", "unsuccessful", "errored"):
+        end_job(context, outcome=outcome)
+    board = api.get("/v1/leaderboard").json()
+    (task,) = board["tasks"]
+    (row,) = task["rows"]
+    assert (row["trials"], row["successes"], row["errored"]) == (2, 1, 1)
+    assert row["success_rate"] == 0.5
+    assert 0 < row["success_low"] < 0.5 < row["success_high"] < 1
+    assert (row["indicator_mean"], row["parts_mean"], row["baseline"]) == (100.0, 7.0, True)
+
+
+def test_a_board_of_errors_alone_has_no_numbers_and_no_nan(api, context, sweep) -> None:
+    api.post("/v1/sweeps", json={**sweep, "seeds": [0]})
+    end_job(context, outcome="errored")
+    answer = api.get("/v1/leaderboard")
+    row = answer.json()["tasks"][0]["rows"][0]
+    assert (row["trials"], row["errored"], row["success_rate"]) == (0, 1, None)
+    assert "NaN" not in answer.text
+
+
+def test_an_unknown_track_or_task_names_the_choices(api) -> None:
+    problem = api.get("/v1/leaderboard", params={"task": "x"}).json()
+    assert "lift-1" in problem["errors"][0]["choices"]
+    assert api.get("/v1/leaderboard", params={"track": "x"}).status_code == 422
+
+
+def test_the_catalogue_lists_what_can_be_submitted(api) -> None:
+    tasks = {task["name"]: task for task in api.get("/v1/tasks").json()}
+    assert len(tasks) == 9
+    assert tasks["support-1"]["indicator"]
+    models = {model["name"]: model for model in api.get("/v1/models").json()}
+    assert models["builtin/expert"]["baseline"]
+    assert {module["name"] for module in api.get("/v1/modules").json()} >= {"Brace", "Torch"}
+
+
+def test_health_tells_which_workers_are_missing(api, context) -> None:
+    health = api.get("/v1/health").json()
+    assert health["status"] == "degraded"
+    checks = {check["name"]: check for check in health["checks"]}
+    assert checks["database"]["ok"]
+    assert checks["broker"]["ok"]
+    assert checks["workers of construct"]["advice"] == "start a worker for the queue construct"
+    context.workers.report(
+        worker_id="w", kind="construct", queues=["construct"], host="h", pid=1, versions={}
+    )
+    checks = {check["name"]: check for check in api.get("/v1/health").json()["checks"]}
+    assert checks["workers of construct"]["ok"]
+
+
+def test_the_contract_is_the_one_that_clients_know(api) -> None:
+    """After a wanted change: make openapi."""
+    assert api.get("/openapi.json").json() == json.loads(GOLDEN.read_text())
+
+
+def test_the_docs_page_is_there(api) -> None:
+    assert api.get("/docs").status_code == 200

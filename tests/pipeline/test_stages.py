@@ -1,0 +1,95 @@
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import pytest
+
+from buildarena_pipeline.errors import PassingFaultError, PermanentFaultError
+from buildarena_pipeline.specs import JobSpec
+from buildarena_pipeline.stages import LeaseKeeper, StageRunner
+from buildarena_store import JobScore, Lease
+
+SCORE = JobScore(outcome="unsuccessful", success=False, indicator=1.0)
+
+
+@pytest.fixture
+def run(context, submissions):
+    """Submits a job and lets a handler work on it; returns the job afterwards."""
+
+    def work(handler: Callable[..., None]):
+        job, _ = submissions.submit_job(JobSpec(task="support-1", model="builtin/idle"))
+        keeper = LeaseKeeper(context, lambda: None)
+        keeper.start()
+        StageRunner(context, handler, keeper, "worker").look("construct", job.id)
+        keeper.stop()
+        return context.jobs.get(job.id)
+
+    return work
+
+
+def finisher(context) -> Callable[..., None]:
+    def finish(lease: Lease, _: object) -> None:
+        with context.database.transaction() as connection:
+            context.results.finish(lease, SCORE, connection=connection)
+
+    return finish
+
+
+def test_a_handler_ends_the_job(context, run) -> None:
+    assert run(finisher(context)).outcome == "unsuccessful"
+
+
+def test_a_lease_lives_as_long_as_its_handler(context, run) -> None:
+    def slow(lease: Lease, still_held: Callable[[], bool]) -> None:
+        time.sleep(context.settings.lease_s * 1.5)
+        context.leases.recover()
+        assert still_held()
+        finisher(context)(lease, still_held)
+
+    assert run(slow).outcome == "unsuccessful"
+
+
+def test_a_handler_hears_that_its_job_was_cancelled(context, run) -> None:
+    heard: list[bool] = []
+
+    def cancelled(lease: Lease, still_held: Callable[[], bool]) -> None:
+        with context.database.transaction() as connection:
+            context.jobs.cancel([lease.job.id], connection=connection)
+        deadline = time.monotonic() + 5
+        while still_held() and time.monotonic() < deadline:
+            time.sleep(0.05)
+        heard.append(still_held())
+
+    assert run(cancelled).outcome == "cancelled"
+    assert heard == [False]
+
+
+@pytest.mark.parametrize(
+    ("error", "state", "outcome", "reason"),
+    [
+        (PassingFaultError("outage", reason="provider_outage", delay_s=9), "queued", None, None),
+        (PermanentFaultError("no key", reason="missing_key"), "done", "errored", "missing_key"),
+        (ZeroDivisionError("a bug"), "queued", None, None),
+    ],
+)
+def test_faults_are_never_scored(run, error, state, outcome, reason) -> None:
+    def fail(*_: object) -> None:
+        raise error
+
+    job = run(fail)
+    assert (job.state, job.outcome, job.reason) == (state, outcome, reason)
+    assert job.success is None
+    assert job.faults == 1
+
+
+def test_what_is_held_at_shutdown_is_handed_back(context, submissions) -> None:
+    job, _ = submissions.submit_job(JobSpec(task="support-1", model="builtin/idle"))
+    keeper = LeaseKeeper(context, lambda: None)
+    keeper.start()
+    lease = context.leases.claim("construct", owner="w")
+    with keeper.keeping(lease) as still_held:
+        keeper.stop()
+        assert not still_held()
+    assert context.jobs.get(job.id).state == "queued"
+    assert [a.result for a in context.jobs.attempts(job.id)] == ["handed_back"]
