@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 
 LARGEST_INTEGER = 2**63 - 1  # databases and other languages read no larger one back
 _LONGEST_TEXT = 2_000  # characters; texts an action accepts are far shorter
 _DEEPEST = 8  # levels of lists and objects inside one another
+_UNSTORABLE = re.compile("[\x00\ud800-\udfff]")
 _WIDEST = 200  # entries of a list or object
 
 
 def is_storable(text: str) -> bool:
     """Whether every database takes the text: without NUL characters and lone surrogates."""
-    return "\x00" not in text and not any("\ud800" <= char <= "\udfff" for char in text)
+    return _UNSTORABLE.search(text) is None
 
 
 def json_value(value: object, *, depth: int = 0) -> object:

@@ -217,7 +217,7 @@ class Machine:
         A path runs over joints that hold and over connectors. In an assembly it is to lead to the
         starting block of the first sub-structure.
         """
-        return self._state.detached()
+        return self._state.detached(self._state.joints())
 
     def to_document(self) -> dict[str, Any]:
         """The machine and its log as JSON values; `from_document` reads them back."""

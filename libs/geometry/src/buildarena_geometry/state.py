@@ -126,12 +126,16 @@ class MachineState:
             if joint is not None:
                 yield joint
 
-    def detached(self) -> tuple[str, ...]:
-        """Ids of the blocks from which no joint that holds and no connector leads to the first."""
+    def detached(self, joints: Iterable[Joint]) -> tuple[str, ...]:
+        """Ids of the blocks from which no joint that holds and no connector leads to the first.
+
+        Args:
+            joints: this state's joints.
+        """
         if not self.blocks:
             return ()
         neighbours: dict[str, list[str]] = {block: [] for block in self.blocks}
-        held = [(joint.base, joint.part) for joint in self.joints() if joint.holds]
+        held = [(joint.base, joint.part) for joint in joints if joint.holds]
         tied = [(link.start[0], link.end[0]) for link in self.connectors.values()]
         for left, right in (*held, *tied):
             neighbours[left].append(right)

@@ -131,8 +131,7 @@ def _motion(state: MachineState, found: SubStructure, motion: Pose, how: str) ->
 
 
 def _told(state: MachineState, letter: str, sentence: str) -> str:
-    lines = [sentence, *(words.block_line(state, block) for block in state.members(letter))]
-    return "\n".join(lines)
+    return "\n".join([sentence, *words.block_lines(state, state.members(letter))])
 
 
 def _letter(count: int) -> str:

@@ -73,7 +73,7 @@ def told_removal(after: MachineState, links: tuple[str, ...]) -> list[str]:
     told = []
     if links:
         told.append(f"Connectors that ended on it went too: {listing(links)}.")
-    told.extend(words.detached(after))
+    told.extend(words.detached(after, after.joints()))
     return told
 
 

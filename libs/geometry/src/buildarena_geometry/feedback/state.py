@@ -9,7 +9,7 @@ from .words import caption, counted, listing, number, plain, point, rolling
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from buildarena_geometry.blocks import Block, Connector
+    from buildarena_geometry.blocks import Block, Connector, Joint
     from buildarena_geometry.rotations import Vector
     from buildarena_geometry.state import MachineState
 
@@ -26,13 +26,22 @@ def heading(part: Block | Connector) -> str:
     return f"B{title(part)[1:]}"
 
 
-def block_line(state: MachineState, block: Block) -> str:
-    """A block in one line, without its faces."""
-    joint = state.joint(block)
-    broken = (
-        "" if joint is None or joint.holds else f", joint broken ({number(joint.offset)} apart)"
-    )
+def block_line(block: Block, joint: Joint | None) -> str:
+    """A block in one line, without its faces.
+
+    Args:
+        block: the block.
+        joint: what holds it to the face it sits on.
+    """
+    broken = ""
+    if joint is not None and not joint.holds:
+        broken = f", joint broken ({number(joint.offset)} apart)"
     return f"{place_line(block)}{broken}{_note(block.note)}"
+
+
+def block_lines(state: MachineState, blocks: Iterable[Block]) -> list[str]:
+    """Blocks of the state, a line each."""
+    return [block_line(block, state.joint(block)) for block in blocks]
 
 
 def place_line(block: Block) -> str:
@@ -70,7 +79,7 @@ def faces(state: MachineState, block: Block) -> str:
 
 def placement(state: MachineState, block: Block) -> str:
     """A block with its faces: what a model has to know to build on."""
-    return f"{block_line(state, block)}.\n{faces(state, block)}"
+    return f"{block_line(block, state.joint(block))}.\n{faces(state, block)}"
 
 
 def block_details(state: MachineState, block: Block) -> str:
@@ -95,15 +104,16 @@ def summary(state: MachineState) -> str:
         f"Sub-structure {structure.letter}: {structure.source}."
         for structure in state.structures.values()
     )
-    lines.extend(block_line(state, block) for block in state.blocks.values())
+    joints = {joint.part: joint for joint in state.joints()}
+    lines.extend(block_line(block, joints.get(block.id)) for block in state.blocks.values())
     lines.extend(connector_line(link) for link in state.connectors.values())
-    lines.extend(detached(state))
+    lines.extend(detached(state, joints.values()))
     return "\n".join(lines)
 
 
-def detached(state: MachineState) -> list[str]:
+def detached(state: MachineState, joints: Iterable[Joint]) -> list[str]:
     """A sentence about the blocks without a path to the first one, if there are any."""
-    loose = state.detached()
+    loose = state.detached(joints)
     if not loose:
         return []
     return [f"Not connected to block {next(iter(state.blocks))}: {listing(loose)}."]
@@ -132,7 +142,7 @@ def control_config(state: MachineState) -> str:
 
 def powered_blocks(state: MachineState) -> str:
     """The blocks that take keys, where they are and what they do."""
-    lines = [block_line(state, block) for block in state.blocks.values() if block.bindings]
+    lines = block_lines(state, (block for block in state.blocks.values() if block.bindings))
     return "\n".join(lines) or "No block is powered."
 
 

@@ -1,0 +1,157 @@
+"""Machines as GLB (binary glTF 2.0), which any 3D viewer opens.
+
+Source: Khronos glTF 2.0 specification, section "GLB File Format".
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from buildarena_geometry.modules import Cylinder
+from buildarena_geometry.poses import Pose
+
+from .meshes import COLOURS, CONNECTOR_RADIUS, normal, polygons
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from numpy.typing import NDArray
+
+    from buildarena_geometry.blocks import Connector
+    from buildarena_geometry.machine import Machine
+    from buildarena_geometry.modules import Module, Solid
+
+_MAGIC, _VERSION = 0x46546C67, 2
+_JSON_CHUNK, _BINARY_CHUNK = 0x4E4F534A, 0x004E4942
+_FLOAT, _VERTEX_BUFFER = 5126, 34962
+_Y_UP_FROM_Z_UP = [-(0.5**0.5), 0.0, 0.0, 0.5**0.5]  # glTF's y points up; quaternion (x, y, z, w)
+
+
+def machine_glb(machine: Machine) -> bytes:
+    """The machine as a GLB file.
+
+    Each block is a node named by its id with its pose as the node's transform, under one root node
+    that turns our z-up world to glTF's y-up. Lengths are units, taken as metres.
+    """
+    scene = _Scene()
+    for block in machine.blocks.values():
+        scene.add_node(block.id, scene.module_mesh(block.module), block.world_from_block)
+    for link in machine.connectors.values():
+        scene.add_node(link.id, scene.add_mesh(link.module, [_rod(link)]), Pose())
+    return scene.packed()
+
+
+class _Scene:
+    """A glTF document under construction."""
+
+    def __init__(self) -> None:
+        self._binary = bytearray()
+        self._meshes: dict[str, int] = {}
+        self._materials: dict[str, int] = {}
+        root = {"name": "machine", "rotation": _Y_UP_FROM_Z_UP, "children": []}
+        self._json: dict[str, Any] = {
+            "asset": {"version": "2.0", "generator": "buildarena-geometry"},
+            "scene": 0,
+            "scenes": [{"nodes": [0]}],
+            "nodes": [root],
+            "meshes": [],
+            "materials": [],
+            "accessors": [],
+            "bufferViews": [],
+        }
+
+    def add_node(self, name: str, mesh: int, pose: Pose) -> None:
+        w, x, y, z = pose.wxyz
+        node = {
+            "name": name,
+            "mesh": mesh,
+            "translation": list(pose.xyz),
+            "rotation": [x, y, z, w],
+        }
+        self._json["nodes"][0]["children"].append(len(self._json["nodes"]))
+        self._json["nodes"].append(node)
+
+    def module_mesh(self, module: Module) -> int:
+        """The index of a module's mesh, which all its blocks share."""
+        if module.name not in self._meshes:
+            self._meshes[module.name] = self.add_mesh(module, module.body)
+        return self._meshes[module.name]
+
+    def add_mesh(self, module: Module, solids: Iterable[Solid]) -> int:
+        """Adds solids in a module's colour, and returns their mesh's index."""
+        corners = _triangles(solids)
+        normals = np.repeat([normal(triangle) for triangle in corners.reshape(-1, 3, 3)], 3, axis=0)
+        primitive = {
+            "attributes": {"POSITION": self._accessor(corners), "NORMAL": self._accessor(normals)},
+            "material": self._material(module),
+        }
+        self._json["meshes"].append({"name": module.name, "primitives": [primitive]})
+        return len(self._json["meshes"]) - 1
+
+    def packed(self) -> bytes:
+        """The file: a header, a JSON chunk and a binary chunk, each padded to four bytes."""
+        self._json["buffers"] = [{"byteLength": len(self._binary)}]
+        if not self._json["meshes"]:
+            # The specification forbids empty lists and buffers.
+            for name in ("meshes", "materials", "accessors", "bufferViews", "buffers"):
+                del self._json[name]
+            del self._json["nodes"][0]["children"]
+        text = json.dumps(self._json, separators=(",", ":")).encode()
+        text += b" " * (-len(text) % 4)
+        chunks = struct.pack("<II", len(text), _JSON_CHUNK) + text
+        if self._binary:
+            chunks += struct.pack("<II", len(self._binary), _BINARY_CHUNK) + bytes(self._binary)
+        return struct.pack("<III", _MAGIC, _VERSION, 12 + len(chunks)) + chunks
+
+    def _accessor(self, vectors: NDArray[np.float64]) -> int:
+        data = vectors.astype("<f4")
+        view = {
+            "buffer": 0,
+            "byteOffset": len(self._binary),
+            "byteLength": data.nbytes,
+            "target": _VERTEX_BUFFER,
+        }
+        self._binary += data.tobytes()
+        self._json["bufferViews"].append(view)
+        accessor = {
+            "bufferView": len(self._json["bufferViews"]) - 1,
+            "componentType": _FLOAT,
+            "count": len(data),
+            "type": "VEC3",
+            "min": data.min(axis=0).tolist(),
+            "max": data.max(axis=0).tolist(),
+        }
+        self._json["accessors"].append(accessor)
+        return len(self._json["accessors"]) - 1
+
+    def _material(self, module: Module) -> int:
+        if module.kind not in self._materials:
+            surface = {
+                "baseColorFactor": [*COLOURS[module.kind], 1.0],
+                "metallicFactor": 0.0,
+                "roughnessFactor": 0.8,
+            }
+            material = {"name": module.kind, "pbrMetallicRoughness": surface}
+            self._json["materials"].append(material)
+            self._materials[module.kind] = len(self._json["materials"]) - 1
+        return self._materials[module.kind]
+
+
+def _triangles(solids: Iterable[Solid]) -> NDArray[np.float64]:
+    """(3 n, 3) corners of the solids' faces cut into triangles, in the solids' frame, units."""
+    fans = [
+        np.array([polygon[0], polygon[index], polygon[index + 1]])
+        for solid in solids
+        for polygon in polygons(solid)
+        for index in range(1, len(polygon) - 1)
+    ]
+    return np.concatenate(fans)
+
+
+def _rod(link: Connector) -> Cylinder:
+    """A connector as a thin rod from end to end, world frame."""
+    return Cylinder(radius=CONNECTOR_RADIUS, base=link.start_xyz, top=link.end_xyz)

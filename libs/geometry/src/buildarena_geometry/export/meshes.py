@@ -1,0 +1,63 @@
+"""The solids of modules as polygons, and the colours of modules."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from buildarena_geometry.modules import Box, Solid
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+CYLINDER_SIDES = 24
+CONNECTOR_RADIUS = 0.06  # units; connectors have no volume, this is for the eye alone
+
+COLOURS = {
+    "start": (0.80, 0.36, 0.27),
+    "block": (0.78, 0.62, 0.42),
+    "wheel": (0.33, 0.35, 0.40),
+    "cannon": (0.30, 0.55, 0.73),
+    "torch": (0.91, 0.64, 0.22),
+    "connector": (0.45, 0.42, 0.40),
+    "cargo": (0.52, 0.60, 0.40),
+}  # red, green and blue of each kind of module, 0 to 1
+
+_CORNERS = np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)], np.float64)
+_BOX_FACES = ((4, 6, 7, 5), (0, 1, 3, 2), (2, 3, 7, 6), (0, 4, 5, 1), (1, 5, 7, 3), (0, 2, 6, 4))
+
+
+@cache
+def polygons(solid: Solid) -> tuple[NDArray[np.float64], ...]:
+    """The flat faces of a solid.
+
+    Returns:
+        Arrays of (n, 3) corners, block frame, units, counter-clockwise seen from outside.
+    """
+    if isinstance(solid, Box):
+        corners = np.array(solid.lowest) + _CORNERS * np.array(solid.size)
+        return tuple(corners[list(face)] for face in _BOX_FACES)
+    angles = np.arange(CYLINDER_SIDES) * (2 * math.pi / CYLINDER_SIDES)
+    circle = np.stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)], axis=1)
+    axis = solid.block_from_axis
+    half = np.array([0.0, 0.0, solid.length / 2])
+    base, top = (axis.apply(circle * solid.radius + end) for end in (-half, half))
+    around = [
+        np.array([base[side - 1], base[side], top[side], top[side - 1]])
+        for side in range(CYLINDER_SIDES)
+    ]
+    return (base[::-1], top, *around)
+
+
+def normal(polygon: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(3,) the outward normal of a flat face, unit length.
+
+    Args:
+        polygon: (n, 3) corners, counter-clockwise seen from outside.
+    """
+    across = np.cross(polygon[1] - polygon[0], polygon[2] - polygon[1])
+    unit: NDArray[np.float64] = across / np.linalg.norm(across)
+    return unit

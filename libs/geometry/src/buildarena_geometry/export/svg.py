@@ -1,0 +1,185 @@
+"""Drawings of machines as SVG: parallel projection, painted from the back to the front."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+from xml.sax.saxutils import escape
+
+import numpy as np
+
+from buildarena_geometry.modules import Box
+
+from .meshes import COLOURS, CYLINDER_SIDES, normal, polygons
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from buildarena_geometry.blocks import Block
+    from buildarena_geometry.machine import Machine
+
+_LIGHT = np.array([0.35, -0.5, 0.79])  # where the light comes from, world frame, unit length
+_DARKEST = 0.55  # brightness of a face turned away from the light
+_AXES = (
+    ("east", (1, 0, 0), "#c0392b"),
+    ("north", (0, 1, 0), "#27883f"),
+    ("up", (0, 0, 1), "#2c5fb3"),
+)
+_STYLE = """
+polygon {stroke-width: 1; stroke-linejoin: round}
+.rod {stroke: #4a4441; stroke-width: 6; stroke-linecap: round}
+.arrow {stroke-width: 3}
+text {font: 600 15px sans-serif; text-anchor: middle; dominant-baseline: central;
+  paint-order: stroke; stroke: #fff; stroke-width: 4}
+"""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class View:
+    """From where a machine is drawn, and what is written into the drawing.
+
+    Attributes:
+        azimuth_deg: where the eye stands, from south through east.
+        elevation_deg: how far above the horizon it stands.
+        scale: pixels a unit.
+        compass: whether arrows show east, north and up.
+        face_labels: ids of the blocks whose visible faces are labelled.
+        frames: ids of the blocks whose axes are drawn (x red, y green, z blue).
+        ids: whether each block bears its id.
+    """
+
+    azimuth_deg: float = 30.0
+    elevation_deg: float = 25.0
+    scale: float = 80.0
+    compass: bool = True
+    face_labels: tuple[str, ...] = ()
+    frames: tuple[str, ...] = ()
+    ids: bool = False
+
+
+def machine_svg(machine: Machine, view: View | None = None) -> str:
+    """The machine as an SVG document.
+
+    Args:
+        machine: what to draw; an empty one gives an empty drawing.
+        view: from where, and with which writing.
+
+    Returns:
+        The document's text.
+    """
+    drawing = _Drawing(view or View())
+    for block in machine.blocks.values():
+        drawing.add_block(block)
+    for link in machine.connectors.values():
+        drawing.add_rod(link.start_point, link.end_point)
+    return drawing.text()
+
+
+class _Drawing:
+    """Collects shapes with their depth and writes them from the back to the front."""
+
+    def __init__(self, view: View) -> None:
+        azimuth, elevation = math.radians(view.azimuth_deg), math.radians(view.elevation_deg)
+        right = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
+        self._towards_eye = np.array(
+            [
+                math.sin(azimuth) * math.cos(elevation),
+                -math.cos(azimuth) * math.cos(elevation),
+                math.sin(elevation),
+            ]
+        )
+        self._axes = np.array([right, np.cross(self._towards_eye, right)])
+        self._view = view
+        self._shapes: list[tuple[float, str]] = []
+        self._writing: list[str] = []
+        self._points: list[NDArray[np.float64]] = []
+
+    def add_block(self, block: Block) -> None:
+        for solid in block.module.body:
+            for polygon in polygons(solid):
+                # A cylinder's side is round: only its two ends have edges.
+                edged = isinstance(solid, Box) or len(polygon) == CYLINDER_SIDES
+                corners = block.world_from_block.apply(polygon)
+                self._add_polygon(corners, block.module.kind, edged=edged)
+        if self._view.ids:
+            self._write(block.center, block.id, "id")
+        if block.id in self._view.face_labels:
+            self._label_faces(block)
+        if block.id in self._view.frames:
+            pose = block.world_from_block
+            for axis, (_, _, colour) in zip(pose.rotation.T, _AXES, strict=True):
+                tip = self._project(pose.position + 0.9 * axis)
+                self._arrow(self._project(pose.position), tip, colour)
+
+    def add_rod(self, start: NDArray[np.float64], end: NDArray[np.float64]) -> None:
+        (x, y), (u, v) = self._project(start), self._project(end)
+        depth = float((start + end) @ self._towards_eye / 2)
+        line = f'<line x1="{x:.1f}" y1="{y:.1f}" x2="{u:.1f}" y2="{v:.1f}" class="rod"/>'
+        self._shapes.append((depth, line))
+
+    def text(self) -> str:
+        if self._view.compass:
+            self._add_compass()
+        points = np.array(self._points) if self._points else np.zeros((1, 2))
+        (left, top), (right, bottom) = points.min(axis=0) - 24, points.max(axis=0) + 24
+        shapes = [shape for _, shape in sorted(self._shapes, key=lambda entry: entry[0])]
+        box = f"{left:.0f} {top:.0f} {right - left:.0f} {bottom - top:.0f}"
+        frame = (
+            f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="{box}" '
+            f'width="{right - left:.0f}" height="{bottom - top:.0f}">'
+        )
+        paper = f'<rect x="{left:.0f}" y="{top:.0f}" width="100%" height="100%" fill="#fff"/>'
+        lines = [frame, f"<style>{_STYLE}</style>", paper, *shapes, *self._writing, "</svg>"]
+        return "\n".join(lines) + "\n"
+
+    def _add_polygon(self, corners: NDArray[np.float64], kind: str, *, edged: bool) -> None:
+        outward = normal(corners)
+        if outward @ self._towards_eye <= 0:
+            return
+        brightness = _DARKEST + (1 - _DARKEST) * max(0.0, float(outward @ _LIGHT))
+        red, green, blue = (round(255 * part * brightness) for part in COLOURS[kind])
+        flat = [self._project(corner) for corner in corners]
+        points = " ".join(f"{x:.1f},{y:.1f}" for x, y in flat)
+        depth = float(corners.mean(axis=0) @ self._towards_eye)
+        colour = f"#{red:02x}{green:02x}{blue:02x}"
+        edge = "#2b2b2b" if edged else colour
+        shape = f'<polygon points="{points}" fill="{colour}" stroke="{edge}"/>'
+        self._shapes.append((depth, shape))
+
+    def _label_faces(self, block: Block) -> None:
+        for face in block.module.faces:
+            if np.array(block.face_normal(face.label)) @ self._towards_eye > 0:
+                self._write(np.array(block.face_center(face.label)), face.label, "face")
+
+    def _add_compass(self) -> None:
+        flat = np.array(self._points) if self._points else np.zeros((1, 2))
+        left, bottom = flat[:, 0].min() - 40, flat[:, 1].max()
+        for name, axis, colour in _AXES:
+            across, up = self._axes @ np.array(axis) * 46
+            tip = np.array([left + across, bottom - up])
+            self._arrow(np.array([left, bottom]), tip, colour)
+            written = np.array([left + 1.45 * across, bottom - 1.45 * up])
+            self._points.append(written)
+            self._writing.append(
+                f'<text x="{written[0]:.1f}" y="{written[1]:.1f}" fill="{colour}">{name}</text>'
+            )
+
+    def _arrow(self, start: NDArray[np.float64], end: NDArray[np.float64], colour: str) -> None:
+        (x, y), (u, v) = start, end
+        self._writing.append(
+            f'<line x1="{x:.1f}" y1="{y:.1f}" x2="{u:.1f}" y2="{v:.1f}" stroke="{colour}" '
+            f'class="arrow"/><circle cx="{u:.1f}" cy="{v:.1f}" r="4" fill="{colour}"/>'
+        )
+
+    def _write(self, place: NDArray[np.float64], words: str, meaning: str) -> None:
+        x, y = self._project(place)
+        self._writing.append(
+            f'<text x="{x:.1f}" y="{y:.1f}" class="{meaning}">{escape(words)}</text>'
+        )
+
+    def _project(self, point: NDArray[np.float64]) -> NDArray[np.float64]:
+        across, up = self._axes @ point * self._view.scale
+        flat = np.array([across, -up])
+        self._points.append(flat)
+        return flat
