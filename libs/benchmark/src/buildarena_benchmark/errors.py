@@ -6,4 +6,4 @@ class BenchmarkError(Exception):
 
 
 class TaskError(BenchmarkError, ValueError):
-    """A task file is wrong; the message names line, field and, where there are any, valid choices."""
+    """A task file is wrong; the message names line, field and valid choices."""

@@ -10,10 +10,9 @@ from buildarena_benchmark.scorers.stability import is_unstable
 from buildarena_benchmark.scorers.verdict import Metric, Verdict
 
 if TYPE_CHECKING:
+    from buildarena_benchmark.tasks.task import Task
     from buildarena_geometry import Machine
     from buildarena_simulation import Trajectory
-
-    from buildarena_benchmark.tasks.task import Task
 
 _SCORERS: Final[Mapping[str, Callable[..., Verdict]]] = MappingProxyType(
     {

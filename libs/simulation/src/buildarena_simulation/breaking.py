@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from buildarena_simulation.constants import GRAVITY
 from buildarena_simulation.engines.base import Engine
 from buildarena_simulation.structure.clusters import Clusters, find_clusters
 from buildarena_simulation.structure.contacts import PointForces, evenly_shared
@@ -10,8 +11,6 @@ from buildarena_simulation.structure.model import JOINT_KINDS, FloatArray, Struc
 from buildarena_simulation.structure.motion import Motion, rope_ends
 from buildarena_simulation.structure.vectors import turned
 from buildarena_simulation.trajectory import Break, JointPeak
-
-from buildarena_simulation.constants import GRAVITY
 
 
 class BreakingModel:
@@ -106,9 +105,7 @@ class BreakingModel:
             c = clusters.cluster_of[cannons]
             turn = motion.rotation[c]
             blocks.append(cannons)
-            points.append(
-                motion.position[c] + turned(turn, structure.shown[cannons])
-            )
+            points.append(motion.position[c] + turned(turn, structure.shown[cannons]))
             sprays = turned(turn, structure.directions[cannons])
             forces.append(-thrusts[:, None] * sprays)
         if len(structure.ropes):

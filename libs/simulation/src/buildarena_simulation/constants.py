@@ -118,7 +118,7 @@ JOINT_STRENGTH: Final = MappingProxyType(
         JointKind.FAR_JOINT: Strength(
             force=1067.0,
             moment=355.0,
-            origin="force: 35,000 force units, public modding notes; moment: the attachment's ratio",
+            origin="force: 35,000 force units, public modding notes; moment: in proportion",
         ),
         JointKind.MOUNT: Strength(
             force=1e5, moment=1e5, origin="public modding notes: practically never breaks"

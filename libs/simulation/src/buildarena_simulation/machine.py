@@ -4,14 +4,23 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from buildarena_geometry.modules import Cylinder
 from buildarena_simulation.constants import MAX_PARTS, JointKind
 from buildarena_simulation.control import Bindings
 from buildarena_simulation.errors import MachineNotSimulable
 from buildarena_simulation.structure.build import Link, Rope, build_structure
-from buildarena_simulation.structure.model import Part, Role, Shape, ShapeKind, Structure
+from buildarena_simulation.structure.model import (
+    FloatArray,
+    Part,
+    Role,
+    Shape,
+    ShapeKind,
+    Structure,
+)
 
 if TYPE_CHECKING:
     from buildarena_geometry import Block, Joint, Machine
+    from buildarena_geometry.modules import Solid
 
 _SMALL_WOODEN_BLOCK = 15
 """Besiege's id of the one module whose far end grabs what it touches."""
@@ -100,9 +109,7 @@ def _part(block: "Block") -> Part:
     )
 
 
-def _shape(solid: object, position: np.ndarray, rotation: np.ndarray) -> Shape:
-    from buildarena_geometry.modules import Cylinder
-
+def _shape(solid: "Solid", position: FloatArray, rotation: FloatArray) -> Shape:
     if isinstance(solid, Cylinder):
         pose = solid.block_from_axis
         half = np.array([solid.radius, solid.radius, solid.length / 2])

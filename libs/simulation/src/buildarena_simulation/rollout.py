@@ -11,7 +11,6 @@ from buildarena_simulation.constants import GRAVITY, SAMPLE_RATE_HZ
 from buildarena_simulation.control import (
     Bindings,
     KeyHold,
-    heated_cannons,
     plan_schedule,
     recoil,
 )

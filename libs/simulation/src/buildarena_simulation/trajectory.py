@@ -120,7 +120,7 @@ class Trajectory:
 
     def to_parquet(self) -> bytes:
         """The trajectory as a Parquet file (zstd, byte-stream split)."""
-        from buildarena_simulation.parquet import write_trajectory  # noqa: PLC0415 - pyarrow is heavy
+        from buildarena_simulation.parquet import write_trajectory
 
         return write_trajectory(self)
 
@@ -131,7 +131,7 @@ class Trajectory:
         Raises:
             TrajectoryFormatError: The bytes are no trajectory of a schema this version reads.
         """
-        from buildarena_simulation.parquet import read_trajectory  # noqa: PLC0415 - pyarrow is heavy
+        from buildarena_simulation.parquet import read_trajectory
 
         return cls(**read_trajectory(data))
 

@@ -13,7 +13,7 @@ Series = NDArray[np.float64]
 
 
 def starting_block(machine: "Machine", trajectory: "Trajectory") -> int:
-    """Index of the machine's first starting block among the tracked blocks; 0 if none is tracked."""
+    """Index of the first starting block among the tracked blocks; 0 if none is tracked."""
     for block in machine.blocks.values():
         if block.module.kind == "start" and block.id in trajectory.block_ids:
             return trajectory.block_ids.index(block.id)

@@ -3,9 +3,9 @@
 from typing import TYPE_CHECKING
 
 import numpy as np
-from buildarena_simulation.constants import GRAVITY, HEATED_THRUST, WHEEL_SPEED
 
 from buildarena_benchmark.scorers.series import speeds
+from buildarena_simulation.constants import GRAVITY, HEATED_THRUST, WHEEL_SPEED
 
 if TYPE_CHECKING:
     from buildarena_geometry import Machine

@@ -3,10 +3,10 @@
 from typing import TYPE_CHECKING
 
 import numpy as np
-from buildarena_simulation.constants import COLD_THRUST, HEATED_THRUST
 
 from buildarena_benchmark.scorers.verdict import Metric, Verdict, rounded
 from buildarena_benchmark.tasks.document import ThrustScoring
+from buildarena_simulation.constants import COLD_THRUST, HEATED_THRUST
 
 if TYPE_CHECKING:
     from buildarena_geometry import Machine

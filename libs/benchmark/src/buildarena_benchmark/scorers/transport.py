@@ -131,6 +131,7 @@ def _path_metrics(time_s: Series, path: Series, target: tuple[float, float]) -> 
     moving = lengths > _RESTING * steps
     headings = (moved[moving] @ aim) / lengths[moving]
     travelled = float(lengths.sum())
+    remaining = float(np.linalg.norm(np.array(target) - path[-1]))
     backward = np.minimum(np.diff(along), 0.0)
     return {
         "progress_ratio": rounded(along.max() / distance),
@@ -139,8 +140,10 @@ def _path_metrics(time_s: Series, path: Series, target: tuple[float, float]) -> 
         else None,
         "backtrack": rounded(-backward.sum() / distance),
         "lateral_deviation": rounded(np.average((across[1:] + across[:-1]) / 2, weights=steps)),
-        "path_efficiency": rounded(np.linalg.norm(path[-1] - path[0]) / travelled)
+        "path_efficiency": rounded(float(np.linalg.norm(path[-1] - path[0])) / travelled)
         if travelled > 0
         else None,
-        "final_distance_ratio": rounded(np.linalg.norm(np.array(target) - path[-1]) / distance),
+        "final_distance_ratio": rounded(
+            float(np.linalg.norm(np.array(target) - path[-1])) / distance
+        ),
     }

@@ -18,4 +18,4 @@ class Verdict:
 
 def rounded(value: float) -> float:
     """A metric to six decimals, so that scores compare equal across machines."""
-    return round(float(value), 6)
+    return round(float(value), 6) + 0.0  # no -0.0

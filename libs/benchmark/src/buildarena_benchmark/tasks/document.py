@@ -6,8 +6,9 @@ from one place.
 
 from typing import Annotated, Literal
 
-from buildarena_simulation import Scenario
 from pydantic import BaseModel, ConfigDict, Field
+
+from buildarena_simulation import Scenario
 
 Weight = Annotated[int, Field(ge=1, le=3)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]

@@ -5,7 +5,7 @@ from functools import cache
 from importlib import resources
 from pathlib import Path
 from types import MappingProxyType
-from typing import Final
+from typing import Any, Final
 
 import yaml
 from pydantic import ValidationError
@@ -14,6 +14,9 @@ from pydantic_core import ErrorDetails
 from buildarena_benchmark.errors import TaskError
 from buildarena_benchmark.tasks.document import TaskDocument
 from buildarena_benchmark.tasks.task import Task, task_of
+
+_Schema = dict[str, Any]
+"""A JSON schema, as pydantic writes it."""
 
 _ORDER: Final = tuple(
     f"{category}-{level}" for category in ("transport", "support", "lift") for level in (1, 2, 3)
@@ -76,7 +79,8 @@ def _described(item: ErrorDetails, root: yaml.Node | None) -> str:
 
 
 def _locate(path: Sequence[int | str], root: yaml.Node | None) -> tuple[str, int | None]:
-    names, node = [], root
+    names: list[str] = []
+    node = root
     line = root.start_mark.line + 1 if root else None
     for step in path:
         below = _child(node, step)
@@ -102,7 +106,7 @@ def _child(node: yaml.Node | None, step: int | str) -> yaml.Node | None:
 def _fields_beside(path: Sequence[int | str]) -> tuple[str, ...]:
     """Names of the fields that are valid where an unknown one was found."""
     schema = TaskDocument.model_json_schema()
-    here = schema
+    here: _Schema = schema
     for step in path[:-1]:
         here = _resolved(here, schema)
         options = here.get("oneOf") or here.get("anyOf")
@@ -119,12 +123,15 @@ def _fields_beside(path: Sequence[int | str]) -> tuple[str, ...]:
     return tuple(_resolved(here, schema).get("properties", {}))
 
 
-def _resolved(part: dict, schema: dict) -> dict:
+def _resolved(part: _Schema, schema: _Schema) -> _Schema:
     reference = part.get("$ref")
-    return schema["$defs"][reference.rsplit("/", 1)[1]] if reference else part
+    if reference is None:
+        return part
+    found: _Schema = schema["$defs"][reference.rsplit("/", 1)[1]]
+    return found
 
 
-def _tag(option: dict) -> str | None:
+def _tag(option: _Schema) -> str | None:
     for name in ("name", "kind"):
         tag = option.get("properties", {}).get(name, {}).get("const")
         if tag:

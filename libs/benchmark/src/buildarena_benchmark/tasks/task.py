@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final, Literal
 
-from buildarena_simulation import Scenario
-
 from buildarena_benchmark.tasks.document import Constraints, Indicator, Scoring, TaskDocument
+from buildarena_simulation import Scenario
 
 SCORER_VERSION: Final = 1
 """Rises with every change of a scorer that can change a score; part of every task's version."""

@@ -7,8 +7,6 @@ whole interval.
 
 from typing import Final
 
-import numpy as np
-
 from buildarena_simulation.structure.contacts import ContactForces, mean_contacts
 from buildarena_simulation.structure.model import FloatArray
 

@@ -16,7 +16,7 @@ from buildarena_simulation.structure.vectors import cross, turned
 
 _STIFFNESS_SHARE = 0.2
 _DAMPING_SHARE = 0.4
-"""Shares of m/dt² and m/dt; an explicit step is stable below 1 each, with room for several ropes."""
+"""Shares of m/dt² and m/dt; an explicit step is stable below 1 each."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,5 +88,5 @@ def _at_end(
     arm = point - motion.centers_of_mass(clusters)[c]
     velocity = motion.velocity[c] + cross(motion.spin[c], arm)
     lever = turned(motion.rotation[c].transpose(0, 2, 1), cross(arm, along))
-    turned = turned(np.linalg.inv(clusters.inertia[c]), lever)
-    return (velocity * along).sum(axis=1), 1.0 / clusters.mass[c] + (lever * turned).sum(axis=1)
+    gained = turned(np.linalg.inv(clusters.inertia[c]), lever)
+    return (velocity * along).sum(axis=1), 1.0 / clusters.mass[c] + (lever * gained).sum(axis=1)

@@ -4,6 +4,8 @@ Each link's inertial frame is the principal frame of its cluster. A newline foll
 URDF lines fail to parse.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from buildarena_simulation.constants import COLLISION_MARGIN
@@ -14,7 +16,7 @@ from buildarena_simulation.structure.model import FloatArray, Shape, ShapeKind, 
 def urdf_of(
     structure: Structure,
     clusters: Clusters,
-    inside: list[int],
+    inside: Sequence[int],
     *,
     axes: FloatArray,
     moments: FloatArray,

@@ -81,8 +81,8 @@ def evenly_shared(contacts: ContactForces, cluster_of: IntArray) -> PointForces:
     """The contacts with each patch's force spread evenly.
 
     A patch is all contacts between one cluster and one other body with about the same normal. Its
-    forces become w·(a + b × r), with a and b such that force and moment stay as they were; points
-    that would have to pull are left out and the rest is spread again.
+    forces become w·(a + cross(b, r)), with a and b such that force and moment stay as they were;
+    points that would have to pull are left out and the rest is spread again.
 
     Args:
         contacts: As reported.
@@ -130,7 +130,7 @@ def _spread(contacts: ContactForces, patch: IntArray, count: int) -> FloatArray:
 def _even(
     x: FloatArray, weight: FloatArray, patch: IntArray, total: FloatArray, moment: FloatArray
 ) -> FloatArray:
-    """Forces w·(a + b × r) of given resultants.
+    """Forces w·(a + cross(b, r)) of given resultants.
 
     Args:
         x: (K, 3) points from an anchor of their patch, units.

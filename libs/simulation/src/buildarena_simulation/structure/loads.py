@@ -101,7 +101,7 @@ class LoadModel:
         self._velocity, self._spin = motion.velocity, motion.spin
         self._solver = self._stiffness.factorize(clusters, self.holds)
         self._arm = structure.centers_of_mass - clusters.center_of_mass[clusters.cluster_of]
-        self._compliance = np.linalg.inv(clusters.inertia)
+        self._compliance = np.asarray(np.linalg.inv(clusters.inertia), dtype=np.float64)
         self._children = [
             np.flatnonzero(clusters.level == level)
             for level in range(int(clusters.level.max()), 0, -1)
@@ -185,12 +185,12 @@ class LoadModel:
         return summed_by(self._clusters.cluster_of, both, len(self._clusters))
 
     def _relieved(self, wrenches: FloatArray) -> FloatArray:
-        """Wrenches less what accelerates the blocks (inertia relief): m·(a + α × r) and I·α."""
+        """Wrenches less what accelerates the blocks (inertia relief)."""
         structure, clusters = self._structure, self._clusters
         total = self._cluster_totals(wrenches)
-        a = total[:, :3] / clusters.mass[:, None]
-        alpha = turned(self._compliance, total[:, 3:])
-        a, alpha = a[clusters.cluster_of], alpha[clusters.cluster_of]
+        of = clusters.cluster_of
+        a = (total[:, :3] / clusters.mass[:, None])[of]
+        alpha = turned(self._compliance, total[:, 3:])[of]
         relieved = wrenches.copy()
         relieved[:, :3] -= structure.masses[:, None] * (a + cross(alpha, self._arm))
         relieved[:, 3:] -= turned(structure.inertias, alpha)

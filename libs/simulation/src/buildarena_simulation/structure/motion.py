@@ -36,15 +36,13 @@ class Motion:
 
     def centers_of_mass(self, clusters: Clusters) -> FloatArray:
         """Centres of mass of the clusters, (C, 3), world frame, units."""
-        return np.asarray(
-            self.position + turned(self.rotation, clusters.center_of_mass)
-        )
+        return np.asarray(self.position + turned(self.rotation, clusters.center_of_mass))
 
     def after_break(self, old: Clusters, new: Clusters) -> "Motion":
         """The same motion, told for the clusters left after a break.
 
         Poses stay; each new cluster's centre of mass keeps the velocity the old cluster had there
-        (v + ω × r), so linear and angular momentum stay as they were.
+        (v + cross(spin, r)), so linear and angular momentum stay as they were.
         """
         source = np.array([old.cluster_of[ids[0]] for ids in new.blocks])
         rotation, spin = self.rotation[source], self.spin[source]

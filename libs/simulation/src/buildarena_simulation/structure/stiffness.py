@@ -5,6 +5,8 @@ clusters are solved at once: the first block of each is its ground, whose reacti
 the loads are self-equilibrated.
 """
 
+from typing import Protocol
+
 import numpy as np
 
 from buildarena_simulation.structure.clusters import Clusters
@@ -40,9 +42,6 @@ class StiffnessModel:
             clusters: The clusters.
             holds: (M,) which members still hold.
         """
-        from scipy.sparse import coo_matrix  # noqa: PLC0415 - heavy, and only simulations need it
-        from scipy.sparse.linalg import splu  # noqa: PLC0415
-
         inside = np.flatnonzero(
             holds & (clusters.cluster_of[self._first] == clusters.cluster_of[self._second])
         )
@@ -51,30 +50,43 @@ class StiffnessModel:
         free[grounds] = False
         dof = np.full((self._node_count, 6), -1, dtype=np.int64)
         dof[free] = np.arange(6 * int(free.sum())).reshape(-1, 6)
-        if not len(inside) or not free.any():
-            return MemberForces(inside=inside, free=free, stress=self._stress[inside], solver=None)
-        rows = np.concatenate([dof[self._first[inside]], dof[self._second[inside]]], axis=1)
-        i = np.repeat(rows, 12, axis=1).reshape(-1)
-        j = np.tile(rows, (1, 12)).reshape(-1)
-        kept = (i >= 0) & (j >= 0)
-        size = 6 * int(free.sum())
-        matrix = coo_matrix(
-            (self._element[inside].reshape(-1)[kept], (i[kept], j[kept])), shape=(size, size)
-        ).tocsc()
-        solver = splu(
-            matrix,
-            permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
-        )
+        first, second = self._first[inside], self._second[inside]
+        solver = self._factorized(inside, dof) if len(inside) and free.any() else None
         return MemberForces(
             inside=inside,
             free=free,
             stress=self._stress[inside],
             solver=solver,
-            first=self._first[inside],
-            second=self._second[inside],
+            first=first,
+            second=second,
         )
+
+    def _factorized(self, inside: IntArray, dof: IntArray) -> "_Factorization":
+        from scipy.sparse import coo_matrix
+        from scipy.sparse.linalg import splu
+
+        rows = np.concatenate([dof[self._first[inside]], dof[self._second[inside]]], axis=1)
+        i = np.repeat(rows, 12, axis=1).reshape(-1)
+        j = np.tile(rows, (1, 12)).reshape(-1)
+        kept = (i >= 0) & (j >= 0)
+        size = int(dof.max()) + 1
+        matrix = coo_matrix(
+            (self._element[inside].reshape(-1)[kept], (i[kept], j[kept])), shape=(size, size)
+        )
+        factorization: _Factorization = splu(
+            matrix.tocsc(),
+            permc_spec="MMD_AT_PLUS_A",
+            diag_pivot_thresh=0.0,
+            options={"SymmetricMode": True},
+        )
+        return factorization
+
+
+class _Factorization(Protocol):
+    """A factorised matrix, as SciPy's SuperLU gives it."""
+
+    def solve(self, rhs: FloatArray) -> FloatArray:
+        """The solution for one right-hand side."""
 
 
 class MemberForces:
@@ -84,15 +96,15 @@ class MemberForces:
         inside: (K,) indices of the members it tells of: those within one cluster.
     """
 
-    def __init__(  # noqa: D417 - an inner product of `StiffnessModel.factorize`
+    def __init__(
         self,
         *,
         inside: IntArray,
         free: BoolArray,
         stress: FloatArray,
-        solver: object,
-        first: IntArray | None = None,
-        second: IntArray | None = None,
+        solver: _Factorization | None,
+        first: IntArray,
+        second: IntArray,
     ) -> None:
         self.inside = inside
         self._free = free

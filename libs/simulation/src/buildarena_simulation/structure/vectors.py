@@ -34,4 +34,4 @@ def summed_by(index: np.ndarray, rows: FloatArray, count: int) -> FloatArray:
         return np.zeros((count, rows.shape[1]))
     flat = index[:, None] * rows.shape[1] + np.arange(rows.shape[1])
     sums = np.bincount(flat.reshape(-1), rows.reshape(-1), minlength=count * rows.shape[1])
-    return sums.reshape(count, -1)
+    return np.asarray(sums.reshape(count, -1), dtype=np.float64)

@@ -1,0 +1,286 @@
+"""MJCF text of a world: what MuJoCo compiles.
+
+Every number is written in full, every inertial frame is stated: what MJCF leaves open would be
+filled in by the compiler from the collision shapes.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from buildarena_simulation.constants import (
+    COLLISION_MARGIN,
+    FRICTION_BLOCK,
+    FRICTION_TERRAIN,
+    FRICTION_WHEEL,
+)
+from buildarena_simulation.engines.base import World, quaternion_of
+from buildarena_simulation.structure.clusters import Clusters
+from buildarena_simulation.structure.model import FloatArray, Role, Shape, ShapeKind, Structure
+from buildarena_simulation.structure.motion import Motion
+
+_TERRAIN_PRIORITY, _CARGO_PRIORITY, _BLOCK_PRIORITY, _WHEEL_PRIORITY = 0, 1, 2, 3
+"""A contact takes its friction from the geom of higher priority."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MjcfSettings:
+    """What the text says about the solver.
+
+    Attributes:
+        time_step_s: Length of a step, seconds.
+        solref: Time constant, seconds, and damping ratio of contacts and ropes.
+        solimp: Impedance of contacts.
+        impratio: Stiffness of friction over that of normal forces.
+        iterations: Most iterations of the solver.
+        wheel_torque: Torque limit of a wheel's motor, mass·unit²/s².
+        servo_gain: Torque of a wheel's motor per rad/s off its target.
+    """
+
+    time_step_s: float
+    solref: Sequence[float]
+    solimp: Sequence[float]
+    impratio: float
+    iterations: int
+    wheel_torque: float
+    servo_gain: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MjcfState:
+    """What the text says about the bodies.
+
+    Attributes:
+        clusters: The clusters.
+        motion: Where they are.
+        axes: (C, 3, 3) machine_from_principal.
+        moments: (C, 3) principal moments of inertia.
+        cargo_mass: Mass of the cargo now.
+        ropes: Indices of the ropes that hold.
+    """
+
+    clusters: Clusters
+    motion: Motion
+    axes: FloatArray
+    moments: FloatArray
+    cargo_mass: float
+    ropes: Sequence[int]
+
+    def in_body(self, c: int, point: FloatArray) -> FloatArray:
+        """A machine-frame point in the frame of a cluster's body: its principal frame."""
+        return np.asarray(self.axes[c].T @ (point - self.clusters.center_of_mass[c]))
+
+
+def mjcf_of(world: World, state: MjcfState, settings: MjcfSettings) -> str:
+    """The MJCF text of a world with its clusters.
+
+    Bodies are named "cluster C", hinges "hinge C", free joints "free C", geoms "block N K", sites
+    and actuators of cannons "cannon N", tendons "rope R", the cargo "cargo".
+    """
+    lines = [
+        "<mujoco>",
+        '<compiler angle="radian" autolimits="true" inertiafromgeom="false"/>',
+        _tag(
+            "option",
+            timestep=settings.time_step_s,
+            gravity=(0.0, 0.0, -world.gravity),
+            integrator="implicitfast",
+            cone="elliptic",
+            impratio=settings.impratio,
+            iterations=settings.iterations,
+            tolerance=1e-10,
+        ),
+        "<default>",
+        _tag("geom", condim=3, solref=settings.solref, solimp=settings.solimp),
+        _tag("tendon", solreflimit=settings.solref),
+        "</default>",
+        "<worldbody>",
+        *_static(world),
+        *_cargo(world, state.cargo_mass),
+        *_pieces(world.structure, state),
+        "</worldbody>",
+        "<contact>",
+        *_exclusions(state.clusters),
+        "</contact>",
+        "<tendon>",
+        *_ropes(world.structure, state),
+        "</tendon>",
+        "<actuator>",
+        *_actuators(world.structure, state, settings),
+        "</actuator>",
+        "</mujoco>",
+    ]
+    return "\n".join(lines)
+
+
+def _static(world: World) -> Iterator[str]:
+    surface: dict[str, object] = {
+        "friction": _friction(FRICTION_TERRAIN),
+        "priority": _TERRAIN_PRIORITY,
+    }
+    if world.ground:
+        yield _tag("geom", name="ground", type="plane", size=(0.0, 0.0, 1.0), **surface)
+    for i, box in enumerate(world.terrain):
+        yield _tag(
+            "geom",
+            name=f"terrain {i}",
+            type="box",
+            size=np.array(box.size) / 2,
+            pos=box.center,
+            **surface,
+        )
+
+
+def _cargo(world: World, mass: float) -> Iterator[str]:
+    cargo = world.cargo
+    if cargo is None:
+        return
+    a, b, c = cargo.size
+    moments = mass / 12 * np.array([b**2 + c**2, a**2 + c**2, a**2 + b**2])
+    yield _opened("body", name="cargo", pos=cargo.position)
+    yield _tag("inertial", pos=(0.0, 0.0, 0.0), mass=mass, diaginertia=moments)
+    yield "<freejoint/>"
+    yield _tag(
+        "geom",
+        name="cargo",
+        type="box",
+        size=cargo.size / 2,
+        friction=_friction(FRICTION_TERRAIN),
+        priority=_CARGO_PRIORITY,
+    )
+    yield "</body>"
+
+
+def _pieces(structure: Structure, state: MjcfState) -> Iterator[str]:
+    for piece in state.clusters.pieces:
+        yield from _body(structure, state, piece[0])
+
+
+def _body(structure: Structure, state: MjcfState, c: int) -> Iterator[str]:
+    """A cluster's body and, within it, those that hang on it by axles."""
+    clusters, motion = state.clusters, state.motion
+    centers = motion.centers_of_mass(clusters)
+    parent = int(clusters.parent[c])
+    turn = motion.rotation[c] @ state.axes[c]
+    if parent < 0:
+        place = centers[c]
+    else:
+        to_parent = (motion.rotation[parent] @ state.axes[parent]).T
+        place, turn = to_parent @ (centers[c] - centers[parent]), to_parent @ turn
+    yield _opened("body", name=f"cluster {c}", pos=place, quat=quaternion_of(turn))
+    yield _tag("inertial", pos=(0.0, 0.0, 0.0), mass=clusters.mass[c], diaginertia=state.moments[c])
+    if parent < 0:
+        yield _tag("freejoint", name=f"free {c}")
+    else:
+        wheel = clusters.wheel[c]
+        yield _tag(
+            "joint",
+            name=f"hinge {c}",
+            type="hinge",
+            pos=state.in_body(c, structure.positions[wheel]),
+            axis=state.axes[c].T @ structure.directions[wheel],
+            armature=0.01,
+        )
+    for i in clusters.blocks[c]:
+        yield from _block(structure, state, c, int(i))
+    yield from _rope_sites(structure, state, c)
+    for child in np.flatnonzero(clusters.parent == c):
+        yield from _body(structure, state, int(child))
+    yield "</body>"
+
+
+def _block(structure: Structure, state: MjcfState, c: int, block: int) -> Iterator[str]:
+    part = structure.parts[block]
+    wheel = part.role is Role.WHEEL
+    for k, shape in enumerate(part.shapes):
+        kind, size = _form(shape)
+        yield _tag(
+            "geom",
+            name=f"block {block} {k}",
+            type=kind,
+            size=size,
+            pos=state.in_body(c, shape.center),
+            quat=quaternion_of(state.axes[c].T @ shape.rotation),
+            friction=_friction(FRICTION_WHEEL if wheel else FRICTION_BLOCK),
+            priority=_WHEEL_PRIORITY if wheel else _BLOCK_PRIORITY,
+        )
+    if part.role is Role.CANNON:
+        yield _tag("site", name=f"cannon {block}", pos=state.in_body(c, structure.shown[block]))
+
+
+def _form(shape: Shape) -> tuple[str, FloatArray]:
+    half = shape.half_extents
+    if shape.kind is ShapeKind.CYLINDER:
+        return "cylinder", half[[0, 2]]
+    return "box", half - COLLISION_MARGIN
+
+
+def _rope_sites(structure: Structure, state: MjcfState, c: int) -> Iterator[str]:
+    ropes, of = structure.ropes, state.clusters.cluster_of
+    for r in state.ropes:
+        ends = ((ropes.first[r], ropes.first_point[r]), (ropes.second[r], ropes.second_point[r]))
+        for k, (block, point) in enumerate(ends):
+            if of[block] == c:
+                yield _tag("site", name=f"rope {r} {k}", pos=state.in_body(c, point))
+
+
+def _exclusions(clusters: Clusters) -> Iterator[str]:
+    """Parts of one articulated piece do not collide with each other."""
+    for piece in clusters.pieces:
+        for i, first in enumerate(piece):
+            for second in piece[i + 1 :]:
+                yield _tag("exclude", body1=f"cluster {first}", body2=f"cluster {second}")
+
+
+def _ropes(structure: Structure, state: MjcfState) -> Iterator[str]:
+    for r in state.ropes:
+        yield _opened(
+            "spatial",
+            name=f"rope {r}",
+            limited="true",
+            range=(0.0, structure.ropes.length[r]),
+        )
+        yield _tag("site", site=f"rope {r} 0")
+        yield _tag("site", site=f"rope {r} 1")
+        yield "</spatial>"
+
+
+def _actuators(structure: Structure, state: MjcfState, settings: MjcfSettings) -> Iterator[str]:
+    for c in np.flatnonzero(state.clusters.parent >= 0):
+        yield _tag(
+            "velocity",
+            name=f"hinge {c}",
+            joint=f"hinge {c}",
+            kv=settings.servo_gain,
+            forcerange=(-settings.wheel_torque, settings.wheel_torque),
+        )
+    for i in structure.cannons:
+        recoil = state.axes[state.clusters.cluster_of[i]].T @ -structure.directions[i]
+        gear = (*recoil, 0.0, 0.0, 0.0)
+        yield _tag("general", name=f"cannon {i}", site=f"cannon {i}", gear=gear)
+
+
+def _friction(coefficient: float) -> tuple[float, float, float]:
+    return (coefficient, 0.005, 0.0001)
+
+
+def _tag(tag: str, **attributes: object) -> str:
+    return f"<{tag}{_written(attributes)}/>"
+
+
+def _opened(tag: str, **attributes: object) -> str:
+    return f"<{tag}{_written(attributes)}>"
+
+
+def _written(attributes: Mapping[str, object]) -> str:
+    return "".join(f" {key}={quoteattr(_text(value))}" for key, value in attributes.items())
+
+
+def _text(value: object) -> str:
+    if isinstance(value, str):
+        return value
+    if isinstance(value, int):
+        return str(value)
+    return " ".join(repr(float(number)) for number in np.atleast_1d(np.asarray(value)))

@@ -1,0 +1,75 @@
+"""Which blocks of a cluster a contact belongs to, for engines that name only the body."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from buildarena_simulation.constants import COLLISION_MARGIN
+from buildarena_simulation.structure.model import FloatArray, IntArray, ShapeKind, Structure
+
+_TIE: Final = 0.02
+"""A contact within this distance of several blocks is shared among them, units."""
+
+_CANDIDATES: Final = 16
+"""Blocks considered for one contact: more than can meet in a point."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ShapeTable:
+    """The collision shapes of one cluster; S of them.
+
+    Attributes:
+        block: (S,) block each belongs to.
+        center: (S, 3) machine frame, units.
+        rotation: (S, 3, 3) machine_from_shape.
+        half: (S, 3) half-extents as the engine has them, units.
+    """
+
+    block: IntArray
+    center: FloatArray
+    rotation: FloatArray
+    half: FloatArray
+
+    def share(self, points: FloatArray) -> tuple[IntArray, IntArray, FloatArray]:
+        """Gives points on the cluster's surface to the nearest blocks.
+
+        Args:
+            points: (K, 3) machine frame, units.
+
+        Returns:
+            Rows of one point and one block each: the point's index, the block, and its share.
+        """
+        candidates = self._nearby(points)
+        apart = points[:, None] - self.center[candidates]
+        along = np.abs((apart[:, :, None] @ self.rotation[candidates])[:, :, 0])
+        outside = np.maximum(along - self.half[candidates], 0.0)
+        distance = np.sqrt((outside * outside).sum(axis=2))
+        near = distance <= distance.min(axis=1)[:, None] + _TIE
+        weight = near / near.sum(axis=1)[:, None]
+        row, column = np.nonzero(near)
+        return row, self.block[candidates[row, column]], weight[row, column]
+
+    def _nearby(self, points: FloatArray) -> IntArray:
+        """The shapes whose centres are nearest to each point, (K, up to 16)."""
+        count = len(self.block)
+        if count <= _CANDIDATES:
+            return np.broadcast_to(np.arange(count), (len(points), count))
+        squares = (self.center * self.center).sum(axis=1) - 2.0 * points @ self.center.T
+        return np.argpartition(squares, _CANDIDATES, axis=1)[:, :_CANDIDATES]
+
+
+def shape_table(structure: Structure, blocks: Sequence[int] | IntArray) -> ShapeTable:
+    """The shapes of some blocks."""
+    owned = [(int(i), shape) for i in blocks for shape in structure.parts[i].shapes]
+    halves = [
+        shape.half_extents - (0.0 if shape.kind is ShapeKind.CYLINDER else COLLISION_MARGIN)
+        for _, shape in owned
+    ]
+    return ShapeTable(
+        block=np.array([i for i, _ in owned], dtype=np.int64),
+        center=np.array([shape.center for _, shape in owned]),
+        rotation=np.array([shape.rotation for _, shape in owned]),
+        half=np.array(halves),
+    )
