@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import gzip
 import json
 import sys
 from pathlib import Path
@@ -14,8 +13,6 @@ from .sequences import parse, run_sequences
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-
-_GZIP_MAGIC = b"\x1f\x8b"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -37,15 +34,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         content = parse(_read(options.file))
         for told in run_sequences(content, every_state=options.states == "all"):
             print(json.dumps(told, allow_nan=False))  # noqa: T201  the command's output
-    except (GeometryError, OSError, UnicodeDecodeError, gzip.BadGzipFile) as error:
+    except (GeometryError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)  # noqa: T201  the command's message
         return 1
     return 0
 
 
-def _read(file: str) -> str:
-    data = sys.stdin.buffer.read() if file == "-" else Path(file).read_bytes()
-    return (gzip.decompress(data) if data.startswith(_GZIP_MAGIC) else data).decode()
+def _read(file: str) -> bytes:
+    return sys.stdin.buffer.read() if file == "-" else Path(file).read_bytes()
 
 
 if __name__ == "__main__":

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gzip
 import json
+import zlib
 from typing import TYPE_CHECKING, Any
 
 from .besiege import besiege_point, besiege_rotation, besiege_span
@@ -19,6 +21,8 @@ if TYPE_CHECKING:
     from .modules import Catalogue
     from .outcomes import Outcome
     from .state import MachineState
+
+_GZIP_MAGIC = b"\x1f\x8b"
 
 # The vectors know no name of their own for these.
 _KIND_OF_CAUSE = {
@@ -57,6 +61,22 @@ def run_sequences(
             told[-1]["state"] = state_entry(machine.state)
         seed = entries.get("seed") if isinstance(entries, dict) else None
         yield {"seed": seed, "steps": told}
+
+
+def parse(data: bytes) -> object:
+    """The JSON values of a sequence file, plain or compressed by gzip.
+
+    Raises:
+        SequenceError: it is not JSON, or damaged.
+    """
+    try:
+        plain = gzip.decompress(data) if data.startswith(_GZIP_MAGIC) else data
+        content: object = json.loads(plain)
+    except (OSError, EOFError, zlib.error) as error:
+        raise SequenceError(f"input: not gzip: {error}") from error
+    except (ValueError, RecursionError) as error:
+        raise SequenceError(f"input: not JSON: {error}") from error
+    return content
 
 
 def kind_of(outcome: Outcome) -> str:
@@ -192,16 +212,3 @@ def _seat(part: Block | Connector, face: FaceRef) -> list[str | None]:
     if part.structure and part.id.startswith(prefix):
         return [None, label, block.removeprefix(prefix)]
     return [block, label]
-
-
-def parse(text: str) -> object:
-    """The JSON values of a sequence file.
-
-    Raises:
-        SequenceError: it is not JSON.
-    """
-    try:
-        content: object = json.loads(text)
-    except json.JSONDecodeError as error:
-        raise SequenceError(f"input: not JSON: {error}") from error
-    return content

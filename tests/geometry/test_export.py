@@ -1,0 +1,128 @@
+"""Machines as GLB files and SVG drawings."""
+
+from __future__ import annotations
+
+import json
+import struct
+import xml.etree.ElementTree as ET
+
+import numpy as np
+import pytest
+
+from buildarena_geometry import Machine
+from buildarena_geometry.export import View, machine_glb, machine_svg
+
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+@pytest.fixture
+def machine(build):
+    built = build(
+        ("1", "A", "Small Wooden Block"),
+        ("1", "B", "Powered Wheel"),
+        ("2", "E", "Small Wooden Block"),
+        ("1", "C", "Torch"),
+        ("1", "D", "Water Cannon"),
+    )
+    built.act("twist_block", {"block_id": "5", "angle": 30})
+    built.act(
+        "connect_blocks",
+        {"block_a": "1", "face_a": "E", "block_b": "4", "face_b": "A", "connector": "Brace"},
+    )
+    return built
+
+
+def parse(glb: bytes):
+    magic, version, length = struct.unpack_from("<4sII", glb)
+    assert (magic, version, length) == (b"glTF", 2, len(glb))
+    size, kind = struct.unpack_from("<I4s", glb, 12)
+    assert kind == b"JSON"
+    scene = json.loads(glb[20 : 20 + size])
+    if length == 20 + size:
+        return scene, b""
+    binary_size, kind = struct.unpack_from("<I4s", glb, 20 + size)
+    assert kind == b"BIN\x00"
+    binary = glb[28 + size :]
+    assert len(binary) == binary_size == scene["buffers"][0]["byteLength"]
+    return scene, binary
+
+
+def corners(scene, binary, accessor):
+    entry = scene["accessors"][accessor]
+    view = scene["bufferViews"][entry["bufferView"]]
+    data = binary[view["byteOffset"] : view["byteOffset"] + view["byteLength"]]
+    return np.frombuffer(data, "<f4").reshape(entry["count"], 3)
+
+
+def test_each_part_is_a_node_with_its_pose(machine):
+    scene, _ = parse(machine_glb(machine))
+    nodes = {node["name"]: node for node in scene["nodes"]}
+    assert set(nodes) == {"machine", *machine.blocks, *machine.connectors}
+    for block_id, block in machine.blocks.items():
+        x, y, z, w = nodes[block_id]["rotation"]
+        assert np.allclose((w, x, y, z), block.world_from_block.quaternion)
+        assert np.allclose(nodes[block_id]["translation"], block.world_from_block.position)
+
+
+def test_blocks_of_one_module_share_a_mesh(machine):
+    scene, _ = parse(machine_glb(machine))
+    meshes = {node["name"]: node.get("mesh") for node in scene["nodes"]}
+    assert meshes["2"] == meshes["4"]
+    assert len({meshes["1"], meshes["2"], meshes["3"], meshes["5"], meshes["6"]}) == 5
+
+
+def test_meshes_span_the_modules_bodies_and_face_outwards(machine):
+    scene, binary = parse(machine_glb(machine))
+    mesh = next(mesh for mesh in scene["meshes"] if mesh["name"] == "Small Wooden Block")
+    attributes = mesh["primitives"][0]["attributes"]
+    points = corners(scene, binary, attributes["POSITION"])
+    normals = corners(scene, binary, attributes["NORMAL"])
+    assert np.allclose(points.min(axis=0), (-0.5, -0.5, 0))
+    assert np.allclose(points.max(axis=0), (0.5, 0.5, 1))
+    middle = np.array((0, 0, 0.5))
+    assert (np.einsum("ij,ij->i", points - middle, normals) > 0).all()
+    assert np.allclose(np.linalg.norm(normals, axis=1), 1)
+
+
+def test_a_wheels_mesh_is_closed(machine):
+    scene, binary = parse(machine_glb(machine))
+    mesh = next(mesh for mesh in scene["meshes"] if mesh["name"] == "Powered Wheel")
+    triangles = corners(scene, binary, mesh["primitives"][0]["attributes"]["POSITION"])
+    a, b, c = triangles.reshape(-1, 3, 3).astype(float).transpose(1, 0, 2)
+    volume = np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6
+    # A regular 24-sided prism of radius 1 and height 0.5.
+    assert volume == pytest.approx(0.5 * 12 * np.sin(2 * np.pi / 24), rel=1e-5)
+
+
+def test_an_empty_machine_is_a_valid_file_too():
+    scene, binary = parse(machine_glb(Machine()))
+    assert "meshes" not in scene
+    assert binary == b""
+
+
+def test_a_drawing_is_svg_with_the_ids_it_is_asked_for(machine):
+    drawing = ET.fromstring(machine_svg(machine, View(ids=True)))
+    ids = [text.text for text in drawing.iter(f"{SVG}text") if text.get("class") == "id"]
+    assert ids == list(machine.blocks)
+    assert len(list(drawing.iter(f"{SVG}polygon"))) > 20
+    assert [line.get("class") for line in drawing.iter(f"{SVG}line")].count("rod") == 1
+
+
+def test_only_faces_that_look_at_the_eye_are_labelled(build):
+    view = View(face_labels=("1",), azimuth_deg=30, elevation_deg=25)
+    drawing = ET.fromstring(machine_svg(build(), view))
+    labels = [text.text for text in drawing.iter(f"{SVG}text") if text.get("class") == "face"]
+    assert labels == ["A", "C", "F"]  # seen from south-east above: east, up, south
+
+
+def test_nearer_faces_are_painted_over_farther_ones(build):
+    machine = build(("1", "F", "Small Wooden Block"))  # stands to the south, towards the eye
+    drawing = ET.fromstring(machine_svg(machine, View(azimuth_deg=0, elevation_deg=0)))
+    last = list(drawing.iter(f"{SVG}polygon"))[-1].get("fill")
+    red, green, _ = (int(last[index : index + 2], 16) for index in (1, 3, 5))
+    assert green > red / 2, "the wooden block's colour, not the starting block's"
+
+
+def test_an_empty_machine_gives_an_empty_drawing():
+    drawing = ET.fromstring(machine_svg(Machine()))
+    assert not list(drawing.iter(f"{SVG}polygon"))

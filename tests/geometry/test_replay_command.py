@@ -1,0 +1,119 @@
+"""`python -m buildarena_geometry replay`: sequences in, JSON lines out."""
+
+from __future__ import annotations
+
+import gzip
+import io
+import json
+import subprocess
+import sys
+from types import SimpleNamespace
+
+import pytest
+
+from buildarena_geometry.__main__ import main
+
+STEPS = [
+    {"op": "start", "params": {}},
+    {"op": "attach_block_to", "params": {"base_block": 1, "face": "A", "new_block": "Torch"}},
+    {"op": "attach_block_to", "params": {"base_block": "1", "face": "A", "new_block": "Torch"}},
+]
+
+
+@pytest.fixture
+def replay(capsys):
+    def run(*arguments):
+        code = main(["replay", *map(str, arguments)])
+        out = capsys.readouterr()
+        return SimpleNamespace(
+            code=code, told=[json.loads(line) for line in out.out.splitlines()], error=out.err
+        )
+
+    return run
+
+
+def test_every_step_tells_verdict_kind_and_state(tmp_path, replay):
+    file = tmp_path / "one.json"
+    file.write_text(json.dumps({"seed": 7, "steps": STEPS}))
+    (told,) = replay(file).told
+    assert told["seed"] == 7
+    assert [step["kind"] for step in told["steps"]] == ["ok", "ok", "face_occupied"]
+    assert [step["ok"] for step in told["steps"]] == [True, True, False]
+    assert [step["state"]["n"] for step in told["steps"]] == [1, 2, 2]
+
+
+def test_the_last_state_alone_can_be_asked_for(tmp_path, replay):
+    file = tmp_path / "one.json"
+    file.write_text(json.dumps([{"seed": 7, "steps": STEPS}]))
+    (told,) = replay(file, "--states", "last").told
+    assert ["state" in step for step in told["steps"]] == [False, False, True]
+
+
+def test_a_bare_list_of_actions_is_one_sequence(tmp_path, replay):
+    file = tmp_path / "bare.json"
+    file.write_text(json.dumps(STEPS))
+    (told,) = replay(file).told
+    assert told["seed"] is None
+    assert len(told["steps"]) == 3
+
+
+def test_compressed_files_and_many_sequences_are_read(tmp_path, replay):
+    file = tmp_path / "many.json.gz"
+    file.write_bytes(
+        gzip.compress(json.dumps([{"seed": n, "steps": STEPS} for n in (1, 2)]).encode())
+    )
+    assert [told["seed"] for told in replay(file).told] == [1, 2]
+
+
+def test_standard_input_is_read_plain_and_compressed(monkeypatch, replay):
+    for data in (json.dumps(STEPS).encode(), gzip.compress(json.dumps(STEPS).encode())):
+        monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(data)))
+        assert len(replay("-").told[0]["steps"]) == 3
+
+
+def test_sub_machines_are_built_before_the_assembly(tmp_path, replay):
+    sequence = {
+        "seed": 1,
+        "sub_machines": {"sub": STEPS},
+        "steps": [{"op": "add_machine", "params": {"machine_id": "sub", "init_shift": [0, 0, 3]}}],
+    }
+    file = tmp_path / "assembly.json"
+    file.write_text(json.dumps([sequence]))
+    (told,) = replay(file).told
+    assert [block["id"] for block in told["steps"][0]["state"]["blocks"]] == ["A_1", "A_2"]
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"{", "input: not JSON"),
+        (b"3", "input: expected a list"),
+        (b"[3]", r"input[0]: expected an object with op and params"),
+        (b'[{"params": {}}]', r"input[0]: expected an object with op and params"),
+        (b'{"seed": 1}', "input: steps are missing"),
+        (b'{"steps": 1}', "input.steps: expected a list"),
+        (b'{"steps": [], "sub_machines": [1]}', "input.sub_machines: expected an object"),
+        (b"\xff\xfe", "codec can't decode"),
+        (b"\x1f\x8bjunk", "error: "),
+    ],
+)
+def test_input_that_is_no_sequence_is_refused_with_its_place(tmp_path, replay, content, message):
+    file = tmp_path / "bad.json"
+    file.write_bytes(content)
+    result = replay(file)
+    assert result.code == 1
+    assert message in result.error
+
+
+def test_a_missing_file_is_named(tmp_path, replay):
+    result = replay(tmp_path / "nowhere.json")
+    assert result.code == 1
+    assert "nowhere.json" in result.error
+
+
+def test_the_module_runs_as_a_command(tmp_path):
+    file = tmp_path / "bare.json"
+    file.write_text(json.dumps(STEPS))
+    command = [sys.executable, "-m", "buildarena_geometry", "replay", str(file)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert json.loads(done.stdout)["steps"][2]["kind"] == "face_occupied"
