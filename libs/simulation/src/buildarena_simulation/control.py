@@ -107,6 +107,17 @@ def plan_schedule(
     return Schedule(wheel_speeds=_lagged(wheel_speeds, time_step_s), firing=firing)
 
 
+def effective_presses(bindings: Bindings, keys: Sequence[KeyHold]) -> int:
+    """How many of the key presses reach some block's action.
+
+    Args:
+        bindings: (N,) the keys of each block's actions.
+        keys: The control sequence.
+    """
+    bound = {key for actions in bindings for names in actions.values() for key in names}
+    return sum(key.key in bound for key in keys)
+
+
 def heated_cannons(structure: Structure, shown: FloatArray, directions: FloatArray) -> BoolArray:
     """Which cannons a flame touches, (C,).
 
@@ -138,6 +149,8 @@ def recoil(firing: BoolArray, heated: BoolArray) -> FloatArray:
 def _lagged(targets: FloatArray, time_step_s: float) -> FloatArray:
     blend = 1.0 - math.exp(-WHEEL_LAG_RATE * time_step_s)
     speeds = np.zeros_like(targets)
+    if not targets.any():
+        return speeds
     current = np.zeros(targets.shape[1])
     for k, target in enumerate(targets):
         current = current + blend * (target - current)

@@ -9,6 +9,8 @@ from buildarena_simulation.structure.model import FloatArray, Role, Structure
 _CLEARANCE = 0.005
 """Height of the lowest point above the ground at the start, units: touching, not overlapping."""
 
+_NUDGE = 0.01
+
 _QUARTER_TURN = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 
 
@@ -37,6 +39,19 @@ def place(
     middle = rotation @ bounds.mean(axis=0)
     lowest = structure.shown[:, 2].min()
     return np.array([-middle[0], -middle[1], placement.lowest_center - lowest]), rotation
+
+
+def nudged(position: FloatArray, seed: int) -> FloatArray:
+    """The position moved sideways by up to a hundredth of a unit, at random.
+
+    A result that a nudge changes hangs on luck.
+
+    Args:
+        position: (3,) units.
+        seed: Of the random generator.
+    """
+    shift = np.random.default_rng(seed).uniform(-_NUDGE, _NUDGE, size=2)
+    return np.asarray(position + np.array([*shift, 0.0]))
 
 
 def cargo_at_start(

@@ -11,6 +11,7 @@ from buildarena_simulation.constants import GRAVITY, SAMPLE_RATE_HZ
 from buildarena_simulation.control import (
     Bindings,
     KeyHold,
+    effective_presses,
     plan_schedule,
     recoil,
 )
@@ -18,7 +19,7 @@ from buildarena_simulation.engines import create_engine, engine_version
 from buildarena_simulation.engines.base import Engine, World
 from buildarena_simulation.errors import SimulationError, SimulationRoomError
 from buildarena_simulation.machine import bindings_of, structure_of
-from buildarena_simulation.placement import cargo_at_start, place
+from buildarena_simulation.placement import cargo_at_start, nudged, place
 from buildarena_simulation.recording import Recorder
 from buildarena_simulation.scenario import Scenario
 from buildarena_simulation.structure.clusters import find_clusters
@@ -41,6 +42,7 @@ def simulate(
     engine: str = "pybullet",
     *,
     controls: Sequence[KeyHold] | None = None,
+    seed: int | None = None,
     on_progress: Callable[[float], None] | None = None,
 ) -> Trajectory:
     """Puts a machine through a scenario. The same input gives the same bytes.
@@ -50,6 +52,7 @@ def simulate(
         scenario: What it is put through.
         engine: Name of the engine; see `ENGINES`.
         controls: A control sequence to use in place of the machine's own.
+        seed: Nudges the machine's start by up to a hundredth of a unit; None for the exact place.
         on_progress: Called now and then with the share of the trial that is done, 0 to 1.
 
     Returns:
@@ -67,6 +70,7 @@ def simulate(
         engine,
         bindings=bindings_of(machine),
         controls=machine.control_sequence if controls is None else controls,
+        seed=seed,
         on_progress=on_progress,
     )
 
@@ -78,6 +82,7 @@ def simulate_structure(
     *,
     bindings: Bindings = (),
     controls: Sequence[KeyHold] = (),
+    seed: int | None = None,
     on_progress: Callable[[float], None] | None = None,
 ) -> Trajectory:
     """Puts a structure through a scenario; see `simulate`.
@@ -88,9 +93,12 @@ def simulate_structure(
         engine: Name of the engine.
         bindings: (N,) the keys of each block's actions; may be empty if nothing is pressed.
         controls: The control sequence.
+        seed: See `simulate`.
         on_progress: Called now and then with the share of the trial that is done.
     """
     position, rotation = place(structure, scenario.placement)
+    if seed is not None:
+        position = nudged(position, seed)
     world = World(
         structure=structure,
         ground=True,
@@ -110,6 +118,8 @@ def simulate_structure(
             settings={
                 **adapter.settings,
                 "gravity": GRAVITY,
+                "effective_key_presses": effective_presses(bindings, controls),
+                **({} if seed is None else {"seed": seed}),
                 "scenario": hashlib.sha256(scenario.model_dump_json().encode()).hexdigest()[:16],
             },
         )

@@ -143,7 +143,5 @@ def _path_metrics(time_s: Series, path: Series, target: tuple[float, float]) -> 
         "path_efficiency": rounded(float(np.linalg.norm(path[-1] - path[0])) / travelled)
         if travelled > 0
         else None,
-        "final_distance_ratio": rounded(
-            float(np.linalg.norm(np.array(target) - path[-1])) / distance
-        ),
+        "final_distance_ratio": rounded(remaining / distance),
     }

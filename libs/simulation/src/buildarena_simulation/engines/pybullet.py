@@ -45,7 +45,6 @@ from buildarena_simulation.structure.contacts import ContactForces
 from buildarena_simulation.structure.model import FloatArray, IntArray, Role
 from buildarena_simulation.structure.motion import Motion
 
-
 _STREAMS = (1, 2)
 
 
