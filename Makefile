@@ -31,7 +31,7 @@ up: $(STAMP) ## The whole service on this machine until Ctrl-C
 	@$(BIN)/buildarena up
 
 test: check ## Lints, types, import rules and all tests
-	@$(BIN)/pytest -n $(WORKERS) --dist worksteal
+	@$(BIN)/pytest -n $(WORKERS) --dist loadgroup
 
 check: $(STAMP) ## Lints, types and import rules alone
 	@$(BIN)/ruff format --check --quiet $(CODE)

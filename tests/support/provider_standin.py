@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from typing import Any
+from typing import Any, Self
 
 from buildarena_worker.builtin import MODELS
 from buildarena_worker.messages import Message, Reply, Request, Tool, ToolCall
@@ -63,7 +63,7 @@ class ProviderStandIn:
         self.url = f"http://127.0.0.1:{self._server.server_port}"
         self._thread = threading.Thread(target=self._server.serve_forever, args=(0.05,))
 
-    def __enter__(self) -> ProviderStandIn:
+    def __enter__(self) -> Self:
         self._thread.start()
         return self
 

@@ -6,14 +6,13 @@ import sys
 from pathlib import Path
 from typing import Annotated, Any
 
-import click
 import typer
 import yaml
 
 from buildarena_cli import service
 from buildarena_cli.client import Client
 from buildarena_cli.doctor import examine
-from buildarena_cli.errors import FAILED, USAGE, CommandError
+from buildarena_cli.errors import FAILED, CommandError
 from buildarena_cli.output import console, error_console, leaderboard_tables, number, print_json
 from buildarena_cli.progress import exit_code, watch_sweep
 from buildarena_pipeline.settings import DEFAULT_PORT
@@ -168,14 +167,7 @@ def _read_yaml(file: Path) -> dict[str, Any]:
 def run() -> None:
     """Runs the command line and exits with its code."""
     try:
-        code = app(standalone_mode=False)
+        app()
     except CommandError as error:
         error_console.print(str(error), soft_wrap=True)
         sys.exit(error.code)
-    except click.UsageError as error:
-        error.show()
-        sys.exit(USAGE)
-    except (KeyboardInterrupt, click.Abort):
-        error_console.print("interrupted")
-        sys.exit(130)
-    sys.exit(code or 0)

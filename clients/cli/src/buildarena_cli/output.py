@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from typing import Any
 
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
@@ -22,27 +23,21 @@ def number(value: float | None, digits: int = 1) -> str:
     return "-" if value is None else f"{value:,.{digits}f}"
 
 
-def percent(value: float | None) -> str:
-    """A share for people."""
-    return "-" if value is None else f"{100 * value:.0f} %"
-
-
 def leaderboard_tables(board: dict[str, Any]) -> list[Table]:
-    """One table for each task of a leaderboard answer."""
+    """One table for each task of a leaderboard answer; each fits 80 columns."""
     tables = []
     for task in board["tasks"]:
-        table = Table(title=f"{task['task']} · {task['indicator']}", title_justify="left")
+        table = Table(
+            title=f"{task['task']}: {task['indicator']} in {task['unit'] or 'units'}",
+            title_justify="left",
+            caption="* baseline; 95 % is the Wilson interval of the success rate",
+            caption_justify="left",
+            box=SIMPLE_HEAD,
+            padding=(0, 1, 0, 0),
+        )
         table.add_column("#", justify="right")
-        table.add_column("model", overflow="fold")
-        for name in (
-            "success",
-            "95 % interval",
-            "indicator",
-            "parts",
-            "requests",
-            "tokens out",
-            "USD",
-        ):
+        table.add_column("model", no_wrap=True)
+        for name in ("success", "95 %", task["indicator"], "parts", "requests", "tokens", "USD"):
             table.add_column(name, justify="right")
         for place, row in enumerate(task["rows"], start=1):
             interval = "-"
@@ -50,14 +45,14 @@ def leaderboard_tables(board: dict[str, Any]) -> list[Table]:
                 interval = f"{100 * row['success_low']:.0f}-{100 * row['success_high']:.0f} %"
             table.add_row(
                 str(place),
-                row["model"] + (" (baseline)" if row["baseline"] else ""),
+                row["model"] + ("*" if row["baseline"] else ""),
                 f"{row['successes']}/{row['trials']}",
                 interval,
                 number(row["indicator_mean"]),
                 number(row["parts_mean"]),
-                number(row["requests_mean"]),
+                number(row["requests_mean"], 0),
                 number(row["output_tokens_mean"], 0),
-                number(row["cost_usd_mean"], 3),
+                number(row["cost_usd_mean"], 2),
             )
         tables.append(table)
     return tables

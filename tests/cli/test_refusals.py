@@ -1,0 +1,127 @@
+"""What cannot work is refused with one clear sentence, the right exit code and nothing left."""
+
+from __future__ import annotations
+
+import os
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import psutil
+import pytest
+
+BUILDARENA = str(Path(sys.executable).parent / "buildarena")
+
+
+def run_cli(*words: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [BUILDARENA, *words],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+        env={**os.environ, **environment},
+    )
+
+
+def assert_refused(done: subprocess.CompletedProcess[str], *words: str) -> None:
+    assert done.returncode == 1, (done.stdout, done.stderr)
+    (line,) = done.stderr.strip().splitlines()
+    for word in words:
+        assert word in line
+
+
+@pytest.mark.parametrize("command", ["up", "demo"])
+def test_a_taken_port(tmp_path: Path, command: str) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = str(taken.getsockname()[1])
+        done = run_cli(command, "--data", str(tmp_path), "--port", port)
+    assert_refused(done, port, "choose another port with --port")
+    named = [p for p in psutil.process_iter(["cmdline"]) if str(tmp_path) in str(p.info["cmdline"])]
+    assert named == []
+
+
+@pytest.mark.parametrize("command", ["up", "demo"])
+def test_an_unwritable_data_folder(tmp_path: Path, command: str) -> None:
+    (tmp_path / "file").write_text("in the way")
+    done = run_cli(command, "--data", str(tmp_path / "file" / "data"))
+    assert_refused(done, "can't be written", "choose another with --data")
+
+
+def test_a_data_folder_in_use(tmp_path: Path) -> None:
+    import fcntl
+
+    (tmp_path / "lock").touch()
+    with (tmp_path / "lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        done = run_cli("up", "--data", str(tmp_path), "--port", "0")
+    assert_refused(done, "another BuildArena runs on the data folder")
+
+
+def test_a_service_that_is_not_there() -> None:
+    done = run_cli("leaderboard", "--url", "http://127.0.0.1:1")
+    assert_refused(done, "no BuildArena answers at http://127.0.0.1:1", "buildarena up")
+
+
+def test_a_port_that_is_no_port() -> None:
+    done = run_cli("up", BUILDARENA_PORT="99999")
+    assert_refused(done, "BUILDARENA_PORT", "99999")
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [("tasks: [", "is no YAML"), ("- 1", "must hold a mapping"), (None, "No such")],
+)
+def test_a_bad_sweep_file(tmp_path: Path, text: str | None, says: str) -> None:
+    file = tmp_path / "sweep.yaml"
+    if text is not None:
+        file.write_text(text)
+    done = run_cli("sweep", "run", str(file), "--url", "http://127.0.0.1:1")
+    assert done.returncode == 1
+    assert says in done.stderr
+
+
+@pytest.mark.parametrize("words", [["fly"], ["job"], ["job", "show"], ["leaderboard", "--fast"]])
+def test_wrong_words_end_with_code_2(words: list[str]) -> None:
+    assert run_cli(*words).returncode == 2
+
+
+def test_help_names_every_command() -> None:
+    text = run_cli("--help").stdout
+    for command in ("up", "demo", "doctor", "sweep", "job", "leaderboard"):
+        assert command in text
+
+
+def test_a_worker_refuses_a_foreign_schema(database_url: str, broker_url: str) -> None:
+    from buildarena_store import Database
+    from buildarena_store.database import expected_schema
+
+    database = Database(database_url)
+
+    def stamp(revision: str) -> None:
+        with database.transaction() as connection:
+            connection.exec_driver_sql(f"UPDATE alembic_version SET version_num = '{revision}'")
+
+    stamp("older")
+    try:
+        for module in ("buildarena_worker", "buildarena_api"):
+            done = subprocess.run(
+                [sys.executable, "-m", module],
+                capture_output=True,
+                text=True,
+                check=False,
+                timeout=60,
+                env={
+                    **os.environ,
+                    "BUILDARENA_DATABASE_URL": database_url,
+                    "BUILDARENA_BROKER_URL": broker_url,
+                },
+            )
+            assert done.returncode == 1
+            assert "schema older" in done.stderr
+    finally:
+        stamp(expected_schema())
+        database.close()

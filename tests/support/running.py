@@ -1,0 +1,75 @@
+"""Running stacks for end-to-end tests."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import httpx
+import psutil
+
+from buildarena_cli.stack import Stack
+from buildarena_pipeline.embedded import free_port
+from buildarena_pipeline.settings import Settings
+
+
+def wait_until(condition: Callable[[], Any], within_s: float, what: str) -> Any:
+    """Waits until a condition holds and returns its value."""
+    deadline = time.monotonic() + within_s
+    while not (value := condition()):
+        assert time.monotonic() < deadline, f"not within {within_s} s: {what}"
+        time.sleep(0.05)
+    return value
+
+
+@contextmanager
+def running_stack(folder: Path, **settings: Any) -> Iterator[Stack]:
+    """A whole service in a folder; its processes are gone afterwards."""
+    folder.chmod(0o755)
+    for parent in folder.parents[:3]:
+        if parent.stat().st_mode & 0o001 == 0:
+            parent.chmod(parent.stat().st_mode | 0o011)  # Postgres runs as nobody under root
+    stack = Stack(
+        Settings(data=folder / "data", port=free_port(), lease_s=3.0, **settings),
+        simulators=("mujoco",),
+    )
+    with stack:
+        yield stack
+    left = [p for p in psutil.Process().children(recursive=True) if "buildarena" in _words(p)]
+    assert left == []
+
+
+def _words(process: psutil.Process) -> str:
+    try:
+        return " ".join(process.cmdline())
+    except psutil.Error:
+        return ""
+
+
+def finished(client: httpx.Client, sweep_id: str, within_s: float = 180) -> dict[str, Any]:
+    """The sweep, once every job has ended."""
+
+    def ended() -> dict[str, Any] | None:
+        try:
+            sweep: dict[str, Any] = client.get(f"/v1/sweeps/{sweep_id}").json()
+        except httpx.TransportError:
+            return None
+        progress = sweep.get("progress")
+        return sweep if progress and progress["done"] == progress["total"] else None
+
+    result: dict[str, Any] = wait_until(ended, within_s, f"{sweep_id} ended")
+    return result
+
+
+def results(client: httpx.Client, sweep_id: str) -> list[dict[str, Any]]:
+    """Everything that must be equal between two runs of one sweep."""
+    jobs = client.get("/v1/jobs", params={"sweep": sweep_id, "limit": 1000}).json()["jobs"]
+    found = []
+    for job in sorted(jobs, key=lambda job: job["id"]):
+        detail = client.get(f"/v1/jobs/{job['id']}").json()
+        names = ("id", "outcome", "reason", "success", "indicator", "metrics", "flags", "refusals")
+        found.append({**{name: detail[name] for name in names}, "artifacts": detail["artifacts"]})
+    return found
