@@ -59,9 +59,8 @@ def test_a_bare_list_of_actions_is_one_sequence(tmp_path, replay):
 
 def test_compressed_files_and_many_sequences_are_read(tmp_path, replay):
     file = tmp_path / "many.json.gz"
-    file.write_bytes(
-        gzip.compress(json.dumps([{"seed": n, "steps": STEPS} for n in (1, 2)]).encode())
-    )
+    sequences = [{"seed": seed, "steps": STEPS} for seed in (1, 2)]
+    file.write_bytes(gzip.compress(json.dumps(sequences).encode()))
     assert [told["seed"] for told in replay(file).told] == [1, 2]
 
 
@@ -93,8 +92,10 @@ def test_sub_machines_are_built_before_the_assembly(tmp_path, replay):
         (b'{"seed": 1}', "input: steps are missing"),
         (b'{"steps": 1}', "input.steps: expected a list"),
         (b'{"steps": [], "sub_machines": [1]}', "input.sub_machines: expected an object"),
-        (b"\xff\xfe", "codec can't decode"),
-        (b"\x1f\x8bjunk", "error: "),
+        (b"\xff\xfe", "input: not JSON"),
+        (b"\x1f\x8bjunk", "input: not gzip"),
+        (gzip.compress(b"[]" * 9)[:-9], "input: not gzip"),
+        (b"[" * 100_000, "input: not JSON"),
     ],
 )
 def test_input_that_is_no_sequence_is_refused_with_its_place(tmp_path, replay, content, message):

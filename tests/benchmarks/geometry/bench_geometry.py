@@ -179,9 +179,8 @@ def main() -> int:
     for figure in figures:
         beside = f"  (published library: {figure.published})" if figure.published else ""
         verdict = "ok  " if figure.met else "MISS"
-        print(
-            f"{verdict} {figure.name}: {figure.value:.3g} {figure.unit}, bar {figure.bar:g}{beside}"
-        )
+        told = f"{figure.value:.3g} {figure.unit}, bar {figure.bar:g}{beside}"
+        sys.stdout.write(f"{verdict} {figure.name}: {told}\n")
     if options.json:
         options.json.parent.mkdir(parents=True, exist_ok=True)
         entries = [{**asdict(figure), "met": figure.met} for figure in figures]
