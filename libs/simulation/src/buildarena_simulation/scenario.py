@@ -25,11 +25,14 @@ class TerrainBox(_Document):
 
     Attributes:
         center: (3,) world frame, units.
-        size: (3,) full extents along east, north and up, units.
+        size: (3,) full extents along its own axes: east, north and up before it is tilted, units.
+        slope_deg: Tilt about the east-west axis through its centre, degrees; above 0 its top rises
+            towards the north.
     """
 
     center: tuple[Coordinate, Coordinate, Coordinate]
     size: Size
+    slope_deg: Annotated[float, Field(gt=-90, lt=90)] = 0.0
 
 
 class Cargo(_Document):

@@ -4,6 +4,7 @@ Every number is written in full, every inertial frame is stated: what MJCF leave
 filled in by the compiler from the collision shapes.
 """
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from xml.sax.saxutils import quoteattr
@@ -129,6 +130,7 @@ def _static(world: World) -> Iterator[str]:
             type="box",
             size=np.array(box.size) / 2,
             pos=box.center,
+            euler=(math.radians(box.slope_deg), 0.0, 0.0),
             **surface,
         )
 

@@ -9,6 +9,7 @@ damping grows with the square of the speed, so drag is a force of ours.
 import contextlib
 import ctypes
 import itertools
+import math
 import os
 import shutil
 import sys
@@ -216,16 +217,29 @@ class PyBulletEngine:
         if world.ground:
             self._add_box((_GROUND_REACH, _GROUND_REACH, 1.0), (0.0, 0.0, -1.0), mass=0.0)
         for box in world.terrain:
-            self._add_box([v / 2 for v in box.size], box.center, mass=0.0)
+            turn = pybullet.getQuaternionFromEuler((math.radians(box.slope_deg), 0.0, 0.0))
+            self._add_box([v / 2 for v in box.size], box.center, mass=0.0, turn=turn)
         if world.cargo is not None:
             cargo = world.cargo
             half, center = (cargo.size / 2).tolist(), cargo.position.tolist()
             self._cargo = self._add_box(half, center, mass=cargo.mass)
 
-    def _add_box(self, half: Sequence[float], center: Sequence[float], *, mass: float) -> int:
+    def _add_box(
+        self,
+        half: Sequence[float],
+        center: Sequence[float],
+        *,
+        mass: float,
+        turn: Sequence[float] = (0.0, 0.0, 0.0, 1.0),
+    ) -> int:
         shape = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=half, **self._client)
         body = pybullet.createMultiBody(
-            mass, shape, basePosition=center, useMaximalCoordinates=0, **self._client
+            mass,
+            shape,
+            basePosition=center,
+            baseOrientation=turn,
+            useMaximalCoordinates=0,
+            **self._client,
         )
         self._free_of_damping(body)
         self._set_friction(body, -1, FRICTION_TERRAIN)

@@ -1,0 +1,197 @@
+"""Physics that can be worked out by hand, held on both engines."""
+
+import math
+
+import numpy as np
+import pytest
+from buildarena_geometry import Machine
+from buildarena_simulation import Scenario, Trajectory, simulate
+from buildarena_simulation.constants import (
+    COLLISION_MARGIN,
+    FRICTION_BLOCK,
+    GRAVITY,
+    HEATED_THRUST,
+    LINEAR_DRAG,
+    WHEEL_SPEED,
+)
+from buildarena_simulation.scenario import (
+    Cargo,
+    Control,
+    SpanPlacement,
+    TerrainBox,
+    gap_terrain,
+)
+
+from tests.simulation.reference_designs import (
+    EAST,
+    NORTH,
+    SIDES,
+    SOUTH,
+    UP,
+    WEST,
+    Draft,
+    beam,
+    car,
+    replayed,
+    rocket,
+)
+
+
+def _lone_block() -> Machine:
+    return replayed([{"op": "start", "params": {}}])
+
+
+def _peak(trajectory: Trajectory, joint: str) -> tuple[float, float]:
+    found = next(peak for peak in trajectory.joint_peaks if peak.joint == joint)
+    return found.force, found.moment
+
+
+def test_a_block_falls_as_gravity_and_drag_say(engine: str) -> None:
+    scenario = Scenario(duration_s=1.0, placement=SpanPlacement(gap=1.0, lowest_center=30.0))
+    trajectory = simulate(_lone_block(), scenario, engine)
+    t = trajectory.time_s
+    drop = GRAVITY / LINEAR_DRAG * (t - (1 - np.exp(-LINEAR_DRAG * t)) / LINEAR_DRAG)
+    fallen = 30.0 - trajectory.positions[:, 0, 2]
+    assert fallen[-1] == pytest.approx(drop[-1], rel=0.015)  # semi-implicit steps lead by dt / t
+    assert np.abs(fallen - drop).max() < 0.2
+
+
+def _slab() -> Machine:
+    draft = Draft()
+    middle = draft.start()
+    for block in (middle, *draft.row(middle, EAST, 1), *draft.row(middle, WEST, 1)):
+        draft.row(block, NORTH, 1)
+        draft.row(block, SOUTH, 1)
+    return draft.machine
+
+
+@pytest.mark.parametrize("slope_deg", [20.0, 45.0])
+def test_a_slab_stays_on_a_slope_below_the_friction_angle_and_slides_above(
+    engine: str, slope_deg: float
+) -> None:
+    slope = math.radians(slope_deg)
+    uphill = np.array([0.0, math.cos(slope), math.sin(slope)])
+    top = 40.0 + 1.0 / math.cos(slope)  # of the slope, below the slab's middle
+    lowest = top + 1.5 * math.tan(slope) + 0.5
+    scenario = Scenario(
+        duration_s=2.4,
+        terrain=(
+            TerrainBox(center=(0.0, 0.0, 40.0), size=(20.0, 60.0, 2.0), slope_deg=slope_deg),
+        ),
+        placement=SpanPlacement(gap=1.0, lowest_center=lowest),
+    )
+    trajectory = simulate(_slab(), scenario, engine)
+    along = trajectory.positions[:, 0].astype(float) @ uphill
+    speeds = np.diff(along) * 25.0
+    pull = GRAVITY * (FRICTION_BLOCK * math.cos(slope) - math.sin(slope))
+    if pull > 0:
+        assert np.abs(speeds[-10:]).max() < 0.01
+        return
+    early, late = speeds[40], speeds[-1]
+    duration = (len(speeds) - 1 - 40) / 25.0
+    # Half-way the drag is about that of the mean speed.
+    expected = pull - LINEAR_DRAG * (early + late) / 2
+    assert (late - early) / duration == pytest.approx(expected, abs=0.02 * GRAVITY)
+
+
+def test_a_cantilever_bears_its_weight_at_the_root(engine: str) -> None:
+    length = 4
+    draft = Draft()
+    middle = draft.start()
+    for side in SIDES:  # a foot wide and heavy enough that nothing tips
+        draft.row(middle, side, 4)
+    top = draft.row(middle, UP, 2)[-1]
+    arm = draft.row(top, EAST, length)
+    trajectory = simulate(draft.machine, Scenario(duration_s=3.0), engine)
+    assert not trajectory.breaks
+    for k, (inner, outer) in enumerate(zip([top, *arm], arm, strict=False)):
+        beyond = length - k
+        force, moment = _peak(trajectory, f"{inner}-{outer}")
+        # Joint k is half a unit inside block k + 1, whose weight is 0.3.
+        assert force == pytest.approx(0.3 * beyond, rel=0.03)
+        assert moment == pytest.approx(0.3 * beyond**2 / 2, rel=0.03)
+
+
+def _bending_of_beam(engine: str, cargo_mass: float) -> dict[str, float]:
+    scenario = Scenario(
+        duration_s=5.0,
+        terrain=gap_terrain(5.0),
+        cargo=Cargo(
+            size=(2.5, 2.5, 1.5),
+            drop_height=0.1,
+            final_mass=cargo_mass,
+            ramp_start_s=1.0,
+            ramp_s=1.0,
+        ),
+        placement=SpanPlacement(gap=5.0, lowest_center=5.5),
+    )
+    trajectory = simulate(replayed(beam(7)), scenario, engine)
+    assert not trajectory.breaks
+    return {peak.joint: peak.moment for peak in trajectory.joint_peaks}
+
+
+def test_a_beam_on_two_supports_bears_the_moments_of_statics(engine: str) -> None:
+    load = 120.0
+    light, half, full = (_bending_of_beam(engine, mass) for mass in (5.0, load / 2, load))
+    # The end blocks rest from the gap's edge to their own end; the cargo spreads over the middle
+    # three blocks. Moments about a joint, from one support and the loads outside of the joint:
+    support = (2.5 + 3.5 - COLLISION_MARGIN) / 2
+    own = 0.3
+    reaction = load / 2 + 3 * own + 0.25 / 2
+    expected = {
+        "1-2": reaction * (support - 0.5) - (load / 3 + own) * 0.5 - own * (1.5 + 2.5),
+        "2-3": reaction * (support - 1.5) - own * (0.5 + 1.5),
+    }
+    for joint, moment in expected.items():
+        assert full[joint] == pytest.approx(moment, rel=0.04)
+    # Symmetric halves bear the same, and loads superpose.
+    assert full["1-5"] == pytest.approx(full["1-2"], rel=0.03)
+    share = (load / 2 - 5.0) / (load - 5.0)
+    for joint in expected:
+        gained = half[joint] - light[joint]
+        assert gained == pytest.approx(share * (full[joint] - light[joint]), rel=0.05)
+
+
+def test_a_rocket_climbs_as_thrust_weight_and_drag_say(engine: str) -> None:
+    machine = replayed(rocket())
+    scenario = Scenario(duration_s=7.0, control=Control(mode="held", from_s=2.0))
+    trajectory = simulate(machine, scenario, engine)
+    height = trajectory.positions[:, 0, 2].astype(float)
+    rise = height - height[50]
+    t = trajectory.time_s - 2.0
+    acceleration = 4 * HEATED_THRUST / machine.mass * GRAVITY - GRAVITY
+    # Wooden and iron blocks all have the same drag, so the whole rocket has it too.
+    climbed = acceleration / LINEAR_DRAG * (t - (1 - np.exp(-LINEAR_DRAG * t)) / LINEAR_DRAG)
+    for second in (1, 2, 3, 4, 5):
+        sample = 50 + 25 * second
+        assert rise[sample] == pytest.approx(climbed[sample], rel=0.03)
+
+
+def test_a_wheel_rolls_without_slip(engine: str) -> None:
+    machine = replayed(car(drive=[("UpArrow", 0.5, 10.0)]))
+    scenario = Scenario(duration_s=4.0, control=Control(mode="agent"))
+    trajectory = simulate(machine, scenario, engine)
+    north = trajectory.positions[:, 0, 1].astype(float)
+    speed = (north[-1] - north[-26]) / 1.0
+    assert speed == pytest.approx(WHEEL_SPEED * 1.0, rel=0.02)
+
+
+@pytest.mark.parametrize("mass", [5.0, 50.0, 500.0, 1500.0])
+def test_no_cargo_mass_makes_an_intact_structure_jitter_or_sink(engine: str, mass: float) -> None:
+    scenario = Scenario(
+        duration_s=4.0,
+        cargo=Cargo(
+            size=(2.5, 2.5, 1.5),
+            drop_height=0.02,
+            initial_mass=mass / 2,
+            final_mass=mass,
+            ramp_s=1.0,
+        ),
+    )
+    trajectory = simulate(_slab(), scenario, engine)
+    assert not trajectory.breaks
+    assert trajectory.cargo_position is not None
+    height = trajectory.cargo_position[50:, 2].astype(float)
+    resting = 1.0 + 0.75
+    assert np.ptp(height) < 0.005
+    assert height.mean() == pytest.approx(resting - 2 * COLLISION_MARGIN, abs=0.06)
