@@ -188,13 +188,9 @@ def deck(
     for y in (1, -1) if pillars else ():
         draft.row(grid[0, y], DOWN, pillars)
     if cross:
-        edge = {xs[0], xs[-1]} if rails else set()
         for y in ys:
             for x in xs[:-1]:
-                railed = abs(y) <= 1 and ({x, x + 1} & edge)
-                draft.connect(grid[x, y], grid[x + 1, y], UP) if not railed else draft.connect(
-                    grid[x, y], grid[x + 1, y], UP
-                )
+                draft.connect(grid[x, y], grid[x + 1, y], UP)
     for kind in along:
         way = UP if kind in "tT1" else DOWN
         reach = {"t": 1, "b": 1, "1": 4, "2": 4}.get(kind, length - 1)
@@ -352,26 +348,30 @@ def paired_engine() -> Actions:
     return draft.actions
 
 
-def rocket_assembly() -> tuple[dict[str, Actions], Actions]:
-    """Four engines braced to a frame: the sub-structures by name, and the assembly's log."""
-    engine = rocket((EAST, WEST))
+def rocket_assembly(*, brace_frame: bool = True) -> tuple[dict[str, Actions], Actions]:
+    """An engine under a cross-shaped frame: the sub-structures by name, and the assembly's log.
+
+    Args:
+        brace_frame: Whether the frame is braced to the engine; else it lies loosely on it.
+    """
     draft = Draft()
     middle = draft.start()
     for side in SIDES:
         draft.row(middle, side, 2)
-    parts = {"engine": engine, "frame": draft.actions}
-    available = {name: replayed(actions) for name, actions in parts.items()}
-    whole = Draft(available)
+    parts = {"engine": rocket(), "frame": draft.actions}
+    whole = Draft({name: replayed(actions) for name, actions in parts.items()})
     whole.do("add_machine", machine_id="frame", init_shift=[0, 0, 2])
     whole.do("add_machine", machine_id="engine", init_shift=[0, 0, 0])
-    frame, engine_start = "A_1", "B_1"
-    for side in (NORTH, SOUTH):
-        whole.link(frame, side, engine_start, side)
-    whole.link(frame, DOWN, engine_start, UP)
-    arms = [block for block in whole.machine.blocks if block.startswith("A_") and block != frame]
-    for arm in arms[1::2]:
-        whole.link(arm, DOWN, engine_start, NORTH)
+    if brace_frame:
+        for side in SIDES:
+            whole.link("A_1", side, "B_1", UP)
     return parts, whole.actions
+
+
+def assembled(logs: tuple[dict[str, Actions], Actions]) -> Machine:
+    """The machine an assembly's logs build."""
+    parts, actions = logs
+    return replayed(actions, {name: replayed(part) for name, part in parts.items()})
 
 
 def replayed(

@@ -75,9 +75,7 @@ def test_a_slab_stays_on_a_slope_below_the_friction_angle_and_slides_above(
     lowest = top + 1.5 * math.tan(slope) + 0.5
     scenario = Scenario(
         duration_s=2.4,
-        terrain=(
-            TerrainBox(center=(0.0, 0.0, 40.0), size=(20.0, 60.0, 2.0), slope_deg=slope_deg),
-        ),
+        terrain=(TerrainBox(center=(0.0, 0.0, 40.0), size=(20.0, 60.0, 2.0), slope_deg=slope_deg),),
         placement=SpanPlacement(gap=1.0, lowest_center=lowest),
     )
     trajectory = simulate(_slab(), scenario, engine)

@@ -1,0 +1,66 @@
+"""Bridges: which carries more, and which does not count."""
+
+import pytest
+from buildarena_benchmark import Score, Task, score
+from buildarena_simulation import Trajectory, simulate
+
+from tests.simulation.reference_designs import (
+    EAST,
+    Actions,
+    beam,
+    deck,
+    one_shot_bridge,
+    replayed,
+)
+
+
+def _trial(task: Task, actions: Actions, engine: str) -> tuple[Score, Trajectory]:
+    machine = replayed(actions)
+    trajectory = simulate(machine, task.scenario, engine)
+    return score(task, machine, trajectory), trajectory
+
+
+def test_more_bracing_carries_more(engine: str, tasks: dict[str, Task]) -> None:
+    beams = [beam(7, braces) for braces in ("", "t", "tb", "12")]
+    loads = [_trial(tasks["support-1"], actions, engine)[0].indicator for actions in beams]
+    assert loads == sorted(loads)
+    assert all(b > 1.2 * a for a, b in zip(loads, loads[1:], strict=False))
+
+
+def test_a_braced_deck_carries_more_than_a_bare_one(engine: str, tasks: dict[str, Task]) -> None:
+    bare = _trial(tasks["support-1"], deck(5, 7), engine)[0].indicator
+    braced = _trial(tasks["support-1"], deck(5, 7, cross=True), engine)[0].indicator
+    assert braced > 1.05 * bare
+
+
+def test_the_one_shot_bridge_carries_what_the_paper_reports(
+    engine: str, tasks: dict[str, Task]
+) -> None:
+    result, trajectory = _trial(tasks["support-1"], one_shot_bridge(), engine)
+    assert result.success
+    assert result.indicator >= 900.0
+    first = trajectory.breaks[0]
+    assert first.cargo_mass is not None
+    assert first.cargo_mass > 800.0  # not on the landing
+
+
+def test_a_beam_that_is_too_short_for_the_gap_scores_nothing(
+    engine: str, tasks: dict[str, Task]
+) -> None:
+    result, _ = _trial(tasks["support-1"], beam(5), engine)
+    assert not result.success
+    assert result.indicator == 0.0
+
+
+def test_a_bridge_built_along_the_gap_is_turned_across_it(
+    engine: str, tasks: dict[str, Task]
+) -> None:
+    along = _trial(tasks["support-1"], beam(7, direction=EAST), engine)[0]
+    across = _trial(tasks["support-1"], beam(7), engine)[0]
+    assert along.success
+    assert along.indicator == pytest.approx(across.indicator, rel=0.1)
+
+
+def test_nothing_breaks_while_the_cargo_is_light(engine: str, tasks: dict[str, Task]) -> None:
+    _, trajectory = _trial(tasks["support-1"], deck(5, 7, cross=True), engine)
+    assert min(event.time_s for event in trajectory.breaks) > 5.0
