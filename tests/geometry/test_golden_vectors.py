@@ -94,10 +94,10 @@ def assert_same_state(ours, theirs, rebound, where):
     }, where
     assert ours["mass"] == pytest.approx(theirs["mass"], abs=NUMBER_TOLERANCE), where
     assert ours["control_sequence"] == theirs["control_sequence"], where
-    blocks = {block["id"]: block for block in ours["blocks"]}
-    assert blocks.keys() == {block["id"] for block in theirs["blocks"]}, where
-    for block in theirs["blocks"]:
-        assert_same_block(blocks[block["id"]], block, rebound, f"{where}, block {block['id']}")
+    ids = [block["id"] for block in theirs["blocks"]]
+    assert [block["id"] for block in ours["blocks"]] == ids, where
+    for our, their in zip(ours["blocks"], theirs["blocks"], strict=True):
+        assert_same_block(our, their, rebound, f"{where}, block {their['id']}")
 
 
 def assert_same_block(ours, theirs, rebound, where):

@@ -1,4 +1,4 @@
-"""Runs action sequences in the golden vectors' format and tells states in their words."""
+"""Runs action sequences in the golden vectors' format."""
 
 from __future__ import annotations
 
@@ -7,28 +7,19 @@ import json
 import zlib
 from typing import TYPE_CHECKING, Any
 
-from .besiege import besiege_point, besiege_rotation, besiege_span
 from .errors import SequenceError
 from .machine import Machine
 from .outcomes import Cause, Refused
 from .reading import Reader
-from .rotations import scaled
+from .vector_state import kind_of, state_entry
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
-    from .blocks import Block, Connector, FaceRef
     from .modules import Catalogue
     from .outcomes import Outcome
-    from .state import MachineState
 
 _GZIP_MAGIC = b"\x1f\x8b"
-
-# The vectors know no name of their own for these.
-_KIND_OF_CAUSE = {
-    Cause.EXCESS_CONNECTION: "too_close",
-    Cause.UNKNOWN_ACTION: "bad_action",
-}
 
 
 def run_sequences(
@@ -47,19 +38,17 @@ def run_sequences(
     Raises:
         SequenceError: the content has another form.
     """
-    root = Reader(value=content, where="input", error=SequenceError)
-    for sequence in _sequences(root):
-        entries = sequence.value
-        machine, steps = _prepare(sequence, catalogue)
+    for sequence in _sequences(Reader(value=content, where="input", error=SequenceError)):
+        run, steps = _prepare(sequence, catalogue)
         told: list[dict[str, Any]] = []
         for step in steps:
-            outcome = _act(machine, step)
+            outcome = run.act(step)
             told.append({"ok": outcome.ok, "kind": kind_of(outcome)})
             if every_state:
-                told[-1]["state"] = state_entry(machine.state)
+                told[-1]["state"] = run.told_state()
         if told and not every_state:
-            told[-1]["state"] = state_entry(machine.state)
-        seed = entries.get("seed") if isinstance(entries, dict) else None
+            told[-1]["state"] = run.told_state()
+        seed = sequence.value.get("seed") if isinstance(sequence.value, dict) else None
         yield {"seed": seed, "steps": told}
 
 
@@ -79,29 +68,45 @@ def parse(data: bytes) -> object:
     return content
 
 
-def kind_of(outcome: Outcome) -> str:
-    """What the vectors call an outcome."""
-    if isinstance(outcome, Refused):
-        return _KIND_OF_CAUSE.get(outcome.cause, outcome.cause.value)
-    return "ok"
+class _Run:
+    """A machine on its way through a sequence, with the order the vectors list its parts in.
 
+    That is the order of creation, but for parts that a twist or shift was tried on: the published
+    library takes them out and puts them in again at the end.
+    """
 
-def state_entry(state: MachineState) -> dict[str, Any]:
-    """A state in the vectors' field names; positions are east, north, up."""
-    return {
-        "blocks": [
-            *(_block_entry(state, block) for block in state.blocks.values()),
-            *(_connector_entry(link) for link in state.connectors.values()),
-        ],
-        "n": len(state.blocks) + len(state.connectors),
-        "cost": state.cost,
-        "mass": state.mass,
-        "next_id": state.next_id,
-        "control_sequence": [
-            {"time": press.time_s, "key": press.key, "hold_for": press.hold_for_s}
-            for press in state.control_sequence
-        ],
-    }
+    def __init__(self, catalogue: Catalogue | None, sources: Mapping[str, _Run]) -> None:
+        available = {name: source.machine for name, source in sources.items()}
+        self.machine: Machine = Machine(catalogue=catalogue, available=available)
+        self._sources = sources
+        self.order: list[str] = []
+
+    def act(self, step: Reader) -> Outcome:
+        if not isinstance(step.value, dict) or "op" not in step.value:
+            step.fail("an object with op and params")
+        name, arguments = step.value["op"], step.value.get("params")
+        outcome = self.machine.act(name, arguments)
+        self._put_in_order(name, arguments, outcome)
+        return outcome
+
+    def told_state(self) -> dict[str, Any]:
+        return state_entry(self.machine.state, self.order)
+
+    def _put_in_order(self, name: object, arguments: object, outcome: Outcome) -> None:
+        parts = [part.id for part in self.machine.state.parts]
+        there, known = set(parts), set(self.order)
+        self.order = [part for part in self.order if part in there]
+        new = [part for part in parts if part not in known]
+        if new and name == "add_machine":
+            letter = list(self.machine.sub_structures)[-1]
+            source = self._sources[self.machine.sub_structures[letter].source]
+            new = [f"{letter}_{part}" for part in source.order]
+        self.order += new
+        tried = outcome.ok or (isinstance(outcome, Refused) and outcome.cause is Cause.OVERLAP)
+        if tried and name in ("twist_block", "shift_block") and isinstance(arguments, dict):
+            moved = str(arguments["block_id"])
+            self.order.remove(moved)
+            self.order.append(moved)
 
 
 def _sequences(root: Reader) -> Iterator[Reader]:
@@ -109,106 +114,29 @@ def _sequences(root: Reader) -> Iterator[Reader]:
         yield root
         return
     entries = list(root.items())
-    if (
-        all(isinstance(entry.value, dict) and "steps" in entry.value for entry in entries)
-        and entries
-    ):
+    whole = [isinstance(entry.value, dict) and "steps" in entry.value for entry in entries]
+    if entries and all(whole):
         yield from entries
     else:
         yield root
 
 
-def _prepare(sequence: Reader, catalogue: Catalogue | None) -> tuple[Machine, list[Reader]]:
-    if not isinstance(sequence.value, dict):
-        return Machine(catalogue=catalogue), list(sequence.items())
-    if "steps" not in sequence.value:
+def _prepare(sequence: Reader, catalogue: Catalogue | None) -> tuple[_Run, list[Reader]]:
+    values = sequence.value
+    if not isinstance(values, dict):
+        return _Run(catalogue, {}), list(sequence.items())
+    if "steps" not in values:
         raise SequenceError(f"{sequence.where}: steps are missing")
-    available: dict[str, Machine] = {}
-    subs = Reader(
-        value=sequence.value.get("sub_machines") or {},
-        where=f"{sequence.where}.sub_machines",
-        error=SequenceError,
+    sources: dict[str, _Run] = {}
+    subs, steps = (
+        Reader(value=value, where=f"{sequence.where}.{name}", error=SequenceError)
+        for name, value in (
+            ("sub_machines", values.get("sub_machines", {})),
+            ("steps", values["steps"]),
+        )
     )
-    for name, steps in subs.entries():
-        available[name] = Machine(catalogue=catalogue)
-        for step in steps.items():
-            _act(available[name], step)
-    steps = Reader(
-        value=sequence.value["steps"], where=f"{sequence.where}.steps", error=SequenceError
-    )
-    return Machine(catalogue=catalogue, available=available), list(steps.items())
-
-
-def _act(machine: Machine, step: Reader) -> Outcome:
-    if not isinstance(step.value, dict) or "op" not in step.value:
-        step.fail("an object with op and params")
-    return machine.act(step.value["op"], step.value.get("params"))
-
-
-def _block_entry(state: MachineState, block: Block) -> dict[str, Any]:
-    center = list(block.center_xyz)
-    entry: dict[str, Any] = {
-        "id": block.id,
-        "name": block.module.name,
-        "pos": list(block.world_from_block.xyz),
-        "virtual": list(besiege_point(block.world_from_block.xyz)),
-        "center": center,
-        "center_follow": center,
-        "quat": list(besiege_rotation(block)),
-        "flipped": block.flipped,
-    }
-    if block.module.faces:
-        entry["faces"] = {
-            face.label: {
-                "c": list(block.face_center(face.label)),
-                "n": list(block.face_normal(face.label)),
-                "att": not state.is_occupied(block, face.label),
-            }
-            for face in block.module.faces
-        }
-    if block.mount is not None:
-        entry["root_face"] = _seat(block, block.mount)
-    elif block.lost_mount is not None:
-        entry["root_face"] = [None, block.lost_mount[1], block.lost_mount[0]]
-    if block.pointing_xyz is not None:
-        entry["pointing"] = list(block.pointing_xyz)
-    if block.module.spins:
-        # Seen in Besiege's left-handed components the spin's sense is the other way round.
-        entry["spin"] = list(scaled(block.axis_xyz, -1.0 if block.flipped else 1.0))
-    if block.module.actions:
-        entry["keys"] = {action: list(keys) for action, keys in block.bindings.items()}
-    return entry
-
-
-def _connector_entry(link: Connector) -> dict[str, Any]:
-    root = list(link.world_from_connector.xyz)
-    return {
-        "id": link.id,
-        "name": link.module.name,
-        "pos": root,
-        "virtual": list(besiege_point(link.world_from_connector.xyz)),
-        "center": root,
-        "center_follow": root,
-        "quat": list(besiege_rotation(link)),
-        "flipped": False,
-        "connector": {
-            "start": _seat(link, link.start),
-            "end": _seat(link, link.end),
-            "start_point": list(link.start_xyz),
-            "end_point": list(link.end_xyz),
-            "projection_virtual": list(besiege_span(link)),
-        },
-    }
-
-
-def _seat(part: Block | Connector, face: FaceRef) -> list[str | None]:
-    """A face by its block and label.
-
-    The vectors look faces up by the ids of the machine a sub-structure was copied from, which are
-    unknown in the assembly: there the block's place is empty, and the id comes last.
-    """
-    block, label = face
-    prefix = f"{part.structure}_"
-    if part.structure and part.id.startswith(prefix):
-        return [None, label, block.removeprefix(prefix)]
-    return [block, label]
+    for name, actions in subs.entries():
+        sources[name] = _Run(catalogue, {})
+        for action in actions.items():
+            sources[name].act(action)
+    return _Run(catalogue, sources), list(steps.items())
