@@ -5,8 +5,10 @@ from pathlib import Path
 import pytest
 
 from buildarena_pipeline.errors import StartupError
+from buildarena_pipeline.extensions import workflow_sources
 from buildarena_pipeline.models import load_registry
-from buildarena_pipeline.prompt_packs import load_pack, read_pack
+from buildarena_pipeline.prompt_packs import PromptPacks, read_pack
+from buildarena_pipeline.specs import ClosedLoop
 from buildarena_pipeline.tracks import make_track
 
 PAPER = {
@@ -69,15 +71,79 @@ def test_a_changed_sentence_changes_the_packs_hash_and_the_track(tmp_path: Path)
 
     copy = tmp_path / "pack"
     shutil.copytree(builtin_folder() / "default", copy)
-    original = load_pack("default").digest
+    packs = PromptPacks()
+    original = packs.load("default").digest
     assert read_pack(copy, name="mine").digest == original
     (copy / "planner.md").write_text("# Role: planner\n\nPlan well.")
     assert read_pack(copy, name="mine").digest != original
-    assert original[:8] in make_track("five-role", "pybullet", "default").id
+    five_role = workflow_sources({})["five-role"]
+    plain = make_track(five_role, "pybullet", packs.load("default"))
+    assert original[:8] in plain.id
+    loop = ClosedLoop(rounds=5, analyst=True)
+    varied = make_track(
+        five_role, "pybullet", packs.load("default"), one_shot=True, closed_loop=loop
+    )
+    assert varied.id.startswith("five-role+one-shot+5-rounds-analyst/pybullet-")
 
 
 def test_a_pack_that_lacks_a_file_is_refused(tmp_path: Path) -> None:
     with pytest.raises(StartupError, match=r"planner\.md"):
         read_pack(tmp_path, name="empty")
     with pytest.raises(StartupError, match="no prompt pack 'x'; there are default"):
-        load_pack("x")
+        PromptPacks().load("x")
+
+
+PUBLISHED = """
+agents:
+  planner: {system_message: Plan it.}
+  draft_reviewer: {system_message: Review it.}
+controller: Drive it.
+"""
+LEVELS = """
+category: support
+level: soft
+task: Carry it over.
+---
+category: lift
+level: hard
+task: Lift it.
+"""
+
+
+def test_a_pack_of_the_published_layout_takes_the_place_of_our_sentences(tmp_path: Path) -> None:
+    folder = tmp_path / "packs" / "theirs"
+    folder.mkdir(parents=True)
+    (folder / "prompt.yaml").write_text(PUBLISHED)
+    (folder / "levels.yaml").write_text(LEVELS)
+    packs = PromptPacks(tmp_path / "packs")
+    assert packs.names == ["default", "theirs"]
+    pack = packs.load("theirs")
+    assert pack.roles["planner"] == "Plan it."
+    assert pack.roles["reviewer"] == "Review it."
+    assert pack.roles["controller"] == "Drive it."
+    assert pack.roles["builder"] == packs.load("default").roles["builder"]
+    assert pack.statements == {"support-1": "Carry it over.", "lift-3": "Lift it."}
+    assert pack.digest != packs.load("default").digest
+
+
+@pytest.mark.parametrize(
+    ("file", "text", "says"),
+    [
+        ("prompt.yaml", "agents: {planner: {}}", "system_message"),
+        ("prompt.yaml", "agents: [", "can't be read"),
+        ("levels.yaml", "category: x\nlevel: extreme\ntask: y", "document 1 .* soft, medium, hard"),
+    ],
+)
+def test_a_malformed_published_pack_is_named(
+    tmp_path: Path, file: str, text: str, says: str
+) -> None:
+    (tmp_path / "prompt.yaml").write_text(PUBLISHED)
+    (tmp_path / file).write_text(text)
+    with pytest.raises(StartupError, match=says):
+        read_pack(tmp_path, name="bad")
+
+
+@pytest.mark.parametrize("target", ["nowhere", "file.py", ":Class", "no/such/file.py:Class", "m:1"])
+def test_a_bad_workflow_setting_is_named(target: str) -> None:
+    with pytest.raises(StartupError, match="workflow 'mine'"):
+        workflow_sources({"mine": target})

@@ -3,21 +3,22 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from types import MappingProxyType
 from typing import Any
 
 import pytest
 
 from buildarena_benchmark import builtin_tasks
 from buildarena_pipeline.models import load_registry
-from buildarena_pipeline.prompt_packs import load_pack
+from buildarena_pipeline.prompt_packs import PromptPack, PromptPacks
 from buildarena_pipeline.specs import Decoding
 from buildarena_pipeline.submission import model_config
 from buildarena_store import JournalEntry, RolloutRecord
 from buildarena_worker.llm import ModelClients
+from buildarena_worker.rounds import Loop, run_session
 from buildarena_worker.session import Session
 from buildarena_worker.session_io import ModelClient, SessionIO, SuspendedError
-from buildarena_worker.workflow.base import run_session
-from buildarena_worker.workflow.registry import find_workflow
+from buildarena_worker.workflow import Workflows
 
 
 @dataclass
@@ -28,6 +29,7 @@ class Played:
     entries: list[JournalEntry]
     suspended: SuspendedError | None = None
     failure: Exception | None = None
+    end: Any = None
 
 
 @dataclass
@@ -50,6 +52,10 @@ class Player:
         append: Callable[[JournalEntry], None] | None = None,
         still_held: Callable[[], bool] = lambda: True,
         offline: bool = False,
+        loop: Loop = Loop(),  # noqa: B008 - frozen
+        pack: PromptPack | None = None,
+        workflows: dict[str, str] = MappingProxyType({}),  # type: ignore[assignment]
+        trajectories: dict[str, Any] = MappingProxyType({}),  # type: ignore[assignment]
     ) -> Played:
         config = model_config(self.registry, model, Decoding())
         if client is None and not offline:
@@ -62,17 +68,18 @@ class Player:
             append=append or written.append,
             still_held=still_held,
             limits=limits or {},
+            load_trajectory=trajectories.__getitem__,
         )
         session = Session(
             task=builtin_tasks()[task],
             seed=seed,
             model_config=config,
-            pack=load_pack("default"),
+            pack=pack or PromptPacks().load("default"),
             io=io,
         )
         played = Played(session=session, entries=written)
         try:
-            run_session(session, find_workflow(workflow))
+            played.end = run_session(session, Workflows(workflows).find(workflow), loop)
         except SuspendedError as suspended:
             played.suspended = suspended
         except Exception as failure:  # noqa: BLE001 - tests look at it

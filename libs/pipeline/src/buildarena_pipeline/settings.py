@@ -33,6 +33,13 @@ class Settings(BaseSettings):
     models_file: Annotated[
         Path | None, Field(description="YAML of further models, added to the built-in registry")
     ] = None
+    prompt_packs: Annotated[
+        Path | None, Field(description="Folder of further prompt packs, one folder each")
+    ] = None
+    workflows: Annotated[
+        dict[str, str],
+        Field(description='Further workflows as JSON, {"name": "path/to/file.py:Class"}'),
+    ] = {}
     lease_s: Annotated[float, Field(description="Lease without heartbeat, seconds", gt=1)] = 15.0
     max_faults: Annotated[
         int, Field(description="Infrastructure faults before a job is given up", ge=1)

@@ -34,6 +34,17 @@ class Limits(BaseModel):
     max_seconds: Annotated[float | None, Field(gt=0)] = None
 
 
+class ClosedLoop(BaseModel):
+    """Further rounds for samples that failed, told what the simulator said."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    rounds: Annotated[StrictInt, Field(ge=2, le=20, description="The first one included")]
+    analyst: Annotated[
+        bool, Field(description="An analyst looks at each failure and advises the next round")
+    ] = False
+
+
 class _Variant(BaseModel):
     """What makes a track, and the limits of its sessions."""
 
@@ -42,6 +53,8 @@ class _Variant(BaseModel):
     workflow: Name = "five-role"
     simulator: Name = "pybullet"
     prompts: Name = "default"
+    one_shot: Annotated[bool, Field(description="Show an example construction")] = False
+    closed_loop: ClosedLoop | None = None
     decoding: Decoding = Decoding()
     limits: Limits = Limits()
 

@@ -9,12 +9,13 @@ from typing import Any
 from buildarena_benchmark import builtin_tasks
 from buildarena_pipeline.context import Context
 from buildarena_pipeline.errors import FieldError, SubmissionError
+from buildarena_pipeline.extensions import workflow_sources
 from buildarena_pipeline.models import ModelRegistry
-from buildarena_pipeline.prompt_packs import pack_names
+from buildarena_pipeline.prompt_packs import PromptPacks
 from buildarena_pipeline.queues import CONSTRUCT
 from buildarena_pipeline.specs import Decoding, JobSpec, SweepSpec
 from buildarena_pipeline.sweeper import announce_waiting
-from buildarena_pipeline.tracks import SIMULATORS, WORKFLOWS, make_track
+from buildarena_pipeline.tracks import SIMULATORS, make_track
 from buildarena_store import Job, JobKey, NewJob, NewSweep, Sweep
 from buildarena_store.ids import content_hash, new_id
 
@@ -45,6 +46,8 @@ class Submissions:
     def __init__(self, context: Context, registry: ModelRegistry) -> None:
         self._context = context
         self._registry = registry
+        self._packs = PromptPacks(context.settings.prompt_packs)
+        self._workflows = workflow_sources(context.settings.workflows)
 
     def submit_job(self, spec: JobSpec) -> tuple[Job, bool]:
         """Stores a job and announces it.
@@ -105,7 +108,13 @@ class Submissions:
         """
         self._check(spec, fields or {})
         tasks = builtin_tasks()
-        track = make_track(spec.workflow, spec.simulator, spec.prompts)
+        track = make_track(
+            self._workflows[spec.workflow],
+            spec.simulator,
+            self._packs.load(spec.prompts),
+            one_shot=spec.one_shot,
+            closed_loop=spec.closed_loop,
+        )
         track_config = track.as_config()
         limits = spec.limits.model_dump(exclude_none=True)
         seeds = spec.all_seeds()
@@ -136,9 +145,9 @@ class Submissions:
         errors = [
             *_unknown("tasks", "task", spec.tasks, builtin_tasks()),
             *_unknown("models", "model", spec.models, self._registry.models),
-            *_unknown("workflow", "workflow", [spec.workflow], WORKFLOWS),
+            *_unknown("workflow", "workflow", [spec.workflow], self._workflows),
             *_unknown("simulator", "simulator", [spec.simulator], SIMULATORS),
-            *_unknown("prompts", "prompt pack", [spec.prompts], pack_names()),
+            *_unknown("prompts", "prompt pack", [spec.prompts], self._packs.names),
         ]
         size = len(set(spec.tasks)) * len(set(spec.models)) * len(spec.all_seeds())
         largest = self._context.settings.max_sweep_jobs

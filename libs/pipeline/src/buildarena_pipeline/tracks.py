@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from buildarena_geometry import FEEDBACK_VERSION
-from buildarena_pipeline.prompt_packs import load_pack
+from buildarena_pipeline.extensions import WorkflowSource
+from buildarena_pipeline.prompt_packs import PromptPack
+from buildarena_pipeline.specs import ClosedLoop
 from buildarena_simulation import ENGINES, SIMULATION_VERSION
-
-WORKFLOWS = ("five-role", "guidance-builder", "builder")
-"""Built-in workflows; the construct worker holds their classes."""
 
 SIMULATORS = tuple(ENGINES)
 """Simulators that jobs can name; each has a queue of its own."""
@@ -28,6 +27,10 @@ class Track:
         prompts: Prompt pack name.
         prompts_digest: Hash of the pack.
         feedback_version: Version of the words in which geometry answers a model.
+        workflow_digest: Hash of an operator's own workflow; "" for built-in ones.
+        one_shot: Whether an example construction is shown.
+        rounds: Rounds of the closed loop; 1 without one.
+        analyst: Whether an analyst advises between rounds.
     """
 
     workflow: str
@@ -36,12 +39,23 @@ class Track:
     prompts: str
     prompts_digest: str
     feedback_version: str
+    workflow_digest: str = ""
+    one_shot: bool = False
+    rounds: int = 1
+    analyst: bool = False
 
     @property
     def id(self) -> str:
         """A short spelling that holds everything."""
+        workflow = self.workflow
+        if self.workflow_digest:
+            workflow += f"-{self.workflow_digest[:8]}"
+        if self.one_shot:
+            workflow += "+one-shot"
+        if self.rounds > 1:
+            workflow += f"+{self.rounds}-rounds" + ("-analyst" if self.analyst else "")
         return (
-            f"{self.workflow}/{self.simulator}-{self.simulation_version}/"
+            f"{workflow}/{self.simulator}-{self.simulation_version}/"
             f"{self.prompts}-{self.prompts_digest[:8]}-{self.feedback_version}"
         )
 
@@ -50,13 +64,24 @@ class Track:
         return {name: getattr(self, name) for name in self.__dataclass_fields__}
 
 
-def make_track(workflow: str, simulator: str, prompts: str) -> Track:
+def make_track(
+    workflow: WorkflowSource,
+    simulator: str,
+    pack: PromptPack,
+    *,
+    one_shot: bool = False,
+    closed_loop: ClosedLoop | None = None,
+) -> Track:
     """The track of a submission, with the versions that are installed now."""
     return Track(
-        workflow=workflow,
+        workflow=workflow.name,
         simulator=simulator,
         simulation_version=SIMULATION_VERSION,
-        prompts=prompts,
-        prompts_digest=load_pack(prompts).digest,
+        prompts=pack.name,
+        prompts_digest=pack.digest,
         feedback_version=FEEDBACK_VERSION,
+        workflow_digest=workflow.digest,
+        one_shot=one_shot,
+        rounds=1 if closed_loop is None else closed_loop.rounds,
+        analyst=closed_loop is not None and closed_loop.analyst,
     )

@@ -12,6 +12,7 @@ from buildarena_api.problems import add_problem_handlers
 from buildarena_pipeline import __version__
 from buildarena_pipeline.context import Context
 from buildarena_pipeline.models import ModelRegistry
+from buildarena_pipeline.submission import Submissions
 from buildarena_pipeline.sweeper import Sweeper
 
 DESCRIPTION = """Find out whether language models can engineer: submit task x model x seed jobs,
@@ -45,6 +46,7 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
     )
     app.state.context = context
     app.state.registry = registry
+    app.state.submissions = Submissions(context, registry)
     add_problem_handlers(app)
     for room in (jobs, sweeps, leaderboard, catalogue, health):
         app.include_router(room.router)

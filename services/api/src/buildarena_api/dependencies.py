@@ -25,8 +25,9 @@ ContextDep = Annotated[Context, Depends(_context)]
 RegistryDep = Annotated[ModelRegistry, Depends(_registry)]
 
 
-def _submissions(context: ContextDep, registry: RegistryDep) -> Submissions:
-    return Submissions(context, registry)
+def _submissions(request: Request) -> Submissions:
+    submissions: Submissions = request.app.state.submissions
+    return submissions
 
 
 SubmissionsDep = Annotated[Submissions, Depends(_submissions)]

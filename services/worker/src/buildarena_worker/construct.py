@@ -8,11 +8,12 @@ from collections.abc import Callable
 from buildarena_benchmark import failed_score
 from buildarena_geometry import Machine
 from buildarena_pipeline.context import Context
-from buildarena_pipeline.errors import PermanentFaultError
+from buildarena_pipeline.errors import PermanentFaultError, StartupError
 from buildarena_pipeline.models import ModelRegistry
-from buildarena_pipeline.prompt_packs import PromptPack, load_pack
+from buildarena_pipeline.prompt_packs import PromptPack, PromptPacks
 from buildarena_pipeline.queues import simulate_queue
 from buildarena_pipeline.scoring import job_manifest, rollout_score, task_of
+from buildarena_simulation import Trajectory
 from buildarena_store import (
     Job,
     JobScore,
@@ -28,10 +29,10 @@ from buildarena_worker.errors import (
     LimitReachedError,
 )
 from buildarena_worker.llm import ModelClients
+from buildarena_worker.rounds import Loop, run_session
 from buildarena_worker.session import Session
 from buildarena_worker.session_io import SessionIO, SuspendedError
-from buildarena_worker.workflow.base import SessionEnd, run_session
-from buildarena_worker.workflow.registry import find_workflow
+from buildarena_worker.workflow import SessionEnd, Workflows
 
 JSON = "application/json"
 
@@ -47,12 +48,14 @@ class ConstructHandler:
     def __init__(self, context: Context, registry: ModelRegistry) -> None:
         self._context = context
         self._clients = ModelClients(registry)
+        self._packs = PromptPacks(context.settings.prompt_packs)
+        self._workflows = Workflows(context.settings.workflows)
 
     def __call__(self, lease: Lease, still_held: Callable[[], bool]) -> None:
         """Runs the job's session as far as it gets: to a simulation, or to its end."""
         job = lease.job
         task = task_of(job)
-        pack = _pack_of(job)
+        pack = pack_of(job, self._packs)
         io = SessionIO(
             client=self._clients.for_config(job.model_config),
             entries=self._context.journal.read(job.id),
@@ -60,10 +63,14 @@ class ConstructHandler:
             append=lambda entry: self._append(lease, entry),
             still_held=still_held,
             limits=job.limits,
+            load_trajectory=lambda digest: Trajectory.from_parquet(
+                self._context.artifacts.get(digest)
+            ),
         )
         session = Session(task=task, seed=job.seed, model_config=job.model_config, pack=pack, io=io)
         try:
-            end = run_session(session, find_workflow(str(job.track_config["workflow"])))
+            workflow = self._workflows.find(str(job.track_config["workflow"]))
+            end = run_session(session, workflow, loop_of(job))
         except SuspendedError as suspended:
             self._suspend(lease, session, suspended)
         except ConstructionFailedError as failure:
@@ -159,10 +166,17 @@ def _machine_json(machine: Machine) -> bytes:
     ).encode()
 
 
-def _pack_of(job: Job) -> PromptPack:
-    """The job's prompt pack, as long as it is still the one that the job was submitted with."""
-    pack = load_pack(str(job.track_config["prompts"]))
-    wanted = job.track_config["prompts_digest"]
+def pack_of(job: Job, packs: PromptPacks) -> PromptPack:
+    """The job's prompt pack, as long as it is still the one that the job was submitted with.
+
+    Raises:
+        PermanentFaultError: It has changed, or it is not on this worker.
+    """
+    name, wanted = str(job.track_config["prompts"]), job.track_config["prompts_digest"]
+    try:
+        pack = packs.load(name)
+    except StartupError as error:
+        raise PermanentFaultError(str(error), reason="no_prompts") from error
     if pack.digest != wanted:
         raise PermanentFaultError(
             f"prompt pack {pack.name!r} has changed since the job was submitted: submit it again "
@@ -170,3 +184,13 @@ def _pack_of(job: Job) -> PromptPack:
             reason="prompts_changed",
         )
     return pack
+
+
+def loop_of(job: Job) -> Loop:
+    """What the job's track says about rounds, analyst and example."""
+    config = job.track_config
+    return Loop(
+        rounds=int(config["rounds"]),
+        analyst=bool(config["analyst"]),
+        one_shot=bool(config["one_shot"]),
+    )

@@ -28,8 +28,13 @@ class _ProgramError(ValueError):
     """The controller's answer can't be used; the message tells it why."""
 
 
-def drive(session: Session, machine: Machine) -> RolloutRecord:
+def drive(session: Session, machine: Machine, *, final: bool) -> RolloutRecord:
     """Lets the controller drive the machine in up to three trials.
+
+    Args:
+        session: The session.
+        machine: What is to be driven.
+        final: Whether the job ends with the last trial.
 
     Returns:
         The best rollout.
@@ -42,7 +47,7 @@ def drive(session: Session, machine: Machine) -> RolloutRecord:
     opening = pack.say(
         "control",
         task=task.name,
-        statement=task.statement,
+        statement=session.statement,
         summary=machine.act("get_machine_summary", {}).text,
         powered=machine.act("review_powered_blocks", {}).text,
     )
@@ -59,7 +64,9 @@ def drive(session: Session, machine: Machine) -> RolloutRecord:
             trajectory = "(not simulated)"
         else:
             session.machine = program.machine
-            record = session.io.simulate(program.machine, program.presses, final=trial == TRIALS)
+            record = session.io.simulate(
+                program.machine, program.presses, final=final and trial == TRIALS
+            )
             records.append(record)
             trajectory = _spelled(record.trace or ())
             result = (

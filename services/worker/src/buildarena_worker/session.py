@@ -24,6 +24,10 @@ class Session:
         model_config: The job's model configuration.
         pack: The sentences to use.
         io: Where answers come from.
+
+    Attributes:
+        additions: What is said behind the task's statement: an example, results of rounds.
+        machine: What is being built.
     """
 
     def __init__(
@@ -40,8 +44,15 @@ class Session:
         self.pack = pack
         self.io = io
         self.transcript = Transcript()
+        self.additions: list[str] = []
         self.machine: Machine | None = None
         self._model_config = model_config
+
+    @property
+    def statement(self) -> str:
+        """What the model is told of the task: the pack's or the task's words, and additions."""
+        told = self.pack.statements.get(self.task.name, self.task.statement)
+        return "\n\n".join([told.strip(), *self.additions])
 
     def ask(
         self, messages: Sequence[Message], tools: Sequence[Tool], *, stage: str, role: str

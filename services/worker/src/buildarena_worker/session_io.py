@@ -13,6 +13,7 @@ from decimal import Decimal
 from typing import Any, Protocol
 
 from buildarena_geometry import KeyPress, Machine
+from buildarena_simulation import Trajectory
 from buildarena_store import JournalEntry, RolloutRecord, Usage
 from buildarena_worker.errors import JournalMismatchError, LeaseLostError, LimitReachedError
 from buildarena_worker.messages import Reply, Request
@@ -98,6 +99,7 @@ class SessionIO:
         append: Writes a new journal entry, before its reply is used.
         still_held: Tells whether the lease goes on.
         limits: The job's limits.
+        load_trajectory: Reads a kept trajectory by its hash.
     """
 
     def __init__(
@@ -109,7 +111,9 @@ class SessionIO:
         append: Callable[[JournalEntry], None],
         still_held: Callable[[], bool],
         limits: Mapping[str, Any],
+        load_trajectory: Callable[[str], Trajectory],
     ) -> None:
+        self._load_trajectory = load_trajectory
         self._client = client
         self._entries = entries
         self._rollouts = [record for record in rollouts if record.finished_at is not None]
@@ -182,3 +186,9 @@ class SessionIO:
             raise SuspendedError(machine, controls, final=final, number=number)
         self._next_rollout += 1
         return self._rollouts[number]
+
+    def trajectory(self, record: RolloutRecord) -> Trajectory | None:
+        """The trajectory of a rollout; None when its machine could not be simulated."""
+        if record.trajectory_hash is None:
+            return None
+        return self._load_trajectory(record.trajectory_hash)

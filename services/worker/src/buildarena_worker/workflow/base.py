@@ -1,4 +1,4 @@
-"""What all workflows share: the form of a workflow, and the way from a machine to its score."""
+"""What all workflows share: the form of a workflow, and the form of a session's end."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from typing import Protocol
 
 from buildarena_geometry import Machine
 from buildarena_store import RolloutRecord
-from buildarena_worker.control import drive
 from buildarena_worker.errors import ConstructionFailedError
 from buildarena_worker.session import Session
 
@@ -17,11 +16,9 @@ class SessionEnd:
     """A session that came to its end.
 
     Attributes:
-        machine: What was built.
         best: The rollout that counts.
     """
 
-    machine: Machine
     best: RolloutRecord
 
 
@@ -36,20 +33,6 @@ class Workflow(Protocol):
         Raises:
             ConstructionFailedError: The model gave up or broke the rules.
         """
-
-
-def run_session(session: Session, workflow: Workflow) -> SessionEnd:
-    """Builds, checks and simulates.
-
-    Raises:
-        ConstructionFailedError: No machine came out that may be simulated.
-        SuspendedError: A simulation must be done first.
-    """
-    machine = workflow.build(session)
-    session.check_machine(machine)
-    if session.task.control == "agent":
-        return SessionEnd(machine=machine, best=drive(session, machine))
-    return SessionEnd(machine=machine, best=session.io.simulate(machine, None, final=True))
 
 
 def require_started(machine: Machine) -> None:

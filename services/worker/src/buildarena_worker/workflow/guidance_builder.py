@@ -18,7 +18,7 @@ class GuidanceBuilder:
     def build(self, session: Session) -> Machine:
         """Builds the machine of the session's task as one structure."""
         task = session.task
-        told = f"{task.statement}\n\nModules\n\n{modules_text(task.constraints.modules)}"
+        told = f"{session.statement}\n\nModules\n\n{modules_text(task.constraints.modules)}"
         part = SubStructure(name="machine", text=told)
         machine = build_stage(session, part, told)
         require_started(machine)

@@ -1,8 +1,15 @@
-"""Finds workflows by name."""
+"""Finds workflows by name: the built-in ones, and an operator's own."""
 
 from __future__ import annotations
 
-from buildarena_pipeline.errors import PermanentFaultError
+import importlib
+import importlib.util
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from types import ModuleType
+
+from buildarena_pipeline.errors import PermanentFaultError, StartupError
+from buildarena_pipeline.extensions import WorkflowSource, workflow_sources
 from buildarena_worker.workflow.base import Workflow
 from buildarena_worker.workflow.builder import Builder
 from buildarena_worker.workflow.five_role import FiveRole
@@ -11,15 +18,54 @@ from buildarena_worker.workflow.guidance_builder import GuidanceBuilder
 BUILTIN: tuple[type[Workflow], ...] = (FiveRole, GuidanceBuilder, Builder)
 
 
-def find_workflow(name: str) -> Workflow:
-    """A workflow with this name.
+class Workflows:
+    """Workflows by name.
+
+    Args:
+        own: Operator's workflows: name to ``module:Class`` or ``path/to/file.py:Class``.
 
     Raises:
-        PermanentFaultError: There is none.
+        StartupError: One of them can't be loaded; the message names it.
     """
-    known = {workflow.name: workflow for workflow in BUILTIN}
-    if name not in known:
-        raise PermanentFaultError(
-            f"no workflow {name!r}; there are {', '.join(known)}", reason="unknown_workflow"
-        )
-    return known[name]()
+
+    def __init__(self, own: Mapping[str, str]) -> None:
+        self._makers: dict[str, Callable[[], Workflow]] = {kind.name: kind for kind in BUILTIN}
+        for source in workflow_sources(own).values():
+            if source.place:
+                self._makers[source.name] = _load(source)
+
+    def find(self, name: str) -> Workflow:
+        """A workflow with this name.
+
+        Raises:
+            PermanentFaultError: There is none on this worker.
+        """
+        if name not in self._makers:
+            raise PermanentFaultError(
+                f"this worker has no workflow {name!r}; it has {', '.join(self._makers)}",
+                reason="unknown_workflow",
+            )
+        return self._makers[name]()
+
+
+def _load(source: WorkflowSource) -> Callable[[], Workflow]:
+    try:
+        maker: Callable[[], Workflow] = getattr(_module(source), source.class_name)
+    except Exception as error:
+        raise StartupError(
+            f"workflow {source.name!r} can't be loaded from {source.place}:{source.class_name}: "
+            f"{type(error).__name__}: {error}"
+        ) from error
+    return maker
+
+
+def _module(source: WorkflowSource) -> ModuleType:
+    if not source.place.endswith(".py"):
+        return importlib.import_module(source.place)
+    name = f"buildarena_workflow_{source.name.replace('-', '_')}"
+    spec = importlib.util.spec_from_file_location(name, Path(source.place))
+    if spec is None or spec.loader is None:
+        raise ImportError(f"{source.place} is no Python file")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module

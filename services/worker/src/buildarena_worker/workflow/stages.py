@@ -33,7 +33,7 @@ def plan_stage(session: Session) -> Plan:
     opening = pack.say(
         "plan",
         task=task.name,
-        statement=task.statement,
+        statement=session.statement,
         modules=modules_text(task.constraints.modules),
     )
     dialogue = Dialogue(session, stage="plan", opening=opening)
@@ -75,7 +75,7 @@ def draft_stage(session: Session, plan: Plan, part: SubStructure) -> str:
     opening = pack.say(
         "draft",
         task=task.name,
-        statement=task.statement,
+        statement=session.statement,
         modules=modules_text(task.constraints.modules),
         overall=plan.overall,
         name=part.name,
@@ -150,7 +150,7 @@ def solo_stage(session: Session) -> Machine:
     opening = pack.say(
         "build_solo",
         task=task.name,
-        statement=task.statement,
+        statement=session.statement,
         modules=modules_text(task.constraints.modules),
     )
     dialogue = Dialogue(session, stage="build", opening=opening)

@@ -1,0 +1,55 @@
+"""What an operator adds: workflows of their own, by name, from a file or an installed module."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from buildarena_pipeline.errors import StartupError
+
+BUILTIN_WORKFLOWS = ("five-role", "guidance-builder", "builder")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WorkflowSource:
+    """Where a workflow's class is.
+
+    Attributes:
+        name: What submissions call it.
+        place: ``module`` or ``path/to/file.py``; "" for a built-in one.
+        class_name: Name of the class there.
+        digest: Hash of the file, part of the track; "" for built-in ones and installed modules.
+    """
+
+    name: str
+    place: str = ""
+    class_name: str = ""
+    digest: str = ""
+
+
+def workflow_sources(settings: Mapping[str, str]) -> dict[str, WorkflowSource]:
+    """All workflows by name.
+
+    Args:
+        settings: Operator's workflows: name to ``module:Class`` or ``path/to/file.py:Class``.
+
+    Raises:
+        StartupError: An entry can't be used; the message names it.
+    """
+    sources = {name: WorkflowSource(name=name) for name in BUILTIN_WORKFLOWS}
+    for name, target in settings.items():
+        place, colon, class_name = target.rpartition(":")
+        if not colon or not place or not class_name.isidentifier():
+            raise StartupError(
+                f"workflow {name!r}: {target!r} is neither module:Class nor path/to/file.py:Class"
+            )
+        digest = ""
+        if place.endswith(".py"):
+            try:
+                digest = hashlib.sha256(Path(place).read_bytes()).hexdigest()
+            except OSError as error:
+                raise StartupError(f"workflow {name!r}: {place}: {error.strerror}") from error
+        sources[name] = WorkflowSource(name=name, place=place, class_name=class_name, digest=digest)
+    return sources

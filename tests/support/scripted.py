@@ -1,0 +1,26 @@
+"""Models for session tests that say what they are told to say."""
+
+from __future__ import annotations
+
+from buildarena_store import Usage
+from buildarena_worker.messages import Reply, Request, ToolCall
+from buildarena_worker.session_io import Answer
+
+
+class Scripted:
+    """A model that says given things in turn, then one thing for ever."""
+
+    def __init__(self, *replies: Reply, last: Reply | None = None) -> None:
+        self.replies = list(replies)
+        self.last = last or Reply(text="TERMINATE")
+        self.requests: list[Request] = []
+
+    def complete(self, request: Request) -> Answer:
+        self.requests.append(request)
+        reply = self.replies.pop(0) if self.replies else self.last
+        usage = Usage(requests=1, input_tokens=10, output_tokens=5)
+        return Answer(reply=reply, usage=usage, latency_s=1.0)
+
+
+def call(name: str, /, **arguments: object) -> Reply:
+    return Reply(text="", calls=(ToolCall(id="c1", name=name, arguments=arguments),))

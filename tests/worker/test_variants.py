@@ -1,0 +1,181 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from scripted import Scripted, call
+
+from buildarena_benchmark import builtin_tasks
+from buildarena_geometry import Machine
+from buildarena_pipeline.errors import PermanentFaultError, StartupError
+from buildarena_pipeline.prompt_packs import PromptPack, PromptPacks
+from buildarena_simulation import simulate
+from buildarena_worker.builtin.expert import reply as expert
+from buildarena_worker.builtin.reading import read_situation
+from buildarena_worker.errors import ConstructionFailedError
+from buildarena_worker.messages import Reply, Request
+from buildarena_worker.rounds import Loop
+from buildarena_worker.workflow import Workflows
+
+START = call("start", init_shift=[0, 0, 0], init_rotation=[0, 0, 0], note="")
+BLOCK = call("attach_block_to", base_block="1", face="A", new_block="Small Wooden Block", note="")
+DONE = Reply(text="TERMINATE")
+CROSS = [START, BLOCK, DONE]
+
+
+def text_of(request: Request) -> str:
+    return "\n".join(message.text for message in request.messages)
+
+
+def test_a_failed_round_is_followed_by_one_that_is_told_the_result(play, rollout) -> None:
+    model = Scripted(*CROSS, *CROSS)
+    played = play(
+        workflow="builder",
+        client=model,
+        loop=Loop(rounds=3),
+        rollouts=[rollout(0, success=False, indicator=12.5)],
+    )
+    assert played.suspended is not None
+    assert (played.suspended.number, played.suspended.final) == (1, False)
+    assert "12.50" not in text_of(model.requests[0])
+    assert "It did not succeed. Load: 12.50 mass units." in text_of(model.requests[3])
+
+
+def test_a_loop_ends_with_the_first_success(play, rollout) -> None:
+    records = [rollout(0, success=False, indicator=1.0), rollout(1, indicator=9.0)]
+    played = play(
+        workflow="builder",
+        client=Scripted(*CROSS, *CROSS),
+        loop=Loop(rounds=5),
+        rollouts=records,
+    )
+    assert played.end.best is records[1]
+
+
+def test_the_last_round_is_final(play, rollout) -> None:
+    played = play(
+        workflow="builder",
+        client=Scripted(*CROSS, *CROSS),
+        loop=Loop(rounds=2),
+        rollouts=[rollout(0, success=False)],
+    )
+    assert played.suspended.final
+
+
+def test_a_round_without_a_machine_is_followed_by_another(play) -> None:
+    objection = call("raise_objection", reason="too hard")
+    model = Scripted(objection, *CROSS)
+    played = play(workflow="builder", client=model, loop=Loop(rounds=2))
+    assert played.suspended is not None
+    assert "No machine came out of round 1: builder: too hard." in text_of(model.requests[1])
+
+
+def test_rounds_without_any_machine_fail(play) -> None:
+    model = Scripted(last=call("raise_objection", reason="no"))
+    played = play(workflow="builder", client=model, loop=Loop(rounds=2))
+    assert isinstance(played.failure, ConstructionFailedError)
+    assert len(played.entries) == 2
+
+
+def test_an_analyst_looks_and_its_advice_reaches_the_next_round(play, rollout) -> None:
+    machine = Machine()
+    for reply in (START, BLOCK):
+        machine.act(reply.calls[0].name, reply.calls[0].arguments)
+    trajectory = simulate(machine, builtin_tasks()["support-1"].scenario, "mujoco")
+    record = rollout(0, success=False)
+    object.__setattr__(record, "trajectory_hash", "t")
+    looks = [
+        call("read_trajectory", block="cargo", from_s=0, to_s=2),
+        call("read_trajectory", block="99", from_s=0, to_s=2),
+        call("read_trajectory", block="1"),
+        call("read_transcript", first_turn=0),
+        call("read_breaks"),
+        call("get_machine_summary"),
+        call("attach_block_to", base_block="1", face="B", new_block="Torch", note=""),
+    ]
+    model = Scripted(*CROSS, *looks, Reply(text="Make it longer than the gap."), *CROSS)
+    played = play(
+        workflow="builder",
+        client=model,
+        loop=Loop(rounds=2, analyst=True),
+        rollouts=[record],
+        trajectories={"t": trajectory},
+    )
+    assert played.suspended is not None, played.failure
+    actions = [a for t in played.session.transcript.turns if t.role == "analyst" for a in t.actions]
+    assert actions[0].feedback.startswith("0.00, 0.00, 0.00, ")
+    assert "There is no block '99'" in actions[1].feedback
+    assert actions[2].reason == "malformed_arguments"
+    assert "[builder]" in actions[3].feedback
+    assert actions[5].ok
+    assert actions[6].reason == "unknown_action"
+    last = text_of(model.requests[-1])
+    assert "Make it longer than the gap." in last
+
+
+def test_one_shot_shows_an_example_that_zero_shot_does_not(play) -> None:
+    shown, plain = Scripted(*CROSS), Scripted(*CROSS)
+    play(workflow="builder", client=shown, loop=Loop(one_shot=True))
+    play(workflow="builder", client=plain)
+    assert "## Example" in text_of(shown.requests[0])
+    assert "## Example" not in text_of(plain.requests[0])
+    assert shown.requests[0].hash != plain.requests[0].hash
+
+
+def test_a_packs_own_statement_takes_the_tasks_place(play) -> None:
+    default = PromptPacks().load("default")
+    pack = PromptPack(
+        name="p",
+        digest="d",
+        roles=default.roles,
+        messages=default.messages,
+        statements={"support-1": "Carry it over."},
+    )
+    model = Scripted(*CROSS)
+    play(workflow="builder", client=model, pack=pack)
+    assert "Carry it over." in text_of(model.requests[0])
+    assert "Two fixed terrains" not in text_of(model.requests[0])
+
+
+OWN = '''
+from buildarena_worker.workflow.stages import solo_stage
+
+class Twice:
+    """Builds alone, after thinking aloud."""
+
+    name = "twice"
+
+    def build(self, session):
+        return solo_stage(session)
+'''
+
+
+def test_an_operators_workflow_is_loaded_by_path(play, tmp_path: Path) -> None:
+    file = tmp_path / "own.py"
+    file.write_text(OWN)
+    workflows = {"twice": f"{file}:Twice"}
+    played = play(workflow="twice", workflows=workflows, client=Scripted(*CROSS))
+    assert played.suspended is not None, played.failure
+
+
+def test_a_workflow_that_cannot_be_loaded_is_named(tmp_path: Path) -> None:
+    file = tmp_path / "own.py"
+    file.write_text("raise RuntimeError('no')")
+    with pytest.raises(StartupError, match=r"workflow .own. can.t be loaded .* no"):
+        Workflows({"own": f"{file}:Own"})
+    with pytest.raises(PermanentFaultError, match="no workflow 'other'; it has five-role"):
+        Workflows({}).find("other")
+
+
+def test_the_expert_ends_work_on_tasks_it_does_not_know() -> None:
+    from buildarena_worker.messages import Message
+
+    request = Request(
+        model_config={},
+        messages=[
+            Message(role="system", text="# Role: planner"),
+            Message(role="user", text="# Task: my-task"),
+        ],
+    )
+    assert read_situation(request).task == "my-task"
+    assert "TERMINATE" in expert(request).text
