@@ -44,7 +44,7 @@ class View:
         elevation_deg: how far above the horizon it stands.
         scale: pixels a unit.
         compass: whether arrows show east, north and up.
-        face_labels: ids of the blocks whose visible faces are labelled.
+        face_labels: ids of the blocks whose visible free faces are labelled.
         frames: ids of the blocks whose axes are drawn (x red, y green, z blue).
         ids: whether each block bears its id.
     """
@@ -70,7 +70,7 @@ def machine_svg(machine: Machine, view: View | None = None) -> str:
     """
     drawing = _Drawing(view or View())
     for block in machine.blocks.values():
-        drawing.add_block(block)
+        drawing.add_block(block, machine.state.free_faces(block))
     for link in machine.connectors.values():
         drawing.add_rod(link.start_point, link.end_point)
     return drawing.text()
@@ -95,7 +95,7 @@ class _Drawing:
         self._writing: list[str] = []
         self._points: list[NDArray[np.float64]] = []
 
-    def add_block(self, block: Block) -> None:
+    def add_block(self, block: Block, free_faces: list[str]) -> None:
         for solid in block.module.body:
             for polygon in polygons(solid):
                 # A cylinder's side is round: only its two ends have edges.
@@ -105,7 +105,7 @@ class _Drawing:
         if self._view.ids:
             self._write(block.center, block.id, "id")
         if block.id in self._view.face_labels:
-            self._label_faces(block)
+            self._label_faces(block, free_faces)
         if block.id in self._view.frames:
             pose = block.world_from_block
             for axis, (_, _, colour) in zip(pose.rotation.T, _AXES, strict=True):
@@ -147,10 +147,10 @@ class _Drawing:
         shape = f'<polygon points="{points}" fill="{colour}" stroke="{edge}"/>'
         self._shapes.append((depth, shape))
 
-    def _label_faces(self, block: Block) -> None:
-        for face in block.module.faces:
-            if np.array(block.face_normal(face.label)) @ self._towards_eye > 0:
-                self._write(np.array(block.face_center(face.label)), face.label, "face")
+    def _label_faces(self, block: Block, labels: list[str]) -> None:
+        for label in labels:
+            if np.array(block.face_normal(label)) @ self._towards_eye > 0:
+                self._write(np.array(block.face_center(label)), label, "face")
 
     def _add_compass(self) -> None:
         flat = np.array(self._points) if self._points else np.zeros((1, 2))
@@ -159,7 +159,7 @@ class _Drawing:
             across, up = self._axes @ np.array(axis) * 46
             tip = np.array([left + across, bottom - up])
             self._arrow(np.array([left, bottom]), tip, colour)
-            written = np.array([left + 1.45 * across, bottom - 1.45 * up])
+            written = np.array([left + 1.6 * across, bottom - 1.6 * up])
             self._points.append(written)
             self._writing.append(
                 f'<text x="{written[0]:.1f}" y="{written[1]:.1f}" fill="{colour}">{name}</text>'
