@@ -244,7 +244,7 @@ def upgrade() -> None:
         sa.Column("stage", sa.Text(), nullable=False),
         sa.Column("role", sa.Text(), nullable=False),
         sa.Column("request_hash", sa.Text(), nullable=False),
-        sa.Column("reply", postgresql.JSONB(astext_type=sa.Text()), nullable=False),
+        sa.Column("reply", postgresql.JSON(astext_type=sa.Text()), nullable=False),
         sa.Column("input_tokens", sa.BigInteger(), server_default=sa.text("0"), nullable=False),
         sa.Column("output_tokens", sa.BigInteger(), server_default=sa.text("0"), nullable=False),
         sa.Column("cached_tokens", sa.BigInteger(), server_default=sa.text("0"), nullable=False),
@@ -274,13 +274,13 @@ def upgrade() -> None:
         sa.Column("final", sa.Boolean(), nullable=False),
         sa.Column("engine", sa.Text(), nullable=False),
         sa.Column("machine_hash", sa.Text(), nullable=False),
-        sa.Column("controls", postgresql.JSONB(astext_type=sa.Text()), nullable=True),
+        sa.Column("controls", postgresql.JSON(astext_type=sa.Text()), nullable=True),
         sa.Column("success", sa.Boolean(), nullable=True),
         sa.Column("indicator", sa.Double(), nullable=True),
-        sa.Column("metrics", postgresql.JSONB(astext_type=sa.Text()), nullable=True),
+        sa.Column("metrics", postgresql.JSON(astext_type=sa.Text()), nullable=True),
         sa.Column("flags", postgresql.JSONB(astext_type=sa.Text()), nullable=True),
         sa.Column("trajectory_hash", sa.Text(), nullable=True),
-        sa.Column("trace", postgresql.JSONB(astext_type=sa.Text()), nullable=True),
+        sa.Column("trace", postgresql.JSON(astext_type=sa.Text()), nullable=True),
         sa.Column("versions", postgresql.JSONB(astext_type=sa.Text()), nullable=True),
         sa.Column("wall_s", sa.Double(), nullable=True),
         sa.Column(
@@ -304,9 +304,28 @@ def upgrade() -> None:
         sa.PrimaryKeyConstraint("sweep_id", "job_id", name=op.f("pk_sweep_jobs")),
     )
     op.create_index("ix_sweep_jobs_job", "sweep_jobs", ["job_id"], unique=False)
+    op.create_table(
+        "verifications",
+        sa.Column("id", sa.Text(), nullable=False),
+        sa.Column("job_id", sa.Text(), nullable=False),
+        sa.Column("state", sa.Text(), nullable=False),
+        sa.Column("report", postgresql.JSONB(astext_type=sa.Text()), nullable=True),
+        sa.Column(
+            "created_at",
+            sa.DateTime(timezone=True),
+            server_default=sa.text("clock_timestamp()"),
+            nullable=False,
+        ),
+        sa.Column("claimed_at", sa.DateTime(timezone=True), nullable=True),
+        sa.Column("nudged_at", sa.DateTime(timezone=True), nullable=True),
+        sa.Column("finished_at", sa.DateTime(timezone=True), nullable=True),
+        sa.ForeignKeyConstraint(["job_id"], ["jobs.id"], name=op.f("fk_verifications_job_id")),
+        sa.PrimaryKeyConstraint("id", name=op.f("pk_verifications")),
+    )
 
 
 def downgrade() -> None:
+    op.drop_table("verifications")
     op.drop_index("ix_sweep_jobs_job", table_name="sweep_jobs")
     op.drop_table("sweep_jobs")
     op.drop_table("rollouts")

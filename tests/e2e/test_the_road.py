@@ -54,6 +54,9 @@ def _look_with_the_command_line(url: str, sweep_id: str, job_id: str) -> None:
     assert json.loads(run_cli(url, "job", "show", job_id, "--json").stdout)["id"] == job_id
     doctor = run_cli(url, "doctor", "--json")
     assert json.loads(doctor.stdout)["checks"][0]["ok"]
+    verified = run_cli(url, "job", "verify", job_id)
+    assert verified.returncode == 0, verified.stdout
+    assert "Every figure is the same." in verified.stdout
     unknown = run_cli(url, "job", "show", "job_x")
     assert (unknown.returncode, unknown.stderr.strip()) == (1, "there is no job 'job_x'")
 

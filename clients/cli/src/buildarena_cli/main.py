@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import time
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -12,7 +13,7 @@ import yaml
 from buildarena_cli import service
 from buildarena_cli.client import Client
 from buildarena_cli.doctor import examine
-from buildarena_cli.errors import FAILED, CommandError
+from buildarena_cli.errors import DONE, FAILED, CommandError
 from buildarena_cli.output import console, error_console, leaderboard_tables, number, print_json
 from buildarena_cli.progress import exit_code, watch_sweep
 from buildarena_pipeline.settings import DEFAULT_PORT
@@ -139,11 +140,35 @@ def job_show(
         )
 
 
+@job_app.command("verify")
+def job_verify(
+    job_id: Annotated[str, typer.Argument(help="Id of the job.")],
+    url: UrlOption = DEFAULT_URL,
+    as_json: JsonOption = False,
+) -> None:
+    """Replay a finished job without a model, simulate it again and compare every figure."""
+    client = Client(url)
+    check = client.post(f"/v1/jobs/{job_id}/verify", {})
+    while check["state"] != "done":
+        time.sleep(0.3)
+        check = client.get_patiently(f"/v1/verifications/{check['id']}")
+    report = check["report"]
+    if as_json:
+        print_json(report)
+    else:
+        for entry in report["checks"]:
+            mark = "ok" if entry["ok"] else "!!"
+            shown = (
+                entry["kept"] if entry["ok"] else f"kept {entry['kept']}, found {entry['found']}"
+            )
+            console.print(f"{mark}  {entry['name']:<32} {shown}", soft_wrap=True)
+        console.print("Every figure is the same." if report["ok"] else "Not the same.")
+    raise typer.Exit(DONE if report["ok"] else FAILED)
+
+
 def _watch(client: Client, sweep_id: str, *, as_json: bool) -> dict[str, Any]:
     if not as_json:
         return watch_sweep(client, sweep_id)
-    import time
-
     while True:
         sweep: dict[str, Any] = client.get_patiently(f"/v1/sweeps/{sweep_id}")
         if sweep["progress"]["done"] == sweep["progress"]["total"]:

@@ -154,7 +154,9 @@ class Stack:
         return {
             **os.environ,
             **{
-                f"BUILDARENA_{name.upper()}": str(value)
+                f"BUILDARENA_{name.upper()}": (
+                    json.dumps(value) if isinstance(value, dict) else str(value)
+                )
                 for name, value in settings.model_dump(mode="json", exclude_none=True).items()
             },
             "BUILDARENA_DATA": str(data),

@@ -16,6 +16,7 @@ from buildarena_store import (
     Results,
     Rollouts,
     Sweeps,
+    Verifications,
     Workers,
 )
 
@@ -36,6 +37,7 @@ class Context:
     results: Results
     events: Events
     workers: Workers
+    verifications: Verifications
 
     def close(self) -> None:
         """Closes the connections."""
@@ -60,4 +62,5 @@ def open_context(settings: Settings, *, pool_size: int = 5) -> Context:
         results=Results(database, leases),
         events=Events(database),
         workers=Workers(database),
+        verifications=Verifications(database),
     )

@@ -17,6 +17,7 @@ LOOK = "buildarena.look"
 """Name of the one message kind; its arguments are the queue's name and a job id."""
 
 CONSTRUCT = "construct"
+VERIFY = "verify"
 BATCH = 200
 """Messages kept waiting per queue; more are sent as workers take them."""
 

@@ -13,7 +13,7 @@ from sqlalchemy import text
 from sqlalchemy.exc import SQLAlchemyError
 
 from buildarena_pipeline.context import Context
-from buildarena_pipeline.queues import BATCH
+from buildarena_pipeline.queues import BATCH, VERIFY
 from buildarena_store.tables import jobs as jobs_table
 
 SWEEP_LOCK = 0x7377656570  # "sweep"
@@ -68,11 +68,10 @@ class Sweeper:
                 .distinct()
             ).scalars()
             for queue in list(queues):
-                self.announce(queue)
-
-    def announce(self, queue: str) -> None:
-        """Fills a queue up with messages for the jobs that wait longest."""
-        announce_waiting(self._context, queue)
+                announce_waiting(self._context, queue)
+            checks = self._context.verifications.to_announce(BATCH)
+            if checks:
+                self._context.queues.announce(VERIFY, checks)
 
 
 def announce_waiting(context: Context, queue: str) -> None:

@@ -37,6 +37,7 @@ class WorkerSpec:
         pool: Celery pool: ``threads``, ``prefork`` or ``solo``.
         concurrency: Jobs at once.
         make_handler: Makes the stage handler from a process' connections.
+        make_others: Makes what else it does: functions of an id, by queue.
         versions: Versions of what it runs.
     """
 
@@ -45,6 +46,7 @@ class WorkerSpec:
     pool: str
     concurrency: int
     make_handler: Callable[[Context], StageHandler]
+    make_others: Callable[[Context], Mapping[str, Callable[[str], None]]] = lambda _: {}
     versions: Mapping[str, Any]
 
 
@@ -57,6 +59,7 @@ class _Runtime:
         self.id = f"{spec.kind}@{socket.gethostname()}:{os.getpid()}"
         self._spec = spec
         self.keeper = LeaseKeeper(self.context, self.report)
+        self.others = spec.make_others(self.context)
         self.runner = StageRunner(
             self.context, spec.make_handler(self.context), self.keeper, self.id
         )
@@ -109,7 +112,11 @@ def run_worker(spec: WorkerSpec, settings: Settings) -> None:
             runtime.stop()
 
     def look(queue: str, job_id: str) -> None:
-        runtimes[os.getpid()].runner.look(queue, job_id)
+        runtime = runtimes[os.getpid()]
+        if queue in runtime.others:
+            runtime.others[queue](job_id)
+        else:
+            runtime.runner.look(queue, job_id)
 
     app = context.queues.app
     app.task(name=LOOK)(look)

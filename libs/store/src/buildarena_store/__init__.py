@@ -20,6 +20,7 @@ from buildarena_store.leases import Lease, Leases
 from buildarena_store.results import JobScore, Results
 from buildarena_store.rollouts import RolloutRecord, RolloutRequest, Rollouts
 from buildarena_store.sweeps import NewSweep, Sweep, SweepProgress, Sweeps
+from buildarena_store.verifications import Verification, Verifications
 from buildarena_store.workers import WorkerInfo, Workers
 
 __all__ = [
@@ -51,6 +52,8 @@ __all__ = [
     "Sweeps",
     "UnknownIdError",
     "Usage",
+    "Verification",
+    "Verifications",
     "WorkerInfo",
     "Workers",
 ]

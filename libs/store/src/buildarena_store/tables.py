@@ -21,7 +21,7 @@ from sqlalchemy import (
     func,
     text,
 )
-from sqlalchemy.dialects.postgresql import JSONB
+from sqlalchemy.dialects.postgresql import JSON, JSONB
 
 metadata = MetaData(
     naming_convention={
@@ -153,7 +153,8 @@ journal = Table(
     Column("stage", Text, nullable=False),
     Column("role", Text, nullable=False),
     Column("request_hash", Text, nullable=False),
-    Column("reply", JSONB, nullable=False),
+    # JSON keeps the order of keys, which replies are replayed with; JSONB does not.
+    Column("reply", JSON, nullable=False),
     _count("input_tokens"),
     _count("output_tokens"),
     _count("cached_tokens"),
@@ -173,13 +174,13 @@ rollouts = Table(
     Column("final", Boolean, nullable=False),
     Column("engine", Text, nullable=False),
     Column("machine_hash", Text, nullable=False),
-    Column("controls", JSONB),
+    Column("controls", JSON),
     Column("success", Boolean),
     Column("indicator", Double),
-    Column("metrics", JSONB),
+    Column("metrics", JSON),
     Column("flags", JSONB),
     Column("trajectory_hash", Text),
-    Column("trace", JSONB),
+    Column("trace", JSON),
     Column("versions", JSONB),
     Column("wall_s", Double),
     _time("created_at", now=True),
@@ -201,6 +202,19 @@ job_artifacts = Table(
     Column("job_id", Text, ForeignKey("jobs.id"), primary_key=True),
     Column("name", Text, primary_key=True),
     Column("hash", Text, ForeignKey("artifacts.hash"), nullable=False),
+)
+
+verifications = Table(
+    "verifications",
+    metadata,
+    Column("id", Text, primary_key=True),
+    Column("job_id", Text, ForeignKey("jobs.id"), nullable=False),
+    Column("state", Text, nullable=False),
+    Column("report", JSONB),
+    _time("created_at", now=True),
+    _time("claimed_at"),
+    _time("nudged_at"),
+    _time("finished_at"),
 )
 
 tasks = Table(

@@ -7,7 +7,7 @@ from contextlib import asynccontextmanager
 
 from fastapi import FastAPI
 
-from buildarena_api import catalogue, health, jobs, leaderboard, sweeps
+from buildarena_api import catalogue, health, jobs, leaderboard, sweeps, verifications
 from buildarena_api.problems import add_problem_handlers
 from buildarena_pipeline import __version__
 from buildarena_pipeline.context import Context
@@ -48,6 +48,6 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
     app.state.registry = registry
     app.state.submissions = Submissions(context, registry)
     add_problem_handlers(app)
-    for room in (jobs, sweeps, leaderboard, catalogue, health):
+    for room in (verifications, jobs, sweeps, leaderboard, catalogue, health):
         app.include_router(room.router)
     return app

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable, Mapping
 
 from buildarena_geometry import FEEDBACK_VERSION
 from buildarena_geometry import __version__ as geometry_version
 from buildarena_pipeline.context import Context
 from buildarena_pipeline.errors import StartupError
 from buildarena_pipeline.models import load_registry
-from buildarena_pipeline.queues import CONSTRUCT
+from buildarena_pipeline.queues import CONSTRUCT, VERIFY
 from buildarena_pipeline.settings import Settings
 from buildarena_pipeline.stages import StageHandler
 from buildarena_pipeline.worker_process import WorkerSpec, run_worker
 from buildarena_worker.construct import ConstructHandler
+from buildarena_worker.verify import VerificationRunner
 
 
 def main() -> None:
@@ -25,13 +27,17 @@ def main() -> None:
         def make_handler(context: Context) -> StageHandler:
             return ConstructHandler(context, registry)
 
+        def make_others(context: Context) -> Mapping[str, Callable[[str], None]]:
+            return {VERIFY: VerificationRunner(context).look}
+
         run_worker(
             WorkerSpec(
                 kind="construct",
-                queues=[CONSTRUCT],
+                queues=[CONSTRUCT, VERIFY],
                 pool="threads",
                 concurrency=settings.sessions_per_worker,
                 make_handler=make_handler,
+                make_others=make_others,
                 versions={"geometry": geometry_version, "feedback": FEEDBACK_VERSION},
             ),
             settings,

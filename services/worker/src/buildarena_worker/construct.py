@@ -90,7 +90,7 @@ class ConstructHandler:
     def _suspend(self, lease: Lease, session: Session, suspended: SuspendedError) -> None:
         """Keeps the machine and hands the job to its simulator, all in one transaction."""
         context, job = self._context, lease.job
-        machine = context.artifacts.put(_machine_json(suspended.machine), JSON)
+        machine = context.artifacts.put(machine_json(suspended.machine), JSON)
         transcript = context.artifacts.put(session.transcript.to_json(), JSON)
         engine = str(job.track_config["simulator"])
         controls = None
@@ -143,7 +143,7 @@ class ConstructHandler:
         transcript = context.artifacts.put(session.transcript.to_json(), JSON)
         machine = None
         if session.machine is not None and session.machine.started:
-            machine = context.artifacts.put(_machine_json(session.machine), JSON)
+            machine = context.artifacts.put(machine_json(session.machine), JSON)
         with context.database.transaction() as connection:
             context.results.attach(job.id, "transcript", transcript, connection=connection)
             if machine is not None:
@@ -160,7 +160,8 @@ def _counts(session: Session) -> dict[str, object]:
     }
 
 
-def _machine_json(machine: Machine) -> bytes:
+def machine_json(machine: Machine) -> bytes:
+    """The machine document as it is kept: one spelling per machine."""
     return json.dumps(
         machine.to_document(), ensure_ascii=False, sort_keys=True, separators=(",", ":")
     ).encode()

@@ -86,7 +86,7 @@ class Session:
                 finish=reply.finish,
                 input_tokens=entry.usage.input_tokens,
                 output_tokens=entry.usage.output_tokens,
-                cost_usd=str(entry.usage.cost_usd),
+                cost_usd=f"{entry.usage.cost_usd:.6f}",
                 latency_s=entry.latency_s,
                 tries=entry.tries,
             )
