@@ -1,0 +1,127 @@
+"""Verifications: finished jobs that are replayed and re-simulated to check every figure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from typing import Any
+
+from sqlalchemy import Row, insert, or_, select, update
+
+from buildarena_store import events
+from buildarena_store.database import Database
+from buildarena_store.errors import UnknownIdError
+from buildarena_store.ids import new_id
+from buildarena_store.tables import verifications
+
+ABANDONED_AFTER = timedelta(minutes=10)
+"""A verification whose worker says nothing for so long is done by another: it writes no score."""
+RENUDGE_AFTER = timedelta(seconds=10)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Verification:
+    """One check of one job.
+
+    Attributes:
+        state: ``queued``, ``running`` or ``done``.
+        report: What was compared, once it is done.
+    """
+
+    id: str
+    job_id: str
+    state: str
+    report: Mapping[str, Any] | None
+    created_at: datetime
+    finished_at: datetime | None
+
+
+class Verifications:
+    """Asks for, claims and ends verifications."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def request(self, job_id: str) -> str:
+        """Stores a wish to verify a job; returns its id."""
+        verification_id = new_id("check")
+        with self._database.transaction() as connection:
+            connection.execute(
+                insert(verifications).values(id=verification_id, job_id=job_id, state="queued")
+            )
+        return verification_id
+
+    def claim(self, verification_id: str) -> Verification | None:
+        """Takes a verification that waits or was abandoned."""
+        with self._database.transaction() as connection:
+            row = connection.execute(
+                update(verifications)
+                .where(
+                    verifications.c.id == verification_id,
+                    or_(
+                        verifications.c.state == "queued",
+                        (verifications.c.state == "running")
+                        & (verifications.c.claimed_at < events.now - ABANDONED_AFTER),
+                    ),
+                )
+                .values(state="running", claimed_at=events.now)
+                .returning(*_COLUMNS)
+            ).first()
+        return None if row is None else _from_row(row)
+
+    def finish(self, verification_id: str, report: Mapping[str, Any]) -> None:
+        """Writes what was found."""
+        with self._database.transaction() as connection:
+            connection.execute(
+                update(verifications)
+                .where(verifications.c.id == verification_id)
+                .values(state="done", report=dict(report), finished_at=events.now)
+            )
+
+    def get(self, verification_id: str) -> Verification:
+        """The verification with this id.
+
+        Raises:
+            UnknownIdError: Nobody has it.
+        """
+        with self._database.transaction() as connection:
+            row = connection.execute(
+                select(*_COLUMNS).where(verifications.c.id == verification_id)
+            ).first()
+        if row is None:
+            raise UnknownIdError("verification", verification_id)
+        return _from_row(row)
+
+    def to_announce(self, limit: int) -> list[str]:
+        """Waiting or abandoned verifications that no message speaks of; they are marked."""
+        silent = (
+            select(verifications.c.id)
+            .where(
+                or_(
+                    verifications.c.state == "queued",
+                    (verifications.c.state == "running")
+                    & (verifications.c.claimed_at < events.now - ABANDONED_AFTER),
+                ),
+                verifications.c.nudged_at.is_(None)
+                | (verifications.c.nudged_at < events.now - RENUDGE_AFTER),
+            )
+            .order_by(verifications.c.created_at)
+            .limit(limit)
+            .with_for_update(skip_locked=True)
+        )
+        with self._database.transaction() as connection:
+            rows = connection.execute(
+                update(verifications)
+                .where(verifications.c.id.in_(silent.scalar_subquery()))
+                .values(nudged_at=events.now)
+                .returning(verifications.c.id)
+            )
+            return [row.id for row in rows]
+
+
+_COLUMNS = [verifications.c[name] for name in Verification.__dataclass_fields__]
+
+
+def _from_row(row: Row[Any]) -> Verification:
+    return Verification(**{name: getattr(row, name) for name in Verification.__dataclass_fields__})

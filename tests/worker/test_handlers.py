@@ -1,0 +1,109 @@
+"""Stages on the real database, in this process."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from buildarena_pipeline.models import load_registry
+from buildarena_pipeline.specs import JobSpec
+from buildarena_pipeline.stages import LeaseKeeper, StageRunner
+from buildarena_pipeline.submission import Submissions
+from buildarena_simworker.simulate import SimulateHandler
+from buildarena_store import Job
+from buildarena_worker.construct import ConstructHandler
+from buildarena_worker.verify import Verifier
+
+
+@pytest.fixture
+def run(context) -> Callable[..., Job]:
+    """Submits a job and works on it until it has ended."""
+    registry = load_registry()
+
+    def work(**spec: object) -> Job:
+        job, _ = Submissions(context, registry).submit_job(
+            JobSpec.model_validate(
+                {"task": "support-1", "model": "builtin/expert", "simulator": "mujoco", **spec}
+            )
+        )
+        keeper = LeaseKeeper(context, lambda: None)
+        keeper.start()
+        handlers = {
+            "construct": ConstructHandler(context, registry),
+            "simulate": SimulateHandler(context),
+        }
+        for _ in range(20):
+            job = context.jobs.get(job.id)
+            if job.state == "done":
+                break
+            StageRunner(context, handlers[job.stage], keeper, "w").look(job.queue, job.id)
+        keeper.stop()
+        return job
+
+    return work
+
+
+def test_a_bridge_is_built_simulated_scored_and_verified(context, run) -> None:
+    job = run()
+    assert (job.outcome, job.success) == ("success", True)
+    assert job.manifest["machine"] == context.jobs.artifacts(job.id)["machine"]
+    assert job.requests == len(context.journal.read(job.id))
+    report = Verifier(context).verify(job.id)
+    assert report["ok"], [check for check in report["checks"] if not check["ok"]]
+    names = {check["name"] for check in report["checks"]}
+    assert {"transcript", "rollout 0: trajectory", "score: indicator", "usage: cost_usd"} <= names
+
+
+@pytest.mark.parametrize(
+    ("statement", "check"),
+    [
+        ("UPDATE jobs SET indicator = indicator + 1e-9", "score: indicator"),
+        ("UPDATE jobs SET input_tokens = input_tokens + 1", "usage: input_tokens"),
+        ("UPDATE rollouts SET machine_hash = repeat('0', 64)", "rollout 0: machine"),
+        (
+            "UPDATE journal SET reply = jsonb_set(reply::jsonb, '{text}', '\"x\"') WHERE sequence = 1",
+            "replay",
+        ),
+        ("DELETE FROM journal WHERE sequence > 100", "replay"),
+    ],
+)
+def test_any_changed_figure_is_found(context, run, statement, check) -> None:
+    job = run()
+    with context.database.transaction() as connection:
+        connection.exec_driver_sql(statement)
+    report = Verifier(context).verify(job.id)
+    assert not report["ok"]
+    assert check in {entry["name"] for entry in report["checks"] if not entry["ok"]}
+
+
+@pytest.mark.parametrize("model", ["builtin/idle", "builtin/random"])
+def test_failures_are_scored_and_verified_too(context, run, model) -> None:
+    job = run(model=model)
+    assert job.success is False
+    assert job.indicator == 0.0 or job.outcome == "unsuccessful"
+    report = Verifier(context).verify(job.id)
+    assert report["ok"], [check for check in report["checks"] if not check["ok"]]
+
+
+def test_a_limit_keeps_what_was_built(context, run) -> None:
+    job = run(limits={"max_requests": 40})
+    assert (job.outcome, job.reason, job.requests) == ("limit", "max_requests", 40)
+    assert job.metrics["parts"] > 10
+    assert "machine" in context.jobs.artifacts(job.id)
+    assert Verifier(context).verify(job.id)["ok"]
+
+
+def test_a_job_that_was_never_scored_is_not_verified(context) -> None:
+    job, _ = Submissions(context, load_registry()).submit_job(
+        JobSpec(task="support-1", model="builtin/idle")
+    )
+    assert not Verifier(context).verify(job.id)["ok"]
+
+
+def test_a_missing_key_ends_the_job_as_errored(run, monkeypatch) -> None:
+    monkeypatch.delenv("OPENAI_API_KEY", raising=False)
+    job = run(model="openai/gpt-4o")
+    assert (job.outcome, job.reason) == ("errored", "missing_key")
+    assert job.success is None
+    assert "OPENAI_API_KEY" in job.detail
