@@ -52,6 +52,30 @@ actions = st.one_of(
 )
 sequences = st.lists(actions, max_size=40)
 
+assembly_ids = st.sampled_from(["A_1", "A_2", "A_3", "B_1", "B_2", "1", "2", "3"])
+letters = st.sampled_from(["A", "B", "C"])
+places = st.tuples(*[st.sampled_from([-3, -1, 0, 0.5, 2, 4])] * 3).map(list)
+turns = st.sampled_from([[90, 0, 0], [0, 45, 0], [30, 20, 10], [0, 0, -30]])
+assembly_actions = st.one_of(
+    action("add_machine", machine_id=st.sampled_from(["row", "cart"]), init_shift=places),
+    action("add_machine", machine_id=st.just("cart"), init_rotation=turns),
+    action("shift_machine", machine_index=letters, position=places),
+    action("rotate_machine", machine_index=letters, rotation=turns),
+    action("remove_machine", machine_index=letters),
+    action("attach_block_to", base_block=assembly_ids, face=labels, new_block=modules),
+    action("twist_block", block_id=assembly_ids, angle=angles),
+    action("shift_block", block_id=assembly_ids, shift_real=vectors),
+    action("remove_block", block_id=assembly_ids),
+    action(
+        "connect_blocks",
+        block_a=assembly_ids,
+        face_a=labels,
+        block_b=assembly_ids,
+        face_b=labels,
+        connector=st.sampled_from(["Brace", "Winch"]),
+    ),
+)
+
 
 def run(sequence, **start):
     machine = Machine()
@@ -180,3 +204,30 @@ def test_each_face_holds_at_most_one_block_and_mass_adds_up(sequence):
     parts = [*machine.blocks.values(), *machine.connectors.values()]
     assert machine.mass == pytest.approx(sum(part.module.mass for part in parts))
     assert machine.part_count == len(parts) == len({part.id for part in parts})
+
+
+@settings(max_examples=80)
+@given(st.lists(assembly_actions, max_size=30))
+def test_the_laws_hold_for_assemblies_too(sequence):
+    row = run([("attach_block_to", {"base_block": "1", "face": "A", "new_block": "Torch"})])
+    cart = run(
+        [("attach_block_to", {"base_block": "1", "face": "C", "new_block": "Powered Wheel"})]
+    )
+    assembly = Machine(available={"row": row, "cart": cart})
+    for name, arguments in sequence:
+        before = assembly.copy()
+        if not assembly.act(name, arguments).ok:
+            assert assembly == before
+    for left, right in itertools.combinations(assembly.blocks.values(), 2):
+        assert overlap_depth(left, right) < 1e-6, (left.id, right.id)
+    for link in assembly.connectors.values():
+        assert np.allclose(link.start_point, end_of(assembly, link.start))
+        assert np.allclose(link.end_point, end_of(assembly, link.end))
+    assert replay(assembly.log) == assembly
+    written = json.dumps(assembly.to_document(), allow_nan=False)
+    assert Machine.from_document(json.loads(written)) == assembly
+
+
+def end_of(machine, face):
+    block, label = face
+    return machine.blocks[block].face_center(label)

@@ -102,10 +102,16 @@ def draw_arguments(rng: random.Random, name):
 def test_a_hundred_thousand_malformed_calls_raise_nothing_and_break_nothing():
     rng = random.Random(20_260)
     reasons = set()
-    for _ in range(CALLS // 500):
-        machine = Machine()
+    wheel = {"base_block": "1", "face": "A", "new_block": "Powered Wheel"}
+    cart = Machine()
+    cart.act("start")
+    cart.act("attach_block_to", wheel)
+    for round_number in range(CALLS // 500):
+        # Every third machine is an assembly, of machines whose names the junk happens to hit.
+        machine = Machine(available={"A": cart, "1": cart} if round_number % 3 == 0 else None)
         machine.act("start")
-        machine.act("attach_block_to", {"base_block": 1, "face": "A", "new_block": "Powered Wheel"})
+        machine.act("attach_block_to", wheel)
+        machine.act("add_machine", {"machine_id": "A"})
         for _ in range(500):
             name = rng.choice(NAMES)
             outcome = machine.act(name, draw_arguments(rng, name))
@@ -124,6 +130,7 @@ def test_a_hundred_thousand_malformed_calls_raise_nothing_and_break_nothing():
         RefusalClass.OUT_OF_RANGE,
         RefusalClass.BAD_KEY,
         RefusalClass.BLOCK_PRESENCE,
+        RefusalClass.UNKNOWN_SUB_STRUCTURE,
     }
 
 
@@ -169,3 +176,13 @@ def test_a_missing_argument_is_named(build):
     outcome = build().act("twist_block", {"block_id": "1"})
     assert outcome.reason == RefusalClass.MALFORMED_ARGUMENTS
     assert "angle" in outcome.text
+
+
+def test_a_machine_can_not_wander_out_of_reach_step_by_step(build):
+    assembly = Machine(available={"cube": build()})
+    assembly.act("add_machine", {"machine_id": "cube", "init_shift": [1e6, 0, 0]})
+    before = assembly.copy()
+    outcome = assembly.act("shift_machine", {"machine_index": "A", "position": [1e6, 0, 0]})
+    assert outcome.reason == RefusalClass.OUT_OF_RANGE
+    assert assembly == before
+    assert Machine.from_document(assembly.to_document()) == assembly

@@ -66,7 +66,7 @@ def test_an_unknown_group_is_refused_with_the_known_ones():
     ("name", "arguments"),
     [
         ("start", {"init_shift": [0, 1.5, 0], "note": "x"}),
-        ("attach_block_to", {"base_block": 1, "face": "A", "new_block": "Torch"}),
+        ("attach_block_to", {"base_block": "1", "face": "A", "new_block": "Torch"}),
         ("twist_block", {"block_id": "2", "angle": 45}),
         ("shift_block", {"block_id": "2", "shift_real": [0.1, 0, 0]}),
         ("get_machine_summary", {}),

@@ -223,7 +223,8 @@ def _face(entry: Reader) -> FaceRef:
 
 def _pose(fields: Fields) -> Pose:
     position, quaternion = fields["position"].vector(), fields["quaternion"].numbers(4)
-    if max(map(abs, position)) > LARGEST_NUMBER:
+    # A connector may begin on a face a little beyond the farthest block's root.
+    if max(map(abs, position)) > 2 * LARGEST_NUMBER:
         fields["position"].fail(f"a position within ±{LARGEST_NUMBER:.0f}")
     if abs(sum(value * value for value in quaternion) - 1) > SHORTEST_QUATERNION:
         fields["quaternion"].fail("a quaternion of length 1")

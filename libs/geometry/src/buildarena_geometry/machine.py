@@ -14,7 +14,7 @@ from .json_values import json_value
 from .log import ActionLog, ActionRecord
 from .measures import bounds, center_of_mass
 from .outcomes import Accepted, Cause, Outcome, Refused
-from .parameters import RefusalError, shown
+from .parameters import LARGEST_NUMBER, RefusalError, shown
 from .state import MachineState
 from .tools import ACTIONS
 
@@ -250,6 +250,7 @@ class Machine:
     def _carry_out(self, change: Change) -> Accepted:
         world = self._collision_world()
         placed = [change.after.blocks[block] for block in change.placed]
+        _require_reach(placed)
         pairs = world.overlaps(placed)
         if pairs:
             raise _overlap(change, pairs)
@@ -283,6 +284,16 @@ def replay(log: ActionLog) -> Machine:
     for record in log:
         machine.act(record.name, record.arguments)
     return machine
+
+
+def _require_reach(blocks: Iterable[Block]) -> None:
+    """Refuses blocks so far out that coordinates lose the digits overlaps are judged by."""
+    for block in blocks:
+        if max(map(abs, block.world_from_block.xyz)) > LARGEST_NUMBER:
+            raise RefusalError(
+                Cause.OUT_OF_RANGE,
+                f"Block {block.id} would lie farther out than {LARGEST_NUMBER:.0f}.",
+            )
 
 
 def _overlap(change: Change, pairs: list[tuple[str, str]]) -> RefusalError:

@@ -122,7 +122,8 @@ _VECTOR_SCHEMA: JsonSchema = {
     "maxItems": 3,
 }
 
-BlockId = Annotated[str, Parameter({"type": ["string", "integer"]}, _read_id)]
+# Whole numbers are read too; the schema says text because not every provider takes two types.
+BlockId = Annotated[str, Parameter({"type": "string"}, _read_id)]
 Name = Annotated[str, Parameter({"type": "string"}, _read_text)]
 Key = Annotated[str, Parameter({"type": "string", "enum": list(KEYS)}, _read_text)]
 Note = Annotated[str, Parameter({"type": "string", "maxLength": LONGEST_TEXT}, _read_note)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from typing import TYPE_CHECKING
 
 from .words import caption, counted, listing, number, plain, point, rolling
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
     from buildarena_geometry.rotations import Vector
     from buildarena_geometry.state import MachineState
 
+LONGEST_NOTE = 80  # characters of a note that are shown
 FLUSH_OFFSET = 1e-6  # units; a joint whose sides are nearer sits flush
 
 
@@ -197,4 +199,7 @@ def _ends(link: Connector) -> tuple[str, str]:
 
 
 def _note(note: str) -> str:
-    return f" — {note}" if note else ""
+    """A note on one line, cut short: it comes back in every summary."""
+    if not note.strip():
+        return ""
+    return f" — {textwrap.shorten(note, LONGEST_NOTE, placeholder='…')}"
