@@ -158,6 +158,7 @@ def deck(
     along: str = "",
     rails: bool = False,
     pillars: int = 0,
+    pillar_at: Sequence[tuple[int, int]] = ((0, 1), (0, -1)),
 ) -> Actions:
     """A deck of rows along north-south that hang on one row along east-west.
 
@@ -167,7 +168,8 @@ def deck(
         cross: Whether every east-west seam is braced on top.
         along: Braces along the rows, as in `beam`.
         rails: Whether three blocks stand at the middle of each long side.
-        pillars: Height of two pillars below the blocks next to the middle.
+        pillars: Height of the pillars below the deck; 0 for none.
+        pillar_at: Where they are: row and block, counted from the middle.
     """
     draft = Draft()
     middle = draft.start()
@@ -185,8 +187,8 @@ def deck(
         for x in (xs[0], xs[-1]):
             for y in (-1, 0, 1):
                 draft.attach(grid[x, y], UP)
-    for y in (1, -1) if pillars else ():
-        draft.row(grid[0, y], DOWN, pillars)
+    for place in pillar_at if pillars else ():
+        draft.row(grid[place], DOWN, pillars)
     if cross:
         for y in ys:
             for x in xs[:-1]:
@@ -348,23 +350,39 @@ def paired_engine() -> Actions:
     return draft.actions
 
 
-def rocket_assembly(*, brace_frame: bool = True) -> tuple[dict[str, Actions], Actions]:
+def waist_engine() -> Actions:
+    """A cannon and a torch beside it whose flame is level with the cannon's narrow middle."""
+    draft = Draft()
+    middle = draft.start()
+    cannon = draft.cannon(middle, EAST, DOWN)
+    post = draft.row(middle, NORTH, 1)[-1]
+    low = draft.row(post, DOWN, 1)[-1]
+    torch = draft.torch(low, EAST, UP)
+    # Flame a quarter off the cannon's side, at the height of its waist.
+    draft.do("shift_block", block_id=torch, shift_real=[0, -0.25, -0.125])
+    draft.bind(cannon, "hold_to_fire", "Alpha1")
+    return draft.actions
+
+
+def rocket_assembly(
+    *, sides: Sequence[Direction] = SIDES, heated: bool = True
+) -> tuple[dict[str, Actions], Actions]:
     """An engine under a cross-shaped frame: the sub-structures by name, and the assembly's log.
 
     Args:
-        brace_frame: Whether the frame is braced to the engine; else it lies loosely on it.
+        sides: On which sides of the engine's starting block a cannon sits.
+        heated: Whether there are torches.
     """
     draft = Draft()
     middle = draft.start()
     for side in SIDES:
         draft.row(middle, side, 2)
-    parts = {"engine": rocket(), "frame": draft.actions}
+    parts = {"engine": rocket(sides, heated=heated), "frame": draft.actions}
     whole = Draft({name: replayed(actions) for name, actions in parts.items()})
     whole.do("add_machine", machine_id="frame", init_shift=[0, 0, 2])
     whole.do("add_machine", machine_id="engine", init_shift=[0, 0, 0])
-    if brace_frame:
-        for side in SIDES:
-            whole.link("A_1", side, "B_1", UP)
+    for side in SIDES:
+        whole.link("A_1", side, "B_1", UP)
     return parts, whole.actions
 
 

@@ -41,7 +41,7 @@ def test_the_one_shot_bridge_carries_what_the_paper_reports(
     assert result.indicator >= 900.0
     first = trajectory.breaks[0]
     assert first.cargo_mass is not None
-    assert first.cargo_mass > 800.0  # not on the landing
+    assert first.cargo_mass > 500.0  # the landing does not break it
 
 
 def test_a_beam_that_is_too_short_for_the_gap_scores_nothing(

@@ -13,6 +13,9 @@ from buildarena_simulation.structure.contacts import ContactForces
 from buildarena_simulation.structure.model import FloatArray
 from buildarena_simulation.structure.motion import Motion
 
+_WORLD: Final = -1
+"""Ground and terrain count as one body."""
+
 _TOUCHING: Final = 0.005
 """Points nearer than this touch, though the solver may have given them no force, units."""
 
@@ -22,6 +25,8 @@ def read_contacts(
     cluster_of_link: Mapping[tuple[int, int], int],
     shapes: Sequence[ShapeTable],
     motion: Motion,
+    *,
+    outsiders: Mapping[int, int],
 ) -> ContactForces:
     """The contact forces on all blocks.
 
@@ -30,6 +35,7 @@ def read_contacts(
         cluster_of_link: Cluster of each body and link.
         shapes: (C,) shapes of each cluster.
         motion: Where the clusters are.
+        outsiders: A negative number of its own for each moving body that is no cluster.
     """
     rows: dict[int, list[tuple[float, ...]]] = {}
     for contact in contacts:
@@ -44,10 +50,10 @@ def read_contacts(
         first = cluster_of_link.get((contact[1], contact[3]))
         second = cluster_of_link.get((contact[2], contact[4]))
         if first is not None:
-            other = -contact[2] - 1 if second is None else second
+            other = outsiders.get(contact[2], _WORLD) if second is None else second
             rows.setdefault(first, []).append((*contact[5], x, y, z, nx, ny, nz, other))
         if second is not None:
-            other = -contact[1] - 1 if first is None else first
+            other = outsiders.get(contact[1], _WORLD) if first is None else first
             rows.setdefault(second, []).append((*contact[6], -x, -y, -z, -nx, -ny, -nz, other))
     return _gathered(
         [_to_blocks(np.array(table), c, shapes[c], motion) for c, table in sorted(rows.items())]

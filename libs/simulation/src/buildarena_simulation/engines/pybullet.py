@@ -80,6 +80,7 @@ _STEPS_PER_EVALUATION = 10
 _ITERATIONS = 50
 _RESIDUAL = 1e-9
 _SPEED_CAP = 1e5
+_CARGO = -2
 _ORIGIN = (0.0, 0.0, 0.0)
 _GROUND_REACH = 2000.0
 
@@ -417,7 +418,10 @@ class PyBulletEngine:
 
     def _read_contacts(self) -> ContactForces:
         contacts = pybullet.getContactPoints(**self._client)
-        return read_contacts(contacts, self._cluster_of_link, self._shapes, self._motion)
+        outsiders = {} if self._cargo is None else {self._cargo: _CARGO}
+        return read_contacts(
+            contacts, self._cluster_of_link, self._shapes, self._motion, outsiders=outsiders
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -44,7 +44,7 @@ class ContactForces:
 
     Attributes:
         block: (K,) block each acts on.
-        other: (K,) any number that tells the body on the other side.
+        other: (K,) any number that tells the body on the other side; ground and terrain are one.
         weight: (K,) share of the point that belongs to the block, above 0, at most 1.
         normal: (K, 3) unit vector from the other body to the block, world frame.
         point: (K, 3) world frame, units.
@@ -114,7 +114,7 @@ def _spread(contacts: ContactForces, patch: IntArray, count: int) -> FloatArray:
         patch, np.concatenate([contacts.force, cross(x, contacts.force)], axis=1), count
     )
     total, moment = load[:, :3], load[:, 3:]
-    weight = contacts.weight
+    weight = contacts.weight / _points_beside(contacts, patch)
     for _ in range(_ROUNDS):
         spread = _even(x, weight, patch, total, moment)
         pulling = (spread * normal[patch]).sum(axis=1) < 0.0
@@ -125,6 +125,16 @@ def _spread(contacts: ContactForces, patch: IntArray, count: int) -> FloatArray:
         # A patch that would lose all its points stays as it was.
         weight = np.where(whole[patch] > 0.0, kept, weight)
     return spread
+
+
+def _points_beside(contacts: ContactForces, patch: IntArray) -> FloatArray:
+    """Number of points its block has in its patch, for each contact.
+
+    A patch is shared by its blocks alike: how many points a block has is the solver's choice.
+    """
+    key = patch * (int(contacts.block.max()) + 1) + contacts.block
+    _, which = np.unique(key, return_inverse=True)
+    return np.bincount(which, contacts.weight)[which]
 
 
 def _even(

@@ -1,0 +1,210 @@
+"""Clusters, joints and loads, without any engine."""
+
+import math
+
+import numpy as np
+import pytest
+from buildarena_geometry import Machine
+from buildarena_simulation.constants import JointKind
+from buildarena_simulation.machine import structure_of
+from buildarena_simulation.structure.clusters import Clusters, find_clusters
+from buildarena_simulation.structure.contacts import ContactForces, evenly_shared
+from buildarena_simulation.structure.model import JOINT_KINDS, Structure
+from buildarena_simulation.structure.motion import Motion
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.simulation.reference_designs import (
+    DOWN,
+    EAST,
+    NORTH,
+    SOUTH,
+    UP,
+    WEST,
+    Draft,
+    beam,
+    car,
+    deck,
+    replayed,
+)
+
+
+def _clusters(structure: Structure) -> Clusters:
+    return find_clusters(structure, np.ones(len(structure.members), dtype=bool))
+
+
+def _kinds(machine: Machine) -> list[JointKind]:
+    return [JOINT_KINDS[k] for k in structure_of(machine).members.kind]
+
+
+def test_a_beam_is_one_cluster_and_a_car_five() -> None:
+    assert len(_clusters(structure_of(replayed(beam(7))))) == 1
+    clusters = _clusters(structure_of(replayed(car())))
+    assert len(clusters) == 5
+    assert len(clusters.pieces) == 1
+    assert (clusters.parent[1:] == 0).all()
+    assert clusters.wheel_is_outer[1:].all()
+
+
+def test_a_block_on_a_wheels_outer_face_turns_with_it() -> None:
+    draft = Draft()
+    wheel = draft.wheel(draft.start(), EAST)
+    draft.attach(wheel, EAST)
+    structure = structure_of(draft.machine)
+    clusters = _clusters(structure)
+    assert sorted(map(len, clusters.blocks)) == [1, 2]
+    # The larger cluster is the root, so the wheel's mount hangs on it.
+    assert not clusters.wheel_is_outer[1]
+
+
+def test_a_brace_across_an_axle_locks_it() -> None:
+    draft = Draft()
+    middle = draft.start()
+    wheel = draft.wheel(middle, EAST)
+    outer = draft.attach(wheel, EAST)
+    draft.connect(middle, outer, UP)
+    assert len(_clusters(structure_of(draft.machine))) == 1
+
+
+def test_a_second_axle_on_the_same_line_leaves_the_first_free() -> None:
+    draft = Draft()
+    middle = draft.start()
+    right = draft.attach(draft.wheel(middle, EAST), EAST)
+    left = draft.attach(draft.wheel(middle, WEST), WEST)
+    draft.connect(left, right, UP)
+    assert len(_clusters(structure_of(draft.machine))) == 2
+
+
+def test_a_second_axle_beside_the_first_locks_both() -> None:
+    draft = Draft()
+    middle = draft.start()
+    other = draft.row(middle, NORTH, 2)[-1]
+    first = draft.attach(draft.wheel(middle, EAST), EAST)
+    second = draft.attach(draft.wheel(other, EAST), EAST)
+    draft.connect(first, second, UP)
+    assert len(_clusters(structure_of(draft.machine))) == 1
+
+
+def test_a_small_blocks_far_end_grabs_what_it_touches() -> None:
+    draft = Draft()
+    middle = draft.start()
+    above = draft.row(middle, UP, 1)[-1]
+    end = draft.row(above, EAST, 1)[-1]
+    side = draft.row(middle, EAST, 1)[-1]
+    assert JointKind.FAR_JOINT not in _kinds(draft.machine)
+    corner = draft.row(side, EAST, 1)[-1]
+    draft.row(corner, UP, 1)  # its end looks up, it only stands beside the other
+    assert JointKind.FAR_JOINT not in _kinds(draft.machine)
+    ring = Draft()
+    a = ring.start()
+    b = ring.row(a, EAST, 1)[-1]
+    c = ring.row(b, UP, 1)[-1]
+    d = ring.row(a, UP, 2)[-1]
+    ring.row(d, EAST, 1)  # its end looks east
+    assert _kinds(ring.machine).count(JointKind.FAR_JOINT) == 0
+    ring.row(c, UP, 1)
+    del end
+    closing = Draft()
+    e = closing.start()
+    top = closing.row(closing.row(e, EAST, 2)[-1], UP, 2)[-1]
+    closing.row(top, WEST, 1)
+    over = closing.row(e, UP, 2)[-1]
+    closing.row(over, EAST, 0)
+    assert _kinds(closing.machine).count(JointKind.FAR_JOINT) == 1
+    del c, over
+
+
+def test_a_joint_moved_too_far_apart_does_not_hold() -> None:
+    draft = Draft()
+    middle = draft.start()
+    block = draft.attach(middle, NORTH)
+    assert len(_clusters(structure_of(draft.machine))) == 1
+    draft.do("shift_block", block_id=block, shift_real=[0, 0.3, 0])
+    draft.do("shift_block", block_id=block, shift_real=[0, 0.3, 0])
+    assert len(_clusters(structure_of(draft.machine)).pieces) == 2
+
+
+def test_mass_and_inertia_are_those_of_the_blocks_and_brace_halves() -> None:
+    machine = replayed(deck(3, 5, cross=True))
+    structure = structure_of(machine)
+    clusters = _clusters(structure)
+    assert clusters.mass[0] == pytest.approx(machine.mass)
+    assert clusters.center_of_mass[0] == pytest.approx(machine.center_of_mass, abs=1e-9)
+    lone = structure_of(replayed(beam(7)))
+    along, across = sorted(np.linalg.eigvalsh(_clusters(lone).inertia[0]))[::2]
+    masses = [0.25, *[0.3] * 6]
+    assert along == pytest.approx(sum(masses) / 6)
+    distances = [0, 1, 2, 3, 1, 2, 3]
+    expected = sum(m * (1 / 6 + d**2) for m, d in zip(masses, distances, strict=True))
+    assert across == pytest.approx(expected)
+
+
+vectors = st.tuples(*[st.floats(-5, 5)] * 3).map(np.array)
+
+
+@given(vectors, vectors, st.integers(0, 20))
+@settings(max_examples=40, deadline=None)
+def test_a_break_keeps_linear_and_angular_momentum(
+    velocity: np.ndarray, spin: np.ndarray, broken: int
+) -> None:
+    structure = structure_of(replayed(deck(3, 7)))
+    before = _clusters(structure)
+    holds = np.ones(len(structure.members), dtype=bool)
+    holds[broken % len(holds)] = False
+    after = find_clusters(structure, holds)
+    angle = float(np.linalg.norm(spin)) or 1.0
+    x, y, z = spin / angle
+    k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    rotation = np.eye(3) + math.sin(angle) * k + (1 - math.cos(angle)) * k @ k
+    motion = Motion(
+        position=velocity[None] + 3.0,
+        rotation=rotation[None],
+        velocity=velocity[None],
+        spin=spin[None],
+    )
+    split = motion.after_break(before, after)
+
+    def momenta(clusters: Clusters, moving: Motion) -> tuple[np.ndarray, np.ndarray]:
+        linear = (clusters.mass[:, None] * moving.velocity).sum(axis=0)
+        turned = moving.rotation @ clusters.inertia @ moving.rotation.transpose(0, 2, 1)
+        own = (turned @ moving.spin[:, :, None])[:, :, 0]
+        orbit = np.cross(
+            moving.centers_of_mass(clusters), clusters.mass[:, None] * moving.velocity
+        )
+        return linear, (own + orbit).sum(axis=0)
+
+    for kept, now in zip(momenta(before, motion), momenta(after, split), strict=True):
+        assert np.allclose(kept, now, atol=1e-8)
+
+
+@given(st.lists(st.tuples(vectors, vectors), min_size=2, max_size=12))
+@settings(max_examples=60, deadline=None)
+def test_sharing_a_patch_evenly_keeps_its_resultant(
+    contacts: list[tuple[np.ndarray, np.ndarray]],
+) -> None:
+    point = np.array([p for p, _ in contacts])
+    force = np.array([f for _, f in contacts])
+    force[:, 2] = np.abs(force[:, 2]) + 20.0
+    count = len(point)
+    given_ = ContactForces(
+        block=np.arange(count),
+        other=np.full(count, -1),
+        weight=np.ones(count),
+        normal=np.tile([0.0, 0.0, 1.0], (count, 1)),
+        point=point,
+        force=force,
+    )
+    shared = evenly_shared(given_, np.zeros(count, dtype=np.int64))
+    assert np.allclose(shared.force.sum(axis=0), force.sum(axis=0), atol=1e-6)
+    apart = np.linalg.svd(point - point.mean(axis=0), compute_uv=False)
+    if apart[min(1, len(apart) - 1)] > 0.5 and (shared.force[:, 2] > 1e-6).all():
+        kept = np.cross(point, force).sum(axis=0)
+        now = np.cross(point, shared.force).sum(axis=0)
+        assert np.allclose(now, kept, atol=1e-3 * (1.0 + np.abs(kept).max()))
+
+
+def test_south_and_down_faces_carry_as_north_and_up_do() -> None:
+    for way in (NORTH, SOUTH, UP, DOWN):
+        draft = Draft()
+        draft.row(draft.start(), way, 3)
+        assert _kinds(draft.machine) == [JointKind.ATTACHMENT] * 3

@@ -1,0 +1,87 @@
+"""Trajectories: what they hold, and that their files give it back."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from buildarena_benchmark import Task
+from buildarena_simulation import (
+    SIMULATION_VERSION,
+    Trajectory,
+    TrajectoryFormatError,
+    engine_version,
+    simulate,
+)
+from buildarena_simulation.engines.base import rotation_of
+
+from tests.simulation.reference_designs import car, one_shot_bridge, replayed, rocket
+
+
+def _equal(first: Trajectory, second: Trajectory) -> bool:
+    for field in dataclasses.fields(Trajectory):
+        a, b = getattr(first, field.name), getattr(second, field.name)
+        same = np.array_equal(a, b) if isinstance(a, np.ndarray) else a == b
+        if not same:
+            return False
+    return True
+
+
+def test_a_file_gives_back_the_trajectory(tasks: dict[str, Task]) -> None:
+    bridge = simulate(replayed(one_shot_bridge()), tasks["support-1"].scenario, "mujoco")
+    scenario = tasks["lift-1"].scenario.model_copy(update={"duration_s": 1.0})
+    engine = simulate(replayed(rocket()), scenario, "mujoco")
+    for trajectory in (bridge, engine):
+        data = trajectory.to_parquet()
+        assert _equal(Trajectory.from_parquet(data), trajectory)
+        assert Trajectory.from_parquet(data).to_parquet() == data
+    assert len(bridge.to_parquet()) < 250_000  # 51 blocks, 17 s, most of it falling debris
+
+
+def test_a_trajectory_tells_where_it_is_from(engine: str, tasks: dict[str, Task]) -> None:
+    scenario = tasks["lift-1"].scenario.model_copy(update={"duration_s": 0.4})
+    trajectory = simulate(replayed(rocket()), scenario, engine)
+    assert (trajectory.engine, trajectory.engine_version) == (engine, engine_version(engine))
+    assert trajectory.simulation_version == SIMULATION_VERSION
+    assert {"time_step_s", "gravity", "scenario"} <= set(trajectory.settings)
+
+
+def test_samples_are_taken_at_25_hz_from_the_start_on(tasks: dict[str, Task]) -> None:
+    scenario = tasks["support-1"].scenario.model_copy(update={"duration_s": 2.0})
+    trajectory = simulate(replayed(one_shot_bridge()), scenario, "mujoco")
+    assert np.allclose(trajectory.time_s, np.arange(51) / 25)
+    assert trajectory.cargo_mass is not None
+    assert trajectory.cargo_mass[0] == pytest.approx(5 + 1495 * 0.005)
+    assert trajectory.cargo_mass[-1] == pytest.approx(5 + 1495 * 0.1)
+
+
+def test_positions_are_the_points_shown_to_models(engine: str, tasks: dict[str, Task]) -> None:
+    machine = replayed(car())
+    scenario = tasks["transport-1"].scenario.model_copy(update={"duration_s": 0.04})
+    trajectory = simulate(machine, scenario, engine)
+    lift = trajectory.positions[0, 0] - machine.blocks["1"].center
+    for k, block in enumerate(machine.blocks.values()):
+        assert np.allclose(trajectory.positions[0, k], block.center + lift, atol=1e-4)
+        turn = rotation_of(trajectory.quaternions[0, k].astype(float))
+        assert np.allclose(turn, block.world_from_block.rotation, atol=1e-4)
+
+
+def test_only_tracked_blocks_are_recorded(tasks: dict[str, Task]) -> None:
+    scenario = tasks["transport-1"].scenario.model_copy(
+        update={"duration_s": 0.2, "tracked_blocks": ("1", "3")}
+    )
+    trajectory = simulate(replayed(car()), scenario, "mujoco")
+    assert trajectory.block_ids == ("1", "3")
+    assert trajectory.positions.shape == (6, 2, 3)
+
+
+def test_arrays_are_read_only(tasks: dict[str, Task]) -> None:
+    scenario = tasks["lift-1"].scenario.model_copy(update={"duration_s": 0.2})
+    trajectory = simulate(replayed(rocket()), scenario, "mujoco")
+    with pytest.raises(ValueError, match="read-only"):
+        trajectory.positions[0] = 0.0
+
+
+@pytest.mark.parametrize("data", [b"", b"PAR1", b"not a parquet file at all" * 10])
+def test_other_bytes_are_refused(data: bytes) -> None:
+    with pytest.raises(TrajectoryFormatError):
+        Trajectory.from_parquet(data)
