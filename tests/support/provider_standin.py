@@ -96,6 +96,11 @@ class _Handler(BaseHTTPRequestHandler):
             error = {"error": {"message": "stand-in says no", "type": "error", "status": "X"}}
             self._send(int(fault), error, {"retry-after": "0"} if fault == "429" else {})
             return
+        if fault == "overflow":
+            message = "This model's maximum context length is 8192 tokens."
+            code = {"message": message, "type": "invalid_request_error"}
+            self._send(400, {"error": {**code, "code": "context_length_exceeded"}}, {})
+            return
         if fault == "garbage":
             self._send(200, {"nothing": "here"}, {})
             return
@@ -187,7 +192,7 @@ class _OpenAI:
             "choices": [
                 {
                     "index": 0,
-                    "finish_reason": "tool_calls" if calls else "stop",
+                    "finish_reason": "tool_calls" if calls else reply.finish,
                     "message": message,
                 }
             ],

@@ -8,6 +8,7 @@ from provider_standin import ProviderStandIn
 from buildarena_pipeline.errors import PassingFaultError, PermanentFaultError
 from buildarena_pipeline.models import ModelEntry, Price, ProviderEntry
 from buildarena_store import Usage
+from buildarena_worker.errors import ConstructionFailedError
 from buildarena_worker.llm.provider import ProviderClient
 from buildarena_worker.llm.retries import RetryPolicy
 from buildarena_worker.messages import Message, Reply, Request, ToolCall
@@ -148,3 +149,23 @@ def test_retry_after_is_honoured_within_bounds() -> None:
     assert policy.wait_s(1, {"retry-after-ms": "250"}, rng) == 0.25
     assert all(4 <= policy.wait_s(4, None, rng) <= 8 for _ in range(20))
     assert policy.wait_s(20, {"retry-after": "soon"}, rng) <= 60
+
+
+def overflow(_: int) -> str:
+    return "overflow"
+
+
+def test_an_overflowing_context_is_the_models_own_failure(play, client) -> None:
+    with ProviderStandIn("idle", fault=overflow) as standin:
+        failure = play(client=client(standin)).failure
+    assert isinstance(failure, ConstructionFailedError)
+    assert failure.reason == "context_overflow"
+    assert standin.counts.requests == 1
+
+
+@pytest.mark.parametrize("finish", ["length", "content_filter"])
+def test_cut_and_filtered_replies_are_marked_in_the_transcript(play, client, finish) -> None:
+    with ProviderStandIn(respond=lambda _: Reply(text="half a", finish=finish)) as standin:
+        played = play(client=client(standin))
+    assert [turn.finish for turn in played.session.transcript.turns] == [finish, finish]
+    assert played.failure.reason == "plan_unreadable"

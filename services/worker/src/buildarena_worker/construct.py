@@ -47,7 +47,7 @@ class ConstructHandler:
 
     def __init__(self, context: Context, registry: ModelRegistry) -> None:
         self._context = context
-        self._clients = ModelClients(registry)
+        self._clients = ModelClients(registry, context.settings.broker_url)
         self._packs = PromptPacks(context.settings.prompt_packs)
         self._workflows = Workflows(context.settings.workflows)
 

@@ -57,12 +57,21 @@ class Session:
     def ask(
         self, messages: Sequence[Message], tools: Sequence[Tool], *, stage: str, role: str
     ) -> tuple[Reply, JournalEntry]:
-        """The model's reply to a conversation."""
+        """The model's reply to a conversation.
+
+        Raises:
+            ConstructionFailedError: The conversation outgrew the model's context.
+        """
         request = Request(
             model_config=self._model_config, messages=messages, tools=tools, seed=self.seed
         )
         entry = self.io.ask(request, stage=stage, role=role)
-        return Reply.from_json(entry.reply), entry
+        reply = Reply.from_json(entry.reply)
+        if reply.finish == "context_overflow":
+            raise ConstructionFailedError(
+                "context_overflow", f"the {role}'s conversation outgrew the model's context"
+            )
+        return reply, entry
 
     def record(
         self,

@@ -17,10 +17,12 @@ class ModelClients:
 
     Args:
         registry: Models and providers.
+        throttle_url: Where the providers' shared limits live; None for no limits.
     """
 
-    def __init__(self, registry: ModelRegistry) -> None:
+    def __init__(self, registry: ModelRegistry, throttle_url: str | None = None) -> None:
         self._registry = registry
+        self._throttle_url = throttle_url
         self._clients: dict[str, ModelClient] = {}
         self._guard = threading.Lock()
 
@@ -46,5 +48,7 @@ class ModelClients:
         if provider.wire == "builtin":
             return BuiltinClient(entry.model)
         from buildarena_worker.llm.provider import ProviderClient
+        from buildarena_worker.llm.throttle import Throttle
 
-        return ProviderClient(entry, provider)
+        throttle = Throttle(self._throttle_url, entry.provider)
+        return ProviderClient(entry, provider, throttle=throttle)

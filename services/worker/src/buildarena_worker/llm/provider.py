@@ -23,7 +23,9 @@ from pydantic_ai.exceptions import (
     ModelContextWindowExceededError,
     ModelHTTPError,
     ModelNotFoundError,
+    ModelOverloadedError,
     ModelQuotaExceededError,
+    ModelRateLimitError,
 )
 from pydantic_ai.messages import ModelResponse
 from pydantic_ai.models import Model
@@ -34,6 +36,7 @@ from buildarena_pipeline.models import ModelEntry, ProviderEntry
 from buildarena_store import Usage
 from buildarena_worker.llm.prices import price_usd
 from buildarena_worker.llm.retries import RetryPolicy
+from buildarena_worker.llm.throttle import Throttle
 from buildarena_worker.llm.wire import from_wire, request_parameters, to_wire
 from buildarena_worker.messages import Reply, Request
 from buildarena_worker.session_io import Answer
@@ -59,11 +62,17 @@ class ProviderClient:
         entry: The model.
         provider: How its provider is reached.
         policy: How often and how long to try.
+        throttle: The provider's shared limit of open requests; none by default.
     """
 
     def __init__(
-        self, entry: ModelEntry, provider: ProviderEntry, policy: RetryPolicy | None = None
+        self,
+        entry: ModelEntry,
+        provider: ProviderEntry,
+        policy: RetryPolicy | None = None,
+        throttle: Throttle | None = None,
     ) -> None:
+        self._throttle = throttle or Throttle(None, entry.provider)
         self._entry = entry
         self._policy = policy or RetryPolicy()
         self._wire = provider.wire
@@ -81,23 +90,18 @@ class ProviderClient:
 
     def close(self) -> None:
         """Closes the connections to the provider."""
-        asyncio.run_coroutine_threadsafe(self._close(), _loop()).result()
+
+        async def close() -> None:
+            await self._close()
+            await self._throttle.close()
+
+        asyncio.run_coroutine_threadsafe(close(), _loop()).result()
 
     async def _complete(self, request: Request) -> Answer:
         started = time.monotonic()
-        messages, parameters = to_wire(request.messages), request_parameters(request.tools)
-        settings = self._settings(request)
         for tries in range(1, self._policy.tries + 1):
             try:
-                response = await asyncio.wait_for(
-                    model_request(
-                        self._model,
-                        messages,
-                        model_settings=settings,
-                        model_request_parameters=parameters,
-                    ),
-                    timeout=self._policy.timeout_s,
-                )
+                response = await self._send(request)
             except ModelContextWindowExceededError as error:
                 return _own_failure("context_overflow", str(error), started, tries)
             except ContentFilterError as error:
@@ -117,6 +121,25 @@ class ProviderClient:
             else:
                 return self._answer(response, time.monotonic() - started, tries)
         raise AssertionError("the last try returns or raises")
+
+    async def _send(self, request: Request) -> ModelResponse:
+        """Sends a request once, when the provider's shared limit lets it."""
+        async with self._throttle.slot() as slot:
+            try:
+                response = await asyncio.wait_for(
+                    model_request(
+                        self._model,
+                        to_wire(request.messages),
+                        model_settings=self._settings(request),
+                        model_request_parameters=request_parameters(request.tools),
+                    ),
+                    timeout=self._policy.timeout_s,
+                )
+            except (ModelRateLimitError, ModelOverloadedError):
+                slot.was_too_much()
+                raise
+            slot.went_well()
+            return response
 
     def _settings(self, request: Request) -> ModelSettings:
         decoding: Mapping[str, Any] = request.model_config["decoding"]

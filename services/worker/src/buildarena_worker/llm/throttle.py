@@ -1,0 +1,121 @@
+"""How many requests may be open at a provider at once, over all workers.
+
+The limit adapts: it grows by about one for each limit's worth of answers and halves when the
+provider says that it is too much (additive increase, multiplicative decrease; Chiu and Jain,
+1989). It lives in the broker's key-value store; without it, each process goes on by itself.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import random
+import uuid
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from typing import Any
+
+import structlog
+from redis.asyncio import Redis
+from redis.exceptions import RedisError
+
+log = structlog.get_logger(__name__)
+
+START, LEAST, MOST = 32.0, 1.0, 2048.0
+HOLD_S = 900
+"""A slot whose holder died is free again after this time; no request may take longer."""
+CALM_S = 2
+"""Several complaints within this time count as one: they speak of the same crowd."""
+
+_TAKE = """
+local now = tonumber(redis.call('TIME')[1])
+redis.call('ZREMRANGEBYSCORE', KEYS[1], '-inf', now)
+local limit = tonumber(redis.call('GET', KEYS[2]) or ARGV[3])
+if redis.call('ZCARD', KEYS[1]) >= math.floor(limit) then return 0 end
+redis.call('ZADD', KEYS[1], now + tonumber(ARGV[2]), ARGV[1])
+redis.call('EXPIRE', KEYS[1], tonumber(ARGV[2]) * 2)
+return 1
+"""
+_GIVE = """
+redis.call('ZREM', KEYS[1], ARGV[1])
+local limit = tonumber(redis.call('GET', KEYS[2]) or ARGV[3])
+if ARGV[2] == 'grow' then
+  limit = math.min(tonumber(ARGV[5]), limit + 1 / limit)
+elseif ARGV[2] == 'shrink' and redis.call('SET', KEYS[3], 1, 'NX', 'EX', ARGV[6]) then
+  limit = math.max(tonumber(ARGV[4]), limit / 2)
+end
+redis.call('SET', KEYS[2], tostring(limit), 'EX', 86400)
+return tostring(limit)
+"""
+
+
+class Throttle:
+    """The shared limit of one provider.
+
+    Args:
+        url: ``redis://…`` of the key-value store, or None to never wait.
+        provider: The provider's name.
+        start: The limit to begin with.
+    """
+
+    def __init__(self, url: str | None, provider: str, *, start: float = START) -> None:
+        self._redis: Any = None if url is None else Redis.from_url(url, socket_timeout=5)
+        self._keys = [
+            f"buildarena:throttle:{provider}:{part}" for part in ("open", "limit", "calm")
+        ]
+        self._start = start
+
+    @asynccontextmanager
+    async def slot(self) -> AsyncIterator[Slot]:
+        """Waits for a free slot and holds it inside the block; say there how it went."""
+        slot = Slot()
+        taken = await self._take(slot.id)
+        try:
+            yield slot
+        finally:
+            if taken:
+                await self._give(slot)
+
+    async def limit(self) -> float:
+        """The limit now."""
+        raw = None if self._redis is None else await self._redis.get(self._keys[1])
+        return self._start if raw is None else float(raw)
+
+    async def close(self) -> None:
+        """Closes the connections."""
+        if self._redis is not None:
+            await self._redis.aclose()
+
+    async def _take(self, slot_id: str) -> bool:
+        while self._redis is not None:
+            try:
+                arguments = [slot_id, HOLD_S, self._start]
+                if await self._redis.eval(_TAKE, 2, *self._keys[:2], *arguments):
+                    return True
+            except (RedisError, OSError) as error:
+                log.warning("throttle_unreachable", error=str(error))
+                return False
+            await asyncio.sleep(random.uniform(0.02, 0.1))  # noqa: S311 - spreads waits
+        return False
+
+    async def _give(self, slot: Slot) -> None:
+        arguments = [slot.id, slot.verdict, self._start, LEAST, MOST, CALM_S]
+        try:
+            await self._redis.eval(_GIVE, 3, *self._keys, *arguments)
+        except (RedisError, OSError) as error:
+            log.warning("throttle_unreachable", error=str(error))
+
+
+class Slot:
+    """One open request."""
+
+    def __init__(self) -> None:
+        self.id = uuid.uuid4().hex
+        self.verdict = "keep"
+
+    def went_well(self) -> None:
+        """The provider answered: it may take a little more."""
+        self.verdict = "grow"
+
+    def was_too_much(self) -> None:
+        """The provider complained of the load: halve it."""
+        self.verdict = "shrink"
