@@ -194,3 +194,21 @@ def test_the_twenty_seventh_sub_structure_is_called_aa(build):
     for index in range(28):
         assert add(assembly, "cube", init_shift=[2 * index, 0, 0]).ok
     assert list(assembly.sub_structures)[25:] == ["Z", "AA", "AB"]
+
+
+def test_moved_blocks_collide_where_they_are_and_not_where_they_were(assembly):
+    add(assembly, "tower")
+    add(assembly, "tower", init_shift=[0, 5, 0])
+    away = {"machine_index": "B", "position": [0, 0, 40]}
+    assert assembly.act("shift_machine", away).ok
+    assert add(assembly, "tower", init_shift=[0, 5, 0]).ok
+    there = add(assembly, "deck", init_shift=[0, 5, 40])
+    assert there.reason == RefusalClass.OVERLAP
+    assert ("D_1", "B_1") in there.overlaps
+
+
+def test_removed_blocks_leave_their_place_to_others(build):
+    machine = build(("1", "A", "Small Wooden Block"), ("2", "E", "Powered Wheel"))
+    machine.act("remove_block", {"block_id": "3"})
+    torch = {"base_block": "2", "face": "E", "new_block": "Torch"}
+    assert machine.act("attach_block_to", torch).ok

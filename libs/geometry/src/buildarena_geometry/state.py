@@ -11,13 +11,14 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from .blocks import Block, Connector, FaceRef, Joint, KeyPress
-from .rotations import distance
+from .rotations import distance, subtract
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
+    from collections.abc import Iterable, Iterator, Mapping, Set
 
     from .modules import Catalogue
     from .poses import Pose
+    from .rotations import Vector
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -171,7 +172,7 @@ class MachineState:
 
 
 def follow(
-    connectors: Mapping[str, Connector], blocks: Mapping[str, Block], moved: Iterable[str]
+    connectors: Mapping[str, Connector], blocks: Mapping[str, Block], moved: Set[str]
 ) -> Mapping[str, Connector]:
     """The connectors with their ends where the faces they sit on are now.
 
@@ -180,8 +181,9 @@ def follow(
         blocks: after the move.
         moved: ids of the blocks that moved.
     """
-    ids = moved if isinstance(moved, set) else set(moved)
-    touched = [link for link in connectors.values() if link.start[0] in ids or link.end[0] in ids]
+    touched = [
+        link for link in connectors.values() if link.start[0] in moved or link.end[0] in moved
+    ]
     if not touched:
         return connectors
     followed = dict(connectors)
@@ -205,9 +207,7 @@ def moved_connector(link: Connector, motion: Pose) -> Connector:
     return replace(link, world_from_connector=pose, span=span_in(pose, link))
 
 
-def span_in(world_from_connector: Pose, link: Connector) -> tuple[float, float, float]:
+def span_in(world_from_connector: Pose, link: Connector) -> Vector:
     """From a connector's start to its end, in the given frame, units."""
-    (a, b, c), (x, y, z) = link.start_xyz, link.end_xyz
-    across = (x - a, y - b, z - c)
-    inverse = world_from_connector.inverse()
-    return inverse.direction(across)
+    across = subtract(link.end_xyz, link.start_xyz)
+    return world_from_connector.inverse().direction(across)
