@@ -228,6 +228,25 @@ def upgrade() -> None:
         sa.PrimaryKeyConstraint("job_id", "token", name=op.f("pk_attempts")),
     )
     op.create_table(
+        "external_calls",
+        sa.Column("job_id", sa.Text(), nullable=False),
+        sa.Column("sequence", sa.Integer(), nullable=False),
+        sa.Column("machine", sa.Text(), nullable=False),
+        sa.Column("tool", sa.Text(), nullable=False),
+        sa.Column("arguments", postgresql.JSON(astext_type=sa.Text()), nullable=False),
+        sa.Column("ok", sa.Boolean(), nullable=False),
+        sa.Column("reason", sa.Text(), nullable=True),
+        sa.Column("feedback", sa.Text(), nullable=False),
+        sa.Column(
+            "at",
+            sa.DateTime(timezone=True),
+            server_default=sa.text("clock_timestamp()"),
+            nullable=False,
+        ),
+        sa.ForeignKeyConstraint(["job_id"], ["jobs.id"], name=op.f("fk_external_calls_job_id")),
+        sa.PrimaryKeyConstraint("job_id", "sequence", name=op.f("pk_external_calls")),
+    )
+    op.create_table(
         "job_artifacts",
         sa.Column("job_id", sa.Text(), nullable=False),
         sa.Column("name", sa.Text(), nullable=False),
@@ -331,6 +350,7 @@ def downgrade() -> None:
     op.drop_table("rollouts")
     op.drop_table("journal")
     op.drop_table("job_artifacts")
+    op.drop_table("external_calls")
     op.drop_table("attempts")
     op.drop_table("workers")
     op.drop_table("tasks")

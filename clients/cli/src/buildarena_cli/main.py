@@ -46,6 +46,27 @@ def doctor(url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) -> None:
 
 
 @app.command()
+def mcp(
+    url: UrlOption = DEFAULT_URL,
+    http: Annotated[
+        int | None, typer.Option("--http", help="Serve streamable HTTP on this loopback port.")
+    ] = None,
+) -> None:
+    """Let agents that speak the Model Context Protocol build and be scored."""
+    import asyncio
+
+    from buildarena_cli.mcp_server import make_server, serve_stdio
+
+    if http is None:
+        asyncio.run(serve_stdio(Client(url)))
+        return
+    import uvicorn
+
+    server = make_server(Client(url)).streamable_http_app()
+    uvicorn.run(server, host="127.0.0.1", port=http, log_level="warning")
+
+
+@app.command()
 def leaderboard(
     task: Annotated[str | None, typer.Option(help="Only this task.")] = None,
     track: Annotated[str | None, typer.Option(help="Track; default: the first.")] = None,

@@ -1,5 +1,6 @@
 """Tasks, scorers, statistics and leaderboard mathematics of BuildArena."""
 
+from buildarena_benchmark.constraints import broken_constraint
 from buildarena_benchmark.errors import BenchmarkError, TaskError
 from buildarena_benchmark.scores import Score, failed_score, score
 from buildarena_benchmark.tasks.loading import builtin_tasks, load_task
@@ -10,6 +11,7 @@ __all__ = [
     "Score",
     "Task",
     "TaskError",
+    "broken_constraint",
     "builtin_tasks",
     "failed_score",
     "load_task",

@@ -10,6 +10,7 @@ from buildarena_store import (
     ArtifactStore,
     Database,
     Events,
+    ExternalCalls,
     Jobs,
     Journal,
     Leases,
@@ -38,6 +39,7 @@ class Context:
     events: Events
     workers: Workers
     verifications: Verifications
+    external: ExternalCalls
 
     def close(self) -> None:
         """Closes the connections."""
@@ -63,4 +65,5 @@ def open_context(settings: Settings, *, pool_size: int = 5) -> Context:
         events=Events(database),
         workers=Workers(database),
         verifications=Verifications(database),
+        external=ExternalCalls(database),
     )

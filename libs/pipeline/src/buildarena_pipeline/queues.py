@@ -18,6 +18,8 @@ LOOK = "buildarena.look"
 
 CONSTRUCT = "construct"
 VERIFY = "verify"
+EXTERNAL = "external"
+"""Where jobs of outside agents are while they build: no worker serves it."""
 BATCH = 200
 """Messages kept waiting per queue; more are sent as workers take them."""
 

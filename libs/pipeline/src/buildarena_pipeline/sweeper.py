@@ -69,6 +69,7 @@ class Sweeper:
             ).scalars()
             for queue in list(queues):
                 announce_waiting(self._context, queue)
+            self._context.external.abandon_idle()
             checks = self._context.verifications.to_announce(BATCH)
             if checks:
                 self._context.queues.announce(VERIFY, checks)

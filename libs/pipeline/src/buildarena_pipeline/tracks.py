@@ -9,6 +9,7 @@ from typing import Any
 from buildarena_geometry import FEEDBACK_VERSION
 from buildarena_pipeline.extensions import WorkflowSource
 from buildarena_pipeline.prompt_packs import PromptPack
+from buildarena_pipeline.queues import EXTERNAL
 from buildarena_pipeline.specs import ClosedLoop
 from buildarena_simulation import ENGINES, SIMULATION_VERSION
 
@@ -62,6 +63,18 @@ class Track:
     def as_config(self) -> Mapping[str, Any]:
         """The parts as a JSON object."""
         return {name: getattr(self, name) for name in self.__dataclass_fields__}
+
+
+def external_track(simulator: str) -> Track:
+    """The track of outside agents, which bring their own prompts."""
+    return Track(
+        workflow=EXTERNAL,
+        simulator=simulator,
+        simulation_version=SIMULATION_VERSION,
+        prompts="own",
+        prompts_digest="",
+        feedback_version=FEEDBACK_VERSION,
+    )
 
 
 def make_track(

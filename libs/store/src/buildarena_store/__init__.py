@@ -14,12 +14,14 @@ from buildarena_store.errors import (
     UnknownIdError,
 )
 from buildarena_store.events import Event, Events
+from buildarena_store.external import ExternalCall, ExternalCalls
 from buildarena_store.jobs import Job, JobKey, Jobs, NewJob
 from buildarena_store.journal import Journal, JournalEntry, Usage
 from buildarena_store.leases import Lease, Leases
 from buildarena_store.results import JobScore, Results
 from buildarena_store.rollouts import RolloutRecord, RolloutRequest, Rollouts
 from buildarena_store.sweeps import NewSweep, Sweep, SweepProgress, Sweeps
+from buildarena_store.text import clean
 from buildarena_store.verifications import Verification, Verifications
 from buildarena_store.workers import WorkerInfo, Workers
 
@@ -30,6 +32,8 @@ __all__ = [
     "Database",
     "Event",
     "Events",
+    "ExternalCall",
+    "ExternalCalls",
     "Job",
     "JobKey",
     "JobScore",
@@ -56,4 +60,5 @@ __all__ = [
     "Verifications",
     "WorkerInfo",
     "Workers",
+    "clean",
 ]

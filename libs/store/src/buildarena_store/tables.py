@@ -166,6 +166,20 @@ journal = Table(
     _time("created_at", now=True),
 )
 
+external_calls = Table(
+    "external_calls",
+    metadata,
+    Column("job_id", Text, ForeignKey("jobs.id"), primary_key=True),
+    Column("sequence", Integer, primary_key=True),
+    Column("machine", Text, nullable=False),
+    Column("tool", Text, nullable=False),
+    Column("arguments", JSON, nullable=False),
+    Column("ok", Boolean, nullable=False),
+    Column("reason", Text),
+    Column("feedback", Text, nullable=False),
+    _time("at", now=True),
+)
+
 rollouts = Table(
     "rollouts",
     metadata,

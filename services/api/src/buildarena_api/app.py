@@ -7,10 +7,11 @@ from contextlib import asynccontextmanager
 
 from fastapi import FastAPI
 
-from buildarena_api import catalogue, health, jobs, leaderboard, sweeps, verifications
+from buildarena_api import catalogue, health, jobs, leaderboard, sessions, sweeps, verifications
 from buildarena_api.problems import add_problem_handlers
 from buildarena_pipeline import __version__
 from buildarena_pipeline.context import Context
+from buildarena_pipeline.external import ExternalSessions
 from buildarena_pipeline.models import ModelRegistry
 from buildarena_pipeline.submission import Submissions
 from buildarena_pipeline.sweeper import Sweeper
@@ -47,7 +48,8 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
     app.state.context = context
     app.state.registry = registry
     app.state.submissions = Submissions(context, registry)
+    app.state.external = ExternalSessions(context)
     add_problem_handlers(app)
-    for room in (verifications, jobs, sweeps, leaderboard, catalogue, health):
+    for room in (verifications, sessions, jobs, sweeps, leaderboard, catalogue, health):
         app.include_router(room.router)
     return app

@@ -7,6 +7,7 @@ from typing import Annotated
 from fastapi import Depends, Request
 
 from buildarena_pipeline.context import Context
+from buildarena_pipeline.external import ExternalSessions
 from buildarena_pipeline.models import ModelRegistry
 from buildarena_pipeline.submission import Submissions
 
@@ -30,4 +31,10 @@ def _submissions(request: Request) -> Submissions:
     return submissions
 
 
+def _external(request: Request) -> ExternalSessions:
+    sessions: ExternalSessions = request.app.state.external
+    return sessions
+
+
+ExternalDep = Annotated[ExternalSessions, Depends(_external)]
 SubmissionsDep = Annotated[Submissions, Depends(_submissions)]

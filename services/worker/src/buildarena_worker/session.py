@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from buildarena_benchmark import Task
+from buildarena_benchmark import Task, broken_constraint
 from buildarena_geometry import Machine
 from buildarena_pipeline.prompt_packs import PromptPack
 from buildarena_store import JournalEntry
@@ -108,24 +108,6 @@ class Session:
             ConstructionFailedError: It breaks one, or there is no machine.
         """
         self.machine = machine
-        constraints = self.task.constraints
-        if not machine.started:
-            raise ConstructionFailedError("empty_machine", "no machine was started")
-        if len(machine.blocks) == 1 and not machine.connectors:
-            raise ConstructionFailedError(
-                "empty_machine", "the machine is nothing but its starting block"
-            )
-        if constraints.max_blocks is not None and machine.part_count > constraints.max_blocks:
-            raise ConstructionFailedError(
-                "constraint_violated",
-                f"the machine has {machine.part_count} parts, "
-                f"the task allows {constraints.max_blocks}",
-            )
-        used = {block.module.name for block in machine.blocks.values()}
-        used |= {connector.module.name for connector in machine.connectors.values()}
-        allowed = {*(constraints.modules or used), "Starting Block"}
-        if not used <= allowed:
-            raise ConstructionFailedError(
-                "constraint_violated",
-                f"{min(used - allowed)} is not among the task's modules",
-            )
+        broken = broken_constraint(self.task, machine)
+        if broken is not None:
+            raise ConstructionFailedError(*broken)

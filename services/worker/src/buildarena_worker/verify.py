@@ -19,9 +19,11 @@ from buildarena_geometry import KeyPress, Machine
 from buildarena_pipeline.context import Context
 from buildarena_pipeline.errors import PermanentFaultError
 from buildarena_pipeline.prompt_packs import PromptPacks
+from buildarena_pipeline.queues import EXTERNAL
 from buildarena_pipeline.scoring import best_rollout, task_of
+from buildarena_pipeline.workbench import Workbench
 from buildarena_simulation import SIMULATION_VERSION, MachineNotSimulable, Trajectory, simulate
-from buildarena_store import Job, RolloutRecord, Usage
+from buildarena_store import ExternalCall, Job, RolloutRecord, Usage
 from buildarena_worker.construct import loop_of, machine_json, pack_of
 from buildarena_worker.errors import (
     ConstructionFailedError,
@@ -84,6 +86,8 @@ class Verifier:
     def _checks(self, job: Job) -> list[Check]:
         if job.state != "done" or job.success is None:
             return [_compare("scored", kept=True, found=False)]
+        if job.track_config["workflow"] == EXTERNAL:
+            return self._external_checks(job)
         try:
             session, io, failure = self._replay(job)
         except (JournalMismatchError, PermanentFaultError, SuspendedError) as error:
@@ -102,8 +106,23 @@ class Verifier:
             checks.append(_compare("reason", job.reason, failure.limit))
         for record, (machine, controls) in zip(records, io.machines, strict=False):
             checks += self._rollout_checks(job, record, machine, controls)
-        checks += self._score_checks(job, session, records)
+        checks += self._score_checks(job, session.machine, records)
         return checks
+
+    def _external_checks(self, job: Job) -> list[Check]:
+        """An outside agent's calls are made again; what it thought in between is its own."""
+        with self._context.database.transaction() as connection:
+            calls = self._context.external.read(job.id, connection=connection)
+        bench = Workbench()
+        again = [bench.call(call.machine, call.tool, call.arguments) for call in calls]
+        checks = [_compare("calls", [_said(call) for call in calls], [_said(c) for c in again])]
+        chosen = bench.result()
+        machine = None if chosen is None else chosen[1]
+        records = self._context.rollouts.read(job.id)
+        if machine is not None:
+            for record in records:
+                checks += self._rollout_checks(job, record, machine, None)
+        return checks + self._score_checks(job, machine, records)
 
     def _replay(self, job: Job) -> tuple[Session, _ReplayIO, Exception | None]:
         io = _ReplayIO(
@@ -162,13 +181,13 @@ class Verifier:
         return checks
 
     def _score_checks(
-        self, job: Job, session: Session, records: Sequence[RolloutRecord]
+        self, job: Job, machine: Machine | None, records: Sequence[RolloutRecord]
     ) -> list[Check]:
         if any(record.finished_at for record in records):
             best = best_rollout(records)
             wanted = {name: _plain(getattr(best, name)) for name in SCORED}
         else:
-            failed = failed_score(session.task, session.machine)
+            failed = failed_score(task_of(job), machine)
             wanted = {name: _plain(getattr(failed, name)) for name in SCORED}
         return [_compare(f"score: {n}", _plain(getattr(job, n)), v) for n, v in wanted.items()]
 
@@ -203,6 +222,10 @@ class VerificationRunner:
 
 SCORED = ("success", "indicator", "metrics", "flags")
 COUNTED = ("requests", "input_tokens", "output_tokens", "cached_tokens", "reasoning_tokens")
+
+
+def _said(call: ExternalCall) -> list[Any]:
+    return [call.ok, call.reason, call.feedback]
 
 
 def _usage_checks(job: Job, usage: Usage) -> list[Check]:

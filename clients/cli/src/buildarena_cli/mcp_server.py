@@ -1,0 +1,160 @@
+"""The MCP server: any agent that speaks the Model Context Protocol can build, submit and be scored.
+
+It is a thin client of the tools API. Each tool of the geometry library is offered with two more
+arguments: the session, and the sub-structure it is meant for.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Mapping
+from typing import Any
+
+from mcp import types
+from mcp.server import Server, ServerRequestContext
+from mcp.server.stdio import stdio_server
+
+from buildarena_cli.client import Client
+from buildarena_cli.errors import CommandError
+from buildarena_geometry import tool_definitions
+
+GROUPS = ("build", "refine", "assemble", "control", "query")
+INSTRUCTIONS = """Build a machine for a BuildArena task. Call list_tasks, then open_session for one
+task; read the statement; call start and the other tools with the session's id until the machine is
+finished; then call submit, and get_result until the job has ended."""
+SESSION = {
+    "session": {"type": "string", "description": "Id that open_session gave."},
+    "machine": {
+        "type": "string",
+        "description": "Sub-structure it is meant for; 'assembly' joins all others.",
+        "default": "main",
+    },
+}
+
+Arguments = Mapping[str, Any]
+
+
+def make_server(client: Client) -> Server[Any]:
+    """The server on top of the API.
+
+    Args:
+        client: The API.
+    """
+    tools = _tools()
+    machine_tools = {tool.name for tool in tool_definitions(GROUPS)}
+
+    async def list_tools(
+        _: ServerRequestContext[Any], __: types.PaginatedRequestParams | None
+    ) -> types.ListToolsResult:
+        return types.ListToolsResult(tools=tools)
+
+    async def call_tool(
+        _: ServerRequestContext[Any], params: types.CallToolRequestParams
+    ) -> types.CallToolResult:
+        given = dict(params.arguments or {})
+        try:
+            if params.name in machine_tools:
+                answer = await asyncio.to_thread(_act, client, params.name, given)
+            else:
+                answer = await asyncio.to_thread(_manage, client, params.name, given)
+        except (CommandError, KeyError) as error:
+            text = f"missing argument {error}" if isinstance(error, KeyError) else str(error)
+            return _result(text, failed=True)
+        return answer
+
+    return Server(
+        "buildarena", instructions=INSTRUCTIONS, on_list_tools=list_tools, on_call_tool=call_tool
+    )
+
+
+async def serve_stdio(client: Client) -> None:
+    """Serves one agent over standard input and output."""
+    server = make_server(client)
+    async with stdio_server() as (read, write):
+        await server.run(read, write, server.create_initialization_options())
+
+
+def _tools() -> list[types.Tool]:
+    managing = [
+        types.Tool(
+            name="list_tasks",
+            description="List the tasks with their titles.",
+            input_schema={"type": "object", "properties": {}},
+        ),
+        types.Tool(
+            name="open_session",
+            description="Begin to build for a task; answers with the session and the statement.",
+            input_schema={
+                "type": "object",
+                "properties": {
+                    "task": {"type": "string", "description": "Task name, e.g. support-1."},
+                    "agent": {"type": "string", "description": "Your name on the leaderboard."},
+                    "seed": {"type": "integer", "minimum": 0, "default": 0},
+                    "simulator": {"type": "string", "default": "pybullet"},
+                },
+                "required": ["task", "agent"],
+            },
+        ),
+        types.Tool(
+            name="submit",
+            description="End the building; the machine is simulated and scored.",
+            input_schema=_object({"session": SESSION["session"]}, ["session"]),
+        ),
+        types.Tool(
+            name="get_result",
+            description="Read how the session's job ended, or where it is.",
+            input_schema=_object({"session": SESSION["session"]}, ["session"]),
+        ),
+    ]
+    building = [
+        types.Tool(
+            name=tool.name,
+            description=tool.description,
+            input_schema=_object(
+                {**SESSION, **tool.parameters.get("properties", {})},
+                ["session", *tool.parameters.get("required", [])],
+            ),
+        )
+        for tool in tool_definitions(GROUPS)
+    ]
+    return managing + building
+
+
+def _object(properties: Mapping[str, Any], required: list[str]) -> dict[str, Any]:
+    return {"type": "object", "properties": dict(properties), "required": required}
+
+
+def _act(client: Client, tool: str, given: dict[str, Any]) -> types.CallToolResult:
+    session, machine = given.pop("session"), given.pop("machine", "main")
+    body = {"tool": tool, "arguments": given, "machine": machine}
+    done = client.post(f"/v1/sessions/{session}/calls", body)
+    return _result(done["feedback"], failed=not done["ok"])
+
+
+def _manage(client: Client, tool: str, given: Arguments) -> types.CallToolResult:
+    if tool == "list_tasks":
+        tasks = client.get("/v1/tasks")
+        return _result("\n".join(f"{task['name']}: {task['title']}" for task in tasks))
+    if tool == "open_session":
+        opened = client.post("/v1/sessions", given)
+        return _result(f"session: {opened['id']}\n\n{opened['statement']}")
+    if tool == "submit":
+        job = client.post(f"/v1/sessions/{given['session']}/submit", {})
+        return _result(_ended(job))
+    if tool == "get_result":
+        return _result(_ended(client.get(f"/v1/jobs/{given['session']}")))
+    return _result(f"there is no tool {tool!r}", failed=True)
+
+
+def _ended(job: Mapping[str, Any]) -> str:
+    if job["outcome"] is None:
+        return f"not ended yet: {job['stage']} {job['state']}"
+    shown = {name: job[name] for name in ("outcome", "reason", "success", "indicator", "metrics")}
+    return json.dumps(shown)
+
+
+def _result(text: str, *, failed: bool = False) -> types.CallToolResult:
+    return types.CallToolResult(
+        content=[types.TextContent(type="text", text=text)], is_error=failed
+    )

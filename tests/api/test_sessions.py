@@ -1,0 +1,120 @@
+"""Outside agents over the tools API."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+OPEN = {"task": "support-1", "agent": "me", "seed": 1, "simulator": "mujoco"}
+START = {"init_shift": [0, 0, 0], "init_rotation": [0, 0, 0], "note": ""}
+ATTACH = {"base_block": "1", "face": "A", "new_block": "Small Wooden Block", "note": ""}
+
+
+@pytest.fixture
+def session(api) -> str:
+    answer = api.post("/v1/sessions", json=OPEN)
+    assert answer.status_code == 201
+    return answer.json()["id"]
+
+
+def act(api, session: str, tool: str, arguments: object, **more: str):
+    body = {"tool": tool, "arguments": arguments, **more}
+    return api.post(f"/v1/sessions/{session}/calls", json=body)
+
+
+def test_an_agent_builds_and_submits(api, context, session) -> None:
+    assert act(api, session, "start", START).json()["ok"]
+    assert act(api, session, "attach_block_to", ATTACH).json()["ok"]
+    refused = act(api, session, "attach_block_to", ATTACH).json()
+    assert (refused["ok"], refused["reason"]) == (False, "face_occupied")
+    job = api.post(f"/v1/sessions/{session}/submit").json()
+    assert (job["state"], job["stage"]) == ("queued", "simulate")
+    assert (job["actions"], job["refused_actions"]) == (3, 1)
+    assert job["refusals"] == {"face_occupied": 1}
+    assert job["track"].startswith("external/mujoco-")
+    assert api.get(f"/v1/jobs/{session}/machine").status_code == 200
+    assert len(api.get(f"/v1/jobs/{session}/transcript").json()["turns"]) == 3
+    assert context.queues.waiting("simulate.mujoco") == 1
+
+
+def test_calls_survive_a_restart_of_the_api(api, context, session) -> None:
+    from buildarena_pipeline.external import ExternalSessions
+
+    act(api, session, "start", START)
+    other = ExternalSessions(context)
+    done = other.call(session, machine="main", tool="attach_block_to", arguments=ATTACH)
+    assert done.ok
+    assert act(api, session, "get_machine_summary", {}).json()["feedback"].count("Wooden") == 1
+
+
+def test_sub_structures_are_joined_in_the_assembly(api, session) -> None:
+    for machine in ("left", "right"):
+        act(api, session, "start", START, machine=machine)
+    assert api.post(f"/v1/sessions/{session}/submit").status_code == 409
+    for machine, shift in (("left", [0, 0, 0]), ("right", [3, 0, 0])):
+        arguments = {"machine_id": machine, "init_shift": shift, "init_rotation": [0, 0, 0]}
+        done = act(api, session, "add_machine", arguments, machine="assembly").json()
+        assert done["ok"], done
+    assert api.post(f"/v1/sessions/{session}/submit").status_code == 202
+
+
+def test_a_session_is_over_once_it_was_submitted(api, session) -> None:
+    act(api, session, "start", START)
+    act(api, session, "attach_block_to", ATTACH)
+    api.post(f"/v1/sessions/{session}/submit")
+    late = act(api, session, "reset", {})
+    assert late.status_code == 409
+    assert "is not open" in late.json()["detail"]
+    assert api.post(f"/v1/sessions/{session}/submit").status_code == 409
+
+
+def test_a_machine_that_breaks_the_rules_is_a_scored_failure(api, session) -> None:
+    act(api, session, "start", START)
+    job = api.post(f"/v1/sessions/{session}/submit").json()
+    assert (job["outcome"], job["reason"], job["success"]) == (
+        "construction_failed",
+        "empty_machine",
+        False,
+    )
+
+
+@pytest.mark.usefixtures("session")
+def test_each_seed_is_played_once(api) -> None:
+    again = api.post("/v1/sessions", json=OPEN)
+    assert again.status_code == 422
+    assert again.json()["errors"][0]["field"] == "seed"
+    assert api.post("/v1/sessions", json={**OPEN, "seed": 2}).status_code == 201
+
+
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [
+        ({"task": "x"}, "task"),
+        ({"simulator": "x"}, "simulator"),
+        ({"agent": "a b"}, "agent"),
+        ({"agent": ""}, "agent"),
+        ({"seed": -1}, "seed"),
+    ],
+)
+def test_a_bad_wish_names_its_field(api, change, field) -> None:
+    problem = api.post("/v1/sessions", json={**OPEN, **change}).json()
+    assert problem["errors"][0]["field"] == field
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [None, [], "x", {"base_block": "\0"}, {"note": "\ud800"}, {"a": {"b": [1e308] * 9}}],
+)
+def test_nonsense_is_refused_and_kept(api, session, arguments) -> None:
+    answer = api.post(
+        f"/v1/sessions/{session}/calls",
+        content=json.dumps({"tool": "attach_block_to", "arguments": arguments}),
+        headers={"content-type": "application/json"},
+    )
+    assert answer.status_code == 200, answer.text
+    assert not answer.json()["ok"]
+
+
+def test_an_unknown_session_is_not_found(api) -> None:
+    assert act(api, "job_x", "start", START).status_code == 404

@@ -1,0 +1,73 @@
+"""A real MCP client builds a bridge over stdio and gets its score."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import sys
+from pathlib import Path
+
+from live_api import live_api
+from mcp import ClientSession, StdioServerParameters, stdio_client
+
+from buildarena_pipeline.stages import LeaseKeeper, StageRunner
+from buildarena_simworker.simulate import SimulateHandler
+from buildarena_worker.builtin.designs import DESIGNS
+from buildarena_worker.verify import Verifier
+
+BUILDARENA = str(Path(sys.executable).parent / "buildarena")
+
+
+def simulate_all(context) -> None:
+    keeper = LeaseKeeper(context, lambda: None)
+    StageRunner(context, SimulateHandler(context), keeper, "w").look("simulate.mujoco", "")
+
+
+async def play(url: str, simulate) -> dict[str, object]:
+    server = StdioServerParameters(command=BUILDARENA, args=["mcp", "--url", url])
+    async with stdio_client(server) as (read, write), ClientSession(read, write) as session:
+        await session.initialize()
+        tools = {tool.name for tool in (await session.list_tools()).tools}
+        assert {"open_session", "attach_block_to", "submit"} <= tools
+        assert "support-1" in await said(session, "list_tasks", {})
+        opened = await said(
+            session, "open_session", {"task": "support-1", "agent": "mcp", "simulator": "mujoco"}
+        )
+        session_id = opened.split()[1]
+        assert "gap" in opened
+        refused = await session.call_tool(
+            "attach_block_to",
+            {
+                "session": session_id,
+                "base_block": "1",
+                "face": "A",
+                "new_block": "Torch",
+                "note": "",
+            },
+        )
+        assert refused.is_error
+        for name, arguments in DESIGNS["support-1"](0).parts["deck"].actions:
+            await said(session, name, {"session": session_id, **arguments})
+        assert "not ended" in await said(session, "submit", {"session": session_id})
+        await asyncio.to_thread(simulate)
+        wrong = await session.call_tool("get_result", {"session": "job_x"})
+        assert wrong.is_error
+        missing = await session.call_tool("submit", {})
+        assert "missing argument 'session'" in missing.content[0].text
+        return json.loads(await said(session, "get_result", {"session": session_id}))
+
+
+async def said(session: ClientSession, tool: str, arguments: dict[str, object]) -> str:
+    result = await session.call_tool(tool, arguments)
+    assert not result.is_error, result
+    return result.content[0].text
+
+
+def test_an_agent_builds_a_bridge_and_gets_its_score(context) -> None:
+    with live_api(context) as url:
+        result = asyncio.run(play(url, lambda: simulate_all(context)))
+    assert result["outcome"] == "success"
+    assert result["indicator"] > 100
+    (job,) = context.jobs.page(limit=2)
+    report = Verifier(context).verify(job.id)
+    assert report["ok"], [check for check in report["checks"] if not check["ok"]]

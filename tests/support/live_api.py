@@ -1,0 +1,34 @@
+"""The API over real HTTP, in a thread of the test's process."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import uvicorn
+
+from buildarena_api.app import create_app
+from buildarena_pipeline.context import Context
+from buildarena_pipeline.embedded import free_port
+from buildarena_pipeline.models import load_registry
+
+
+@contextmanager
+def live_api(context: Context) -> Iterator[str]:
+    """Serves the API of a context; yields its URL."""
+    port = free_port()
+    config = uvicorn.Config(
+        create_app(context, load_registry()), host="127.0.0.1", port=port, log_config=None
+    )
+    server = uvicorn.Server(config)
+    thread = threading.Thread(target=server.run)
+    thread.start()
+    while not server.started:
+        time.sleep(0.01)
+    try:
+        yield f"http://127.0.0.1:{port}"
+    finally:
+        server.should_exit = True
+        thread.join()
