@@ -11,7 +11,7 @@ from buildarena_benchmark import builtin_tasks
 from buildarena_simulation import simulate
 from tests.simulation.references import load_machine
 task = builtin_tasks()[sys.argv[3]]
-scenario = task.scenario.model_copy(update={"duration_s": 5.0})
+scenario = task.scenario.model_copy(update={"duration_s": 2.6})
 data = simulate(load_machine(sys.argv[2]), scenario, sys.argv[1]).to_parquet()
 print(hashlib.sha256(data).hexdigest())
 """

@@ -1,0 +1,277 @@
+"""Scorers, on trajectories made by hand."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from buildarena_benchmark import Task, failed_score, score
+from buildarena_geometry import Machine
+from buildarena_simulation import Trajectory
+
+Make = Callable[..., Trajectory]
+
+
+def _columns(*columns: np.ndarray | float, like: np.ndarray) -> np.ndarray:
+    return np.stack([np.broadcast_to(c, like.shape) for c in columns], axis=1)
+
+
+def _ramp(t: np.ndarray) -> np.ndarray:
+    return 5 + 1495 * np.clip((t - 0.5) / 15, 0.005, 1)
+
+
+# Transport
+
+
+def _north_east(speed: float) -> Callable[[np.ndarray], np.ndarray]:
+    return lambda t: _columns(speed * t / np.sqrt(2), speed * t / np.sqrt(2), 0.0, like=t)
+
+
+def test_a_vehicle_that_goes_far_enough_passes(
+    tasks: dict[str, Task], trajectory_of: Make, car: Machine
+) -> None:
+    result = score(tasks["transport-1"], car, trajectory_of(car, 30.0, moved=_north_east(1.0)))
+    assert result.success
+    assert result.indicator == pytest.approx(30.0, abs=1e-3)
+    assert result.flags == ()
+    metrics = result.metrics
+    assert metrics["wheels"] == 4
+    assert metrics["intact"] is True
+    assert metrics["parts"] == car.part_count
+    assert metrics["direction_consistency"] == pytest.approx(1.0, abs=1e-4)
+    assert metrics["lateral_deviation"] == pytest.approx(0.0, abs=1e-3)
+    assert metrics["path_efficiency"] == pytest.approx(1.0, abs=1e-4)
+    assert metrics["backtrack"] == pytest.approx(0.0, abs=1e-4)
+    assert metrics["max_speed"] == pytest.approx(1.0, abs=1e-2)
+
+
+def test_the_distance_must_exceed_ten(
+    tasks: dict[str, Task], trajectory_of: Make, car: Machine
+) -> None:
+    short = trajectory_of(car, 10.0, moved=_north_east(0.99))
+    assert not score(tasks["transport-1"], car, short).success
+
+
+def test_the_farthest_point_counts_not_the_last(
+    tasks: dict[str, Task], trajectory_of: Make, car: Machine
+) -> None:
+    there_and_back = trajectory_of(
+        car, 30.0, moved=lambda t: _columns(0.0, 15 - np.abs(t - 15), 0.0, like=t)
+    )
+    result = score(tasks["transport-1"], car, there_and_back)
+    assert result.success
+    assert result.indicator == pytest.approx(15.0, abs=1e-3)
+    assert result.metrics["backtrack"] > 0.5
+    assert result.metrics["path_efficiency"] < 0.1
+
+
+def test_a_vehicle_without_wheels_enough_fails(
+    tasks: dict[str, Task], trajectory_of: Make, car: Machine
+) -> None:
+    wheel = next(b.id for b in car.blocks.values() if b.module.kind == "wheel")
+    assert car.act("remove_block", {"block_id": wheel}).ok
+    result = score(tasks["transport-1"], car, trajectory_of(car, 30.0, moved=_north_east(1.0)))
+    assert not result.success
+    assert result.metrics["wheels"] == 3
+
+
+def test_a_vehicle_that_nothing_drives_scores_nothing(
+    tasks: dict[str, Task], trajectory_of: Make, car: Machine
+) -> None:
+    assert car.act("reset_control_sequence", {}).ok
+    rolling = trajectory_of(car, 30.0, moved=_north_east(1.0))
+    result = score(tasks["transport-1"], car, rolling)
+    assert (result.success, result.indicator) == (False, 0.0)
+    driven = trajectory_of(car, 30.0, moved=_north_east(1.0), settings={"effective_key_presses": 2})
+    assert score(tasks["transport-1"], car, driven).success
+
+
+def test_success_without_wheels_is_flagged(
+    tasks: dict[str, Task], trajectory_of: Make, engine_machine: Machine
+) -> None:
+    result = score(
+        tasks["transport-2"],
+        engine_machine,
+        trajectory_of(
+            engine_machine,
+            30.0,
+            cargo=lambda t: _columns(t, 0.0, 2.0, like=t),
+            cargo_mass=lambda t: np.full_like(t, 50.0),
+            heated=(False, False),
+            settings={"effective_key_presses": 1},
+        ),
+    )
+    assert result.success
+    assert result.flags == ("no_wheels",)
+
+
+def test_a_start_too_high_fails_and_is_flagged(
+    tasks: dict[str, Task], trajectory_of: Make, car: Machine
+) -> None:
+    high = trajectory_of(
+        car, 30.0, moved=lambda t: _columns(t, 0.0, np.maximum(20.0 - 10 * t, 0.0), like=t)
+    )
+    result = score(tasks["transport-1"], car, high)
+    assert not result.success
+    assert result.flags == ("start_too_high",)
+
+
+def test_wheels_that_drift_apart_are_not_intact(
+    tasks: dict[str, Task], trajectory_of: Make, car: Machine
+) -> None:
+    trajectory = trajectory_of(car, 30.0, moved=_north_east(1.0))
+    positions = trajectory.positions.copy()
+    wheel = list(car.blocks).index(
+        next(b.id for b in car.blocks.values() if b.module.kind == "wheel")
+    )
+    positions[:, wheel, 0] += np.linspace(0, 2, len(positions))
+    import dataclasses
+
+    broken = dataclasses.replace(trajectory, positions=positions)
+    assert score(tasks["transport-1"], car, broken).metrics["intact"] is False
+
+
+# Support
+
+
+def _carried(
+    make: Make, machine: Machine, fall_at: float | None, *, start: float = 10.0
+) -> Trajectory:
+    def height(t: np.ndarray) -> np.ndarray:
+        settled = np.maximum(start - 20 * t, 6.75)
+        if fall_at is None:
+            return settled
+        return np.where(t < fall_at, settled, np.maximum(settled - 20 * (t - fall_at), 0.8))
+
+    return make(
+        machine,
+        17.0,
+        cargo=lambda t: _columns(0.0, 0.0, height(t), like=t),
+        cargo_mass=_ramp,
+    )
+
+
+def test_the_load_is_the_cargos_mass_when_it_sinks(
+    tasks: dict[str, Task], trajectory_of: Make, car: Machine
+) -> None:
+    result = score(tasks["support-1"], car, _carried(trajectory_of, car, 8.0))
+    assert result.success
+    below = 8.0 + 2.75 / 20  # from 6.75 to 4 at 20 units/s
+    sample = np.ceil(below * 25) / 25
+    assert result.indicator == pytest.approx(float(_ramp(np.array([sample]))[0]), abs=4.1)
+    assert result.metrics["fall_time_s"] == pytest.approx(sample, abs=0.05)
+    assert result.flags == ()
+
+
+def test_a_cargo_that_never_falls_counts_in_full_and_is_flagged(
+    tasks: dict[str, Task], trajectory_of: Make, car: Machine
+) -> None:
+    result = score(tasks["support-1"], car, _carried(trajectory_of, car, None))
+    assert result.success
+    assert result.indicator == 1500.0
+    assert result.flags == ("never_fell",)
+
+
+def test_a_cargo_that_is_not_up_for_two_seconds_scores_nothing(
+    tasks: dict[str, Task], trajectory_of: Make, car: Machine
+) -> None:
+    early = score(tasks["support-1"], car, _carried(trajectory_of, car, 1.5))
+    assert (early.success, early.indicator) == (False, 0.0)
+    later = score(tasks["support-1"], car, _carried(trajectory_of, car, 2.1))
+    assert later.success
+
+
+def test_a_cargo_that_starts_too_high_scores_nothing(
+    tasks: dict[str, Task], trajectory_of: Make, car: Machine
+) -> None:
+    result = score(tasks["support-1"], car, _carried(trajectory_of, car, 8.0, start=20.5))
+    assert (result.success, result.indicator) == (False, 0.0)
+    assert result.flags == ("start_too_high",)
+
+
+# Lift
+
+
+@pytest.mark.parametrize(
+    ("heated", "thrust"), [((True, True), 2 * 13.76), ((True, False), 15.36), ((False, False), 3.2)]
+)
+def test_thrust_over_weight_counts_heated_and_cold_cannons(
+    tasks: dict[str, Task],
+    trajectory_of: Make,
+    engine_machine: Machine,
+    heated: tuple[bool, bool],
+    thrust: float,
+) -> None:
+    trajectory = trajectory_of(engine_machine, 10.0, heated=heated)
+    result = score(tasks["lift-1"], engine_machine, trajectory)
+    assert result.indicator == pytest.approx(thrust / 3.25, rel=1e-6)
+    assert result.success == (thrust > 3.25)
+    assert result.metrics["heated_cannons"] == sum(heated)
+
+
+def _climb(
+    make: Make, machine: Machine, height: Callable[[np.ndarray], np.ndarray], **more: object
+) -> Trajectory:
+    return make(machine, 30.0, moved=lambda t: _columns(0.0, 0.0, height(t), like=t), **more)
+
+
+def test_a_rocket_that_keeps_rising_passes(
+    tasks: dict[str, Task], trajectory_of: Make, engine_machine: Machine
+) -> None:
+    rising = _climb(
+        trajectory_of, engine_machine, lambda t: np.maximum(t - 2, 0) * 4, heated=(True, True)
+    )
+    result = score(tasks["lift-2"], engine_machine, rising)
+    assert result.success
+    assert result.indicator == pytest.approx(28 * 4, abs=0.01)
+    assert result.flags == ()
+    assert result.metrics["rise"] == pytest.approx(20.0, abs=0.1)
+
+
+def test_a_rocket_that_only_hops_fails(
+    tasks: dict[str, Task], trajectory_of: Make, engine_machine: Machine
+) -> None:
+    hop = _climb(
+        trajectory_of,
+        engine_machine,
+        lambda t: np.maximum(40 - 4 * np.abs(t - 5) * 4, 0.0),
+        heated=(True, True),
+    )
+    result = score(tasks["lift-2"], engine_machine, hop)
+    assert result.indicator > 30
+    assert not result.success
+
+
+def test_a_success_with_less_thrust_than_weight_is_flagged(
+    tasks: dict[str, Task], trajectory_of: Make, engine_machine: Machine
+) -> None:
+    miracle = _climb(
+        trajectory_of, engine_machine, lambda t: np.maximum(t - 2, 0) * 4, heated=(False, False)
+    )
+    result = score(tasks["lift-2"], engine_machine, miracle)
+    assert result.success
+    assert result.flags == ("twr_below_one",)
+
+
+# Every task
+
+
+def test_a_blow_up_is_never_a_success(
+    tasks: dict[str, Task], trajectory_of: Make, car: Machine
+) -> None:
+    thrown = trajectory_of(car, 30.0, moved=lambda t: _columns(1e4 * t**2, 0.0, 0.0, like=t))
+    result = score(tasks["transport-1"], car, thrown)
+    assert not result.success
+    assert result.indicator == 0.0
+    assert "unstable" in result.flags
+    lost = trajectory_of(
+        car, 30.0, moved=lambda t: _columns(np.where(t > 3, np.nan, 0.0), 0.0, 0.0, like=t)
+    )
+    assert "unstable" in score(tasks["transport-1"], car, lost).flags
+
+
+def test_a_machine_never_finished_scores_nothing_but_tells_its_parts(
+    tasks: dict[str, Task], car: Machine
+) -> None:
+    for task in tasks.values():
+        assert (failed_score(task).success, failed_score(task).indicator) == (False, 0.0)
+        assert failed_score(task, car).metrics["parts"] == car.part_count

@@ -1,0 +1,74 @@
+"""Machines that cannot be simulated, and names that do not exist."""
+
+import json
+
+import pytest
+from buildarena_benchmark import Task, failed_score, score
+from buildarena_geometry import DocumentError, Machine
+from buildarena_simulation import MachineNotSimulable, UnknownEngineError, simulate
+from buildarena_simulation.constants import MAX_PARTS
+
+from tests.simulation.reference_designs import EAST, Draft, beam, replayed
+
+
+def test_an_empty_machine_is_no_machine(engine: str, tasks: dict[str, Task]) -> None:
+    with pytest.raises(MachineNotSimulable, match="no blocks"):
+        simulate(Machine(), tasks["lift-1"].scenario, engine)
+    result = failed_score(tasks["lift-1"], Machine())
+    assert (result.success, result.indicator) == (False, 0.0)
+
+
+def test_a_machine_of_ten_thousand_blocks_is_refused_at_once(
+    engine: str, tasks: dict[str, Task]
+) -> None:
+    draft = Draft()
+    draft.row(draft.start(), EAST, 120)
+
+    class Crowd:
+        """A machine as large as asked for; building one block by block would take long."""
+
+        blocks = {str(i): block for i, block in enumerate([*draft.machine.blocks.values()] * 83)}
+        part_count = 10_000
+
+    with pytest.raises(MachineNotSimulable, match=str(MAX_PARTS)):
+        simulate(Crowd(), tasks["lift-1"].scenario, engine)
+
+
+def test_an_unknown_engine_is_named_with_the_known_ones(tasks: dict[str, Task]) -> None:
+    with pytest.raises(UnknownEngineError, match="pybullet, mujoco"):
+        simulate(replayed(beam(3)), tasks["lift-1"].scenario, "havok")
+
+
+def test_a_machine_in_two_halves_is_simulated_as_two(engine: str, tasks: dict[str, Task]) -> None:
+    draft = Draft()
+    far = draft.row(draft.start(), EAST, 3)
+    draft.do("remove_block", block_id=far[0])
+    assert draft.machine.detached
+    task = tasks["support-1"]
+    scenario = task.scenario.model_copy(update={"duration_s": 3.0})
+    trajectory = simulate(draft.machine, scenario, engine)
+    assert not score(task, draft.machine, trajectory).success
+
+
+def _document_with(change: str) -> str:
+    text = json.dumps(replayed(beam(3)).to_document())
+    assert "Small Wooden Block" in text
+    return text.replace("Small Wooden Block", change)
+
+
+def test_a_document_with_an_unknown_module_never_reaches_the_simulator() -> None:
+    with pytest.raises(DocumentError, match="Small Stone Block"):
+        Machine.from_document(json.loads(_document_with("Small Stone Block")))
+
+
+def test_a_scenario_that_tracks_a_missing_block_says_so(tasks: dict[str, Task]) -> None:
+    scenario = tasks["lift-1"].scenario.model_copy(update={"tracked_blocks": ("1", "77")})
+    with pytest.raises(MachineNotSimulable, match="77"):
+        simulate(replayed(beam(3)), scenario, "mujoco")
+
+
+def test_the_process_goes_on_after_a_failed_trial(engine: str, tasks: dict[str, Task]) -> None:
+    scenario = tasks["lift-1"].scenario.model_copy(update={"duration_s": 0.2})
+    with pytest.raises(MachineNotSimulable):
+        simulate(Machine(), scenario, engine)
+    assert simulate(replayed(beam(3)), scenario, engine).time_s[-1] == pytest.approx(0.2)

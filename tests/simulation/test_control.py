@@ -1,0 +1,137 @@
+"""Keys, heat, ropes and the lock between a scenario and its machine."""
+
+import math
+
+import numpy as np
+import pytest
+from buildarena_benchmark import Task
+from buildarena_geometry import KeyPress, Machine
+from buildarena_simulation import Scenario, simulate
+from buildarena_simulation.constants import WHEEL_LAG_RATE, WHEEL_SPEED
+from buildarena_simulation.control import heated_cannons, plan_schedule
+from buildarena_simulation.machine import bindings_of, structure_of
+from buildarena_simulation.scenario import Control, SpanPlacement
+
+from tests.simulation.reference_designs import (
+    DOWN,
+    EAST,
+    NORTH,
+    UP,
+    WEST,
+    WINCH,
+    Draft,
+    car,
+    replayed,
+    rocket,
+)
+
+
+def _press(key: str, time: float, hold_for: float) -> KeyPress:
+    return KeyPress(time_s=time, key=key, hold_for_s=hold_for)
+
+
+def _speeds(machine: Machine, *keys: KeyPress) -> np.ndarray:
+    return plan_schedule(
+        structure_of(machine),
+        bindings_of(machine),
+        keys,
+        control=Control(mode="agent"),
+        step_count=300,
+        time_step_s=0.01,
+    ).wheel_speeds
+
+
+def test_a_wheel_follows_its_key_with_a_lag() -> None:
+    speeds = np.abs(_speeds(replayed(car()), _press("UpArrow", 0.5, 1.0))[:, 0])
+    assert (speeds[:50] == 0.0).all()
+    reached = WHEEL_SPEED * (1 - math.exp(-WHEEL_LAG_RATE * 0.1))
+    assert speeds[59] == pytest.approx(reached)
+    assert speeds[149] == pytest.approx(WHEEL_SPEED, rel=1e-3)
+    assert speeds[299] < 0.01
+
+
+def test_keys_for_both_directions_brake() -> None:
+    both = _press("UpArrow", 0.0, 3.0), _press("DownArrow", 0.0, 3.0)
+    assert (_speeds(replayed(car()), *both) == 0.0).all()
+
+
+def test_wheels_on_both_sides_roll_the_same_way_once_flipped() -> None:
+    machine = replayed(car())
+    structure = structure_of(machine)
+    speeds = _speeds(machine, _press("UpArrow", 0.0, 3.0))[-1]
+    spin = speeds[:, None] * structure.directions[structure.wheels]
+    rolling = np.cross(spin, [0.0, 0.0, 1.0])  # velocity of the axle over the ground
+    assert (rolling[:, 1] > 10.0).all()
+
+
+def test_given_controls_replace_the_machines_own(tasks: dict[str, Task]) -> None:
+    scenario = tasks["transport-1"].scenario.model_copy(update={"duration_s": 2.0})
+    machine = replayed(car(drive=()))
+    keys = (_press("UpArrow", 0.0, 2.0), _press("Alpha9", 0.0, 1.0))
+    trajectory = simulate(machine, scenario, "mujoco", controls=keys)
+    assert trajectory.positions[-1, 0, 1] > 10.0
+    assert trajectory.settings["effective_key_presses"] == 1
+
+
+def _heated(flame: tuple[float, float, float]) -> bool:
+    """Whether a flame heats a cannon at the origin that sprays down."""
+    structure = structure_of(replayed(rocket((EAST,))))
+    shown = np.zeros((len(structure), 3))
+    directions = np.zeros((len(structure), 3))
+    directions[structure.cannons] = DOWN
+    directions[structure.torches] = UP
+    shown[structure.torches] = np.array(flame) - UP
+    return bool(heated_cannons(structure, shown, directions)[0])
+
+
+def test_a_flame_heats_what_it_touches() -> None:
+    assert _heated((0.0, 0.0, -1.0))  # the outlet
+    assert _heated((0.0, 0.0, 0.75))  # the inlet
+    assert _heated((0.79, 0.0, -0.5))
+    assert not _heated((0.81, 0.0, -0.5))
+    assert not _heated((0.0, 0.0, -1.31))
+
+
+def test_a_small_flame_at_the_waist_misses() -> None:
+    waist = -0.125
+    assert not _heated((0.75, 0.0, waist))
+    assert _heated((0.7, 0.0, waist))
+    assert _heated((0.75, 0.0, waist - 0.375))
+
+
+def _hanging_block() -> Machine:
+    """A gallows whose arm holds a loose block by a winch."""
+    draft = Draft()
+    foot = draft.start()
+    for side in (EAST, WEST, NORTH, (0, -1, 0)):
+        draft.row(foot, side, 3)
+    mast = draft.row(foot, UP, 6)[-1]
+    arm = draft.row(mast, EAST, 2)[-1]
+    hook = draft.row(arm, DOWN, 2)
+    draft.do("remove_block", block_id=hook[0])
+    draft.link(arm, DOWN, hook[-1], UP, connector=WINCH)
+    return draft.machine
+
+
+def test_a_rope_holds_what_hangs_on_it(engine: str) -> None:
+    machine = _hanging_block()
+    trajectory = simulate(machine, Scenario(duration_s=4.0), engine)
+    rope = next(peak for peak in trajectory.joint_peaks if peak.kind == "rope")
+    assert not trajectory.breaks
+    last = list(machine.blocks)[-1]
+    height = trajectory.positions[50:, trajectory.block_ids.index(last), 2].astype(float)
+    assert height == pytest.approx(4.0 + 0.5, abs=0.1)
+    # It bears the block and its own lower half, and more only on the first jerk.
+    assert 0.3 + 0.2 <= rope.force < 5.0
+
+
+def test_a_rope_does_not_push(engine: str) -> None:
+    draft = Draft()
+    low = draft.start()
+    middle, high = draft.row(low, UP, 2)
+    draft.link(low, UP, high, DOWN, connector=WINCH)
+    draft.do("remove_block", block_id=middle)
+    scenario = Scenario(duration_s=2.0, placement=SpanPlacement(gap=1.0, lowest_center=0.6))
+    trajectory = simulate(draft.machine, scenario, engine)
+    # The upper block has come down on the lower one, or beside it.
+    assert trajectory.positions[-1, 1, 2] < 2.0
