@@ -42,7 +42,8 @@ def test_the_same_machine_can_be_added_twice_and_letters_are_never_used_again(as
     add(assembly, "tower", init_shift=[5, 0, 0])
     assert assembly.act("remove_machine", {"machine_index": "A"}).ok
     add(assembly, "tower", init_shift=[10, 0, 0])
-    assert list(assembly.sub_structures) == ["B", "C"]
+    add(assembly, "tower", init_shift=[15, 0, 0])
+    assert list(assembly.sub_structures) == ["B", "C", "D"]
 
 
 def test_a_refused_machine_uses_no_letter_up(assembly):
