@@ -8,7 +8,7 @@ from .feedback import FEEDBACK_VERSION
 from .keys import KEYS
 from .log import ActionLog, ActionRecord
 from .machine import Machine, replay
-from .modules import Catalogue, Face, Module
+from .modules import Box, Catalogue, Cylinder, Face, Landmark, Module
 from .outcomes import Accepted, Cause, Outcome, RefusalClass, Refused
 from .poses import Pose
 from .tools import GROUPS, ToolDefinition, tool_definitions
@@ -24,15 +24,18 @@ __all__ = [
     "ActionLog",
     "ActionRecord",
     "Block",
+    "Box",
     "Catalogue",
     "CatalogueError",
     "Cause",
     "Connector",
+    "Cylinder",
     "DocumentError",
     "Face",
     "GeometryError",
     "Joint",
     "KeyPress",
+    "Landmark",
     "Machine",
     "Module",
     "Outcome",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import textwrap
 from typing import TYPE_CHECKING
 
 from .words import caption, counted, listing, number, plain, point, rolling
@@ -200,6 +199,7 @@ def _ends(link: Connector) -> tuple[str, str]:
 
 def _note(note: str) -> str:
     """A note on one line, cut short: it comes back in every summary."""
-    if not note.strip():
-        return ""
-    return f" — {textwrap.shorten(note, LONGEST_NOTE, placeholder='…')}"
+    words = " ".join(note.split())
+    if len(words) > LONGEST_NOTE:
+        words = f"{words[: LONGEST_NOTE - 1]}…"
+    return f" — {words}" if words else ""
