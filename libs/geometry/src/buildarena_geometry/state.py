@@ -14,7 +14,8 @@ from .blocks import Block, Connector, FaceRef, Joint, KeyPress
 from .rotations import distance, subtract
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Set
+    from collections.abc import Iterable, Iterator, Mapping
+    from collections.abc import Set as AbstractSet
 
     from .modules import Catalogue
     from .poses import Pose
@@ -172,7 +173,7 @@ class MachineState:
 
 
 def follow(
-    connectors: Mapping[str, Connector], blocks: Mapping[str, Block], moved: Set[str]
+    connectors: Mapping[str, Connector], blocks: Mapping[str, Block], moved: AbstractSet[str]
 ) -> Mapping[str, Connector]:
     """The connectors with their ends where the faces they sit on are now.
 
