@@ -10,6 +10,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
+from player import Player
 from redis import Redis
 from sqlalchemy import create_engine, text
 
@@ -95,3 +96,9 @@ def context(settings: Settings) -> Iterator[Context]:
         valkey.flushdb()
     yield context
     context.close()
+
+
+@pytest.fixture(scope="session")
+def play() -> Player:
+    """Plays sessions up to their first simulation, without database or simulator."""
+    return Player()

@@ -62,7 +62,7 @@ def test_a_bridge_is_built_simulated_scored_and_verified(context, run) -> None:
         ("UPDATE jobs SET input_tokens = input_tokens + 1", "usage: input_tokens"),
         ("UPDATE rollouts SET machine_hash = repeat('0', 64)", "rollout 0: machine"),
         (
-            "UPDATE journal SET reply = jsonb_set(reply::jsonb, '{text}', '\"x\"') WHERE sequence = 1",
+            "UPDATE journal SET reply = jsonb_set(reply::jsonb, '{text}', '0')",
             "replay",
         ),
         ("DELETE FROM journal WHERE sequence > 100", "replay"),

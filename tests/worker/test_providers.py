@@ -1,6 +1,8 @@
 from __future__ import annotations
 
+import random
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 from provider_standin import ProviderStandIn
@@ -141,7 +143,6 @@ def test_arguments_that_are_no_json_reach_the_session_as_text(client) -> None:
 
 
 def test_retry_after_is_honoured_within_bounds() -> None:
-    import random
 
     policy, rng = RetryPolicy(longest_wait_s=60), random.Random(1)
     assert policy.wait_s(1, {"retry-after": "7"}, rng) == 7
@@ -169,3 +170,23 @@ def test_cut_and_filtered_replies_are_marked_in_the_transcript(play, client, fin
         played = play(client=client(standin))
     assert [turn.finish for turn in played.session.transcript.turns] == [finish, finish]
     assert played.failure.reason == "plan_unreadable"
+
+
+def test_sessions_get_through_a_provider_that_fails_one_request_in_five(play, client) -> None:
+    kinds = ("429", "500", "503", "drop", "slow", "garbage")
+    rng = random.Random(5)
+    faults = [rng.choice(kinds) if rng.random() < 0.2 else None for _ in range(5000)]
+    policy = RetryPolicy(tries=8, first_wait_s=0.01, longest_wait_s=0.05, timeout_s=0.5)
+    with (
+        ProviderStandIn(fault=lambda n: faults[n % len(faults)]) as standin,
+        ThreadPoolExecutor(4) as threads,
+    ):
+        one = client(standin, policy=policy)
+        played = list(
+            threads.map(lambda seed: play(client=one, workflow="builder", seed=seed), range(4))
+        )
+    assert all(p.suspended is not None for p in played), [p.failure for p in played]
+    tries = [entry.tries for p in played for entry in p.entries]
+    assert max(tries) <= policy.tries
+    assert sum(tries) == standin.counts.requests
+    assert sum(tries) > 1.1 * len(tries)

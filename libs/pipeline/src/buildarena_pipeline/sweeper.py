@@ -51,6 +51,9 @@ class Sweeper:
                 self.sweep()
             except SQLAlchemyError as error:
                 log.warning("sweep_failed", error=str(error).splitlines()[0])
+            except Exception:
+                # Without a sweeper, lost messages stay lost: it must outlive what nobody foresaw.
+                log.exception("sweep_failed")
 
     def sweep(self) -> None:
         """Sweeps once, unless another process is at it."""
