@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 import pytest
+
 from buildarena_benchmark import Task, builtin_tasks
 from buildarena_geometry import Machine
 from buildarena_simulation import Trajectory

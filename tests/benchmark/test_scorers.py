@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+
 from buildarena_benchmark import Task, failed_score, score
 from buildarena_geometry import Machine
 from buildarena_simulation import Trajectory

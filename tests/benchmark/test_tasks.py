@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+
 from buildarena_benchmark import Task, TaskError, load_task
 
 OWN = """\

@@ -4,6 +4,7 @@ import sys
 from pathlib import Path
 
 import pytest
+
 from buildarena_benchmark import Task, builtin_tasks
 from buildarena_simulation import ENGINES
 

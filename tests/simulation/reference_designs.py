@@ -1,13 +1,14 @@
 """Reference machines of our own design: one function per family, each yielding an action log.
 
-A log is a list of ``{"op": action, "params": arguments}``. Every design is parametric, so that tests
-vary it, and good ones can serve as a scripted expert's repertoire.
+A log is a list of ``{"op": action, "params": arguments}``. Every design is parametric, so that
+tests vary it, and good ones can serve as a scripted expert's repertoire.
 """
 
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+
 from buildarena_geometry import Machine
 
 Actions = list[dict[str, Any]]
@@ -172,34 +173,42 @@ def deck(
         pillar_at: Where they are: row and block, counted from the middle.
     """
     draft = Draft()
-    middle = draft.start()
-    grid = {(0, 0): middle}
-    for sign, way in ((1, EAST), (-1, WEST)):
-        for x, block in enumerate(draft.row(middle, way, width // 2), 1):
-            grid[sign * x, 0] = block
-    for x in range(-(width // 2), width // 2 + 1):
-        for sign, way in ((1, NORTH), (-1, SOUTH)):
-            for y, block in enumerate(draft.row(grid[x, 0], way, length // 2), 1):
-                grid[x, sign * y] = block
-    xs = range(-(width // 2), width // 2 + 1)
-    ys = range(-(length // 2), length // 2 + 1)
+    grid = _deck_grid(draft, width // 2, length // 2)
     if rails:
-        for x in (xs[0], xs[-1]):
+        for x in (-(width // 2), width // 2):
             for y in (-1, 0, 1):
                 draft.attach(grid[x, y], UP)
     for place in pillar_at if pillars else ():
         draft.row(grid[place], DOWN, pillars)
     if cross:
-        for y in ys:
-            for x in xs[:-1]:
-                draft.connect(grid[x, y], grid[x + 1, y], UP)
+        _brace_grid(draft, grid, (1, 0), UP)
     for kind in along:
-        way = UP if kind in "tT1" else DOWN
         reach = {"t": 1, "b": 1, "1": 4, "2": 4}.get(kind, length - 1)
-        for x in xs:
-            for y in ys[: len(ys) - reach]:
-                draft.connect(grid[x, y], grid[x, y + reach], way)
+        _brace_grid(draft, grid, (0, reach), UP if kind in "tT1" else DOWN)
     return draft.actions
+
+
+def _deck_grid(draft: Draft, across: int, along: int) -> dict[tuple[int, int], str]:
+    """Blocks of a deck by row and place, counted from the middle."""
+    grid = {(0, 0): draft.start()}
+    for sign, way in ((1, EAST), (-1, WEST)):
+        for x, block in enumerate(draft.row(grid[0, 0], way, across), 1):
+            grid[sign * x, 0] = block
+    for x in range(-across, across + 1):
+        for sign, way in ((1, NORTH), (-1, SOUTH)):
+            for y, block in enumerate(draft.row(grid[x, 0], way, along), 1):
+                grid[x, sign * y] = block
+    return grid
+
+
+def _brace_grid(
+    draft: Draft, grid: dict[tuple[int, int], str], step: tuple[int, int], way: Direction
+) -> None:
+    """A brace from every block to the one a step further on."""
+    for x, y in sorted(grid, key=lambda place: place[:: -1 if step[0] else 1]):
+        further = grid.get((x + step[0], y + step[1]))
+        if further is not None:
+            draft.connect(grid[x, y], further, way)
 
 
 def one_shot_bridge() -> Actions:

@@ -12,12 +12,12 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
 
+from tests.simulation import reference_designs as designs
+from tests.simulation.reference_designs import EAST, SIDES, WEST, Actions, replayed
+
 from buildarena_benchmark import builtin_tasks, score
 from buildarena_geometry import Machine
 from buildarena_simulation import ENGINES, simulate
-
-from tests.simulation import reference_designs as designs
-from tests.simulation.reference_designs import EAST, SIDES, WEST, Actions, replayed
 
 DATA: Final = Path(__file__).parents[1] / "data" / "simulation"
 GOLDENS: Final = DATA / "goldens.json"

@@ -4,6 +4,20 @@ import math
 
 import numpy as np
 import pytest
+from tests.simulation.reference_designs import (
+    EAST,
+    NORTH,
+    SIDES,
+    SOUTH,
+    UP,
+    WEST,
+    Draft,
+    beam,
+    car,
+    replayed,
+    rocket,
+)
+
 from buildarena_geometry import Machine
 from buildarena_simulation import Scenario, Trajectory, simulate
 from buildarena_simulation.constants import (
@@ -20,20 +34,6 @@ from buildarena_simulation.scenario import (
     SpanPlacement,
     TerrainBox,
     gap_terrain,
-)
-
-from tests.simulation.reference_designs import (
-    EAST,
-    NORTH,
-    SIDES,
-    SOUTH,
-    UP,
-    WEST,
-    Draft,
-    beam,
-    car,
-    replayed,
-    rocket,
 )
 
 

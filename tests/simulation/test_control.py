@@ -4,14 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from buildarena_benchmark import Task
-from buildarena_geometry import KeyPress, Machine
-from buildarena_simulation import Scenario, simulate
-from buildarena_simulation.constants import WHEEL_LAG_RATE, WHEEL_SPEED
-from buildarena_simulation.control import heated_cannons, plan_schedule
-from buildarena_simulation.machine import bindings_of, structure_of
-from buildarena_simulation.scenario import Control, SpanPlacement
-
 from tests.simulation.reference_designs import (
     DOWN,
     EAST,
@@ -24,6 +16,14 @@ from tests.simulation.reference_designs import (
     replayed,
     rocket,
 )
+
+from buildarena_benchmark import Task
+from buildarena_geometry import KeyPress, Machine
+from buildarena_simulation import Scenario, simulate
+from buildarena_simulation.constants import WHEEL_LAG_RATE, WHEEL_SPEED
+from buildarena_simulation.control import heated_cannons, plan_schedule
+from buildarena_simulation.machine import bindings_of, structure_of
+from buildarena_simulation.scenario import Control, SpanPlacement
 
 
 def _press(key: str, time: float, hold_for: float) -> KeyPress:

@@ -1,8 +1,5 @@
 """Rockets: heat, thrust, balance."""
 
-from buildarena_benchmark import Score, Task, score
-from buildarena_simulation import Trajectory, simulate
-
 from tests.simulation.reference_designs import (
     EAST,
     WEST,
@@ -12,6 +9,9 @@ from tests.simulation.reference_designs import (
     rocket,
     rocket_assembly,
 )
+
+from buildarena_benchmark import Score, Task, score
+from buildarena_simulation import Trajectory, simulate
 
 
 def _trial(task: Task, actions: Actions, engine: str) -> tuple[Score, Trajectory]:

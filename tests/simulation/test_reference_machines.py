@@ -4,7 +4,6 @@ import json
 from typing import Any
 
 import pytest
-
 from tests.simulation.references import GOLDENS, REFERENCES, load_machine, outcome
 
 EXPECTED: dict[str, dict[str, dict[str, Any]]] = json.loads(GOLDENS.read_text(encoding="utf-8"))

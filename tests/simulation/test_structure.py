@@ -4,16 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from buildarena_geometry import Machine
-from buildarena_simulation.constants import JointKind
-from buildarena_simulation.machine import structure_of
-from buildarena_simulation.structure.clusters import Clusters, find_clusters
-from buildarena_simulation.structure.contacts import ContactForces, evenly_shared
-from buildarena_simulation.structure.model import JOINT_KINDS, Structure
-from buildarena_simulation.structure.motion import Motion
 from hypothesis import given, settings
 from hypothesis import strategies as st
-
 from tests.simulation.reference_designs import (
     DOWN,
     EAST,
@@ -27,6 +19,14 @@ from tests.simulation.reference_designs import (
     deck,
     replayed,
 )
+
+from buildarena_geometry import Machine
+from buildarena_simulation.constants import JointKind
+from buildarena_simulation.machine import structure_of
+from buildarena_simulation.structure.clusters import Clusters, find_clusters
+from buildarena_simulation.structure.contacts import ContactForces, evenly_shared
+from buildarena_simulation.structure.model import JOINT_KINDS, Structure
+from buildarena_simulation.structure.motion import Motion
 
 
 def _clusters(structure: Structure) -> Clusters:

@@ -1,9 +1,8 @@
 """Bridges: which carries more, and which does not count."""
 
-import pytest
-from buildarena_benchmark import Score, Task, score
-from buildarena_simulation import Trajectory, simulate
+import itertools
 
+import pytest
 from tests.simulation.reference_designs import (
     EAST,
     Actions,
@@ -12,6 +11,9 @@ from tests.simulation.reference_designs import (
     one_shot_bridge,
     replayed,
 )
+
+from buildarena_benchmark import Score, Task, score
+from buildarena_simulation import Trajectory, simulate
 
 
 def _trial(task: Task, actions: Actions, engine: str) -> tuple[Score, Trajectory]:
@@ -24,7 +26,7 @@ def test_more_bracing_carries_more(engine: str, tasks: dict[str, Task]) -> None:
     beams = [beam(7, braces) for braces in ("", "t", "tb", "12")]
     loads = [_trial(tasks["support-1"], actions, engine)[0].indicator for actions in beams]
     assert loads == sorted(loads)
-    assert all(b > 1.2 * a for a, b in zip(loads, loads[1:], strict=False))
+    assert all(b > 1.2 * a for a, b in itertools.pairwise(loads))
 
 
 def test_a_braced_deck_carries_more_than_a_bare_one(engine: str, tasks: dict[str, Task]) -> None:

@@ -4,6 +4,8 @@ import dataclasses
 
 import numpy as np
 import pytest
+from tests.simulation.reference_designs import car, one_shot_bridge, replayed, rocket
+
 from buildarena_benchmark import Task
 from buildarena_simulation import (
     SIMULATION_VERSION,
@@ -13,8 +15,6 @@ from buildarena_simulation import (
     simulate,
 )
 from buildarena_simulation.engines.base import rotation_of
-
-from tests.simulation.reference_designs import car, one_shot_bridge, replayed, rocket
 
 
 def _equal(first: Trajectory, second: Trajectory) -> bool:

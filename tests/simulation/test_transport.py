@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from tests.simulation.reference_designs import Actions, car, replayed, stool
+
 from buildarena_benchmark import Score, Task, score
 from buildarena_simulation import Trajectory, simulate
 from buildarena_simulation.engines.base import rotation_of
-
-from tests.simulation.reference_designs import Actions, car, replayed, stool
 
 STRAIGHT = [("UpArrow", 1.0, 3.0)]
 

@@ -134,7 +134,7 @@ def _points_beside(contacts: ContactForces, patch: IntArray) -> FloatArray:
     """
     key = patch * (int(contacts.block.max()) + 1) + contacts.block
     _, which = np.unique(key, return_inverse=True)
-    return np.bincount(which, contacts.weight)[which]
+    return np.asarray(np.bincount(which, contacts.weight)[which], dtype=np.float64)
 
 
 def _even(

@@ -1,0 +1,131 @@
+"""Writes a trial as a film (mp4, gif) or as a sheet of pictures (png)."""
+
+from collections.abc import Callable, Iterator, Sequence
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from buildarena_simulation.constants import SAMPLE_RATE_HZ
+from buildarena_simulation.render.camera import Camera
+from buildarena_simulation.render.drawing import draw
+from buildarena_simulation.render.scene import Scene
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
+
+    from buildarena_geometry import Machine
+    from buildarena_simulation.scenario import Scenario
+    from buildarena_simulation.trajectory import Trajectory
+
+FORMATS: Final = ("mp4", "gif", "png")
+
+_SIZE: Final = (960, 540)
+_SHEET: Final = (3, 2)
+_SHEET_FRAME: Final = (640, 420)
+_GIF_EVERY: Final = 3
+_GIF_SIZE: Final = (640, 360)
+_CODECS: Final = ("libx264", "mpeg4")
+
+
+def write_film(
+    machine: "Machine",
+    scenario: "Scenario",
+    trajectory: "Trajectory",
+    path: Path,
+    *,
+    on_progress: Callable[[float], None] | None = None,
+) -> None:
+    """Writes a film or a sheet of pictures of a trial.
+
+    Args:
+        machine: The machine.
+        scenario: What it was put through.
+        trajectory: Its trajectory.
+        path: Where to; the ending says what: mp4, gif, or png for six pictures on one sheet.
+        on_progress: Called with the share that is done.
+
+    Raises:
+        ValueError: The ending is another.
+        ImportError: The extra `video` is not installed.
+    """
+    kind = path.suffix.lstrip(".").lower()
+    if kind not in FORMATS:
+        raise ValueError(f"{path.name}: a film ends in {', '.join(FORMATS)}")
+    scene = Scene(machine, scenario, trajectory)
+    count = len(trajectory.time_s)
+    if kind == "png":
+        samples = np.linspace(0, count - 1, _SHEET[0] * _SHEET[1]).round().astype(int)
+        _write_sheet(list(_frames(scene, trajectory, samples, _SHEET_FRAME, on_progress)), path)
+    elif kind == "gif":
+        samples = np.arange(0, count, _GIF_EVERY)
+        _write_gif(list(_frames(scene, trajectory, samples, _GIF_SIZE, on_progress)), path)
+    else:
+        _write_mp4(_frames(scene, trajectory, np.arange(count), _SIZE, on_progress), path)
+
+
+def _frames(
+    scene: Scene,
+    trajectory: "Trajectory",
+    samples: Sequence[int] | np.ndarray,
+    size: tuple[int, int],
+    on_progress: Callable[[float], None] | None,
+) -> Iterator["Image"]:
+    distance = 2.6 * scene.reach()
+    for done, sample in enumerate(samples, 1):
+        focus = scene.focus(int(sample))
+        camera = Camera.looking_at(
+            focus, distance=distance, size=size, azimuth_deg=scene.azimuth_deg
+        )
+        caption = _caption(trajectory, int(sample))
+        yield draw(scene.at(int(sample)), camera, size=size, caption=caption)
+        if on_progress:
+            on_progress(done / len(samples))
+
+
+def _caption(trajectory: "Trajectory", sample: int) -> str:
+    time_s = float(trajectory.time_s[sample])
+    lines = [f"{trajectory.engine}   t = {time_s:.1f} s"]
+    if trajectory.cargo_mass is not None:
+        lines.append(f"cargo {trajectory.cargo_mass[sample]:.0f}")
+    if len(trajectory.block_ids):
+        x, y, z = trajectory.positions[sample, 0]
+        lines.append(f"x {x:.1f}  y {y:.1f}  z {z:.1f}")
+    broken = sum(event.time_s <= time_s for event in trajectory.breaks)
+    if broken:
+        lines.append(f"{broken} joints broken")
+    return "\n".join(lines)
+
+
+def _write_sheet(frames: Sequence["Image"], path: Path) -> None:
+    from PIL import Image
+
+    width, height = _SHEET_FRAME
+    columns, rows = _SHEET
+    sheet = Image.new("RGB", (columns * width, rows * height))
+    for k, frame in enumerate(frames):
+        sheet.paste(frame, (k % columns * width, k // columns * height))
+    sheet.save(path)
+
+
+def _write_gif(frames: Sequence["Image"], path: Path) -> None:
+    first, *rest = (frame.quantize(colors=64) for frame in frames)
+    duration_ms = 1000 * _GIF_EVERY // SAMPLE_RATE_HZ
+    first.save(path, save_all=True, append_images=rest, duration=duration_ms, loop=0)
+
+
+def _write_mp4(frames: Iterator["Image"], path: Path) -> None:
+    import av
+
+    codec = next(name for name in _CODECS if name in av.codecs_available)
+    with av.open(str(path), mode="w") as container:
+        stream = container.add_stream(codec, rate=Fraction(SAMPLE_RATE_HZ))
+        stream.width, stream.height = _SIZE
+        stream.pix_fmt = "yuv420p"
+        for frame in frames:
+            picture = av.VideoFrame.from_ndarray(np.asarray(frame), format="rgb24")
+            for packet in stream.encode(picture):
+                container.mux(packet)
+        for packet in stream.encode():
+            container.mux(packet)

@@ -1,0 +1,206 @@
+"""What a trial looks like at one moment: flat faces and lines in the world."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from buildarena_simulation.constants import FLAME_DISTANCE, FLAME_RADIUS
+from buildarena_simulation.engines.base import rotation_of
+from buildarena_simulation.machine import structure_of
+from buildarena_simulation.structure.model import FloatArray, Role, Shape, ShapeKind
+
+if TYPE_CHECKING:
+    from buildarena_geometry import Machine
+    from buildarena_simulation.scenario import Scenario
+    from buildarena_simulation.trajectory import Trajectory
+
+Color = tuple[int, int, int]
+
+_COLORS: Final[dict[Role, Color]] = {
+    Role.START: (196, 78, 66),
+    Role.BLOCK: (205, 164, 108),
+    Role.WHEEL: (82, 84, 92),
+    Role.CANNON: (86, 132, 178),
+    Role.TORCH: (140, 96, 60),
+}
+_HEATED: Final[Color] = (230, 120, 50)
+_CARGO: Final[Color] = (120, 124, 132)
+_TERRAIN: Final[Color] = (132, 160, 116)
+_BRACE: Final[Color] = (60, 64, 72)
+_WINCH: Final[Color] = (168, 140, 60)
+_FLAME: Final[Color] = (250, 190, 60)
+_ROUND_SIDES: Final = 16
+_LIGHT: Final = np.array([0.35, -0.5, 0.79])
+
+_CUBE_FACES: Final = (
+    (0, 1, 3, 2),
+    (4, 6, 7, 5),
+    (0, 4, 5, 1),
+    (2, 3, 7, 6),
+    (0, 2, 6, 4),
+    (1, 5, 7, 3),
+)
+"""Corners of each face of a box; corner k has its x, y and z signs in bits 4, 2 and 1."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Picture:
+    """What is to be drawn, world frame.
+
+    Attributes:
+        faces: Corners (K, 3) and shaded colour of each flat face.
+        lines: Ends (2, 3) and colour of each line.
+        balls: Centre (3,), radius and colour of each ball.
+    """
+
+    faces: list[tuple[FloatArray, Color]] = field(default_factory=list)
+    lines: list[tuple[FloatArray, Color]] = field(default_factory=list)
+    balls: list[tuple[FloatArray, float, Color]] = field(default_factory=list)
+
+
+class Scene:
+    """A trial as pictures.
+
+    Args:
+        machine: The machine.
+        scenario: What it was put through.
+        trajectory: Its trajectory; blocks that were not tracked are not drawn.
+    """
+
+    def __init__(self, machine: "Machine", scenario: "Scenario", trajectory: "Trajectory") -> None:
+        self._trajectory = trajectory
+        structure = structure_of(machine)
+        row = {block: k for k, block in enumerate(trajectory.block_ids)}
+        self._parts = [(part, row[part.id]) for part in structure.parts if part.id in row]
+        self._heated = {block: k for k, block in enumerate(trajectory.cannon_ids)}
+        self._terrain = [
+            shape
+            for box in scenario.terrain
+            for shape in _box(
+                np.array(box.center),
+                _about_x(np.radians(box.slope_deg)),
+                np.array(box.size) / 2,
+                _TERRAIN,
+            )
+        ]
+        self._braces = []
+        for connector in machine.connectors.values():
+            ends = [
+                (row.get(face[0]), machine.blocks[face[0]], np.array(point))
+                for face, point in (
+                    (connector.start, connector.start_point),
+                    (connector.end, connector.end_point),
+                )
+            ]
+            name = f"{connector.module.name} {connector.id}"
+            broken = [event.time_s for event in trajectory.breaks if event.joint == name]
+            local = [
+                (k, np.array(block.world_from_block.rotation).T @ (point - np.array(block.center)))
+                for k, block, point in ends
+                if k is not None
+            ]
+            if len(local) == 2:  # noqa: PLR2004 - both ends are tracked
+                color = _WINCH if connector.module.name == "Winch" else _BRACE
+                self._braces.append((local, broken[0] if broken else np.inf, color))
+
+    @property
+    def azimuth_deg(self) -> float:
+        """Whence to look: across the gap where there is terrain, else from the south-east."""
+        return -14.0 if self._terrain else -55.0
+
+    def focus(self, sample: int) -> FloatArray:
+        """The point to look at, (3,): the first tracked block, and the cargo if there is one."""
+        position = self._trajectory.positions[sample].astype(np.float64)
+        return np.asarray(position[0] if len(position) else np.zeros(3))
+
+    def reach(self) -> float:
+        """How far the machine, cargo and terrain extend from the focus at the start, units."""
+        apart = self._trajectory.positions[0].astype(np.float64) - self.focus(0)
+        reach = float(np.linalg.norm(apart, axis=1).max(initial=1.0))
+        if self._trajectory.cargo_position is not None:
+            reach = max(reach, 5.0)
+        return reach + (3.0 if self._terrain else 1.0)
+
+    def at(self, sample: int) -> Picture:
+        """The picture of one sample."""
+        trajectory, picture = self._trajectory, Picture()
+        picture.faces.extend(self._terrain)
+        positions = trajectory.positions[sample].astype(np.float64)
+        turns = rotation_of(trajectory.quaternions[sample].astype(np.float64))
+        for part, k in self._parts:
+            color = _COLORS[part.role]
+            cannon = self._heated.get(part.id)
+            if cannon is not None and trajectory.heated[sample, cannon]:
+                color = _HEATED
+            world_from_machine = turns[k] @ part.rotation.T
+            for shape in part.shapes:
+                center = positions[k] + world_from_machine @ (shape.center - part.shown)
+                picture.faces.extend(_faces(shape, center, world_from_machine, color))
+            if part.role is Role.TORCH and part.direction is not None:
+                flame = positions[k] + FLAME_DISTANCE * (world_from_machine @ part.direction)
+                picture.balls.append((flame, FLAME_RADIUS, _FLAME))
+        for ends, until, color in self._braces:
+            if trajectory.time_s[sample] < until:
+                line = np.array([positions[k] + turns[k] @ local for k, local in ends])
+                picture.lines.append((line, color))
+        if trajectory.cargo_position is not None and trajectory.cargo_quaternion is not None:
+            turn = rotation_of(trajectory.cargo_quaternion[sample].astype(np.float64))
+            half = np.array(trajectory.cargo_size) / 2
+            center = trajectory.cargo_position[sample].astype(np.float64)
+            picture.faces.extend(_box(center, turn, half, _CARGO))
+        return picture
+
+
+def _faces(
+    shape: Shape, center: FloatArray, turn: FloatArray, color: Color
+) -> Iterator[tuple[FloatArray, Color]]:
+    rotation = turn @ shape.rotation
+    if shape.kind is ShapeKind.BOX:
+        return _box(center, rotation, shape.half_extents, color)
+    return _cylinder(center, rotation, shape.half_extents, color)
+
+
+def _box(
+    center: FloatArray, rotation: FloatArray, half: FloatArray, color: Color
+) -> Iterator[tuple[FloatArray, Color]]:
+    signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+    corners = center + (signs * half) @ rotation.T
+    for face in _CUBE_FACES:
+        yield _shaded(corners[list(face)], center, color)
+
+
+def _cylinder(
+    center: FloatArray, rotation: FloatArray, half: FloatArray, color: Color
+) -> Iterator[tuple[FloatArray, Color]]:
+    angles = np.linspace(0.0, 2 * np.pi, _ROUND_SIDES, endpoint=False)
+    rim = half[0] * np.stack([np.cos(angles), np.sin(angles), np.zeros(_ROUND_SIDES)], axis=1)
+    up = np.array([0.0, 0.0, half[2]])
+    low, high = (center + (rim + offset) @ rotation.T for offset in (-up, up))
+    yield _shaded(low[::-1], center, color)
+    yield _shaded(high, center, color)
+    for k in range(_ROUND_SIDES):
+        after = (k + 1) % _ROUND_SIDES
+        # One spoke-like darker patch shows that a wheel turns.
+        shade = color if k else (200, 200, 200)
+        yield _shaded(np.array([low[k], low[after], high[after], high[k]]), center, shade)
+
+
+def _shaded(corners: FloatArray, center: FloatArray, color: Color) -> tuple[FloatArray, Color]:
+    normal = np.cross(corners[1] - corners[0], corners[2] - corners[1])
+    normal = normal / (np.linalg.norm(normal) or 1.0)
+    if normal @ (corners.mean(axis=0) - center) < 0:
+        corners, normal = corners[::-1], -normal
+    brightness = 0.62 + 0.38 * max(0.0, float(normal @ _LIGHT))
+    return corners, _scaled(color, brightness)
+
+
+def _scaled(color: Sequence[int], brightness: float) -> Color:
+    red, green, blue = (round(channel * brightness) for channel in color)
+    return red, green, blue
+
+
+def _about_x(angle: float) -> FloatArray:
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])

@@ -1,0 +1,143 @@
+"""The command `machine simulate` and `machine render`, without any server."""
+
+import json
+from pathlib import Path
+
+import av
+import pytest
+from PIL import Image
+from tests.simulation.reference_designs import beam, replayed
+from tests.simulation.references import DATA
+from typer.testing import CliRunner
+
+from buildarena_cli.machine import app
+from buildarena_simulation import Trajectory
+
+SHORT_TASK = """\
+name: short-bridge
+title: A bridge for a moment
+category: support
+statement: |
+  A bridge.
+scenario:
+  duration_s: 1.0
+  terrain:
+    - {center: [0, -12.5, 2.5], size: [30, 20, 5]}
+    - {center: [0, 12.5, 2.5], size: [30, 20, 5]}
+  cargo: {size: [2.5, 2.5, 1.5], final_mass: 100, ramp_s: 1}
+  placement: {kind: span, gap: 5}
+scoring: {name: support, min_time_s: 0.5}
+indicator: {name: load, unit: mass units}
+"""
+
+
+@pytest.fixture
+def run(tmp_path: Path):
+    task = tmp_path / "task.yaml"
+    task.write_text(SHORT_TASK, encoding="utf-8")
+
+    def call(*arguments: str, task_name: str = str(task)):
+        return CliRunner().invoke(app, [*arguments, "--task", task_name])
+
+    return call
+
+
+def test_json_tells_the_score_and_nothing_else(run) -> None:
+    done = run("simulate", str(DATA / "beam.json"), "--engine", "mujoco", "--json")
+    assert done.exit_code == 0, done.output
+    report = json.loads(done.stdout)
+    assert (report["task"], report["engine"], report["success"]) == ("short-bridge", "mujoco", True)
+    assert report["metrics"]["parts"] == 7
+
+
+def test_a_document_a_log_and_a_bare_list_are_the_same_machine(run, tmp_path: Path) -> None:
+    machine = replayed(beam(7))
+    forms = {
+        "document.json": machine.to_document(),
+        "list.json": beam(7),
+        "log.json": [{"name": a["op"], "arguments": a["params"]} for a in beam(7)],
+    }
+    reports = []
+    for name, content in forms.items():
+        file = tmp_path / name
+        file.write_text(json.dumps(content), encoding="utf-8")
+        done = run("simulate", str(file), "--engine", "mujoco", "--json")
+        reports.append(json.loads(done.stdout))
+    assert reports[0] == reports[1] == reports[2]
+
+
+@pytest.mark.parametrize("kind", ["png", "gif", "mp4"])
+def test_a_film_shows_the_trial(run, tmp_path: Path, kind: str) -> None:
+    video, data = tmp_path / f"film.{kind}", tmp_path / "beam.parquet"
+    file = str(DATA / "beam.json")
+    done = run("simulate", file, "--engine", "mujoco", "--trajectory", str(data))
+    assert done.exit_code == 0, done.output
+    assert len(Trajectory.from_parquet(data.read_bytes()).time_s) == 26
+    done = run("render", file, "--trajectory", str(data), "--video", str(video))
+    assert done.exit_code == 0, done.output
+    if kind == "mp4":
+        with av.open(str(video)) as film:
+            frames = [frame.to_image() for frame in film.decode(video=0)]
+        assert len(frames) == 26
+        picture = frames[0]
+    else:
+        with Image.open(video) as film:
+            assert getattr(film, "n_frames", 1) == (9 if kind == "gif" else 1)
+            picture = film.convert("RGB")
+    colors = picture.convert("RGB").getcolors(maxcolors=10**6)
+    assert colors is not None
+    assert len(colors) > 8
+
+
+def test_a_seed_nudges_the_start(run, tmp_path: Path) -> None:
+    starts = []
+    for more in ([], ["--seed", "1"], ["--seed", "2"]):
+        data = tmp_path / "nudged.parquet"
+        run(
+            "simulate",
+            str(DATA / "beam.json"),
+            "--engine",
+            "mujoco",
+            "--trajectory",
+            str(data),
+            *more,
+        )
+        starts.append(tuple(Trajectory.from_parquet(data.read_bytes()).positions[0, 0]))
+    assert len(set(starts)) == 3
+    assert all(abs(x) <= 0.01 and abs(y) <= 0.01 for x, y, _ in starts)
+
+
+def test_an_empty_machine_is_a_failed_trial_not_a_crash(run, tmp_path: Path) -> None:
+    file = tmp_path / "empty.json"
+    file.write_text("[]", encoding="utf-8")
+    done = run("simulate", str(file), "--json")
+    assert done.exit_code == 0
+    assert json.loads(done.stdout)["success"] is False
+
+
+@pytest.mark.parametrize(
+    ("content", "arguments", "told"),
+    [
+        ("{", [], "no JSON"),
+        ('{"blocks": 3}', [], "version is missing"),
+        ('{"hello": 1}', [], "neither a machine document nor an action log"),
+        ("[]", ["--engine", "havok"], "pybullet, mujoco"),
+    ],
+)
+def test_bad_input_is_told_in_one_line(
+    run, tmp_path: Path, content: str, arguments: list[str], told: str
+) -> None:
+    file = tmp_path / "machine.json"
+    file.write_text(content, encoding="utf-8")
+    if "--engine" in arguments:
+        file.write_text(json.dumps(beam(3)), encoding="utf-8")
+    done = run("simulate", str(file), *arguments)
+    assert done.exit_code == 1
+    assert told in done.output
+    assert "Traceback" not in done.output
+
+
+def test_an_unknown_task_is_told_with_the_known_ones(run) -> None:
+    done = run("simulate", str(DATA / "beam.json"), task_name="support-9")
+    assert done.exit_code == 1
+    assert "support-3" in done.output
