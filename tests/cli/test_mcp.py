@@ -46,7 +46,7 @@ async def play(url: str, simulate) -> dict[str, object]:
             },
         )
         assert refused.is_error
-        for name, arguments in DESIGNS["support-1"](0).parts["deck"].actions:
+        for name, arguments in DESIGNS["support-1"](0).parts["bridge"].actions:
             await said(session, name, {"session": session_id, **arguments})
         assert "not ended" in await said(session, "submit", {"session": session_id})
         await asyncio.to_thread(simulate)

@@ -101,7 +101,7 @@ def _read_program(machine: Machine, text: str) -> _Program:
                 "action": entry.get("action"),
                 "new_key": key,
             }
-            outcome = driven.act("change_control_key", arguments)
+            outcome = driven.act("add_control_key", arguments)
             if not outcome.ok:
                 raise _ProgramError(f"control_config[{index}]: {outcome.text}")
     presses = data.get("control_sequence")

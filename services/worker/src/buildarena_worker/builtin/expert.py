@@ -11,7 +11,8 @@ from collections.abc import Sequence
 from functools import lru_cache
 
 from buildarena_worker.builtin.designs import DESIGNS
-from buildarena_worker.builtin.designs.design import Action, Design
+from buildarena_worker.builtin.designs.design import Design
+from buildarena_worker.builtin.designs.drafting import Action
 from buildarena_worker.builtin.reading import Situation, read_situation
 from buildarena_worker.messages import Reply, Request, ToolCall
 
@@ -60,13 +61,12 @@ def _script(design: Design, situation: Situation) -> Sequence[Action]:
     part = design.parts.get(situation.part or "")
     if part is None:
         return _whole_script(design)
-    return part.refinements if situation.refining else part.actions
+    return () if situation.refining else part.actions
 
 
 def _whole_script(design: Design) -> Sequence[Action]:
     """Everything in one go, for workflows without sub-structures."""
-    part = next(iter(design.parts.values()))
-    return (*part.actions, *part.refinements)
+    return next(iter(design.parts.values())).actions
 
 
 def _drawing(design: Design, situation: Situation) -> str:

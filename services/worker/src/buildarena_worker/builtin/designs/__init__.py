@@ -1,14 +1,22 @@
-"""Parametric designs of our own for the built-in tasks; docs/expert.md explains them."""
+"""Parametric designs of our own for the nine tasks; docs/expert.md explains them."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
-from buildarena_worker.builtin.designs.bridges import bridge
+from buildarena_worker.builtin.designs import bridges, rockets, vehicles
 from buildarena_worker.builtin.designs.design import Design
 
 DESIGNS: dict[str, Callable[[int], Design]] = {
-    "support-1": lambda seed: bridge(seed, gap=5),
+    "transport-1": vehicles.car,
+    "transport-2": vehicles.carrier,
+    "transport-3": vehicles.long_carrier,
+    "support-1": lambda seed: bridges.braced_beam(seed, gap=5),
+    "support-2": lambda seed: bridges.braced_deck(seed, gap=10),
+    "support-3": lambda seed: bridges.braced_beam(seed, gap=20),
+    "lift-1": rockets.engine,
+    "lift-2": rockets.rocket,
+    "lift-3": rockets.framed_rocket,
 }
 """By task name: the design for a seed, which varies it within its tolerances."""
 

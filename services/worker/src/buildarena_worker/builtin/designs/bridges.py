@@ -1,69 +1,78 @@
-"""Bridges: a deck across the gap, its rows held together by braces on both sides."""
+"""Bridges: a row of blocks, or a deck of three, stiffened by overlapping braces."""
 
 from __future__ import annotations
 
-from buildarena_worker.builtin.designs.design import (
+from collections.abc import Sequence
+
+from buildarena_worker.builtin.designs.design import Design, PartDesign
+from buildarena_worker.builtin.designs.drafting import (
     DOWN,
     EAST,
     NORTH,
     SOUTH,
     UP,
     WEST,
-    Design,
-    PartDesign,
-    Place,
-    Sketch,
+    Direction,
+    Draft,
 )
 
-HALF_WIDTH = 2
-"""Columns on each side of the middle: the cargo is 2.5 wide and lands on the middle three."""
-BRACE_REACH = 4
-"""Blocks that one brace bridges: overlapping braces share the load of several joints."""
+OVERLAP = 4
+"""Blocks that a brace spans: braces that overlap share the load of several joints."""
 
 
-def bridge(seed: int, *, gap: int) -> Design:
-    """A deck five blocks wide.
+def braced_beam(seed: int, *, gap: int) -> Design:
+    """A single row of blocks with braces above and below.
 
     Args:
-        seed: Varies how far the deck rests on the terrain, between 1 and 2 blocks more.
+        seed: Varies how far the beam rests on the terrain, by a block at each end.
         gap: Width of the gap, units.
     """
-    half_length = gap // 2 + 2 + seed % 2
-    sketch = Sketch()
-    sketch.start("middle of the deck")
-    for side in (EAST, WEST):
-        for step in range(HALF_WIDTH):
-            sketch.attach((side[0] * step, 0.0, 0.0), side, note="middle row")
-    for column in range(-HALF_WIDTH, HALF_WIDTH + 1):
-        for way in (NORTH, SOUTH):
-            for step in range(half_length):
-                sketch.attach((float(column), way[1] * step, 0.0), way, note=f"column {column}")
-    _brace_along(sketch, half_length)
-    _brace_across(sketch, half_length)
-    length = 2 * half_length + 1
-    description = (
-        f"A flat deck, {2 * HALF_WIDTH + 1} blocks wide (east-west) and {length} long "
-        "(north-south), of small wooden blocks, with overlapping braces above and below"
+    draft = Draft()
+    row = _row(draft, draft.start("middle of the beam"), _half(seed, gap))
+    for way in (UP, DOWN):
+        _brace(draft, row, way)
+    return _bridge(draft, gap, f"A row of {len(row)} blocks from south to north, braced both sides")
+
+
+def braced_deck(seed: int, *, gap: int) -> Design:
+    """Three rows side by side, held together at every block, with braces on top.
+
+    Args:
+        seed: As for the beam.
+        gap: Width of the gap, units.
+    """
+    draft = Draft()
+    middle = draft.start("middle of the deck")
+    starts = [draft.attach(middle, WEST), middle, draft.attach(middle, EAST)]
+    rows = [_row(draft, start, _half(seed, gap)) for start in starts]
+    for west, centre, east in zip(*rows, strict=True):
+        draft.connect(west, centre, UP)
+        draft.connect(centre, east, UP)
+    for row in rows:
+        _brace(draft, row, UP)
+    return _bridge(
+        draft, gap, f"3 rows of {len(rows[0])} blocks from south to north, braced on top"
     )
+
+
+def _half(seed: int, gap: int) -> int:
+    return gap // 2 + 1 + seed % 2
+
+
+def _row(draft: Draft, middle: str, half: int) -> list[str]:
+    """Blocks to the north and south of one, from south to north."""
+    ahead = draft.row(middle, NORTH, half)
+    behind = draft.row(middle, SOUTH, half)
+    return [*reversed(behind), middle, *ahead]
+
+
+def _brace(draft: Draft, row: Sequence[str], way: Direction) -> None:
+    for first, second in zip(row, row[OVERLAP:], strict=False):
+        draft.connect(first, second, way)
+
+
+def _bridge(draft: Draft, gap: int, description: str) -> Design:
     return Design(
-        overall=f"A braced deck that rests on both terrains and spans the gap of {gap}.",
-        parts={"deck": PartDesign(description=description, actions=tuple(sketch.actions))},
+        overall=f"A bridge over the gap of {gap} that rests on both terrains by its own weight.",
+        parts={"bridge": PartDesign(description=description, actions=tuple(draft.actions))},
     )
-
-
-def _brace_along(sketch: Sketch, half_length: int) -> None:
-    """Overlapping braces along every column, above and below, where the deck bends most."""
-    for column in range(-HALF_WIDTH, HALF_WIDTH + 1):
-        for normal in (UP, DOWN):
-            for south in range(-half_length, half_length - BRACE_REACH + 1, 2):
-                start: Place = (float(column), float(south), 0.0)
-                end: Place = (float(column), float(south + BRACE_REACH), 0.0)
-                sketch.connect((start, normal), (end, normal), note="along")
-
-
-def _brace_across(sketch: Sketch, half_length: int) -> None:
-    """Braces across the columns, which hang together by the middle row alone."""
-    for row in range(-half_length, half_length + 1, 2):
-        start: Place = (float(-HALF_WIDTH), float(row), 0.0)
-        end: Place = (float(HALF_WIDTH), float(row), 0.0)
-        sketch.connect((start, DOWN), (end, DOWN), note="across")

@@ -1,0 +1,131 @@
+"""Drafting: a machine built by directions instead of face letters, with the actions it took."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from buildarena_geometry import Machine
+
+Action = tuple[str, Mapping[str, Any]]
+Direction = tuple[int, int, int]
+"""A unit vector along an axis, world frame."""
+
+EAST, WEST = (1, 0, 0), (-1, 0, 0)
+NORTH, SOUTH = (0, 1, 0), (0, -1, 0)
+UP, DOWN = (0, 0, 1), (0, 0, -1)
+SIDES: tuple[Direction, ...] = (EAST, WEST, NORTH, SOUTH)
+WOOD, WHEEL, CANNON, TORCH = "Small Wooden Block", "Powered Wheel", "Water Cannon", "Torch"
+BRACE = "Brace"
+ALIGNED = 0.999
+"""Cosine above which two directions count as one; a quarter turn is far below it."""
+
+
+class Draft:
+    """A machine under construction.
+
+    Args:
+        available: Sub-structures by name, for an assembly.
+
+    Attributes:
+        machine: The machine so far.
+        actions: The actions that made it.
+    """
+
+    def __init__(self, available: Mapping[str, Machine] | None = None) -> None:
+        self.machine = Machine(available=dict(available)) if available else Machine()
+        self.actions: list[Action] = []
+
+    def do(self, name: str, **arguments: Any) -> None:
+        """Carries out an action that must be accepted.
+
+        Raises:
+            ValueError: It was refused: the design is wrong.
+        """
+        outcome = self.machine.act(name, arguments)
+        if not outcome.ok:
+            raise ValueError(f"{name}({arguments}): {outcome.text}")
+        self.actions.append((name, arguments))
+
+    def start(self, note: str = "") -> str:
+        """Places the starting block; returns its id."""
+        self.do("start", init_shift=[0, 0, 0], init_rotation=[0, 0, 0], note=note)
+        return "1"
+
+    def attach(self, base: str, way: Direction, module: str = WOOD, note: str = "") -> str:
+        """Attaches a block to a block's side; returns the new block's id."""
+        face = self._face(base, way)
+        self.do("attach_block_to", base_block=base, face=face, new_block=module, note=note)
+        return list(self.machine.blocks)[-1]
+
+    def row(self, base: str, way: Direction, count: int) -> list[str]:
+        """Attaches blocks one after the other; the base is not among those returned."""
+        made = []
+        for _ in range(count):
+            base = self.attach(base, way)
+            made.append(base)
+        return made
+
+    def connect(
+        self, first: str, second: str, way: Direction, other_way: Direction | None = None
+    ) -> None:
+        """Braces a side of one block to a side of another, by default the one that looks alike."""
+        self.do(
+            "connect_blocks",
+            block_a=first,
+            face_a=self._face(first, way),
+            block_b=second,
+            face_b=self._face(second, other_way or way),
+            connector=BRACE,
+            note="",
+        )
+
+    def cannon(self, base: str, side: Direction, spray: Direction) -> str:
+        """Attaches a water cannon that sprays in a direction."""
+        return self._aimed(self.attach(base, side, CANNON), spray)
+
+    def torch(self, base: str, side: Direction, flame: Direction) -> str:
+        """Attaches a torch whose flame is in a direction."""
+        return self._aimed(self.attach(base, side, TORCH), flame)
+
+    def wheel(self, base: str, side: Direction) -> str:
+        """Attaches a wheel to an east or west side; forward spin rolls it north."""
+        made = self.attach(base, side, WHEEL)
+        if side == WEST:
+            self.do("flip_spin", block_id=made)
+        return made
+
+    def _aimed(self, block: str, way: Direction) -> str:
+        """Twists a block by quarter turns until it points in a direction."""
+        wanted = np.array(way, dtype=float)
+        for angle in (0, 90, 180, 270):
+            trial = self.machine.copy()
+            if angle and not trial.act("twist_block", {"block_id": block, "angle": angle}).ok:
+                continue
+            pointing = trial.blocks[block].pointing
+            if pointing is not None and pointing @ wanted > ALIGNED:
+                if angle:
+                    self.do("twist_block", block_id=block, angle=angle)
+                return block
+        raise ValueError(f"block {block} cannot point towards {way}")
+
+    def _face(self, block: str, way: Direction) -> str:
+        found = self.machine.blocks[block]
+        for face in found.module.faces:
+            if np.dot(found.face_normal(face.label), way) > ALIGNED:
+                return face.label
+        raise ValueError(f"block {block} has no side towards {way}")
+
+
+def replay_actions(actions: Sequence[Action]) -> Machine:
+    """The machine that actions build; every one must be accepted.
+
+    Raises:
+        ValueError: One was refused.
+    """
+    draft = Draft()
+    for name, arguments in actions:
+        draft.do(name, **arguments)
+    return draft.machine

@@ -1,0 +1,98 @@
+"""Vehicles: a spine with cross members, a wheel at each end, and a deck for cargo."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from buildarena_worker.builtin.designs.design import Design, PartDesign
+from buildarena_worker.builtin.designs.drafting import EAST, NORTH, SOUTH, UP, WEST, Draft
+
+Press = tuple[str, float, float]
+"""Key, time and duration, seconds."""
+
+
+def car(seed: int) -> Design:
+    """A light car on four wheels that turns on the spot towards the target and drives there."""
+    length = 5 + 2 * (seed % 2)
+    presses: list[Press] = [("UpArrow", 1.0 + 0.1 * (seed % 5), 20.0)]
+    return _vehicle(length=length, track=1, deck=None, presses=presses)
+
+
+def carrier(seed: int) -> Design:
+    """A carrier with a railed deck of 5 x 5 for the small cargo."""
+    presses: list[Press] = [("UpArrow", 3.0 + 0.1 * (seed % 5), 6.0)]
+    return _vehicle(length=5, track=2, deck=(2, 2), presses=presses)
+
+
+def long_carrier(seed: int) -> Design:
+    """A carrier with a railed deck of 5 x 9 for the long cargo, there and back."""
+    begin = 3.0 + 0.1 * (seed % 5)
+    presses: list[Press] = [("UpArrow", begin, 3.0), ("DownArrow", begin + 4.0, 3.0)]
+    return _vehicle(length=9, track=2, deck=(2, 4), presses=presses)
+
+
+def _vehicle(
+    *, length: int, track: int, deck: tuple[int, int] | None, presses: Sequence[Press]
+) -> Design:
+    """A vehicle that skid-steers: its wheels on one side share their keys.
+
+    Args:
+        length: Odd number of blocks of the spine.
+        track: Blocks between the spine and a wheel.
+        deck: Half-width and half-length of the deck in blocks, or None.
+        presses: The control sequence.
+    """
+    draft = Draft()
+    middle = draft.start("middle of the spine")
+    front = draft.row(middle, NORTH, length // 2)[-1]
+    back = draft.row(middle, SOUTH, length // 2)[-1]
+    right: list[str] = []
+    left: list[str] = []
+    for base in (front, back):
+        for side, wheels in ((EAST, right), (WEST, left)):
+            end = [base, *draft.row(base, side, track)][-1]
+            wheels.append(draft.wheel(end, side))
+    if deck is not None:
+        _railed_deck(draft, middle, deck)
+    told = "no deck" if deck is None else f"a railed deck of {2 * deck[0] + 1} x {2 * deck[1] + 1}"
+    description = f"A spine of {length} blocks, two cross members with two wheels each, {told}"
+    return Design(
+        overall="A vehicle on four powered wheels that steers by driving its sides apart.",
+        parts={"vehicle": PartDesign(description=description, actions=tuple(draft.actions))},
+        control={
+            "control_design": "Both sides drive together; opposite drive turns on the spot.",
+            "control_config": [*_bindings(right, turn=1), *_bindings(left, turn=-1)],
+            "control_sequence": [
+                {"time": time, "key": key, "hold_for": hold_for} for key, time, hold_for in presses
+            ],
+        },
+    )
+
+
+def _bindings(wheels: Sequence[str], *, turn: int) -> list[dict[str, Any]]:
+    """Keys of one side's wheels: a left turn drives the right side forward, and the reverse."""
+    forward, backward = ("LeftArrow", "RightArrow")[::turn]
+    return [
+        {"block": wheel, "action": action, "keys": keys}
+        for wheel in wheels
+        for action, keys in (
+            ("spinning_forward", ["UpArrow", forward]),
+            ("spinning_backward", ["DownArrow", backward]),
+        )
+    ]
+
+
+def _railed_deck(draft: Draft, base: str, half: tuple[int, int]) -> None:
+    across, along = half
+    grid = {(0, 0): draft.attach(base, UP)}
+    for sign, way in ((1, NORTH), (-1, SOUTH)):
+        for y, block in enumerate(draft.row(grid[0, 0], way, along), 1):
+            grid[0, sign * y] = block
+    for y in range(-along, along + 1):
+        for sign, way in ((1, EAST), (-1, WEST)):
+            for x, block in enumerate(draft.row(grid[0, y], way, across), 1):
+                grid[sign * x, y] = block
+    for (x, y), block in grid.items():
+        if abs(x) == across or abs(y) == along:
+            draft.attach(block, UP, note="rail")

@@ -1,0 +1,44 @@
+"""The expert solves all nine tasks; the other baselines solve none."""
+
+from __future__ import annotations
+
+import os
+
+import pytest
+
+from buildarena_benchmark import builtin_tasks, score
+from buildarena_simulation import simulate
+from buildarena_worker.errors import ConstructionFailedError
+
+TASKS = sorted(builtin_tasks())
+SEEDS = range(int(os.environ.get("EXPERT_SEEDS", "1")))
+ENGINES = ["pybullet", "mujoco"]
+
+
+def tried(play, model: str, task: str, seed: int, engine: str):
+    """The score of a model's machine, or the failure that kept it from being tried."""
+    played = play(model, task=task, seed=seed)
+    if played.suspended is None:
+        return played.failure
+    machine = played.suspended.machine
+    trajectory = simulate(
+        machine, builtin_tasks()[task].scenario, engine, controls=played.suspended.controls
+    )
+    return score(builtin_tasks()[task], machine, trajectory)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("task", TASKS)
+def test_the_expert_succeeds(play, task, seed, engine) -> None:
+    result = tried(play, "builtin/expert", task, seed, engine)
+    assert not isinstance(result, Exception), result
+    assert result.success, result
+
+
+@pytest.mark.parametrize("model", ["builtin/random", "builtin/idle"])
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("task", TASKS)
+def test_the_other_baselines_fail(play, model, task, seed) -> None:
+    result = tried(play, model, task, seed, "mujoco")
+    assert isinstance(result, ConstructionFailedError) or not result.success
