@@ -36,6 +36,9 @@ def test_an_agent_builds_and_submits(api, context, session) -> None:
     assert api.get(f"/v1/jobs/{session}/machine").status_code == 200
     assert len(api.get(f"/v1/jobs/{session}/transcript").json()["turns"]) == 3
     assert context.queues.waiting("simulate.mujoco") == 1
+    page = api.get(f"/v1/jobs/{session}/transcript", params={"style": "markdown"}).text
+    assert page.startswith("# support-1 by agent/me, seed 1")
+    assert "3 actions, 33.3% of them refused (1 face_occupied)." in page
 
 
 def test_calls_survive_a_restart_of_the_api(api, context, session) -> None:

@@ -10,6 +10,7 @@ from buildarena_api import cursors
 from buildarena_api.dependencies import ContextDep, SubmissionsDep
 from buildarena_api.problems import ProblemError, problem_responses
 from buildarena_api.schemas import AttemptView, JobDetail, JobPage, JobView
+from buildarena_api.transcripts import as_markdown
 from buildarena_pipeline.specs import JobSpec
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
@@ -75,7 +76,9 @@ def show_job(job_id: str, context: ContextDep) -> JobDetail:
 @router.get(
     "/{job_id}/{artifact}",
     responses={
-        200: {"content": {kind: {} for kind in sorted(set(ARTIFACT_TYPES.values()))}},
+        200: {
+            "content": {kind: {} for kind in sorted({*ARTIFACT_TYPES.values(), "text/markdown"})}
+        },
         **problem_responses(404, 422, 503),
     },
     response_class=Response,
@@ -85,15 +88,22 @@ def get_artifact(
     artifact: Literal["machine", "transcript", "trajectory"],
     context: ContextDep,
     number: Annotated[int, Query(ge=0, le=1000, description="Which rollout's trajectory")] = 0,
+    style: Annotated[
+        Literal["json", "markdown"], Query(description="markdown: a transcript for people")
+    ] = "json",
 ) -> Response:
     """The machine document, the transcript or a trajectory of a job."""
-    context.jobs.get(job_id)
+    job = context.jobs.get(job_id)
     name = f"trajectory-{number}" if artifact == "trajectory" else artifact
     digest = context.jobs.artifacts(job_id).get(name)
     if digest is None:
         raise ProblemError(404, f"job {job_id} has no {name} yet")
+    data = context.artifacts.get(digest)
+    if artifact == "transcript" and style == "markdown":
+        title = f"{job.task} by {job.model}, seed {job.seed}"
+        return Response(as_markdown(data, title), media_type="text/markdown; charset=utf-8")
     return Response(
-        context.artifacts.get(digest),
+        data,
         media_type=ARTIFACT_TYPES[artifact],
         headers={"ETag": f'"{digest}"'},
     )
