@@ -1,0 +1,46 @@
+"""Statistics of scored trials: pure functions of arrays, each with its source.
+
+Rates are fractions in [0, 1]. Where a figure does not exist (nothing was tried, nothing varied)
+the answer is None, never NaN. Everything random takes a seed and is reproducible.
+"""
+
+from buildarena_benchmark.statistics.agreement import Agreement, agreement
+from buildarena_benchmark.statistics.comparisons import (
+    PairedTest,
+    holm,
+    paired_indicators,
+    paired_successes,
+)
+from buildarena_benchmark.statistics.economy import TokenBin, cost_per_success, token_bins
+from buildarena_benchmark.statistics.power import detectable_difference, trials_needed
+from buildarena_benchmark.statistics.proportions import (
+    difference_interval,
+    pass_at_k,
+    pass_hat_k,
+    wilson_interval,
+)
+from buildarena_benchmark.statistics.ranking import Ranking, mean_ranks, rank_models
+from buildarena_benchmark.statistics.resampling import mean_interval, resampled_means
+
+__all__ = [
+    "Agreement",
+    "PairedTest",
+    "Ranking",
+    "TokenBin",
+    "agreement",
+    "cost_per_success",
+    "detectable_difference",
+    "difference_interval",
+    "holm",
+    "mean_interval",
+    "mean_ranks",
+    "paired_indicators",
+    "paired_successes",
+    "pass_at_k",
+    "pass_hat_k",
+    "rank_models",
+    "resampled_means",
+    "token_bins",
+    "trials_needed",
+    "wilson_interval",
+]

@@ -1,0 +1,91 @@
+"""Success rates: their intervals, their differences, and what k tries would bring.
+
+Closed forms only, so that a process which serves rates need not load SciPy.
+"""
+
+from __future__ import annotations
+
+import math
+from statistics import NormalDist
+from typing import Final
+
+LEVEL: Final = 0.95
+"""Confidence level of every interval that is shown."""
+
+
+def quantile(level: float = LEVEL) -> float:
+    """How many standard deviations a two-sided interval of this level spans to each side."""
+    return NormalDist().inv_cdf(0.5 + level / 2)
+
+
+def wilson_interval(successes: int, trials: int, level: float = LEVEL) -> tuple[float, float]:
+    """The Wilson score interval of a success rate; it never leaves [0, 1].
+
+    Raises:
+        ValueError: There were no trials, or more successes than trials.
+
+    Source:
+        E. B. Wilson, J. Am. Stat. Assoc. 22 (1927) 209.
+    """
+    if not 0 <= successes <= trials or trials == 0:
+        raise ValueError(f"{successes} successes of {trials} trials have no interval")
+    z = quantile(level)
+    rate, square = successes / trials, z**2
+    centre = (rate + square / (2 * trials)) / (1 + square / trials)
+    spread = math.sqrt(rate * (1 - rate) / trials + square / (4 * trials**2))
+    half = z * spread / (1 + square / trials)
+    # At the ends the formula gives exactly 0 or 1; rounding must not make it miss them.
+    low = 0.0 if successes == 0 else max(0.0, centre - half)
+    high = 1.0 if successes == trials else min(1.0, centre + half)
+    return low, high
+
+
+def difference_interval(
+    first: tuple[int, int], second: tuple[int, int], level: float = LEVEL
+) -> tuple[float, float]:
+    """The interval of the difference of two independent success rates, first minus second.
+
+    Args:
+        first: Successes and trials of the one.
+        second: Successes and trials of the other.
+        level: Confidence level.
+
+    Source:
+        R. G. Newcombe, Stat. Med. 17 (1998) 873, method 10 (hybrid score).
+    """
+    (low_1, high_1), (low_2, high_2) = (
+        wilson_interval(*first, level=level),
+        wilson_interval(*second, level=level),
+    )
+    rate_1, rate_2 = first[0] / first[1], second[0] / second[1]
+    difference = rate_1 - rate_2
+    return (
+        difference - math.hypot(rate_1 - low_1, high_2 - rate_2),
+        difference + math.hypot(high_1 - rate_1, rate_2 - low_2),
+    )
+
+
+def pass_at_k(successes: int, trials: int, k: int) -> float | None:
+    """The chance that at least one of k tries succeeds; None when fewer than k were made.
+
+    Unbiased: the share of all k-subsets of the trials that hold a success.
+
+    Source:
+        M. Chen et al., arXiv:2107.03374 (2021), equation 1.
+    """
+    if not 1 <= k <= trials:
+        return None
+    return 1.0 - math.comb(trials - successes, k) / math.comb(trials, k)
+
+
+def pass_hat_k(successes: int, trials: int, k: int) -> float | None:
+    """The chance that all of k tries succeed; None when fewer than k were made.
+
+    Unbiased: the share of all k-subsets of the trials that hold successes alone.
+
+    Source:
+        S. Yao et al., arXiv:2406.12045 (2024), section 3 (pass^k).
+    """
+    if not 1 <= k <= trials:
+        return None
+    return math.comb(successes, k) / math.comb(trials, k)
