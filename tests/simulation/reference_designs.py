@@ -211,6 +211,22 @@ def _brace_grid(
             draft.connect(grid[x, y], further, way)
 
 
+def lattice(width: int, length: int, brace_count: int) -> Actions:
+    """A plain deck with some of its east-west seams braced; for measurements of speed.
+
+    Args:
+        width: Odd number of rows.
+        length: Odd number of blocks per row.
+        brace_count: How many seams are braced.
+    """
+    draft = Draft()
+    grid = _deck_grid(draft, width // 2, length // 2)
+    seams = [(x, y) for x, y in sorted(grid) if (x + 1, y) in grid]
+    for x, y in seams[:: len(seams) // brace_count][:brace_count]:
+        draft.connect(grid[x, y], grid[x + 1, y], DOWN)
+    return draft.actions
+
+
 def one_shot_bridge() -> Actions:
     """The bridge of the paper's one-shot example, which is reported to carry 1000."""
     return deck(5, 7, cross=True, rails=True, pillars=5)

@@ -24,7 +24,7 @@ from buildarena_geometry import Machine
 from buildarena_simulation.constants import JointKind
 from buildarena_simulation.machine import structure_of
 from buildarena_simulation.structure.clusters import Clusters, find_clusters
-from buildarena_simulation.structure.contacts import ContactForces, evenly_shared
+from buildarena_simulation.structure.contacts import ContactForces, EvenSharing
 from buildarena_simulation.structure.model import JOINT_KINDS, Structure
 from buildarena_simulation.structure.motion import Motion
 
@@ -174,7 +174,7 @@ def test_sharing_a_patch_evenly_keeps_its_resultant(
         point=point,
         force=force,
     )
-    shared = evenly_shared(given_, np.zeros(count, dtype=np.int64))
+    shared = EvenSharing(np.zeros(count, dtype=np.int64)).shared(given_)
     assert np.allclose(shared.force.sum(axis=0), force.sum(axis=0), atol=1e-6)
     apart = np.linalg.svd(point - point.mean(axis=0), compute_uv=False)
     if apart[min(1, len(apart) - 1)] > 0.5 and (shared.force[:, 2] > 1e-6).all():

@@ -1,20 +1,29 @@
 """Breaking: the worst joint over its strength gives way, one per evaluation."""
 
+from typing import Final
+
 import numpy as np
 
 from buildarena_simulation.constants import GRAVITY
 from buildarena_simulation.engines.base import Engine
 from buildarena_simulation.structure.clusters import Clusters, find_clusters
-from buildarena_simulation.structure.contacts import PointForces, evenly_shared
+from buildarena_simulation.structure.contacts import EvenSharing, PointForces
 from buildarena_simulation.structure.loads import LoadModel
 from buildarena_simulation.structure.model import JOINT_KINDS, FloatArray, Structure
 from buildarena_simulation.structure.motion import Motion, rope_ends
 from buildarena_simulation.structure.vectors import turned
 from buildarena_simulation.trajectory import Break, JointPeak
 
+_CALM: Final = 0.5
+"""Share of its strength below which no joint is in danger."""
+
 
 class BreakingModel:
     """Follows a machine's loads and lets its joints break.
+
+    While no joint bears half its strength and nothing is struck, every other evaluation is left
+    out: with the filter's time constant four times the interval, no joint can break in between
+    unless its load rises almost threefold at once.
 
     Args:
         structure: The machine.
@@ -27,8 +36,10 @@ class BreakingModel:
         self, structure: Structure, clusters: Clusters, motion: Motion, *, interval_s: float
     ) -> None:
         self._structure = structure
-        self._loads = LoadModel(structure, clusters, motion, interval_s=interval_s)
-        self._peaks = np.zeros((len(structure.members), 3))
+        self._loads = LoadModel(structure, clusters, motion)
+        self._sharing = EvenSharing(clusters.cluster_of)
+        self._interval_s, self._unseen_s, self._calm = interval_s, 0.0, False
+        self._peaks = np.zeros((3, len(structure.members)))
         self._rope_holds = np.ones(len(structure.ropes), dtype=bool)
         self._rope_peaks = np.zeros(len(structure.ropes))
         self.clusters = clusters
@@ -47,12 +58,18 @@ class BreakingModel:
             cargo_mass: Mass of the cargo now.
         """
         self.motion = engine.motion()
+        self._unseen_s += self._interval_s
+        if self._calm and not engine.struck:
+            self._calm = False
+            return
         tensions = engine.rope_tensions()
-        contacts = evenly_shared(engine.contacts(), self.clusters.cluster_of)
+        contacts = self._sharing.shared(engine.contacts())
         forces = self._all_forces(contacts, thrusts, tensions)
-        loads = self._loads.evaluate(forces, self.motion)
-        seen = np.stack([loads.force, loads.moment, loads.ratio], axis=1)
-        self._peaks = np.maximum(self._peaks, seen)
+        loads = self._loads.evaluate(forces, self.motion, self._unseen_s)
+        self._unseen_s = 0.0
+        self._calm = bool(loads.ratio.max(initial=0.0) < _CALM) and not engine.struck
+        for peak, seen in zip(self._peaks, (loads.force, loads.moment, loads.ratio), strict=True):
+            np.maximum(peak, seen, out=peak)
         self._break_ropes(engine, tensions, time_s, cargo_mass)
         if not len(loads.ratio):
             return
@@ -79,7 +96,7 @@ class BreakingModel:
                 ratio=round(float(ratio), 5),
             )
             for name, kind, (force, moment, ratio) in zip(
-                members.names, members.kind, self._peaks, strict=True
+                members.names, members.kind, self._peaks.T, strict=True
             )
         ]
         winches = [
@@ -99,6 +116,8 @@ class BreakingModel:
     ) -> PointForces:
         """Contacts, thrust and ropes together."""
         structure, clusters, motion = self._structure, self.clusters, self.motion
+        if not len(structure.cannons) and not len(structure.ropes):
+            return contacts
         blocks, points, forces = [contacts.block], [contacts.point], [contacts.force]
         if len(structure.cannons):
             cannons = structure.cannons
@@ -150,6 +169,7 @@ class BreakingModel:
         if not _same(before, after):
             self.motion = self.motion.after_break(before, after)
             self.clusters = after
+            self._sharing = EvenSharing(after.cluster_of)
             engine.enter(after, self.motion)
         self._loads.rebuild(after, self.motion)
 

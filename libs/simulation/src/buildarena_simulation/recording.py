@@ -1,5 +1,6 @@
 """Collects a trial's samples and makes its trajectory."""
 
+import itertools
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
@@ -10,7 +11,7 @@ from buildarena_simulation.engines.base import CargoPose, quaternion_of
 from buildarena_simulation.errors import MachineNotSimulable
 from buildarena_simulation.scenario import Scenario
 from buildarena_simulation.structure.clusters import Clusters
-from buildarena_simulation.structure.model import BoolArray, Structure
+from buildarena_simulation.structure.model import BoolArray, FloatArray, Structure
 from buildarena_simulation.structure.motion import Motion
 from buildarena_simulation.structure.vectors import turned
 from buildarena_simulation.trajectory import (
@@ -46,8 +47,7 @@ class Recorder:
         self._tracked = np.array([ids.index(block) for block in wanted], dtype=np.int64)
         count, cannons = scenario.sample_count, len(structure.cannons)
         self._time_s = np.zeros(count)
-        self._positions = np.zeros((count, len(wanted), 3))
-        self._rotations = np.zeros((count, len(wanted), 3, 3))
+        self._seen: list[tuple[Clusters, Motion]] = []
         self._heated = np.zeros((count, cannons), dtype=bool)
         self._cargo_size = scenario.cargo.size if scenario.cargo else None
         self._cargo_position = np.zeros((count, 3))
@@ -65,20 +65,37 @@ class Recorder:
         cargo_mass: float | None,
     ) -> None:
         """Keeps one instant, and finds which cannons are heated from here on."""
-        structure, row = self._structure, self._row
-        shown = motion.points(clusters, structure.shown)
-        turn = motion.rotation[clusters.cluster_of]
-        directions = turned(turn, structure.directions)
-        self.heated_now = heated_cannons(structure, shown, directions)
+        row = self._row
         self._time_s[row] = time_s
-        self._positions[row] = shown[self._tracked]
-        self._rotations[row] = (turn @ structure.rotations)[self._tracked]
+        self._seen.append((clusters, motion))
+        if len(self.heated_now):
+            self.heated_now = self._heated_in(clusters, motion)
         self._heated[row] = self.heated_now
         if cargo is not None and cargo_mass is not None:
             self._cargo_position[row] = cargo.position
             self._cargo_quaternion[row] = cargo.quaternion
             self._cargo_mass[row] = cargo_mass
         self._row += 1
+
+    def _heated_in(self, clusters: Clusters, motion: Motion) -> BoolArray:
+        structure = self._structure
+        shown = motion.points(clusters, structure.shown)
+        directions = turned(motion.rotation[clusters.cluster_of], structure.directions)
+        return heated_cannons(structure, shown, directions)
+
+    def _poses(self) -> tuple[FloatArray, FloatArray]:
+        """Positions (T, N, 3) and quaternions (T, N, 4) of the tracked blocks, world frame."""
+        structure, tracked = self._structure, self._tracked
+        shown, turns = structure.shown[tracked], structure.rotations[tracked]
+        positions, quaternions = [], []
+        for _, run in itertools.groupby(self._seen, key=lambda seen: id(seen[0])):
+            samples = list(run)
+            of = samples[0][0].cluster_of[tracked]
+            rotation = np.array([motion.rotation for _, motion in samples])[:, of]
+            origin = np.array([motion.position for _, motion in samples])[:, of]
+            positions.append(origin + (rotation @ shown[:, :, None])[..., 0])
+            quaternions.append(quaternion_of(rotation @ turns))
+        return np.concatenate(positions), np.concatenate(quaternions)
 
     def finished(
         self,
@@ -95,11 +112,12 @@ class Recorder:
             self._cargo_quaternion[:, :1] < 0, -self._cargo_quaternion, self._cargo_quaternion
         )
         structure = self._structure
+        positions, quaternions = self._poses()
         return Trajectory(
             time_s=self._time_s,
             block_ids=self._ids,
-            positions=rounded_positions(self._positions),
-            quaternions=rounded_quaternions(quaternion_of(self._rotations)),
+            positions=rounded_positions(positions),
+            quaternions=rounded_quaternions(quaternions),
             cargo_position=rounded_positions(self._cargo_position) if has_cargo else None,
             cargo_quaternion=rounded_quaternions(quaternion) if has_cargo else None,
             cargo_mass=self._cargo_mass if has_cargo else None,

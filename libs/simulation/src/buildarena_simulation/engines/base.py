@@ -100,7 +100,11 @@ class Engine(Protocol):
         """
 
     def contacts(self) -> ContactForces:
-        """Contact and friction forces on the blocks in the last step."""
+        """Mean contact and friction forces on the blocks over the steps of `advance`."""
+
+    @property
+    def struck(self) -> bool:
+        """Whether something was struck in the steps of `advance`."""
 
     def rope_tensions(self) -> FloatArray:
         """Tension of each rope in the last step, (R,), mass·unit/s²."""

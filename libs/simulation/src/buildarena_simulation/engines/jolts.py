@@ -5,7 +5,10 @@ which something is struck is read as well: its impulse would else be missed, or 
 whole interval.
 """
 
+from collections.abc import Callable
 from typing import Final
+
+import numpy as np
 
 from buildarena_simulation.structure.contacts import ContactForces, mean_contacts
 from buildarena_simulation.structure.model import FloatArray
@@ -24,32 +27,36 @@ class JoltWatch:
     """
 
     def __init__(self, step_count: int, *, gravity: float, time_step_s: float) -> None:
-        self._left, self._count = step_count, step_count
-        self._limit = (_JOLT * gravity * time_step_s) ** 2
+        self._count = step_count
+        self._limit = _JOLT * gravity * time_step_s
         self._jolts: list[ContactForces] = []
-        self._last: ContactForces | None = None
-        self._jolted = False
+        self._ends_in_jolt = False
 
-    def wants_reading(self, change: FloatArray) -> bool:
+    @property
+    def struck(self) -> bool:
+        """Whether there was a jolt."""
+        return bool(self._jolts)
+
+    def is_jolt(self, change: FloatArray) -> bool:
         """Whether the step just made must be read.
 
         Args:
             change: (K, 3) change of velocity of every free body in it, units/s.
         """
-        self._left -= 1
-        self._jolted = bool((change * change).sum(axis=1).max(initial=0.0) > self._limit)
-        return self._jolted or self._left == 0
+        self._ends_in_jolt = bool(np.abs(change).max() > self._limit)
+        return self._ends_in_jolt
 
     def take(self, contacts: ContactForces) -> None:
-        """Keeps the reading of the step just made."""
-        if self._jolted:
-            self._jolts.append(contacts)
-        else:
-            self._last = contacts
+        """Keeps the reading of a step that was a jolt."""
+        self._jolts.append(contacts)
 
-    def mean(self) -> ContactForces:
-        """The mean over the interval; if it ended in a jolt, its quiet steps are not known of."""
+    def mean(self, read: Callable[[], ContactForces]) -> ContactForces:
+        """The mean over the interval; if it ended in a jolt, its quiet steps are not known of.
+
+        Args:
+            read: Reads the contacts of the last step.
+        """
         readings = [(1.0 / self._count, contacts) for contacts in self._jolts]
-        if self._last is not None:
-            readings.append((1.0 - len(self._jolts) / self._count, self._last))
+        if not self._ends_in_jolt:
+            readings.append((1.0 - len(self._jolts) / self._count, read()))
         return mean_contacts(readings)

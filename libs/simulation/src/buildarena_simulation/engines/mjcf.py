@@ -196,6 +196,8 @@ def _body(structure: Structure, state: MjcfState, c: int) -> Iterator[str]:
 def _block(structure: Structure, state: MjcfState, c: int, block: int) -> Iterator[str]:
     part = structure.parts[block]
     wheel = part.role is Role.WHEEL
+    turns = [state.axes[c].T @ shape.rotation for shape in part.shapes]
+    quaternions = quaternion_of(np.array(turns))
     for k, shape in enumerate(part.shapes):
         kind, size = _form(shape)
         yield _tag(
@@ -204,7 +206,7 @@ def _block(structure: Structure, state: MjcfState, c: int, block: int) -> Iterat
             type=kind,
             size=size,
             pos=state.in_body(c, shape.center),
-            quat=quaternion_of(state.axes[c].T @ shape.rotation),
+            quat=quaternions[k],
             friction=_friction(FRICTION_WHEEL if wheel else FRICTION_BLOCK),
             priority=_WHEEL_PRIORITY if wheel else _BLOCK_PRIORITY,
         )

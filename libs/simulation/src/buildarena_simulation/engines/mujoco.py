@@ -125,11 +125,11 @@ class MujocoEngine:
                 data.ctrl[at.hinge_actuators] = row[at.hinge_wheels] * at.hinge_signs
             mujoco.mj_step(model, data)
             before, velocity = velocity, data.qvel[at.free_dofs]
-            if jolts.wants_reading(velocity - before):
+            if jolts.is_jolt(velocity - before):
                 jolts.take(self._read_contacts())
         self._limit_spin()
         self._keep_cargo_state()
-        self._contacts = jolts.mean()
+        self._jolts = jolts
         self._tensions = self._read_tensions()
         # A step leaves the kinematics of its beginning behind; bring them up to its end.
         mujoco.mj_kinematics(model, data)
@@ -138,7 +138,12 @@ class MujocoEngine:
 
     def contacts(self) -> ContactForces:
         """See `Engine`."""
-        return self._contacts
+        return self._jolts.mean(self._read_contacts)
+
+    @property
+    def struck(self) -> bool:
+        """See `Engine`."""
+        return self._jolts.struck
 
     def rope_tensions(self) -> FloatArray:
         """See `Engine`."""
@@ -204,8 +209,8 @@ class MujocoEngine:
         """Slows pieces that spin faster than any part of the game may."""
         dofs = self._addresses.spin_dofs
         spins = self._data.qvel[dofs]
-        speeds = np.sqrt((spins * spins).sum(axis=1))
-        if speeds.max(initial=0.0) > MAX_SPIN:
+        if np.abs(spins).max() > MAX_SPIN / 2:
+            speeds = np.sqrt((spins * spins).sum(axis=1))
             scale = np.minimum(1.0, MAX_SPIN / np.maximum(speeds, 1e-9))
             self._data.qvel[dofs] = spins * scale[:, None]
 
@@ -234,8 +239,7 @@ class MujocoEngine:
         )
 
     def _read_tensions(self) -> FloatArray:
-        tensions = np.zeros(len(self._rope_alive))
-        tendons = self._addresses.tendons
+        tendons, tensions = self._addresses.tendons, np.zeros(len(self._rope_alive))
         if tendons:
             data = self._data
             limits = data.efc_type[: data.nefc] == mujoco.mjtConstraint.mjCNSTR_LIMIT_TENDON

@@ -169,15 +169,21 @@ class PyBulletEngine:
             self._push(pushes, drags)
             pybullet.stepSimulation(**self._client)
             before, velocity = velocity, self._free_velocities()
-            if jolts.wants_reading(velocity - before):
+            if jolts.is_jolt(velocity - before):
                 self._motion = self._read_motion()
                 jolts.take(self._read_contacts())
+        self._motion = self._read_motion()
         self._limit_spin()
-        self._contacts = jolts.mean()
+        self._jolts = jolts
 
     def contacts(self) -> ContactForces:
         """See `Engine`."""
-        return self._contacts
+        return self._jolts.mean(self._read_contacts)
+
+    @property
+    def struck(self) -> bool:
+        """See `Engine`."""
+        return self._jolts.struck
 
     def rope_tensions(self) -> FloatArray:
         """See `Engine`."""

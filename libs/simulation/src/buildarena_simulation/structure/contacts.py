@@ -18,9 +18,13 @@ from buildarena_simulation.structure.vectors import cross, summed_by
 _NORMAL_GRID: Final = 4.0
 """Normals are told apart by their components rounded to quarters."""
 
+_NORMAL_DIGITS: Final = np.array([256, 16, 1])
 _ROUNDS: Final = 4
 _LINE_TOLERANCE: Final = 1e-6
 """Points in a line bear no moment about it; this share of the spread keeps that solvable."""
+
+_POINT_TOLERANCE: Final = 1e-9
+"""The same for a single point, units²."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,88 +81,127 @@ def mean_contacts(readings: Sequence[tuple[float, ContactForces]]) -> ContactFor
     )
 
 
-def evenly_shared(contacts: ContactForces, cluster_of: IntArray) -> PointForces:
-    """The contacts with each patch's force spread evenly.
+class EvenSharing:
+    """Spreads each patch's force evenly over its points.
 
     A patch is all contacts between one cluster and one other body with about the same normal. Its
     forces become w·(a + cross(b, r)), with a and b such that force and moment stay as they were;
-    points that would have to pull are left out and the rest is spread again.
+    points that would have to pull are left out and the rest is spread again. What touches what
+    changes seldom, so the last patches are remembered.
 
     Args:
-        contacts: As reported.
         cluster_of: (N,) cluster of each block.
     """
-    block, point, force = contacts.block, contacts.point, contacts.force
-    if len(block) > 1:
-        patch, count = _patches(contacts, cluster_of)
-        force = _spread(contacts, patch, count)
-    return PointForces(block=block, point=point, force=force)
+
+    def __init__(self, cluster_of: IntArray) -> None:
+        self._cluster_of = cluster_of
+        self._key: IntArray = np.zeros(0, dtype=np.int64)
+        self._block: IntArray = np.zeros(0, dtype=np.int64)
+        self._patches = _NO_PATCHES
+
+    def shared(self, contacts: ContactForces) -> PointForces:
+        """The contacts with their forces spread."""
+        force = contacts.force
+        if len(contacts.block) > 1:
+            force = _spread(contacts, self._patches_of(contacts))
+        return PointForces(block=contacts.block, point=contacts.point, force=force)
+
+    def _patches_of(self, contacts: ContactForces) -> "_Patches":
+        key = _patch_keys(contacts, self._cluster_of)
+        same = np.array_equal(key, self._key) and np.array_equal(contacts.block, self._block)
+        if not same:
+            self._key, self._block = key, contacts.block
+            self._patches = _find_patches(key, contacts.block)
+        return self._patches
 
 
-def _patches(contacts: ContactForces, cluster_of: IntArray) -> tuple[IntArray, int]:
-    """Patch of each contact, and how many there are."""
-    way = np.round(contacts.normal * _NORMAL_GRID).astype(np.int64) + 8
-    key = cluster_of[contacts.block]
-    for digit, base in ((contacts.other + 2**20, 2**22), *((way[:, k], 16) for k in range(3))):
-        key = key * base + digit
-    _, patch = np.unique(key, return_inverse=True)
-    return patch, int(patch.max()) + 1
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Patches:
+    """Which contacts belong together.
+
+    Attributes:
+        of: (K,) patch of each contact.
+        count: How many patches there are.
+        beside: (K,) index of contact's block and patch together.
+        columns: (K, 19) where the sums over each patch go, flat.
+    """
+
+    of: IntArray
+    count: int
+    beside: IntArray
+    columns: IntArray
 
 
-def _spread(contacts: ContactForces, patch: IntArray, count: int) -> FloatArray:
+_SUMS: Final = 19
+_NO_PATCHES: Final = _Patches(
+    of=np.zeros(0, dtype=np.int64),
+    count=0,
+    beside=np.zeros(0, dtype=np.int64),
+    columns=np.zeros((0, _SUMS), dtype=np.int64),
+)
+
+
+def _patch_keys(contacts: ContactForces, cluster_of: IntArray) -> IntArray:
+    """A number for each contact that it shares with those of its patch."""
+    way = (contacts.normal * _NORMAL_GRID + 8.5).astype(np.int64) @ _NORMAL_DIGITS
+    key = (cluster_of[contacts.block] * 2**22 + contacts.other + 2**20) * 2**12 + way
+    return np.asarray(key, dtype=np.int64)
+
+
+def _find_patches(key: IntArray, block: IntArray) -> _Patches:
+    _, of = np.unique(key, return_inverse=True)
+    _, beside = np.unique(of * (int(block.max()) + 1) + block, return_inverse=True)
+    columns = (of[:, None] * _SUMS + np.arange(_SUMS)).reshape(-1)
+    return _Patches(of=of, count=int(of.max()) + 1, beside=beside, columns=columns)
+
+
+def _spread(contacts: ContactForces, patches: _Patches) -> FloatArray:
+    of, count = patches.of, patches.count
     anchor = np.empty((count, 3))
-    anchor[patch] = contacts.point
-    x = contacts.point - anchor[patch]
-    normal = summed_by(patch, contacts.normal, count)
-    load = summed_by(
-        patch, np.concatenate([contacts.force, cross(x, contacts.force)], axis=1), count
-    )
-    total, moment = load[:, :3], load[:, 3:]
-    weight = contacts.weight / _points_beside(contacts, patch)
+    anchor[of] = contacts.point
+    x = contacts.point - anchor[of]
+    # A patch is shared by its blocks alike: how many points a block has is the solver's choice.
+    weight = contacts.weight / np.bincount(patches.beside, contacts.weight)[patches.beside]
     for _ in range(_ROUNDS):
-        spread = _even(x, weight, patch, total, moment)
-        pulling = (spread * normal[patch]).sum(axis=1) < 0.0
+        spread, normal = _even(contacts, x, weight, patches)
+        pulling = (spread * normal[of]).sum(axis=1) < 0.0
         if not pulling.any():
             return spread
         kept = np.where(pulling, 0.0, weight)
-        whole = np.bincount(patch, kept, minlength=count)
+        whole = np.bincount(of, kept, minlength=count)
         # A patch that would lose all its points stays as it was.
-        weight = np.where(whole[patch] > 0.0, kept, weight)
+        weight = np.where(whole[of] > 0.0, kept, weight)
     return spread
 
 
-def _points_beside(contacts: ContactForces, patch: IntArray) -> FloatArray:
-    """Number of points its block has in its patch, for each contact.
-
-    A patch is shared by its blocks alike: how many points a block has is the solver's choice.
-    """
-    key = patch * (int(contacts.block.max()) + 1) + contacts.block
-    _, which = np.unique(key, return_inverse=True)
-    return np.asarray(np.bincount(which, contacts.weight)[which], dtype=np.float64)
-
-
 def _even(
-    x: FloatArray, weight: FloatArray, patch: IntArray, total: FloatArray, moment: FloatArray
-) -> FloatArray:
-    """Forces w·(a + cross(b, r)) of given resultants.
+    contacts: ContactForces, x: FloatArray, weight: FloatArray, patches: _Patches
+) -> tuple[FloatArray, FloatArray]:
+    """Forces w·(a + cross(b, r)), (K, 3), and the patches' summed normals, (P, 3).
 
     Args:
+        contacts: The contacts.
         x: (K, 3) points from an anchor of their patch, units.
         weight: (K,) of each point.
-        patch: (K,) patch of each point.
-        total: (P, 3) resultant force of each patch.
-        moment: (P, 3) resultant moment of each patch about its anchor.
+        patches: Which belong together.
     """
-    count = len(total)
-    sums = summed_by(patch, np.column_stack([weight, weight[:, None] * x]), count)
-    whole = sums[:, :1]
-    center = sums[:, 1:] / whole
-    r = x - center[patch]
-    second = summed_by(
-        patch, (weight[:, None, None] * r[:, :, None] * r[:, None, :]).reshape(-1, 9), count
-    ).reshape(-1, 3, 3)
-    trace = np.trace(second, axis1=1, axis2=2)[:, None, None]
-    inertia = (1.0 + _LINE_TOLERANCE) * trace * np.eye(3) - second + 1e-12 * np.eye(3)
-    rest = moment - cross(center, total)
-    b = np.linalg.solve(inertia, rest[:, :, None])[:, :, 0]
-    return np.asarray(weight[:, None] * ((total / whole)[patch] + cross(b[patch], r)))
+    heavy = weight[:, None] * x
+    rows = np.empty((len(x), _SUMS))
+    rows[:, 0], rows[:, 1:4] = weight, heavy
+    rows[:, 4:13] = (heavy[:, :, None] * x[:, None, :]).reshape(-1, 9)
+    rows[:, 13:16] = contacts.force
+    rows[:, 16:19] = cross(x, contacts.force)
+    normal = summed_by(patches.of, contacts.normal, patches.count)
+    flat = np.bincount(patches.columns, rows.reshape(-1), minlength=patches.count * _SUMS)
+    sums = np.asarray(flat.reshape(patches.count, _SUMS), dtype=np.float64)
+    whole, total, moment = sums[:, :1], sums[:, 13:16], sums[:, 16:19]
+    center = sums[:, 1:4] / whole
+    second = sums[:, 4:13].reshape(-1, 3, 3)
+    second = second - whole[:, :, None] * center[:, :, None] * center[:, None, :]
+    trace = (second[:, 0, 0] + second[:, 1, 1] + second[:, 2, 2])[:, None, None]
+    inertia = ((1.0 + _LINE_TOLERANCE) * trace + _POINT_TOLERANCE) * np.eye(3) - second
+    rest = (moment - cross(center, total))[:, :, None]
+    b = np.asarray(np.linalg.solve(inertia, rest)[:, :, 0], dtype=np.float64)
+    r = x - center[patches.of]
+    spread = weight[:, None] * ((total / whole)[patches.of] + cross(b[patches.of], r))
+    return np.asarray(spread), normal

@@ -41,16 +41,11 @@ class LoadModel:
         structure: The machine.
         clusters: Its clusters at the start.
         motion: Their motion at the start.
-        interval_s: Time between two evaluations, seconds.
     """
 
-    def __init__(
-        self, structure: Structure, clusters: Clusters, motion: Motion, *, interval_s: float
-    ) -> None:
+    def __init__(self, structure: Structure, clusters: Clusters, motion: Motion) -> None:
         self._structure = structure
         self._stiffness = StiffnessModel(structure)
-        self._interval_s = interval_s
-        self._blend = 1.0 - math.exp(-interval_s / LOAD_FILTER_S)
         self._wrenches = np.zeros((len(structure), 6))
         self.holds: BoolArray = np.ones(len(structure.members), dtype=bool)
         self._enter(clusters, motion)
@@ -69,23 +64,26 @@ class LoadModel:
         turn = self._root_rotation.transpose(0, 2, 1) @ inertial_before
         self._inertial = turned_wrenches(turn, inertial) * share[:, None]
 
-    def evaluate(self, forces: PointForces, motion: Motion) -> JointLoads:
+    def evaluate(self, forces: PointForces, motion: Motion, interval_s: float) -> JointLoads:
         """Joint loads after one more interval.
 
         Args:
             forces: Mean forces on the blocks over the interval, without gravity.
             motion: The clusters' motion now.
+            interval_s: Time since the last evaluation, seconds.
 
         Returns:
             The loads of all members.
         """
-        self._update(forces, motion)
+        self._update(forces, motion, interval_s)
         clusters = self._clusters
-        relative = motion.rotation.transpose(0, 2, 1) @ self._root_rotation
-        wrenches = turned_wrenches(relative[clusters.cluster_of], self._wrenches)
         count = len(self.holds)
         force, moment = np.zeros(count), np.zeros(count)
-        self._add_axle_reactions(wrenches, relative, force, moment)
+        wrenches = self._wrenches
+        if self._children:
+            relative = motion.rotation.transpose(0, 2, 1) @ self._root_rotation
+            wrenches = turned_wrenches(relative[clusters.cluster_of], wrenches)
+            self._add_axle_reactions(wrenches, relative, force, moment)
         members = self._solver.solve(self._relieved(wrenches))
         inside = self._solver.inside
         force[inside] = np.sqrt((members[:, :3] ** 2).sum(axis=1))
@@ -107,9 +105,10 @@ class LoadModel:
             for level in range(int(clusters.level.max()), 0, -1)
         ]
 
-    def _update(self, forces: PointForces, motion: Motion) -> None:
+    def _update(self, forces: PointForces, motion: Motion, interval_s: float) -> None:
         """Filters the wrenches on the blocks and the clusters' rates of momentum."""
         structure, clusters = self._structure, self._clusters
+        blend = 1.0 - math.exp(-interval_s / LOAD_FILTER_S)
         self._root_rotation = motion.rotation[clusters.root]
         centers = motion.points(clusters, structure.centers_of_mass)
         moments = cross(forces.point - centers[forces.block], forces.force)
@@ -120,7 +119,7 @@ class LoadModel:
         world[:, 2] -= structure.masses
         to_root = self._root_rotation.transpose(0, 2, 1)
         local = turned_wrenches(to_root[clusters.cluster_of], world)
-        self._wrenches += self._blend * (local - self._wrenches)
+        self._wrenches += blend * (local - self._wrenches)
         rate = np.concatenate(
             [
                 clusters.mass[:, None] * (motion.velocity - self._velocity),
@@ -130,9 +129,9 @@ class LoadModel:
                 ),
             ],
             axis=1,
-        ) / (self._interval_s * GRAVITY)
+        ) / (interval_s * GRAVITY)
         self._velocity, self._spin = motion.velocity, motion.spin
-        self._inertial += self._blend * (turned_wrenches(to_root, rate) - self._inertial)
+        self._inertial += blend * (turned_wrenches(to_root, rate) - self._inertial)
 
     def _add_axle_reactions(
         self, wrenches: FloatArray, relative: FloatArray, force: FloatArray, moment: FloatArray

@@ -1,0 +1,138 @@
+"""Measures the simulation: speed, growth, memory, and how far the engines agree.
+
+Run by `make bench-simulation`. Speed is wall time per simulated second on one core, loads on,
+building the world included: the median of several runs of a support trial whose cargo grows to a
+mass that nothing breaks under.
+"""
+
+import argparse
+import json
+import resource
+import statistics
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).parents[3]))
+
+from tests.simulation.reference_designs import beam, lattice, replayed
+from tests.simulation.references import REFERENCES, outcome
+
+from buildarena_benchmark import builtin_tasks
+from buildarena_geometry import Machine
+from buildarena_simulation import ENGINES, simulate
+
+SECONDS = 17.0
+LOAD = 100.0
+REPEATS = 5
+BARS = {
+    ("beam of 7", "mujoco"): 0.01,
+    ("beam of 7", "pybullet"): 0.08,
+    ("100 blocks, 30 braces", "mujoco"): 0.04,
+    ("100 blocks, 30 braces", "pybullet"): 0.5,
+}
+INDICATOR_TOLERANCE = 0.25
+
+
+def main() -> int:
+    """Runs the benchmark.
+
+    Returns:
+        The exit code: 1 if the engines agree less than they should.
+    """
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--json", type=Path, help="where the figures go")
+    parser.add_argument("--speed-only", action="store_true", help="leave out the agreement")
+    options = parser.parse_args()
+    figures: dict[str, Any] = {"speed": _speed()}
+    agreement = None if options.speed_only else _agreement()
+    figures["agreement"] = agreement
+    figures["peak_memory_mb"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    _say(f"\npeak memory {figures['peak_memory_mb']:.0f} MB (bar 400)")
+    if options.json:
+        options.json.parent.mkdir(parents=True, exist_ok=True)
+        options.json.write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
+    return 0 if agreement is None or agreement["passed"] else 1
+
+
+def _speed() -> dict[str, dict[str, float]]:
+    cases = {
+        "beam of 7": replayed(beam(7)),
+        "100 blocks, 30 braces": replayed(lattice(7, 15, 30)),
+        "300 blocks, 90 braces": replayed(lattice(13, 23, 90)),
+    }
+    _say(f"{'wall seconds per simulated second':34s}" + "".join(f"{e:>20s}" for e in ENGINES))
+    figures: dict[str, dict[str, float]] = {}
+    for name, machine in cases.items():
+        figures[name] = {engine: _wall_per_second(machine, engine) for engine in ENGINES}
+        cells = [
+            f"{figures[name][engine]:.4f}"
+            + (f" (bar {BARS[name, engine]})" if (name, engine) in BARS else "")
+            for engine in ENGINES
+        ]
+        _say(f"{name:34s}" + "".join(f"{cell:>20s}" for cell in cells))
+    small, large = (figures[name] for name in list(cases)[1:])
+    growth = {engine: large[engine] / small[engine] for engine in ENGINES}
+    cells = [f"{growth[engine]:.1f} (bar {3**1.5:.1f})" for engine in ENGINES]
+    _say(f"{'growth from 100 to 300 blocks':34s}" + "".join(f"{cell:>20s}" for cell in cells))
+    figures["growth"] = growth
+    return figures
+
+
+def _wall_per_second(machine: Machine, engine: str) -> float:
+    task = builtin_tasks()["support-1"]
+    cargo = task.scenario.cargo.model_copy(update={"final_mass": LOAD})
+    scenario = task.scenario.model_copy(update={"duration_s": SECONDS, "cargo": cargo})
+    warm_up = scenario.model_copy(update={"duration_s": 0.2})
+    simulate(machine, warm_up, engine)
+    walls = []
+    for _ in range(REPEATS):
+        start = time.perf_counter()
+        simulate(machine, scenario, engine)
+        walls.append((time.perf_counter() - start) / SECONDS)
+    return statistics.median(walls)
+
+
+def _agreement() -> dict[str, Any]:
+    """Every reference machine on both engines."""
+    first, second = ENGINES
+    _say(f"\n{'machine':30s}{'task':13s}{first:>22s}{second:>22s}  agree")
+    rows, same, close, both = [], 0, 0, 0
+    for name, reference in REFERENCES.items():
+        found = {engine: outcome(name, engine) for engine in ENGINES}
+        a, b = found[first], found[second]
+        verdict = a["success"] == b["success"]
+        same += verdict
+        near = True
+        if a["success"] and b["success"]:
+            both += 1
+            apart = abs(a["indicator"] - b["indicator"])
+            near = apart <= INDICATOR_TOLERANCE * max(a["indicator"], b["indicator"])
+            close += near
+        cells = [
+            f"{'success' if found[e]['success'] else 'failure'} {found[e]['indicator']:12,.2f}"
+            for e in ENGINES
+        ]
+        sign = "yes" if verdict and near else "no"
+        _say(f"{name:30s}{reference.task:13s}{cells[0]:>22s}{cells[1]:>22s}  {sign}")
+        rows.append({"machine": name, "task": reference.task, **found})
+    share = same / len(REFERENCES)
+    _say(
+        f"same verdict: {same} of {len(REFERENCES)} ({share:.1%}, bar 95 %); "
+        f"indicators within {INDICATOR_TOLERANCE:.0%} where both succeed: {close} of {both}"
+    )
+    return {
+        "same_verdict": share,
+        "indicators_close": close / both,
+        "machines": rows,
+        "passed": share >= 0.95 and close == both,
+    }
+
+
+def _say(line: str) -> None:
+    sys.stdout.write(line + "\n")
+
+
+if __name__ == "__main__":
+    sys.exit(main())
