@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
 from decimal import Decimal
 from typing import Any
 
-from sqlalchemy import insert, select
+from sqlalchemy import select, text
 
 from buildarena_store.database import Database
-from buildarena_store.leases import Lease, require_held
-from buildarena_store.tables import jobs, journal
+from buildarena_store.errors import StaleLeaseError
+from buildarena_store.leases import Lease
+from buildarena_store.tables import journal
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,6 +77,33 @@ class JournalEntry:
     created_at: datetime | None = None
 
 
+# One statement, because it is the one that every turn of every session waits for.
+_APPEND = text(
+    """
+    WITH held AS (
+        UPDATE jobs SET
+            requests = requests + :requests,
+            input_tokens = input_tokens + :input_tokens,
+            output_tokens = output_tokens + :output_tokens,
+            cached_tokens = cached_tokens + :cached_tokens,
+            reasoning_tokens = reasoning_tokens + :reasoning_tokens,
+            cost_usd = cost_usd + :cost_usd
+        WHERE id = :job_id AND lease_token = :token AND state = 'running'
+        RETURNING id
+    )
+    INSERT INTO journal (
+        job_id, sequence, token, stage, role, request_hash, reply, input_tokens, output_tokens,
+        cached_tokens, reasoning_tokens, cost_usd, latency_s, tries, provider_request_id
+    )
+    SELECT
+        id, :sequence, :token, :stage, :role, :request_hash, CAST(:reply AS json), :input_tokens,
+        :output_tokens, :cached_tokens, :reasoning_tokens, :cost_usd, :latency_s, :tries,
+        CAST(:provider_request_id AS text)
+    FROM held
+    """
+)
+
+
 class Journal:
     """Appends to and reads the journals of jobs."""
 
@@ -88,34 +117,30 @@ class Journal:
             StaleLeaseError: The lease is over; nothing was written.
         """
         usage = entry.usage
-        counts = {
-            "requests": usage.requests,
-            "input_tokens": usage.input_tokens,
-            "output_tokens": usage.output_tokens,
-            "cached_tokens": usage.cached_tokens,
-            "reasoning_tokens": usage.reasoning_tokens,
-            "cost_usd": usage.cost_usd,
-        }
         with self._database.transaction() as connection:
-            require_held(
-                connection, lease, **{name: jobs.c[name] + n for name, n in counts.items()}
+            written = connection.execute(
+                _APPEND,
+                {
+                    "job_id": lease.job.id,
+                    "token": lease.token,
+                    "sequence": entry.sequence,
+                    "stage": entry.stage,
+                    "role": entry.role,
+                    "request_hash": entry.request_hash,
+                    "reply": json.dumps(entry.reply),
+                    "requests": usage.requests,
+                    "input_tokens": usage.input_tokens,
+                    "output_tokens": usage.output_tokens,
+                    "cached_tokens": usage.cached_tokens,
+                    "reasoning_tokens": usage.reasoning_tokens,
+                    "cost_usd": usage.cost_usd,
+                    "latency_s": entry.latency_s,
+                    "tries": entry.tries,
+                    "provider_request_id": entry.provider_request_id,
+                },
             )
-            del counts["requests"]
-            connection.execute(
-                insert(journal).values(
-                    job_id=lease.job.id,
-                    sequence=entry.sequence,
-                    token=lease.token,
-                    stage=entry.stage,
-                    role=entry.role,
-                    request_hash=entry.request_hash,
-                    reply=dict(entry.reply),
-                    latency_s=entry.latency_s,
-                    tries=entry.tries,
-                    provider_request_id=entry.provider_request_id,
-                    **counts,
-                )
-            )
+            if written.rowcount != 1:
+                raise StaleLeaseError(lease.job.id, lease.token)
 
     def read(self, job_id: str) -> list[JournalEntry]:
         """All entries of a job in their order."""

@@ -309,17 +309,6 @@ def _held(lease: Lease) -> tuple[ColumnElement[bool], ...]:
     )
 
 
-def require_held(connection: Connection, lease: Lease, **values: Any) -> None:
-    """Writes job columns while the lease goes on, or refuses.
-
-    Raises:
-        StaleLeaseError: The lease is over.
-    """
-    changed = connection.execute(update(jobs).where(*_held(lease)).values(**values))
-    if changed.rowcount != 1:
-        raise StaleLeaseError(lease.job.id, lease.token)
-
-
 def _end_attempt(
     connection: Connection, job_id: str, token: int, result: str, detail: str | None
 ) -> None:

@@ -191,11 +191,12 @@ def _make_model(
             reason="missing_key",
         )
     if provider.wire == "openai":
-        from openai import AsyncOpenAI
         from pydantic_ai.models.openai import OpenAIChatModel
         from pydantic_ai.providers.openai import OpenAIProvider
 
-        client = AsyncOpenAI(base_url=provider.base_url, api_key=key, max_retries=0)
+        from buildarena_worker.llm.openai_direct import direct_client
+
+        client = direct_client(base_url=provider.base_url, api_key=key)
         model = OpenAIChatModel(entry.model, provider=OpenAIProvider(openai_client=client))
         return model, client.close
     if provider.wire == "anthropic":

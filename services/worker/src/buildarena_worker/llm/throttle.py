@@ -1,8 +1,9 @@
 """How many requests may be open at a provider at once, over all workers.
 
-The limit adapts: it grows by about one for each limit's worth of answers and halves when the
-provider says that it is too much (additive increase, multiplicative decrease; Chiu and Jain,
-1989). It lives in the broker's key-value store; without it, each process goes on by itself.
+The limit adapts: it halves when the provider says that it is too much, and grows by about one
+for each limit's worth of answers (additive increase, multiplicative decrease; Chiu and Jain,
+1989). Until the provider's limit was met once, it grows by one with each answer (slow start).
+It lives in the broker's key-value store; without it, each process goes on by itself.
 """
 
 from __future__ import annotations
@@ -39,9 +40,11 @@ _GIVE = """
 redis.call('ZREM', KEYS[1], ARGV[1])
 local limit = tonumber(redis.call('GET', KEYS[2]) or ARGV[3])
 if ARGV[2] == 'grow' then
-  limit = math.min(tonumber(ARGV[5]), limit + 1 / limit)
+  local step = redis.call('EXISTS', KEYS[4]) == 1 and 1 / limit or 1
+  limit = math.min(tonumber(ARGV[5]), limit + step)
 elseif ARGV[2] == 'shrink' and redis.call('SET', KEYS[3], 1, 'NX', 'EX', ARGV[6]) then
   limit = math.max(tonumber(ARGV[4]), limit / 2)
+  redis.call('SET', KEYS[4], 1, 'EX', 86400)
 end
 redis.call('SET', KEYS[2], tostring(limit), 'EX', 86400)
 return tostring(limit)
@@ -60,7 +63,7 @@ class Throttle:
     def __init__(self, url: str | None, provider: str, *, start: float = START) -> None:
         self._redis: Any = None if url is None else Redis.from_url(url, socket_timeout=5)
         self._keys = [
-            f"buildarena:throttle:{provider}:{part}" for part in ("open", "limit", "calm")
+            f"buildarena:throttle:{provider}:{part}" for part in ("open", "limit", "calm", "met")
         ]
         self._start = start
 
@@ -100,7 +103,7 @@ class Throttle:
     async def _give(self, slot: Slot) -> None:
         arguments = [slot.id, slot.verdict, self._start, LEAST, MOST, CALM_S]
         try:
-            await self._redis.eval(_GIVE, 3, *self._keys, *arguments)
+            await self._redis.eval(_GIVE, 4, *self._keys, *arguments)
         except (RedisError, OSError) as error:
             log.warning("throttle_unreachable", error=str(error))
 
