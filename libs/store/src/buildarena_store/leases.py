@@ -12,7 +12,17 @@ from dataclasses import dataclass
 from datetime import timedelta
 from typing import Any
 
-from sqlalchemy import ColumnElement, Connection, case, insert, literal, select, true, update
+from sqlalchemy import (
+    ColumnElement,
+    Connection,
+    case,
+    insert,
+    literal,
+    select,
+    true,
+    tuple_,
+    update,
+)
 
 from buildarena_store import events
 from buildarena_store.database import Database
@@ -124,16 +134,11 @@ class Leases:
         """
         if not leases:
             return set()
-        held = [
-            (jobs.c.id == lease.job.id) & (jobs.c.lease_token == lease.token) for lease in leases
-        ]
-        condition = held[0]
-        for other in held[1:]:
-            condition = condition | other
+        pairs = [(lease.job.id, lease.token) for lease in leases]
         with self._database.transaction() as connection:
             rows = connection.execute(
                 update(jobs)
-                .where(jobs.c.state == "running", condition)
+                .where(jobs.c.state == "running", tuple_(jobs.c.id, jobs.c.lease_token).in_(pairs))
                 .values(lease_expires_at=events.now + self.duration)
                 .returning(jobs.c.id)
             )
