@@ -1,15 +1,27 @@
 """Machines that cannot be simulated, and names that do not exist."""
 
+import dataclasses
+import itertools
 import json
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
-from tests.simulation.reference_designs import EAST, Draft, beam, replayed
+from tests.simulation.reference_designs import EAST, Draft, beam, replayed, rocket
 
 from buildarena_benchmark import Task, failed_score, score
 from buildarena_geometry import DocumentError, Machine
-from buildarena_simulation import MachineNotSimulable, UnknownEngineError, simulate
+from buildarena_simulation import (
+    MachineNotSimulable,
+    Trajectory,
+    UnknownEngineError,
+    rollout,
+    simulate,
+)
 from buildarena_simulation.constants import MAX_PARTS
+from buildarena_simulation.engines import create_engine
+from buildarena_simulation.engines.base import Engine, World
+from buildarena_simulation.structure.motion import Motion
 
 
 def test_an_empty_machine_is_no_machine(engine: str, tasks: dict[str, Task]) -> None:
@@ -69,3 +81,31 @@ def test_the_process_goes_on_after_a_failed_trial(engine: str, tasks: dict[str, 
     with pytest.raises(MachineNotSimulable):
         simulate(Machine(), scenario, engine)
     assert simulate(replayed(beam(3)), scenario, engine).time_s[-1] == pytest.approx(0.2)
+
+
+def test_a_rollout_that_blows_up_is_told_and_never_a_success(
+    engine: str, tasks: dict[str, Task], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fragile(name: str, world: World) -> Engine:
+        made = create_engine(name, world)
+        motion, calls = made.motion, itertools.count()
+
+        def lost() -> Motion:
+            now = motion()
+            gone = next(calls) > 10
+            return dataclasses.replace(now, position=now.position + (np.nan if gone else 0.0))
+
+        monkeypatch.setattr(made, "motion", lost)
+        return made
+
+    monkeypatch.setattr(rollout, "create_engine", fragile)
+    task = tasks["lift-1"]
+    scenario = task.scenario.model_copy(update={"duration_s": 2.0})
+    machine = replayed(rocket())
+    trajectory = simulate(machine, scenario, engine)
+    assert np.isfinite(trajectory.positions[:10]).all()
+    assert not np.isfinite(trajectory.positions[-1]).any()
+    result = score(task, machine, Trajectory.from_parquet(trajectory.to_parquet()))
+    assert not result.success
+    assert "unstable" in result.flags
+    assert all(value == value for value in result.metrics.values())  # noqa: PLR0124 - no NaN

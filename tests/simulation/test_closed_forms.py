@@ -165,6 +165,18 @@ def test_a_rocket_climbs_as_thrust_weight_and_drag_say(engine: str) -> None:
         assert rise[sample] == pytest.approx(climbed[sample], rel=0.03)
 
 
+def test_each_axle_of_a_standing_car_bears_its_share(engine: str) -> None:
+    machine = replayed(car(drive=()))
+    trajectory = simulate(machine, Scenario(duration_s=2.0), engine)
+    axles = [peak for peak in trajectory.joint_peaks if peak.kind == "axle"]
+    assert len(axles) == 4
+    share = (machine.mass - 4 * 1.0) / 4
+    for axle in axles:
+        assert axle.force == pytest.approx(share, rel=0.1)  # the peak of a start without a jerk
+        # The wheel's support stands a quarter of a unit off the face it sits on.
+        assert axle.moment == pytest.approx(0.25 * share, rel=0.35)
+
+
 def test_a_wheel_rolls_without_slip(engine: str) -> None:
     machine = replayed(car(drive=[("UpArrow", 0.5, 10.0)]))
     scenario = Scenario(duration_s=4.0, control=Control(mode="agent"))

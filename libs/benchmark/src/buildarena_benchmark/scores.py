@@ -1,5 +1,6 @@
 """Scores: one trial's verdict, and a trial that never was."""
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -53,7 +54,7 @@ def score(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Score:
         The score; a rollout that blew up is flagged `unstable` and is never a success.
     """
     verdict = _SCORERS[task.scorer](task.scoring, machine, trajectory)
-    metrics = {**_machine_metrics(machine), **verdict.metrics}
+    metrics = {**_machine_metrics(machine), **_finite(verdict.metrics)}
     if is_unstable(machine, trajectory):
         return Score(
             success=False,
@@ -82,6 +83,14 @@ def failed_score(task: "Task", machine: "Machine | None" = None) -> Score:
     del task  # every task's failure looks the same; the argument keeps the call like `score`
     metrics = _machine_metrics(machine) if machine is not None else {}
     return Score(success=False, indicator=0.0, metrics=MappingProxyType(metrics), flags=())
+
+
+def _finite(metrics: Mapping[str, Metric]) -> dict[str, Metric]:
+    """Metrics of a rollout that blew up may not be numbers; they are told as none."""
+    return {
+        name: None if isinstance(value, float) and not math.isfinite(value) else value
+        for name, value in metrics.items()
+    }
 
 
 def _machine_metrics(machine: "Machine") -> dict[str, Metric]:

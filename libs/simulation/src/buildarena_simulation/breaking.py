@@ -47,17 +47,24 @@ class BreakingModel:
         self.breaks: list[Break] = []
 
     def follow(
-        self, engine: Engine, thrusts: FloatArray, *, time_s: float, cargo_mass: float | None
+        self,
+        engine: Engine,
+        motion: Motion,
+        thrusts: FloatArray,
+        *,
+        time_s: float,
+        cargo_mass: float | None,
     ) -> None:
         """Evaluates the loads after one interval and breaks what is overloaded.
 
         Args:
             engine: The engine, which is given new bodies if the machine falls apart.
+            motion: The clusters' motion now.
             thrusts: (C,) recoil of each cannon during the interval, mass·unit/s².
             time_s: Time now, seconds.
             cargo_mass: Mass of the cargo now.
         """
-        self.motion = engine.motion()
+        self.motion = motion
         self._unseen_s += self._interval_s
         if self._calm and not engine.struck:
             self._calm = False
@@ -65,7 +72,9 @@ class BreakingModel:
         tensions = engine.rope_tensions()
         contacts = self._sharing.shared(engine.contacts())
         forces = self._all_forces(contacts, thrusts, tensions)
-        loads = self._loads.evaluate(forces, self.motion, self._unseen_s)
+        # A blow is told of for one interval only, whatever was left out before.
+        seen_s = self._interval_s if engine.struck else self._unseen_s
+        loads = self._loads.evaluate(forces, self.motion, elapsed_s=self._unseen_s, seen_s=seen_s)
         self._unseen_s = 0.0
         self._calm = bool(loads.ratio.max(initial=0.0) < _CALM) and not engine.struck
         for peak, seen in zip(self._peaks, (loads.force, loads.moment, loads.ratio), strict=True):

@@ -150,6 +150,7 @@ class _Trial:
         self._interval_s = engine.time_step_s * engine.steps_per_evaluation
         self.breaking = BreakingModel(structure, clusters, motion, interval_s=self._interval_s)
         self.recorder = Recorder(structure, scenario)
+        self._blown_up = False
 
     def run(
         self,
@@ -180,6 +181,8 @@ class _Trial:
                 on_progress((sample + 1) / samples)
 
     def _advance(self, wheel_speeds: np.ndarray, firing: np.ndarray, step: int) -> None:
+        if self._blown_up:
+            return
         engine, cargo = self._engine, self._scenario.cargo
         time_s = step * engine.time_step_s
         mass = cargo.mass_at(time_s) if cargo else None
@@ -187,7 +190,15 @@ class _Trial:
             engine.set_cargo_mass(mass)
         thrusts = recoil(firing, self.recorder.heated_now)
         engine.advance(wheel_speeds, thrusts)
-        self.breaking.follow(engine, thrusts, time_s=time_s + self._interval_s, cargo_mass=mass)
+        motion = engine.motion()
+        if not (np.isfinite(motion.position).all() and np.isfinite(motion.rotation).all()):
+            # Nothing more can be known; the samples say so and the scorer flags them.
+            self._blown_up = True
+            self.breaking.motion = motion
+            return
+        self.breaking.follow(
+            engine, motion, thrusts, time_s=time_s + self._interval_s, cargo_mass=mass
+        )
 
     def _sample(self, time_s: float) -> None:
         cargo = self._scenario.cargo

@@ -83,7 +83,7 @@ def mjcf_of(world: World, state: MjcfState, settings: MjcfSettings) -> str:
     lines = [
         "<mujoco>",
         '<compiler angle="radian" autolimits="true" inertiafromgeom="false"/>',
-        _tag(
+        _opened(
             "option",
             timestep=settings.time_step_s,
             gravity=(0.0, 0.0, -world.gravity),
@@ -93,6 +93,8 @@ def mjcf_of(world: World, state: MjcfState, settings: MjcfSettings) -> str:
             iterations=settings.iterations,
             tolerance=1e-10,
         ),
+        '<flag autoreset="disable"/>',  # a rollout that blows up must not start anew in silence
+        "</option>",
         "<default>",
         _tag("geom", condim=3, solref=settings.solref, solimp=settings.solimp),
         _tag("tendon", solreflimit=settings.solref),

@@ -27,6 +27,13 @@ _SERVO_SLIP = 2.0
 """A wheel's motor reaches its torque limit this far off its target, rad/s: stiff, calm at rest."""
 
 
+def _ignore(message: str) -> None:
+    """MuJoCo writes its warnings to a file in the working directory; a blow-up is seen anyway."""
+
+
+mujoco.set_mju_user_warning(_ignore)
+
+
 def version() -> str:
     """Version of the MuJoCo library."""
     return str(mujoco.__version__)

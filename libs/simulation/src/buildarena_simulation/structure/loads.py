@@ -64,18 +64,21 @@ class LoadModel:
         turn = self._root_rotation.transpose(0, 2, 1) @ inertial_before
         self._inertial = turned_wrenches(turn, inertial) * share[:, None]
 
-    def evaluate(self, forces: PointForces, motion: Motion, interval_s: float) -> JointLoads:
-        """Joint loads after one more interval.
+    def evaluate(
+        self, forces: PointForces, motion: Motion, *, elapsed_s: float, seen_s: float
+    ) -> JointLoads:
+        """Joint loads now.
 
         Args:
-            forces: Mean forces on the blocks over the interval, without gravity.
+            forces: Mean forces on the blocks, without gravity.
             motion: The clusters' motion now.
-            interval_s: Time since the last evaluation, seconds.
+            elapsed_s: Time since the last evaluation, seconds.
+            seen_s: The part of it that the forces stand for, seconds.
 
         Returns:
             The loads of all members.
         """
-        self._update(forces, motion, interval_s)
+        self._update(forces, motion, elapsed_s=elapsed_s, seen_s=seen_s)
         clusters = self._clusters
         count = len(self.holds)
         force, moment = np.zeros(count), np.zeros(count)
@@ -105,10 +108,12 @@ class LoadModel:
             for level in range(int(clusters.level.max()), 0, -1)
         ]
 
-    def _update(self, forces: PointForces, motion: Motion, interval_s: float) -> None:
+    def _update(
+        self, forces: PointForces, motion: Motion, *, elapsed_s: float, seen_s: float
+    ) -> None:
         """Filters the wrenches on the blocks and the clusters' rates of momentum."""
         structure, clusters = self._structure, self._clusters
-        blend = 1.0 - math.exp(-interval_s / LOAD_FILTER_S)
+        blend = 1.0 - math.exp(-seen_s / LOAD_FILTER_S)
         self._root_rotation = motion.rotation[clusters.root]
         centers = motion.points(clusters, structure.centers_of_mass)
         moments = cross(forces.point - centers[forces.block], forces.force)
@@ -129,7 +134,7 @@ class LoadModel:
                 ),
             ],
             axis=1,
-        ) / (interval_s * GRAVITY)
+        ) / (elapsed_s * GRAVITY)
         self._velocity, self._spin = motion.velocity, motion.spin
         self._inertial += blend * (turned_wrenches(to_root, rate) - self._inertial)
 
