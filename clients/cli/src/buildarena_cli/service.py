@@ -21,7 +21,11 @@ from buildarena_store import Database
 
 DEMO_SWEEP = {
     "name": "demo",
-    "tasks": ["support-1"],
+    "tasks": [
+        *("transport-1", "transport-2", "transport-3"),
+        *("support-1", "support-2", "support-3"),
+        *("lift-1", "lift-2", "lift-3"),
+    ],
     "models": ["builtin/expert", "builtin/random", "builtin/idle"],
     "seeds": [0, 1, 2, 3],
 }
