@@ -5,6 +5,7 @@ Rows leave this room as frozen dataclasses, never as database objects.
 """
 
 from buildarena_store.artifacts import ArtifactInfo, ArtifactStore
+from buildarena_store.boards import BoardChange, BoardFeed, Boards, Round
 from buildarena_store.database import Database
 from buildarena_store.errors import (
     ArtifactMissingError,
@@ -29,6 +30,9 @@ __all__ = [
     "ArtifactInfo",
     "ArtifactMissingError",
     "ArtifactStore",
+    "BoardChange",
+    "BoardFeed",
+    "Boards",
     "Database",
     "Event",
     "Events",
@@ -48,6 +52,7 @@ __all__ = [
     "RolloutRecord",
     "RolloutRequest",
     "Rollouts",
+    "Round",
     "SchemaVersionError",
     "StaleLeaseError",
     "StoreError",

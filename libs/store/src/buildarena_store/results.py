@@ -1,21 +1,20 @@
-"""Results: a finished job's score, and the scores that leaderboards are made of."""
+"""Results: a finished job's score, written once, and the artifacts that belong to it."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from datetime import datetime
-from decimal import Decimal
 from typing import Any
 
-from sqlalchemy import Connection, select
+from sqlalchemy import Connection
 from sqlalchemy.dialects.postgresql import insert
 
 from buildarena_store import events
 from buildarena_store.artifacts import ArtifactInfo
+from buildarena_store.boards import Boards
 from buildarena_store.database import Database
 from buildarena_store.leases import Lease, Leases
-from buildarena_store.tables import artifacts, job_artifacts, jobs
+from buildarena_store.tables import artifacts, job_artifacts
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,36 +42,15 @@ class JobScore:
     manifest: Mapping[str, Any] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ScoredJob:
-    """What a leaderboard needs of one ended job."""
-
-    id: str
-    task: str
-    task_version: str
-    model: str
-    model_hash: str
-    seed: int
-    outcome: str
-    reason: str | None
-    success: bool | None
-    indicator: float | None
-    metrics: Mapping[str, Any] | None
-    flags: Sequence[str] | None
-    requests: int
-    input_tokens: int
-    output_tokens: int
-    cost_usd: Decimal
-    actions: int
-    refused_actions: int
-    finished_at: datetime | None
-
-
 class Results:
-    """Writes scores and reads them in bulk."""
+    """Writes scores.
+
+    Attributes:
+        boards: Reads scores in bulk, for leaderboards.
+    """
 
     def __init__(self, database: Database, leases: Leases) -> None:
-        self._database = database
+        self.boards = Boards(database)
         self._leases = leases
 
     def finish(
@@ -120,23 +98,3 @@ class Results:
                 index_elements=["job_id", "name"], set_={"hash": artifact.hash}
             )
         )
-
-    def tracks(self) -> list[str]:
-        """Every track that has jobs."""
-        query = select(jobs.c.track).distinct().order_by(jobs.c.track)
-        with self._database.transaction() as connection:
-            return [row.track for row in connection.execute(query)]
-
-    def ended(self, track: str) -> list[ScoredJob]:
-        """All ended jobs of a track, in a fixed order."""
-        columns = [jobs.c[name] for name in ScoredJob.__dataclass_fields__]
-        query = (
-            select(*columns)
-            .where(jobs.c.track == track, jobs.c.state == "done")
-            .order_by(jobs.c.task, jobs.c.model, jobs.c.model_hash, jobs.c.seed, jobs.c.id)
-        )
-        with self._database.transaction() as connection:
-            return [
-                ScoredJob(**{name: getattr(row, name) for name in ScoredJob.__dataclass_fields__})
-                for row in connection.execute(query)
-            ]

@@ -231,6 +231,26 @@ verifications = Table(
     _time("finished_at"),
 )
 
+# Written by triggers on jobs, so that no writer can forget it.
+board_changes = Table(
+    "board_changes",
+    metadata,
+    Column("id", BigInteger, Identity(), primary_key=True),
+    # The transaction that changed the job: ids alone become visible out of order.
+    Column("transaction", BigInteger, nullable=False),
+    Column("job_id", Text, nullable=False),
+    Column("track", Text, nullable=False),
+    Column("task", Text, nullable=False),
+    Column("model", Text, nullable=False),
+    Column("kind", Text, nullable=False),
+    Column("before", JSONB),
+    Column("after", JSONB),
+    Column("why", Text),
+    _time("at", now=True),
+)
+Index("ix_board_changes_transaction", board_changes.c.transaction)
+Index("ix_board_changes_track", board_changes.c.track, board_changes.c.id)
+
 tasks = Table(
     "tasks",
     metadata,

@@ -8,6 +8,7 @@ from contextlib import asynccontextmanager
 from fastapi import FastAPI
 
 from buildarena_api import catalogue, health, jobs, leaderboard, sessions, sweeps, verifications
+from buildarena_api.board_cache import BoardCache
 from buildarena_api.problems import add_problem_handlers
 from buildarena_pipeline import __version__
 from buildarena_pipeline.context import Context
@@ -47,6 +48,7 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
     )
     app.state.context = context
     app.state.registry = registry
+    app.state.boards = BoardCache(context.results.boards)
     app.state.submissions = Submissions(context, registry)
     app.state.external = ExternalSessions(context)
     add_problem_handlers(app)

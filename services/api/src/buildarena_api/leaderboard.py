@@ -2,115 +2,222 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+import random
+from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter, Query
+from fastapi import APIRouter, Query, Request, Response
 from pydantic import BaseModel, ConfigDict, Field
 
+from buildarena_api import exports
+from buildarena_api.board_cache import Answer
+from buildarena_api.board_filters import BoardsDep, SelectionDep, unknown
+from buildarena_api.board_views import Board, ChangePage, ChangeView, board_view
 from buildarena_api.dependencies import ContextDep, RegistryDep
-from buildarena_api.problems import FieldProblem, ProblemError, problem_responses
-from buildarena_benchmark import builtin_tasks
-from buildarena_benchmark.leaderboard import Trial, task_rows
+from buildarena_api.problems import problem_responses
+from buildarena_benchmark.leaderboard import SCORED, BoardQuery, TaskDuel, duel
+from buildarena_pipeline.queues import VERIFY
 
 router = APIRouter(prefix="/v1", tags=["leaderboard"])
+MOST_DISTINCT = 20
+"""Values of a manifest that are spelled out; of a name with more, seeds say, only their number."""
 
 
-class Row(BaseModel):
-    """One model on one task."""
+class TestView(BaseModel):
+    """A paired test on shared seeds."""
 
     model_config = ConfigDict(from_attributes=True)
 
-    model: str
-    baseline: bool = Field(description="A built-in model for comparison")
-    trials: int = Field(description="Scored jobs: the denominator of the averages")
-    errored: int = Field(description="Jobs that infrastructure faults ended: in no average")
-    successes: int
-    success_rate: float | None = Field(description="null when nothing was scored")
-    success_low: float | None = Field(description="Lower end of the 95 % Wilson interval")
-    success_high: float | None = Field(description="Upper end of the 95 % Wilson interval")
-    indicator_mean: float | None
-    parts_mean: float | None
-    requests_mean: float | None
-    input_tokens_mean: float | None
-    output_tokens_mean: float | None
-    cost_usd_mean: float | None
+    method: Literal["exact McNemar", "Wilcoxon signed-rank"]
+    pairs: int
+    difference: float
+    p_value: float
 
 
-class TaskBoard(BaseModel):
-    """All models on one task, the best first."""
+class TaskDuelView(BaseModel):
+    """Two models on one task; tests only where they share seeds."""
+
+    model_config = ConfigDict(from_attributes=True)
 
     task: str
-    indicator: str
-    unit: str
-    rows: list[Row]
+    successes: tuple[int, int]
+    trials: tuple[int, int]
+    difference: float = Field(description="Success rate of the first minus that of the second")
+    low: float = Field(description="Lower end of its 95 % interval, unpaired")
+    high: float
+    success: TestView | None
+    indicator: TestView | None
+    success_p: float | None = Field(description="Adjusted over the tasks (Holm)")
+    indicator_p: float | None
 
 
-class Board(BaseModel):
-    """The leaderboard of one track."""
+class Comparison(BaseModel):
+    """Two models on all tasks that both were tried on."""
 
-    track: str | None = Field(description="null when there are no jobs at all")
-    tracks: list[str] = Field(description="Every track with jobs")
-    tasks: list[TaskBoard]
-
-
-@router.get("/leaderboard", responses=problem_responses(422, 503))
-def leaderboard(
-    context: ContextDep,
-    registry: RegistryDep,
-    track: Annotated[str | None, Query(description="Default: the first with jobs")] = None,
-    task: Annotated[str | None, Query(description="Only this task")] = None,
-) -> Board:
-    """Ranks the models of one track on each task; tracks are never mixed."""
-    tracks = context.results.tracks()
-    if track is not None and track not in tracks:
-        raise _unknown("track", track, tracks)
-    tasks = builtin_tasks()
-    if task is not None and task not in tasks:
-        raise _unknown("task", task, sorted(tasks))
-    chosen = track or (tracks[0] if tracks else None)
-    if chosen is None:
-        return Board(track=None, tracks=[], tasks=[])
-    trials: dict[str, list[Trial]] = {}
-    for job in context.results.ended(chosen):
-        if task is None or job.task == task:
-            trials.setdefault(job.task, []).append(
-                Trial(
-                    model=job.model,
-                    outcome=job.outcome,
-                    success=bool(job.success),
-                    indicator=job.indicator or 0.0,
-                    parts=(job.metrics or {}).get("parts"),
-                    requests=job.requests,
-                    input_tokens=job.input_tokens,
-                    output_tokens=job.output_tokens,
-                    cost_usd=float(job.cost_usd),
-                )
-            )
-    boards = [
-        TaskBoard(
-            task=name,
-            indicator=tasks[name].indicator.name if name in tasks else "indicator",
-            unit=tasks[name].indicator.unit if name in tasks else "",
-            rows=[
-                Row.model_validate(
-                    {
-                        **{field: getattr(row, field) for field in row.__dataclass_fields__},
-                        "baseline": row.model in registry.models
-                        and registry.models[row.model].baseline,
-                    }
-                )
-                for row in task_rows(found)
-            ],
-        )
-        for name, found in sorted(trials.items())
-    ]
-    return Board(track=chosen, tracks=tracks, tasks=boards)
+    track: str | None
+    first: str
+    second: str
+    tasks: list[TaskDuelView]
 
 
-def _unknown(field: str, value: str, choices: list[str]) -> ProblemError:
-    message = f"there is no {field} {value!r}"
-    return ProblemError(
-        422,
-        f"{field}: {message}",
-        errors=[FieldProblem(field=field, message=message, choices=choices)],
+class ManifestEntry(BaseModel):
+    """What the manifests behind an entry say about one thing."""
+
+    name: str
+    distinct: int
+    values: list[dict[str, Any]] = Field(
+        description="value and jobs (how many say so); empty when there are too many"
     )
+
+
+class VerifyRequest(BaseModel):
+    """Which results to verify."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    track: str | None = None
+    model: str
+    tasks: list[str] | None = None
+    sample: Annotated[int | None, Field(ge=1, le=10_000, description="Default: all")] = None
+    seed: Annotated[int, Field(description="Of the choice of the sample")] = 0
+
+
+class VerifyAccepted(BaseModel):
+    """Verifications that were asked for."""
+
+    scored: int = Field(description="Scored jobs of the model")
+    verifications: list[str] = Field(description="Ids; see /v1/verifications/{id}")
+
+
+@router.get("/leaderboard", response_model=Board, responses=problem_responses(422, 503))
+def leaderboard(
+    boards: BoardsDep, selection: SelectionDep, registry: RegistryDep, request: Request
+) -> Any:
+    """Ranks the models of one track, on each task and overall; tracks are never mixed."""
+    track, tracks = selection.track, selection.tracks
+    if track is None:
+        return Board(track=None, tracks=[], tasks=[])
+    answer = boards.answer(
+        track,
+        selection.query,
+        "json " + " ".join(tracks),
+        lambda board: (
+            board_view(board, track=track, tracks=tracks, registry=registry)
+            .model_dump_json()
+            .encode()
+        ),
+    )
+    return conditional(request, answer, "application/json")
+
+
+@router.get("/leaderboard/compare", responses=problem_responses(422, 503))
+def compare(
+    boards: BoardsDep,
+    selection: SelectionDep,
+    first: Annotated[str, Query(description="A model, or model@configuration")],
+    second: Annotated[str, Query(description="Another")],
+) -> Comparison:
+    """Tells whether one model is better than another, task by task."""
+    tasks: list[TaskDuel] = []
+    if selection.track is not None:
+        every = boards.trials(selection.track, selection.query)
+        sides = []
+        for field, name in (("first", first), ("second", second)):
+            model, _, wanted = name.partition("@")
+            side = [
+                trial
+                for trial in every
+                if trial.model == model and trial.configuration.startswith(wanted)
+            ]
+            if not side:
+                choices = sorted({f"{t.model}@{t.configuration[:8]}" for t in every})
+                raise unknown(field, name, choices)
+            configurations = [trial.configuration for trial in side]
+            usual = max(sorted(set(configurations)), key=configurations.count)
+            sides.append([trial for trial in side if trial.configuration == usual])
+        found = duel(*sides)
+        tasks = list(found.tasks) if found else []
+    return Comparison(
+        track=selection.track,
+        first=first,
+        second=second,
+        tasks=[TaskDuelView.model_validate(task) for task in tasks],
+    )
+
+
+@router.get("/leaderboard/changes", responses=problem_responses(422, 503))
+def changes(
+    context: ContextDep,
+    selection: SelectionDep,
+    *,
+    before: Annotated[int | None, Query(ge=0, description="Only older ones")] = None,
+    limit: Annotated[int, Query(ge=1, le=1000)] = 100,
+    unscored: Annotated[bool, Query(description="Also jobs that ended without a score")] = False,
+) -> ChangePage:
+    """What entered a track's board, left it or was scored anew, and why; the newest first."""
+    if selection.track is None:
+        return ChangePage(track=None, changes=[], next_before=None)
+    found = context.results.boards.changes(
+        selection.track, before=before, limit=limit, scored_only=not unscored
+    )
+    return ChangePage(
+        track=selection.track,
+        changes=[ChangeView.model_validate(change) for change in found],
+        next_before=found[-1].id if len(found) == limit else None,
+    )
+
+
+@router.get("/leaderboard/manifest", responses=problem_responses(422, 503))
+def manifest(
+    context: ContextDep, boards: BoardsDep, selection: SelectionDep
+) -> list[ManifestEntry]:
+    """The versions behind an entry (name task and model): what its jobs' manifests say."""
+    if selection.track is None:
+        return []
+    trials = boards.trials(selection.track, selection.query)
+    entries: dict[str, list[dict[str, Any]]] = {}
+    for task, version, model in sorted({(t.task, t.task_version, t.model) for t in trials}):
+        for name, value, jobs in context.results.boards.manifest_values(
+            selection.track, task, version, model
+        ):
+            entries.setdefault(name, []).append({"value": value, "jobs": jobs})
+    return [
+        ManifestEntry(
+            name=name,
+            distinct=len(values),
+            values=values if len(values) <= MOST_DISTINCT else [],
+        )
+        for name, values in entries.items()
+    ]
+
+
+@router.post("/leaderboard/verify", status_code=202, responses=problem_responses(422, 503))
+def verify(body: VerifyRequest, context: ContextDep, boards: BoardsDep) -> VerifyAccepted:
+    """Has all of a model's results on a board, or a sample, replayed and simulated again."""
+    tracks = boards.tracks()
+    if body.track is not None and body.track not in tracks:
+        raise unknown("track", body.track, tracks)
+    track = body.track or (tracks[0] if tracks else None)
+    query = BoardQuery(tasks=frozenset(body.tasks) if body.tasks else None, include_flagged=True)
+    every = [] if track is None else boards.trials(track, query)
+    scored = sorted(t.job_id for t in every if t.model == body.model and t.outcome in SCORED)
+    if not scored:
+        raise unknown("model", body.model, sorted({trial.model for trial in every}))
+    chosen = scored
+    if body.sample is not None and body.sample < len(scored):
+        # Whoever names the seed gets the same sample again; nothing secret hangs on it.
+        chosen = random.Random(body.seed).sample(scored, body.sample)  # noqa: S311
+    asked = [context.verifications.request(job_id) for job_id in chosen]
+    context.queues.announce(VERIFY, asked)
+    return VerifyAccepted(scored=len(scored), verifications=asked)
+
+
+def conditional(request: Request, answer: Answer, media_type: str) -> Response:
+    """The answer, or 304 when the reader has it."""
+    headers = {"ETag": answer.etag, "Cache-Control": "no-cache"}
+    known = [tag.strip() for tag in request.headers.get("if-none-match", "").split(",")]
+    if answer.etag in known or "*" in known:
+        return Response(status_code=304, headers=headers)
+    return Response(answer.body, media_type=media_type, headers=headers)
+
+
+router.include_router(exports.router)

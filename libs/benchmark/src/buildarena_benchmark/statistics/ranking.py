@@ -8,6 +8,7 @@ tasks".
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -70,16 +71,23 @@ def mean_ranks(success_rate: Floats, indicator: Floats) -> Floats:
 
 
 def rank_models(
-    figures: tuple[Floats, Floats], replicates: tuple[Floats, Floats], *, level: float = LEVEL
+    figures: tuple[Floats, Floats],
+    replicates: tuple[Floats, Floats],
+    trials: NDArray[np.int64],
+    *,
+    level: float = LEVEL,
 ) -> Ranking:
     """Ranks models, with the uncertainty that their resampled figures show.
 
     A model is better than another beyond chance when its mean rank is smaller in nearly all
     replicates: in more than the share that a one-sided test at half the level's error asks for.
+    A resample of very few trials shows no spread, so there must also be enough trials for an
+    exact permutation test to find a difference at all (four of each on a single task).
 
     Args:
         figures: Success rates and indicators, each (T, M) float64.
         replicates: The same of resampled trials, each (B, T, M) float64.
+        trials: (T, M) int64, how many trials each figure rests on.
         level: Confidence level.
 
     Returns:
@@ -87,13 +95,43 @@ def rank_models(
     """
     means = mean_ranks(*replicates)
     wins = np.stack([(row[None, :] < means.T).mean(axis=1) for row in means.T])
-    better = wins >= (1 + level) / 2
+    better = (wins >= (1 + level) / 2) & (smallest_p_value(trials) <= 1 - level)
     places = 1 + (means[:, None, :] < means[:, :, None]).sum(axis=-1)
     tail = (1 - level) / 2
+    low = np.quantile(places, tail, axis=0, method="lower")
+    high = np.quantile(places, 1 - tail, axis=0, method="higher")
+    # No place may be ruled out on account of a model that can't be told apart.
     return Ranking(
         mean_rank=mean_ranks(*figures),
         rank=(1 + better.sum(axis=0)).astype(np.int64),
-        low=np.quantile(places, tail, axis=0, method="lower").astype(np.int64),
-        high=np.quantile(places, 1 - tail, axis=0, method="higher").astype(np.int64),
+        low=np.minimum(low, 1 + better.sum(axis=0)).astype(np.int64),
+        high=np.maximum(high, len(better) - better.sum(axis=1)).astype(np.int64),
         better=better,
     )
+
+
+def smallest_p_value(trials: NDArray[np.int64]) -> Floats:
+    """The least two-sided p-value that a permutation test of two models can reach.
+
+    The labels of n and m trials can be dealt in C(n + m, n) ways on each task, and the most
+    extreme deal is one of them.
+
+    Args:
+        trials: (T, M) int64.
+
+    Returns:
+        (M, M) float64, at most 1.
+    """
+    models = range(trials.shape[1])
+    ways = np.array(
+        [
+            [sum(_log_binomial(int(n), int(m)) for n, m in trials[:, [i, j]]) for j in models]
+            for i in models
+        ]
+    )
+    least: Floats = np.minimum(1.0, 2.0 * np.exp(-ways))
+    return least
+
+
+def _log_binomial(first: int, second: int) -> float:
+    return math.lgamma(first + second + 1) - math.lgamma(first + 1) - math.lgamma(second + 1)

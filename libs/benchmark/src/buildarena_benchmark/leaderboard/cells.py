@@ -1,0 +1,186 @@
+"""Cells: all trials of one model configuration on one task, summarised with their uncertainty."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import datetime
+from typing import Any, Final
+from zlib import crc32
+
+import numpy as np
+from numpy.typing import NDArray
+
+from buildarena_benchmark.leaderboard.trials import SIMULATED, Trial
+from buildarena_benchmark.statistics import (
+    cost_per_success,
+    mean_interval,
+    pass_at_k,
+    pass_hat_k,
+    resampled_means,
+    wilson_interval,
+)
+
+TRIES: Final = (1, 2, 4, 8)
+"""The k of pass@k and pass^k."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cell:
+    """One model configuration on one task. What does not exist is None.
+
+    Averages are over counted trials: scored ones, but for flagged successes unless these were
+    asked for.
+
+    Attributes:
+        trials: Counted trials: the denominator of the averages.
+        ended: All ended jobs, errored, cancelled and flagged ones included: the other
+            denominator.
+        errored: Jobs that infrastructure faults ended.
+        cancelled: Jobs that somebody cancelled.
+        flagged: Successes that a flag keeps out of the averages.
+        simulated: Counted trials whose machine was finished and tried.
+        success_rate: Successes of counted trials, with its Wilson interval.
+        success_rate_of_ended: Successes of all ended jobs.
+        indicator_mean: Mean indicator, with its bootstrap interval.
+        invalid_action_rate: Refused actions of all actions.
+        cost_per_success_usd: US dollars of all counted trials for each success.
+        pass_at: Chance that at least one of k tries succeeds, by k.
+        pass_all: Chance that all of k tries succeed, by k.
+        outcomes: Ended jobs by outcome.
+        reasons: Counted trials that failed, by reason.
+        refusals: Refused actions by refusal class.
+        newest: When the last of its jobs ended.
+        replicates: (B, 2) float64, success rate and mean indicator of resampled trials; None
+            without counted trials.
+    """
+
+    task: str
+    model: str
+    configuration: str
+    decoding: Mapping[str, Any]
+    trials: int
+    ended: int
+    errored: int
+    cancelled: int
+    flagged: int
+    simulated: int
+    successes: int
+    success_rate: float | None
+    success_low: float | None
+    success_high: float | None
+    success_rate_of_ended: float | None
+    indicator_mean: float | None
+    indicator_low: float | None
+    indicator_high: float | None
+    parts_mean: float | None
+    requests_mean: float | None
+    input_tokens_mean: float | None
+    output_tokens_mean: float | None
+    cost_usd_mean: float | None
+    cost_per_success_usd: float | None
+    invalid_action_rate: float | None
+    pass_at: Mapping[str, float]
+    pass_all: Mapping[str, float]
+    outcomes: Mapping[str, int]
+    reasons: Mapping[str, int]
+    refusals: Mapping[str, int]
+    newest: datetime | None
+    replicates: NDArray[np.float64] | None = field(repr=False, compare=False)
+
+
+def counted_trials(trials: Iterable[Trial], *, include_flagged: bool = False) -> list[Trial]:
+    """The trials that averages are made of.
+
+    A flag casts doubt on a success, so a flagged success leaves numerator and denominator. A
+    flagged failure stays a failure: else a machine that blows up would raise its model's rate.
+    """
+    return [
+        trial
+        for trial in trials
+        if trial.scored and (include_flagged or not (trial.success and trial.flags))
+    ]
+
+
+def summarise(trials: Sequence[Trial], *, include_flagged: bool = False) -> Cell:
+    """Summarises the trials of one model configuration on one task; at least one.
+
+    The order of the trials does not matter.
+    """
+    counted = counted_trials(trials, include_flagged=include_flagged)
+    first, number = trials[0], len(counted)
+    successes = sum(trial.success for trial in counted)
+    outcomes = Counter(trial.outcome for trial in trials)
+    low_high = wilson_interval(successes, number) if counted else (None, None)
+    replicates, indicator_ends = None, None
+    if counted:
+        figures = np.array([(trial.success, trial.indicator) for trial in counted], float)
+        # Each cell has draws of its own: resamples of different cells are independent.
+        seed = crc32(f"{first.task} {first.model} {first.configuration}".encode())
+        replicates = resampled_means(figures, seed=seed)
+        indicator_ends = mean_interval(figures[:, 1], replicates[:, 1])
+    actions = sum(trial.actions for trial in counted)
+    refused = sum(trial.refused_actions for trial in counted)
+    mean = _Means(counted)
+    return Cell(
+        task=first.task,
+        model=first.model,
+        configuration=first.configuration,
+        decoding=first.decoding,
+        trials=number,
+        ended=len(trials),
+        errored=outcomes["errored"],
+        cancelled=outcomes["cancelled"],
+        flagged=sum(trial.scored for trial in trials) - number,
+        simulated=sum(trial.outcome in SIMULATED for trial in counted),
+        successes=successes,
+        success_rate=successes / number if number else None,
+        success_low=low_high[0],
+        success_high=low_high[1],
+        success_rate_of_ended=successes / len(trials),
+        indicator_mean=mean.of(lambda t: t.indicator),
+        indicator_low=indicator_ends[0] if indicator_ends else None,
+        indicator_high=indicator_ends[1] if indicator_ends else None,
+        parts_mean=mean.of(lambda t: t.parts),
+        requests_mean=mean.of(lambda t: t.requests),
+        input_tokens_mean=mean.of(lambda t: t.input_tokens),
+        output_tokens_mean=mean.of(lambda t: t.output_tokens),
+        cost_usd_mean=mean.of(lambda t: t.cost_usd),
+        cost_per_success_usd=cost_per_success([t.cost_usd for t in counted], successes),
+        invalid_action_rate=refused / actions if actions else None,
+        pass_at=_tries(pass_at_k, successes, number),
+        pass_all=_tries(pass_hat_k, successes, number),
+        outcomes=dict(sorted(outcomes.items())),
+        reasons=dict(sorted(Counter(t.reason for t in counted if t.reason).items())),
+        refusals=_refusals(counted),
+        newest=max((t.finished_at for t in trials if t.finished_at), default=None),
+        replicates=replicates,
+    )
+
+
+class _Means:
+    """Means over the trials that have a value."""
+
+    def __init__(self, trials: Sequence[Trial]) -> None:
+        self._trials = trials
+
+    def of(self, value: Callable[[Trial], float | None]) -> float | None:
+        # fsum is exact, so the order of the trials cannot show in the last digit.
+        values = [v for v in map(value, self._trials) if v is not None]
+        return math.fsum(values) / len(values) if values else None
+
+
+def _tries(
+    estimate: Callable[[int, int, int], float | None], successes: int, trials: int
+) -> dict[str, float]:
+    found = {str(k): estimate(successes, trials, k) for k in TRIES}
+    return {k: chance for k, chance in found.items() if chance is not None}
+
+
+def _refusals(trials: Iterable[Trial]) -> dict[str, int]:
+    total: Counter[str] = Counter()
+    for trial in trials:
+        total.update(trial.refusals)
+    return dict(sorted(total.items()))

@@ -1,0 +1,106 @@
+"""One model against another, task by task: in pairs where they share seeds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+from buildarena_benchmark.leaderboard.cells import counted_trials
+from buildarena_benchmark.leaderboard.trials import Trial
+from buildarena_benchmark.statistics import (
+    PairedTest,
+    difference_interval,
+    holm,
+    paired_indicators,
+    paired_successes,
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TaskDuel:
+    """Two models on one task.
+
+    Attributes:
+        successes: Of the first and of the second.
+        trials: Of the first and of the second.
+        difference: Success rate of the first minus that of the second.
+        low: Lower end of its 95 % interval (unpaired).
+        high: Upper end.
+        success: Test of success on shared seeds; None when none are shared.
+        indicator: Test of the indicators on shared seeds; None when none are shared.
+        success_p: P-value of the success test, adjusted for the number of tasks.
+        indicator_p: The same of the indicator test.
+    """
+
+    task: str
+    successes: tuple[int, int]
+    trials: tuple[int, int]
+    difference: float
+    low: float
+    high: float
+    success: PairedTest | None
+    indicator: PairedTest | None
+    success_p: float | None = None
+    indicator_p: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Duel:
+    """Two models on all tasks that both were tried on."""
+
+    first: str
+    second: str
+    tasks: Sequence[TaskDuel]
+
+
+def duel(first: Sequence[Trial], second: Sequence[Trial]) -> Duel | None:
+    """Compares two models; None when one of them has no trial.
+
+    Each side has one model configuration; p-values are adjusted by Holm over the tasks.
+    """
+    if not first or not second:
+        return None
+    sides = [_by_task(counted_trials(side)) for side in (first, second)]
+    shared = [task for task in sides[0] if task in sides[1]]
+    tasks = [_task_duel(task, sides[0][task], sides[1][task]) for task in sorted(shared)]
+    success_p = iter(holm([t.success.p_value for t in tasks if t.success]))
+    indicator_p = iter(holm([t.indicator.p_value for t in tasks if t.indicator]))
+    return Duel(
+        first=first[0].model,
+        second=second[0].model,
+        tasks=[
+            replace(
+                task,
+                success_p=next(success_p) if task.success else None,
+                indicator_p=next(indicator_p) if task.indicator else None,
+            )
+            for task in tasks
+        ],
+    )
+
+
+def _by_task(trials: Iterable[Trial]) -> dict[str, list[Trial]]:
+    found: dict[str, list[Trial]] = {}
+    for trial in trials:
+        found.setdefault(trial.task, []).append(trial)
+    return found
+
+
+def _task_duel(task: str, first: Sequence[Trial], second: Sequence[Trial]) -> TaskDuel:
+    seeds_1, seeds_2 = ({trial.seed: trial for trial in side} for side in (first, second))
+    shared = sorted(seeds_1.keys() & seeds_2.keys())
+    counts = tuple((sum(t.success for t in side), len(side)) for side in (first, second))
+    low, high = difference_interval(counts[0], counts[1])
+    pairs = [(seeds_1[seed], seeds_2[seed]) for seed in shared]
+    return TaskDuel(
+        task=task,
+        successes=(counts[0][0], counts[1][0]),
+        trials=(counts[0][1], counts[1][1]),
+        difference=counts[0][0] / counts[0][1] - counts[1][0] / counts[1][1],
+        low=low,
+        high=high,
+        success=paired_successes([a.success for a, _ in pairs], [b.success for _, b in pairs]),
+        indicator=paired_indicators(
+            [a.indicator for a, _ in pairs], [b.indicator for _, b in pairs]
+        ),
+    )

@@ -1,0 +1,103 @@
+"""Tables in the layout of the BuildArena paper: categories down, levels across.
+
+In each column the best figure is bold and the second-best underlined, ties alike, as the paper
+marks its own: where two are best, none is second.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Protocol
+
+Column = tuple[str, str, int, bool]
+"""Heading, name of the figure, power of ten it is divided by, whether more is better."""
+
+PERFORMANCE: tuple[Column, ...] = (
+    ("Number of Parts", "parts_mean", 0, True),
+    (r"Success Rate (\%)↑", "success_rate", -2, True),
+    ("Indicator↑", "indicator_mean", 0, True),
+)
+COST: tuple[Column, ...] = (
+    (r"\# Input Tokens ($\times 10^3$)↓", "input_tokens_mean", 3, False),
+    (r"\# Output Tokens ($\times 10^3$)↓", "output_tokens_mean", 3, False),
+    (r"\# LLM Requests↓", "requests_mean", 0, False),
+)
+LEVELS = (1, 2, 3)
+
+
+class Figures(Protocol):
+    """Anything that has a model's figures on a task: our cells and the paper's rows."""
+
+    @property
+    def model(self) -> str:
+        """The model's name."""
+
+
+Cells = Mapping[str, Sequence[Figures]]
+"""Rows by task; tasks are named ``category-level``."""
+
+
+def performance_table(cells: Cells) -> str:
+    """Parts, success rate and indicator of each model; tasks that are absent show dashes."""
+    return _table(cells, PERFORMANCE)
+
+
+def cost_table(cells: Cells) -> str:
+    """Tokens and requests of each model."""
+    return _table(cells, COST)
+
+
+def _table(cells: Cells, columns: Sequence[Column]) -> str:
+    groups = " & ".join(rf"\multicolumn{{3}}{{c}}{{{heading}}}" for heading, *_ in columns)
+    levels = " & ".join(f"Lv.{level}" for _ in columns for level in LEVELS)
+    lines = [
+        r"\begin{tabular}{ll" + "c" * 3 * len(columns) + "}",
+        r"\toprule",
+        rf"\multirow{{2}}{{*}}{{Task}} & \multirow{{2}}{{*}}{{Model}} & {groups} \\",
+        rf"& & {levels} \\",
+    ]
+    categories = dict.fromkeys(task.rsplit("-", 1)[0] for task in cells)
+    for category in categories:
+        lines += [r"\midrule", *_category(cells, category, columns)]
+    return "\n".join([*lines, r"\bottomrule", r"\end{tabular}"]) + "\n"
+
+
+def _category(cells: Cells, category: str, columns: Sequence[Column]) -> list[str]:
+    tasks = [f"{category}-{level}" for level in LEVELS]
+    models = list(dict.fromkeys(row.model for task in tasks for row in cells.get(task, ())))
+    texts: list[list[str]] = []
+    for _, name, power, more in columns:
+        for task in tasks:
+            values = {row.model: getattr(row, name) for row in cells.get(task, ())}
+            shown = [_scaled(values.get(model), power) for model in models]
+            texts.append(_marked(shown, more=more))
+    lines = [rf"\multirow{{{len(models)}}}{{*}}{{{_escaped(category.capitalize())}}}"]
+    for number, model in enumerate(models):
+        figures = " & ".join(column[number] for column in texts)
+        lines.append(rf"& {_escaped(model)} & {figures} \\")
+    return lines
+
+
+def _scaled(value: float | None, power: int) -> float | None:
+    """A figure as it is printed: to one decimal, which also decides what is a tie."""
+    return None if value is None else round(value / 10.0**power, 1)
+
+
+def _marked(values: Sequence[float | None], *, more: bool) -> list[str]:
+    known = sorted((value for value in values if value is not None), reverse=more)
+    # Where nobody has anything there is no best.
+    places = [value for value in known if value != 0.0 or not more][:2]
+    found = []
+    for value in values:
+        text = "--" if value is None else f"{value:.1f}"
+        if places and value == places[0]:
+            text = rf"\textbf{{{text}}}"
+        elif len(places) > 1 and value == places[1]:
+            text = rf"\underline{{{text}}}"
+        found.append(text)
+    return found
+
+
+def _escaped(text: str) -> str:
+    special = {char: "\\" + char for char in "&%$#_{}"} | {"\\": r"\textbackslash{}"}
+    return "".join(special.get(char, char) for char in text)

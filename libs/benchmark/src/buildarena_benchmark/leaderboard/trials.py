@@ -1,0 +1,73 @@
+"""One ended job, as leaderboards see it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from datetime import datetime
+from types import MappingProxyType
+from typing import Any, Final
+
+SCORED: Final = frozenset({"success", "unsuccessful", "construction_failed", "limit"})
+"""Outcomes that count in the averages; faults and cancelled jobs never do."""
+SIMULATED: Final = frozenset({"success", "unsuccessful"})
+"""Outcomes of machines that were finished and tried."""
+_NOTHING: Final[Mapping[str, Any]] = MappingProxyType({})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trial:
+    """One ended job.
+
+    Attributes:
+        job_id: Id of the job.
+        track: Track; trials of different tracks are never compared.
+        task: Task name.
+        task_version: Content hash of the task; trials of different versions are never mixed.
+        model: Model name.
+        configuration: Hash of model and decoding: what makes a row of a board.
+        decoding: How the model's replies were sampled.
+        seed: Seed; models tried with the same one can be compared in pairs.
+        outcome: How the job ended.
+        reason: Class of its failure, if any.
+        success: Whether it met the task's criterion.
+        indicator: The task's performance indicator.
+        parts: Parts of its machine, if there was one.
+        flags: Remarks that keep a success out of rankings.
+        refusals: Refused actions by refusal class.
+        requests: Model requests.
+        input_tokens: Tokens sent.
+        output_tokens: Tokens received.
+        cost_usd: US dollars.
+        actions: Actions, refused ones included.
+        refused_actions: Refused actions.
+        finished_at: When it ended.
+    """
+
+    job_id: str
+    task: str
+    model: str
+    outcome: str
+    success: bool
+    indicator: float
+    seed: int = 0
+    track: str = ""
+    task_version: str = ""
+    configuration: str = ""
+    decoding: Mapping[str, Any] = field(default_factory=lambda: _NOTHING)
+    reason: str | None = None
+    parts: int | None = None
+    flags: tuple[str, ...] = ()
+    refusals: Mapping[str, int] = field(default_factory=lambda: _NOTHING)
+    requests: int = 0
+    input_tokens: int = 0
+    output_tokens: int = 0
+    cost_usd: float = 0.0
+    actions: int = 0
+    refused_actions: int = 0
+    finished_at: datetime | None = None
+
+    @property
+    def scored(self) -> bool:
+        """Whether the trial counts in averages."""
+        return self.outcome in SCORED

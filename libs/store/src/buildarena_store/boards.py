@@ -1,0 +1,236 @@
+"""What leaderboards are made of: ended jobs in bulk, what changed since, and why."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any
+
+from sqlalchemy import Connection, Integer, Row, cast, func, select, text
+
+from buildarena_benchmark.leaderboard import Trial
+from buildarena_store.database import Database
+from buildarena_store.tables import board_changes, jobs, rollouts, sweep_jobs
+
+CHUNK = 5000
+"""Rows that are in memory twice at a time while all are read."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BoardFeed:
+    """Changes of ended jobs since a mark.
+
+    Attributes:
+        mark: Give it to read on from here.
+        put: Trials that are new or may have changed.
+        gone: Ids of jobs that are no longer ended.
+    """
+
+    mark: int
+    put: Sequence[Trial]
+    gone: Sequence[str]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BoardChange:
+    """One line of the change log.
+
+    Attributes:
+        kind: ``entered``, ``left``, ``rescored``, ``corrected`` (a figure beside the score), or
+            ``unscored`` (a job ended without a score).
+        before: Outcome, reason, success, indicator and flags, if it had ended before.
+        after: The same now, if it has ended.
+        why: What the writer said, if anything.
+    """
+
+    id: int
+    job_id: str
+    track: str
+    task: str
+    model: str
+    kind: str
+    before: Mapping[str, Any] | None
+    after: Mapping[str, Any] | None
+    why: str | None
+    at: datetime
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Round:
+    """One simulated machine of a job: all rollouts of one machine together."""
+
+    success: bool
+    indicator: float
+    parts: int | None
+
+
+class Boards:
+    """Reads ended jobs and their changes."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def feed(self, mark: int | None) -> BoardFeed:
+        """Everything that has ended, or what changed since a mark.
+
+        A transaction that was open when the mark was taken may have become visible since: the
+        mark is the oldest such transaction, and changes from it on are read again.
+        """
+        with self._database.transaction() as connection:
+            connection.execute(text("SET TRANSACTION ISOLATION LEVEL REPEATABLE READ, READ ONLY"))
+            oldest = func.pg_snapshot_xmin(func.pg_current_snapshot())
+            new_mark = int(connection.execute(select(oldest.op("::")(text("text")))).scalar_one())
+            if mark is None:
+                query = select(*_COLUMNS).where(jobs.c.state == "done")
+                return BoardFeed(mark=new_mark, put=list(_trials(connection, query)), gone=())
+            changed = select(board_changes.c.job_id).where(board_changes.c.transaction >= mark)
+            ids = {row.job_id for row in connection.execute(changed.distinct())}
+            put: list[Trial] = []
+            if ids:
+                query = select(*_COLUMNS).where(jobs.c.state == "done", jobs.c.id.in_(ids))
+                put = list(_trials(connection, query))
+        gone = sorted(ids - {trial.job_id for trial in put})
+        return BoardFeed(mark=new_mark, put=put, gone=gone)
+
+    def of_sweep(self, sweep_id: str) -> list[tuple[Trial, list[Round]]]:
+        """A sweep's ended jobs with their rounds, in a fixed order."""
+        members = select(sweep_jobs.c.job_id).where(sweep_jobs.c.sweep_id == sweep_id)
+        query = (
+            select(*_COLUMNS)
+            .where(jobs.c.state == "done", jobs.c.id.in_(members))
+            .order_by(jobs.c.task, jobs.c.model, jobs.c.seed, jobs.c.id)
+        )
+        simulated = (
+            select(rollouts)
+            .where(rollouts.c.job_id.in_(members), rollouts.c.finished_at.is_not(None))
+            .order_by(rollouts.c.job_id, rollouts.c.number)
+        )
+        with self._database.transaction() as connection:
+            found = list(_trials(connection, query))
+            rounds: dict[str, list[tuple[str, Round]]] = {}
+            for row in connection.execute(simulated):
+                _add_rollout(rounds.setdefault(row.job_id, []), row)
+        return [(trial, [r for _, r in rounds.get(trial.job_id, [])]) for trial in found]
+
+    def tracks(self) -> list[str]:
+        """Every track that has jobs, ended or not."""
+        query = select(jobs.c.track).distinct().order_by(jobs.c.track)
+        with self._database.transaction() as connection:
+            return [row.track for row in connection.execute(query)]
+
+    def changes(
+        self, track: str, *, before: int | None = None, limit: int = 100, scored_only: bool = True
+    ) -> list[BoardChange]:
+        """The change log of a track, the newest first.
+
+        Args:
+            track: The track.
+            before: Only changes with smaller ids.
+            limit: Rows at the most.
+            scored_only: Leave out jobs that ended without a score.
+        """
+        columns = [board_changes.c[name] for name in BoardChange.__dataclass_fields__]
+        query = select(*columns).where(board_changes.c.track == track)
+        if before is not None:
+            query = query.where(board_changes.c.id < before)
+        if scored_only:
+            query = query.where(board_changes.c.kind != "unscored")
+        query = query.order_by(board_changes.c.id.desc()).limit(limit)
+        with self._database.transaction() as connection:
+            return [
+                BoardChange(
+                    **{name: getattr(row, name) for name in BoardChange.__dataclass_fields__}
+                )
+                for row in connection.execute(query)
+            ]
+
+    def manifest_values(
+        self, track: str, task: str, task_version: str, model: str
+    ) -> list[tuple[str, Any, int]]:
+        """What a board entry's manifests say: name, value, and how many scored jobs say so."""
+        entries = func.jsonb_each(jobs.c.manifest).table_valued("key", "value")
+        query = (
+            select(entries.c.key, entries.c.value, func.count().label("jobs"))
+            .select_from(jobs.join(entries, text("true")))
+            .where(
+                jobs.c.track == track,
+                jobs.c.task == task,
+                jobs.c.task_version == task_version,
+                jobs.c.model == model,
+                jobs.c.success.is_not(None),
+            )
+            .group_by(entries.c.key, entries.c.value)
+            .order_by(entries.c.key, func.count().desc())
+        )
+        with self._database.transaction() as connection:
+            return [(row.key, row.value, row.jobs) for row in connection.execute(query)]
+
+
+_COLUMNS = [
+    jobs.c.track,
+    jobs.c.task,
+    jobs.c.task_version,
+    jobs.c.model,
+    jobs.c.seed,
+    jobs.c.outcome,
+    jobs.c.reason,
+    jobs.c.success,
+    jobs.c.indicator,
+    jobs.c.flags,
+    jobs.c.refusals,
+    jobs.c.requests,
+    jobs.c.input_tokens,
+    jobs.c.output_tokens,
+    jobs.c.cost_usd,
+    jobs.c.actions,
+    jobs.c.refused_actions,
+    jobs.c.finished_at,
+    jobs.c.id.label("job_id"),
+    jobs.c.model_hash.label("configuration"),
+    jobs.c.model_config["decoding"].label("decoding"),
+    cast(jobs.c.metrics["parts"], Integer).label("parts"),
+]
+
+
+def _trials(connection: Connection, query: Any) -> Iterator[Trial]:
+    # A hundred thousand rows repeat a few dozen words and settings: one object serves them all.
+    decodings: dict[str, Mapping[str, Any]] = {}
+    result = connection.execution_options(stream_results=True).execute(query)
+    for row in result.yield_per(CHUNK):
+        yield Trial(
+            job_id=row.job_id,
+            track=sys.intern(row.track),
+            task=sys.intern(row.task),
+            task_version=sys.intern(row.task_version),
+            model=sys.intern(row.model),
+            configuration=sys.intern(row.configuration),
+            decoding=decodings.setdefault(row.configuration, row.decoding or {}),
+            seed=row.seed,
+            outcome=sys.intern(row.outcome),
+            reason=None if row.reason is None else sys.intern(row.reason),
+            success=bool(row.success),
+            indicator=row.indicator or 0.0,
+            parts=row.parts,
+            flags=tuple(row.flags or ()),
+            refusals=row.refusals or {},
+            requests=row.requests,
+            input_tokens=row.input_tokens,
+            output_tokens=row.output_tokens,
+            cost_usd=float(row.cost_usd),
+            actions=row.actions,
+            refused_actions=row.refused_actions,
+            finished_at=row.finished_at,
+        )
+
+
+def _add_rollout(rounds: list[tuple[str, Round]], row: Row[Any]) -> None:
+    """Adds a rollout to the round of its machine; the best rollout of a round counts."""
+    parts = (row.metrics or {}).get("parts")
+    new = Round(success=bool(row.success), indicator=row.indicator or 0.0, parts=parts)
+    if rounds and rounds[-1][0] == row.machine_hash:
+        best = max(rounds[-1][1], new, key=lambda r: (r.success, r.indicator))
+        rounds[-1] = (row.machine_hash, best)
+    else:
+        rounds.append((row.machine_hash, new))

@@ -1,0 +1,108 @@
+"""The boards of this process: fed with what changed, answered from memory."""
+
+from __future__ import annotations
+
+import threading
+from collections import OrderedDict
+from collections.abc import Callable
+from dataclasses import dataclass
+from hashlib import sha256
+from typing import Final
+
+from buildarena_benchmark import builtin_tasks
+from buildarena_benchmark.leaderboard import Board, BoardQuery, TrackBoard, Trial
+from buildarena_store import Boards
+
+KEPT_ANSWERS: Final = 256
+"""Answers in memory at the most; one of a full board is about 200 kB."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Answer:
+    """A body and the hash by which a reader can tell that it has it already."""
+
+    body: bytes
+    etag: str
+
+
+class BoardCache:
+    """Keeps every track's board up to date and its answers as long as they are true.
+
+    Each question first asks the database what changed since the last one, which is one indexed
+    look-up; nothing that a question is answered with is older than the question.
+
+    Args:
+        boards: Where ended jobs and their changes are read.
+    """
+
+    def __init__(self, boards: Boards) -> None:
+        self._boards = boards
+        self._lock = threading.Lock()
+        self._mark: int | None = None
+        self._tracks: dict[str, TrackBoard] = {}
+        self._track_of: dict[str, str] = {}
+        self._generations: dict[str, int] = {}
+        self._answers: OrderedDict[tuple[str, BoardQuery, str], tuple[int, Answer]] = OrderedDict()
+
+    def tracks(self) -> list[str]:
+        """Tracks with ended jobs."""
+        with self._lock:
+            self._refresh()
+            return sorted(track for track, board in self._tracks.items() if len(board))
+
+    def answer(
+        self, track: str, query: BoardQuery, kind: str, render: Callable[[Board], bytes]
+    ) -> Answer:
+        """The rendered board of a track.
+
+        Args:
+            track: The track.
+            query: What the board is made of.
+            kind: Names the rendering: one kind is always rendered alike.
+            render: Makes the body; called only when there is no true answer in memory.
+        """
+        with self._lock:
+            self._refresh()
+            generation = self._generations.get(track, 0)
+            key = (track, query, kind)
+            kept = self._answers.get(key)
+            if kept is not None and kept[0] == generation:
+                self._answers.move_to_end(key)
+                return kept[1]
+            body = render(self._track(track).board(query))
+            answer = Answer(body=body, etag=f'"{sha256(body).hexdigest()[:32]}"')
+            self._answers[key] = (generation, answer)
+            self._answers.move_to_end(key)
+            while len(self._answers) > KEPT_ANSWERS:
+                self._answers.popitem(last=False)
+            return answer
+
+    def trials(self, track: str, query: BoardQuery) -> list[Trial]:
+        """The ended jobs that a board is made of."""
+        with self._lock:
+            self._refresh()
+            return list(self._track(track).trials(query))
+
+    def _refresh(self) -> None:
+        feed = self._boards.feed(self._mark)
+        changed: set[str] = set()
+        for trial in feed.put:
+            if self._track(trial.track).put(trial):
+                changed.add(trial.track)
+            self._track_of[trial.job_id] = trial.track
+        for job_id in feed.gone:
+            track = self._track_of.pop(job_id, None)
+            if track is not None and self._track(track).remove(job_id):
+                changed.add(track)
+        for track in changed:
+            self._generations[track] = self._generations.get(track, 0) + 1
+        self._mark = feed.mark
+
+    def _track(self, track: str) -> TrackBoard:
+        if track not in self._tracks:
+            tasks = builtin_tasks()
+            self._tracks[track] = TrackBoard(
+                {name: task.version for name, task in tasks.items()},
+                {name: task.difficulty for name, task in tasks.items() if task.difficulty},
+            )
+        return self._tracks[track]

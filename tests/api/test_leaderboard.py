@@ -1,0 +1,240 @@
+from __future__ import annotations
+
+import json
+from datetime import UTC, datetime, timedelta
+
+import pytest
+from sqlalchemy import delete, text, update
+from starlette.testclient import TestClient
+
+from buildarena_api.app import create_app
+from buildarena_pipeline.models import load_registry
+from buildarena_store import JobScore
+from buildarena_store.tables import jobs
+
+SWEEP = {
+    "tasks": ["support-1", "lift-1"],
+    "models": ["builtin/expert", "builtin/random"],
+    "seeds": [0, 1, 2, 3, 4],
+}
+
+
+@pytest.fixture
+def finish(api, context):
+    """Submits the sweep and ends its jobs: the expert's succeed, the other's do not."""
+
+    def work(count: int = 20, **values: object) -> list[str]:
+        api.post("/v1/sweeps", json=SWEEP)
+        ended = []
+        for _ in range(count):
+            lease = context.leases.claim("construct", owner="w")
+            won = lease.job.model == "builtin/expert"
+            score = JobScore(
+                **{
+                    "outcome": "success" if won else "unsuccessful",
+                    "success": won,
+                    "indicator": 100.0 if won else 0.0,
+                    "metrics": {"parts": 7},
+                    "manifest": {"geometry": "1.0", "seed": lease.job.seed},
+                    **values,
+                }
+            )
+            with context.database.transaction() as connection:
+                context.results.finish(lease, score, connection=connection)
+            ended.append(lease.job.id)
+        return ended
+
+    return work
+
+
+def board(api, **params):
+    return api.get("/v1/leaderboard", params=params).json()
+
+
+def change(context, job_id: str, why: str | None = None, **values: object) -> None:
+    with context.database.transaction() as connection:
+        if why is not None:
+            connection.execute(
+                text("SELECT set_config('buildarena.why', :why, true)"), {"why": why}
+            )
+        connection.execute(update(jobs).where(jobs.c.id == job_id).values(**values))
+
+
+def test_models_are_ranked_on_tasks_and_overall_with_their_uncertainty(api, finish) -> None:
+    finish()
+    answer = board(api)
+    assert [task["task"] for task in answer["tasks"]] == ["support-1", "lift-1"]
+    first, second = answer["tasks"][0]["rows"]
+    assert (first["model"], first["rank"], first["successes"]) == ("builtin/expert", 1, 5)
+    assert (second["rank"], second["rank_low"], second["rank_high"]) == (2, 2, 2)
+    assert (first["indicator_low"], first["indicator_high"]) == (100.0, 100.0)
+    assert first["pass_at"]["4"] == 1.0
+    best, _ = answer["overall"]
+    assert (best["model"], best["rank"], best["mean_rank"], best["pareto"]) == (
+        "builtin/expert",
+        1,
+        1.0,
+        True,
+    )
+    assert best["dimensions"]["precision"] == 1.0
+    listed = api.get(first["jobs"]).json()["jobs"]
+    assert {job["model"] for job in listed} == {"builtin/expert"}
+
+
+def test_the_papers_figures_stand_beside_and_are_never_ranked_with_ours(api, finish) -> None:
+    finish()
+    answer = board(api)
+    rows = answer["tasks"][0]["published"]
+    assert len(rows) == 12
+    assert (rows[0]["model"], rows[0]["matches"]) == ("GPT-5", ["openai/gpt-5"])
+    assert {row["model"] for row in answer["overall"]} == {"builtin/expert", "builtin/random"}
+    assert answer["published"][0]["model"] == "GPT-5"
+
+
+def test_filters_choose_tasks_levels_models_and_time(api, finish) -> None:
+    finish()
+    assert [t["task"] for t in board(api, task="lift-1")["tasks"]] == ["lift-1"]
+    assert board(api, level=2)["tasks"] == []
+    assert {t["task"] for t in board(api, level=[1, 2])["tasks"]} == {"lift-1", "support-1"}
+    (row,) = board(api, model="builtin/random", task="lift-1")["tasks"][0]["rows"]
+    assert (row["model"], row["rank"]) == ("builtin/random", 1)
+    soon = (datetime.now(UTC) + timedelta(hours=1)).isoformat()
+    assert board(api, since=soon)["tasks"] == []
+    assert len(board(api, until=soon)["tasks"]) == 2
+
+
+@pytest.mark.parametrize(
+    ("params", "field"),
+    [({"level": 7}, "level"), ({"task": "x"}, "task"), ({"since": "2026-01-01T00:00:00"}, "since")],
+)
+def test_filters_that_name_nothing_are_refused(api, params, field) -> None:
+    answer = api.get("/v1/leaderboard", params=params)
+    assert (answer.status_code, answer.json()["errors"][0]["field"]) == (422, field)
+
+
+def test_flagged_successes_count_only_when_asked_for(api, finish) -> None:
+    finish(10, flags=["no_wheels"])
+    rows = board(api, task="support-1")["tasks"][0]["rows"]
+    expert = next(row for row in rows if row["model"] == "builtin/expert")
+    assert (expert["flagged"], expert["trials"], expert["success_rate"]) == (5, 0, None)
+    rows = board(api, task="support-1", flagged=True)["tasks"][0]["rows"]
+    assert (rows[0]["flagged"], rows[0]["successes"]) == (0, 5)
+
+
+def test_a_reader_who_has_the_answer_gets_none_until_something_changes(api, context, finish):
+    ids = finish()
+    first = api.get("/v1/leaderboard")
+    tag = {"If-None-Match": first.headers["etag"]}
+    assert api.get("/v1/leaderboard", headers=tag).status_code == 304
+    change(context, ids[0], indicator=55.0, success=False, outcome="unsuccessful")
+    again = api.get("/v1/leaderboard", headers=tag)
+    assert again.status_code == 200
+    assert again.headers["etag"] != first.headers["etag"]
+
+
+def test_a_board_kept_up_to_date_equals_one_that_is_made_anew(api, context, finish) -> None:
+    def fresh() -> bytes:
+        with TestClient(create_app(context, load_registry())) as other:
+            return other.get("/v1/leaderboard").content
+
+    ids = finish(7)
+    assert api.get("/v1/leaderboard").content == fresh()
+    api.get("/v1/leaderboard")
+    change(context, ids[0], success=False, outcome="limit", indicator=0.0)
+    assert api.get("/v1/leaderboard").content == fresh()
+    change(context, ids[1], state="queued", outcome=None, success=None, indicator=None)
+    with context.database.transaction() as connection:
+        connection.execute(delete(jobs).where(jobs.c.id == "nobody"))
+    assert api.get("/v1/leaderboard").content == fresh()
+    finish(6)
+    assert api.get("/v1/leaderboard").content == fresh()
+
+
+def test_a_change_that_was_not_yet_committed_is_seen_later(api, context, finish) -> None:
+    """Ids and transactions become visible out of order; no change may be lost by that."""
+    ids = finish(6)
+    slow = context.database.engine.connect()
+    slow.execute(update(jobs).where(jobs.c.id == ids[0]).values(indicator=999.0))
+    change(context, ids[1], indicator=55.0)
+    board(api)
+    slow.commit()
+    slow.close()
+    indicators = [
+        job["indicator"] for job in api.get("/v1/jobs").json()["jobs"] if job["id"] == ids[0]
+    ]
+    assert indicators == [999.0]
+    means = [r["indicator_mean"] for t in board(api)["tasks"] for r in t["rows"]]
+    assert max(means) > 200
+
+
+def test_the_change_log_tells_what_entered_left_and_was_rescored(api, context, finish) -> None:
+    ids = finish(3)
+    change(context, ids[0], why="the scorer was wrong", indicator=55.0)
+    change(context, ids[1], state="queued", outcome=None, success=None, indicator=None)
+    log = api.get("/v1/leaderboard/changes").json()
+    kinds = [(entry["kind"], entry["job_id"]) for entry in log["changes"]]
+    assert kinds == [
+        ("left", ids[1]),
+        ("rescored", ids[0]),
+        *(("entered", id_) for id_ in reversed(ids)),
+    ]
+    rescored = log["changes"][1]
+    assert rescored["why"] == "the scorer was wrong"
+    assert rescored["after"]["indicator"] == 55.0
+    page = api.get("/v1/leaderboard/changes", params={"limit": 2}).json()
+    rest = api.get("/v1/leaderboard/changes", params={"before": page["next_before"]}).json()
+    assert page["changes"] + rest["changes"] == log["changes"]
+
+
+def test_an_errored_job_is_in_the_log_only_when_asked_for(api, context, sweep) -> None:
+    api.post("/v1/sweeps", json=sweep)
+    lease = context.leases.claim("construct", owner="w")
+    with context.database.transaction() as connection:
+        context.leases.give_up(lease, "gone", reason="lost_worker", connection=connection)
+    assert api.get("/v1/leaderboard/changes").json()["changes"] == []
+    (entry,) = api.get("/v1/leaderboard/changes", params={"unscored": True}).json()["changes"]
+    assert (entry["kind"], entry["after"]["reason"]) == ("unscored", "lost_worker")
+
+
+def test_two_models_are_compared_in_pairs_of_shared_seeds(api, finish) -> None:
+    finish()
+    pair = {"first": "builtin/expert", "second": "builtin/random"}
+    answer = api.get("/v1/leaderboard/compare", params=pair).json()
+    task = answer["tasks"][0]
+    assert (task["successes"], task["trials"], task["success"]["pairs"]) == ([5, 0], [5, 5], 5)
+    assert task["success"]["p_value"] == pytest.approx(2 / 32)
+    assert task["success_p"] == pytest.approx(4 / 32)
+    unknown = api.get("/v1/leaderboard/compare", params={**pair, "second": "x"})
+    assert unknown.status_code == 422
+    assert "builtin/random@" in unknown.text
+
+
+def test_a_manifest_tells_the_versions_behind_an_entry(api, finish) -> None:
+    finish()
+    row = board(api)["tasks"][0]["rows"][0]
+    entries = {entry["name"]: entry for entry in api.get(row["manifest"]).json()}
+    assert entries["geometry"]["values"] == [{"value": "1.0", "jobs": 5}]
+    assert entries["seed"]["distinct"] == 5
+
+
+def test_all_or_a_sample_of_a_models_results_are_verified(api, context, finish) -> None:
+    finish()
+    body = {"model": "builtin/expert", "sample": 3}
+    accepted = api.post("/v1/leaderboard/verify", json=body).json()
+    assert (accepted["scored"], len(accepted["verifications"])) == (10, 3)
+    checked = {context.verifications.get(id_).job_id for id_ in accepted["verifications"]}
+    again = api.post("/v1/leaderboard/verify", json=body).json()
+    assert checked == {context.verifications.get(id_).job_id for id_ in again["verifications"]}
+    everything = api.post("/v1/leaderboard/verify", json={"model": "builtin/expert"}).json()
+    assert len(everything["verifications"]) == 10
+    assert api.post("/v1/leaderboard/verify", json={"model": "x"}).status_code == 422
+
+
+def test_a_sweeps_results_have_their_rounds(api, finish) -> None:
+    finish()
+    sweep_id = api.get("/v1/sweeps").json()["sweeps"][0]["id"]
+    results = api.get(f"/v1/sweeps/{sweep_id}/results").json()
+    assert len(results) == 20
+    assert results[0]["rounds"] == []
+    assert json.dumps(results).count("NaN") == 0
+    assert api.get("/v1/sweeps/sweep_x/results").status_code == 404

@@ -1,0 +1,232 @@
+from __future__ import annotations
+
+import random
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from buildarena_benchmark.leaderboard import BoardQuery, TrackBoard, Trial, duel, summarise
+
+START = datetime(2026, 1, 1, tzinfo=UTC)
+ALL = BoardQuery()
+WEIGHTS = {
+    "lift-1": {"precision": 3, "ambiguity": 1},
+    "support-1": {"precision": 1, "ambiguity": 1},
+}
+
+
+def trials(task: str, model: str, successes: int, of: int, **values: object) -> list[Trial]:
+    return [
+        Trial(
+            **{
+                "job_id": f"{task}/{model}/{seed}",
+                "task": task,
+                "task_version": "v2",
+                "model": model,
+                "configuration": model,
+                "seed": seed,
+                "outcome": "success" if seed < successes else "unsuccessful",
+                "success": seed < successes,
+                "indicator": 10.0 + seed % 7 if seed < successes else 0.0,
+                "cost_usd": 0.5,
+                "finished_at": START + timedelta(hours=seed),
+                **values,
+            }
+        )
+        for seed in range(of)
+    ]
+
+
+def board_of(*groups: list[Trial], versions: dict[str, str] | None = None) -> TrackBoard:
+    board = TrackBoard({"lift-1": "v2", "support-1": "v2"} | (versions or {}), WEIGHTS)
+    for group in groups:
+        for trial in group:
+            board.put(trial)
+    return board
+
+
+def test_a_cell_of_a_hand_worked_case() -> None:
+    found = trials("lift-1", "a", 3, 6, requests=4, actions=10, refused_actions=1)
+    found[3] = replace(found[3], outcome="construction_failed", reason="no_plan", parts=None)
+    found[4] = replace(found[4], outcome="errored")
+    found[5] = replace(found[5], outcome="cancelled")
+    cell = summarise([replace(t, refusals={"overlap": 2}) for t in found])
+    assert (cell.trials, cell.ended, cell.errored, cell.cancelled) == (4, 6, 1, 1)
+    assert (cell.success_rate, cell.success_rate_of_ended) == (0.75, 0.5)
+    assert (cell.simulated, cell.successes) == (3, 3)
+    assert cell.indicator_mean == pytest.approx((10 + 11 + 12) / 4)
+    assert cell.indicator_low < cell.indicator_mean < cell.indicator_high
+    assert cell.cost_per_success_usd == pytest.approx(2.0 / 3)
+    assert cell.invalid_action_rate == pytest.approx(0.1)
+    assert (cell.pass_at["2"], cell.pass_all["2"]) == (1.0, pytest.approx(0.5))
+    assert (cell.reasons, cell.refusals) == ({"no_plan": 1}, {"overlap": 8})
+    assert cell.outcomes["construction_failed"] == 1
+
+
+def test_a_flagged_success_counts_only_when_it_is_asked_for() -> None:
+    found = trials("lift-1", "a", 3, 4)
+    found[0] = replace(found[0], flags=("thrust_below_weight",))
+    found[3] = replace(found[3], flags=("unstable",))
+    strict, lax = summarise(found), summarise(found, include_flagged=True)
+    assert (strict.flagged, strict.successes, strict.trials) == (1, 2, 3)
+    assert (lax.flagged, lax.successes, lax.trials) == (0, 3, 4)
+
+
+def test_errored_jobs_alone_give_no_numbers() -> None:
+    board = board_of(
+        [replace(t, outcome="errored", success=False) for t in trials("lift-1", "a", 0, 3)]
+    )
+    answer = board.board(ALL)
+    (row,) = answer.tasks[0].rows
+    assert (row.rank, row.cell.success_rate, row.cell.indicator_mean) == (None, None, None)
+    assert (row.cell.trials, row.cell.errored, row.cell.success_rate_of_ended) == (0, 3, 0.0)
+    (overall,) = answer.overall
+    assert (overall.rank, overall.success_rate_mean, overall.dimensions) == (None, None, {})
+
+
+def test_zero_successes_have_an_interval_and_no_cost_per_success() -> None:
+    cell = summarise(trials("lift-1", "a", 0, 64))
+    assert (cell.success_low, cell.cost_per_success_usd) == (0.0, None)
+    assert 0.05 < cell.success_high < 0.06
+    assert (cell.indicator_low, cell.indicator_high) == (0.0, 0.0)
+
+
+def test_an_empty_board_is_empty() -> None:
+    answer = board_of().board(ALL)
+    assert (list(answer.tasks), answer.overall) == ([], [])
+
+
+def test_one_model_is_first_and_scores_one() -> None:
+    (row,) = board_of(trials("lift-1", "a", 0, 5)).board(ALL).overall
+    assert (row.rank, row.rank_low, row.rank_high, row.pareto) == (1, 1, 1, True)
+    assert row.dimensions == {"precision": 1.0, "ambiguity": 1.0}
+
+
+def test_models_alike_share_a_rank_and_better_ones_do_not() -> None:
+    board = board_of(
+        trials("lift-1", "a", 60, 64), trials("lift-1", "b", 30, 64), trials("lift-1", "c", 29, 64)
+    )
+    rows = board.board(ALL).tasks[0].rows
+    assert [(row.cell.model, row.rank) for row in rows] == [("a", 1), ("b", 2), ("c", 2)]
+    assert [(row.rank_low, row.rank_high) for row in rows] == [(1, 1), (2, 3), (2, 3)]
+
+
+def test_a_model_with_a_missing_task_is_shown_but_not_ranked() -> None:
+    board = board_of(
+        trials("lift-1", "a", 3, 9),
+        trials("support-1", "a", 3, 9),
+        trials("lift-1", "b", 9, 9),
+    )
+    ranked, unranked = board.board(ALL).overall
+    assert (ranked.model, ranked.rank, ranked.missing) == ("a", 1, [])
+    assert (unranked.model, unranked.rank, unranked.missing) == ("b", None, ["support-1"])
+
+
+def test_difficulty_dimensions_weigh_the_tasks() -> None:
+    board = board_of(
+        trials("lift-1", "a", 9, 9),
+        trials("support-1", "a", 0, 9),
+        trials("lift-1", "b", 0, 9),
+        trials("support-1", "b", 9, 9),
+    )
+    scores = {row.model: row.dimensions for row in board.board(ALL).overall}
+    assert scores["a"] == pytest.approx({"precision": 0.75, "ambiguity": 0.5})
+    assert scores["b"] == pytest.approx({"precision": 0.25, "ambiguity": 0.5})
+
+
+def test_the_cost_front_holds_the_better_and_the_cheaper() -> None:
+    board = board_of(
+        trials("lift-1", "good", 9, 9, cost_usd=2.0),
+        trials("lift-1", "cheap", 4, 9, cost_usd=0.1),
+        trials("lift-1", "neither", 2, 9, cost_usd=3.0),
+    )
+    front = {row.model for row in board.board(ALL).overall if row.pareto}
+    assert front == {"good", "cheap"}
+
+
+def test_only_the_current_version_of_a_task_counts() -> None:
+    old = [
+        replace(t, task_version="v1", job_id=f"old-{t.job_id}") for t in trials("lift-1", "a", 9, 9)
+    ]
+    task = board_of(old, trials("lift-1", "a", 1, 4)).board(ALL).tasks[0]
+    assert (task.version, task.outdated, task.rows[0].cell.trials) == ("v2", 9, 4)
+    own = [replace(t, task="own") for t in trials("own", "a", 1, 3)]
+    newer = [
+        replace(t, task_version="v0", job_id=f"n-{t.job_id}", finished_at=START + timedelta(days=9))
+        for t in own
+    ]
+    assert board_of(own, newer).board(ALL).tasks[0].version == "v0"
+
+
+def test_one_model_with_two_decodings_has_two_rows() -> None:
+    warm = [
+        replace(t, configuration="warm", job_id=f"w{t.job_id}") for t in trials("lift-1", "a", 2, 4)
+    ]
+    rows = board_of(trials("lift-1", "a", 2, 4), warm).board(ALL).tasks[0].rows
+    assert {row.cell.configuration for row in rows} == {"a", "warm"}
+
+
+def test_queries_choose_tasks_models_and_time() -> None:
+    board = board_of(
+        trials("lift-1", "a", 3, 9), trials("lift-1", "b", 3, 9), trials("support-1", "a", 3, 9)
+    )
+    some = board.board(BoardQuery(tasks=frozenset({"lift-1"}), models=frozenset({"b"})))
+    assert [(t.task, [r.cell.model for r in t.rows]) for t in some.tasks] == [("lift-1", ["b"])]
+    early = board.board(BoardQuery(until=START + timedelta(hours=3)))
+    assert {row.cell.trials for task in early.tasks for row in task.rows} == {3}
+    late = board.board(BoardQuery(since=START + timedelta(hours=7), until=START + timedelta(99)))
+    assert {row.cell.successes for task in late.tasks for row in task.rows} == {0}
+    assert board.board(BoardQuery(since=START + timedelta(99))).tasks == []
+
+
+changes = st.lists(
+    st.tuples(st.sampled_from(["put", "take", "score"]), st.integers(0, 29)), max_size=40
+)
+
+
+@settings(suppress_health_check=[HealthCheck.too_slow], deadline=None, max_examples=30)
+@given(changes, st.randoms(use_true_random=False))
+def test_a_board_kept_up_to_date_equals_one_made_anew(steps, rng: random.Random) -> None:
+    pool = [
+        *trials("lift-1", "a", 4, 10),
+        *trials("lift-1", "b", 6, 10),
+        *trials("support-1", "a", 1, 10),
+    ]
+    kept: dict[str, Trial] = {}
+    board = board_of()
+    for what, number in steps:
+        trial = pool[number]
+        if what == "score":
+            trial = replace(trial, success=not trial.success, indicator=trial.indicator + 1)
+        if what == "take":
+            assert board.remove(trial.job_id) == (kept.pop(trial.job_id, None) is not None)
+        else:
+            assert board.put(trial) == (kept.get(trial.job_id) != trial)
+            kept[trial.job_id] = trial
+        board.board(ALL)
+    shuffled = list(kept.values())
+    rng.shuffle(shuffled)
+    assert board.board(ALL) == board_of(shuffled).board(ALL)
+    assert len(board) == len(kept)
+
+
+def test_a_duel_pairs_shared_seeds_and_adjusts_for_the_tasks() -> None:
+    first = trials("lift-1", "a", 60, 64) + trials("support-1", "a", 30, 64)
+    second = trials("lift-1", "b", 20, 64) + trials("support-1", "b", 28, 64)
+    lift, support = duel(first, second).tasks
+    assert (lift.successes, lift.trials, lift.success.pairs) == ((60, 20), (64, 64), 64)
+    assert lift.success_p == pytest.approx(2 * lift.success.p_value)
+    assert lift.success_p < 0.001
+    assert lift.low > 0
+    assert support.success_p == support.success.p_value
+    assert support.low < 0 < support.high
+
+
+def test_a_duel_without_shared_seeds_has_no_test() -> None:
+    second = [replace(t, seed=t.seed + 100) for t in trials("lift-1", "b", 3, 9)]
+    (task,) = duel(trials("lift-1", "a", 3, 9), second).tasks
+    assert (task.success, task.success_p, task.indicator_p) == (None, None, None)
+    assert duel([], second) is None
