@@ -16,7 +16,9 @@ from sqlalchemy import create_engine, text
 
 from buildarena_pipeline.context import Context, open_context
 from buildarena_pipeline.embedded import EmbeddedPostgres, EmbeddedValkey
+from buildarena_pipeline.models import load_registry
 from buildarena_pipeline.settings import Settings
+from buildarena_pipeline.submission import Submissions
 from buildarena_store import Database
 from buildarena_store.tables import metadata
 
@@ -102,3 +104,9 @@ def context(settings: Settings) -> Iterator[Context]:
 def play() -> Player:
     """Plays sessions up to their first simulation, without database or simulator."""
     return Player()
+
+
+@pytest.fixture
+def submissions(context: Context) -> Submissions:
+    """Submits with the built-in registry."""
+    return Submissions(context, load_registry())

@@ -22,6 +22,8 @@ from buildarena_pipeline.sweeper import Sweeper
 
 KILLS = int(os.environ.get("CHAOS_KILLS", "4"))
 LATENCY_S = 0.02
+TASK = "support-2"
+"""Its session has some two hundred turns, so that there is time for many kills."""
 
 
 @contextmanager
@@ -48,7 +50,7 @@ def worker(environment: dict[str, str]) -> Iterator[subprocess.Popen[bytes]]:
 def test_a_session_that_is_killed_again_and_again_builds_the_same_machine(
     play, context, settings, tmp_path: Path
 ) -> None:
-    undisturbed = play("builtin/expert", workflow="five-role")
+    undisturbed = play("builtin/expert", task=TASK)
     rng = random.Random(os.environ.get("CHAOS_SEED", "1"))
     with ProviderStandIn("expert", latency_s=LATENCY_S) as standin:
         file = tmp_path / "models.yaml"
@@ -57,7 +59,7 @@ def test_a_session_that_is_killed_again_and_again_builds_the_same_machine(
             "models:\n  - {name: standin/expert, provider: standin, model: expert}\n"
         )
         job, _ = Submissions(context, load_registry(file)).submit_job(
-            JobSpec(task="support-1", model="standin/expert", simulator="mujoco")
+            JobSpec(task=TASK, model="standin/expert", simulator="mujoco")
         )
         environment = {
             **os.environ,

@@ -9,6 +9,7 @@ from typing import Any
 from buildarena_benchmark import builtin_tasks
 from buildarena_pipeline.context import Context
 from buildarena_pipeline.errors import FieldError, SubmissionError
+from buildarena_pipeline.estimates import SweepEstimate, estimate
 from buildarena_pipeline.extensions import workflow_sources
 from buildarena_pipeline.models import ModelRegistry
 from buildarena_pipeline.prompt_packs import PromptPacks
@@ -81,20 +82,27 @@ class Submissions:
             SubmissionError: Something of it is unknown; nothing was stored.
         """
         new = self.plan(spec)
-        document = spec.model_dump(mode="json", exclude_none=True)
         sweep = NewSweep(
             id=new_id("sweep"),
             name=spec.name,
-            spec=document,
+            spec=spec.model_dump(mode="json", exclude_none=True),
             owner=owner,
             request_key=request_key,
-            request_hash=content_hash(document),
+            request_hash=spec_hash(spec),
         )
         with self._context.database.transaction() as connection:
             added = self._context.jobs.add(new, connection=connection)
             self._context.sweeps.add(sweep, [job.key.job_id for job in new], connection=connection)
         announce_waiting(self._context, CONSTRUCT)
         return Submitted(sweep=self._context.sweeps.get(sweep.id), jobs=len(new), added=added)
+
+    def estimate(self, spec: SweepSpec) -> SweepEstimate:
+        """What a sweep would use, without storing anything.
+
+        Raises:
+            SubmissionError: Something of it is unknown, or it is too large.
+        """
+        return estimate(self.plan(spec), self._registry)
 
     def plan(self, spec: SweepSpec, *, fields: dict[str, str] | None = None) -> list[NewJob]:
         """The jobs that a sweep consists of, without storing anything.
@@ -165,6 +173,11 @@ class Submissions:
                     for error in errors
                 ]
             )
+
+
+def spec_hash(spec: SweepSpec) -> str:
+    """The content hash of a submission."""
+    return content_hash(spec.model_dump(mode="json", exclude_none=True))
 
 
 def model_config(registry: ModelRegistry, name: str, decoding: Decoding) -> dict[str, Any]:

@@ -48,6 +48,11 @@ class Events:
     def __init__(self, database: Database) -> None:
         self._database = database
 
+    def newest(self) -> int:
+        """The greatest id so far; 0 when nothing has happened."""
+        with self._database.transaction() as connection:
+            return int(connection.execute(select(func.max(events.c.id))).scalar_one() or 0)
+
     def after(
         self,
         last_id: int,

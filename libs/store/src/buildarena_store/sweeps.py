@@ -187,6 +187,30 @@ class Sweeps:
         connection.execute(update(sweeps).where(sweeps.c.id == sweep_id).values(state=state))
         events.record_sweep(connection, sweep_id, state, {})
 
+    def hold(self, sweep_id: str, *, connection: Connection) -> None:
+        """Keeps waiting jobs from being taken, unless another active sweep wants them."""
+        self._move(sweep_id, "queued", "held", connection)
+
+    def release(self, sweep_id: str, *, connection: Connection) -> None:
+        """Lets the sweep's held jobs be taken again."""
+        self._move(sweep_id, "held", "queued", connection)
+
+    def _move(self, sweep_id: str, before: str, after: str, connection: Connection) -> None:
+        own = self.own_jobs(sweep_id, connection=connection)
+        rows = connection.execute(
+            update(jobs)
+            .where(jobs.c.id.in_(own), jobs.c.state == before)
+            .values(state=after, nudged_at=None)
+            .returning(jobs.c.id)
+        )
+        events.record_jobs(connection, [row.id for row in rows], after, {})
+
+    def job_ids(self, sweep_id: str) -> list[str]:
+        """Ids of all the sweep's jobs."""
+        query = select(sweep_jobs.c.job_id).where(sweep_jobs.c.sweep_id == sweep_id)
+        with self._database.transaction() as connection:
+            return [row.job_id for row in connection.execute(query)]
+
     def own_jobs(self, sweep_id: str, *, connection: Connection) -> list[str]:
         """Ids of the jobs that no other active sweep wants."""
         other = sweep_jobs.alias("other")

@@ -7,8 +7,19 @@ from contextlib import asynccontextmanager
 
 from fastapi import FastAPI
 
-from buildarena_api import catalogue, health, jobs, leaderboard, sessions, sweeps, verifications
+from buildarena_api import (
+    catalogue,
+    health,
+    jobs,
+    leaderboard,
+    sessions,
+    streams,
+    sweeps,
+    verifications,
+)
 from buildarena_api.board_cache import BoardCache
+from buildarena_api.event_hub import EventHub
+from buildarena_api.guards import Guards
 from buildarena_api.problems import add_problem_handlers
 from buildarena_pipeline import __version__
 from buildarena_pipeline.context import Context
@@ -46,12 +57,14 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
         redoc_url=None,
         license_info={"name": "Apache-2.0", "identifier": "Apache-2.0"},
     )
+    app.add_middleware(Guards)
     app.state.context = context
+    app.state.hub = EventHub(context)
     app.state.registry = registry
     app.state.boards = BoardCache(context.results.boards)
     app.state.submissions = Submissions(context, registry)
     app.state.external = ExternalSessions(context)
     add_problem_handlers(app)
-    for room in (verifications, sessions, jobs, sweeps, leaderboard, catalogue, health):
+    for room in (verifications, sessions, streams, jobs, sweeps, leaderboard, catalogue, health):
         app.include_router(room.router)
     return app

@@ -12,6 +12,7 @@ from buildarena_api.problems import ProblemError, problem_responses
 from buildarena_api.schemas import AttemptView, JobDetail, JobPage, JobView
 from buildarena_api.transcripts import as_markdown
 from buildarena_pipeline.specs import JobSpec
+from buildarena_pipeline.sweeper import announce_waiting
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
 
@@ -37,7 +38,7 @@ def list_jobs(
     sweep: Annotated[str | None, Query(description="Only this sweep's jobs")] = None,
     task: Annotated[str | None, Query()] = None,
     model: Annotated[str | None, Query()] = None,
-    state: Annotated[Literal["queued", "running", "done"] | None, Query()] = None,
+    state: Annotated[Literal["queued", "held", "running", "done"] | None, Query()] = None,
     outcome: Annotated[str | None, Query()] = None,
     cursor: Annotated[str | None, Query(max_length=500)] = None,
     limit: Annotated[int, Query(ge=1, le=1000)] = 100,
@@ -71,6 +72,30 @@ def show_job(job_id: str, context: ContextDep) -> JobDetail:
         attempts=[AttemptView.model_validate(a) for a in context.jobs.attempts(job_id)],
         artifacts=context.jobs.artifacts(job_id),
     )
+
+
+@router.post("/{job_id}/cancel", responses=problem_responses(404, 409, 503))
+def cancel_job(job_id: str, context: ContextDep) -> JobView:
+    """Ends a job that has not ended; its worker stops before its next model request."""
+    context.jobs.get(job_id)
+    with context.database.transaction() as connection:
+        cancelled = context.jobs.cancel([job_id], connection=connection)
+    if not cancelled:
+        raise ProblemError(409, f"job {job_id} has ended already")
+    return JobView.of(context.jobs.get(job_id))
+
+
+@router.post("/{job_id}/retry", status_code=202, responses=problem_responses(404, 409, 503))
+def retry_job(job_id: str, context: ContextDep) -> JobView:
+    """Queues an errored job again where it failed. A scored job is never rolled again."""
+    job = context.jobs.get(job_id)
+    with context.database.transaction() as connection:
+        again = context.jobs.retry(job_id, connection=connection)
+    if not again:
+        state = job.outcome or job.state
+        raise ProblemError(409, f"only errored jobs are retried; job {job_id} is {state}")
+    announce_waiting(context, job.queue)
+    return JobView.of(context.jobs.get(job_id))
 
 
 @router.get(

@@ -48,7 +48,7 @@ class JobView(_Answer):
     model: str = Field(examples=["builtin/expert"])
     track: str
     seed: int
-    state: Literal["queued", "running", "done"]
+    state: Literal["queued", "held", "running", "done"]
     stage: Literal["construct", "simulate"]
     outcome: Outcome | None = Field(description="How it ended; null while it goes on")
     reason: str | None = Field(description="Class of the failure, if any")
@@ -129,6 +129,25 @@ class SweepAccepted(_Answer):
     id: str
     jobs: int = Field(description="Jobs it consists of")
     added: int = Field(description="Jobs that are new; the others had been submitted before")
+
+
+class ModelEstimate(_Answer):
+    """What one model's part of a sweep would use."""
+
+    model: str
+    jobs: int
+    requests: float
+    input_tokens: float
+    output_tokens: float
+    cost_usd: float | None = Field(description="null when no price is known")
+
+
+class SweepEstimate(_Answer):
+    """What a sweep would consist of, from the mean figures that the paper reports per task."""
+
+    jobs: int
+    models: list[ModelEstimate]
+    cost_usd: float = Field(description="Sum over the models with a known price")
 
 
 class SweepPage(_Answer):

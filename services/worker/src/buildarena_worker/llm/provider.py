@@ -33,8 +33,8 @@ from pydantic_ai.settings import ModelSettings
 
 from buildarena_pipeline.errors import PassingFaultError, PermanentFaultError
 from buildarena_pipeline.models import ModelEntry, ProviderEntry
+from buildarena_pipeline.prices import price_usd
 from buildarena_store import Usage
-from buildarena_worker.llm.prices import price_usd
 from buildarena_worker.llm.retries import RetryPolicy
 from buildarena_worker.llm.throttle import Throttle
 from buildarena_worker.llm.wire import from_wire, request_parameters, to_wire
