@@ -20,7 +20,9 @@ BUILDARENA = str(Path(sys.executable).parent / "buildarena")
 
 def simulate_all(context) -> None:
     keeper = LeaseKeeper(context, lambda: None)
+    keeper.start()
     StageRunner(context, SimulateHandler(context), keeper, "w").look("simulate.mujoco", "")
+    keeper.stop()
 
 
 async def play(url: str, simulate) -> dict[str, object]:

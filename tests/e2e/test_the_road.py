@@ -54,6 +54,14 @@ def _look_with_the_command_line(url: str, sweep_id: str, job_id: str) -> None:
     assert json.loads(run_cli(url, "job", "show", job_id, "--json").stdout)["id"] == job_id
     doctor = run_cli(url, "doctor", "--json")
     assert json.loads(doctor.stdout)["checks"][0]["ok"]
+    listed = json.loads(run_cli(url, "job", "list", "--sweep", sweep_id, "--json").stdout)
+    assert job_id in {job["id"] for job in listed["jobs"]}
+    assert run_cli(url, "job", "logs", job_id).stdout.startswith("# support-1 by builtin/")
+    assert "support-1" in run_cli(url, "task", "list").stdout
+    assert "cargo" in run_cli(url, "task", "show", "support-1").stdout
+    assert "builtin/expert*" in run_cli(url, "model", "list").stdout
+    retried = run_cli(url, "job", "retry", job_id)
+    assert (retried.returncode, "only errored jobs" in retried.stderr) == (1, True)
     verified = run_cli(url, "job", "verify", job_id)
     assert verified.returncode == 0, verified.stdout
     assert "Every figure is the same." in verified.stdout

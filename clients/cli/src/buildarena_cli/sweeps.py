@@ -1,0 +1,151 @@
+"""The commands of sweeps."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+import yaml
+from rich.table import Table
+
+from buildarena_cli.client import Client
+from buildarena_cli.errors import CommandError
+from buildarena_cli.options import DEFAULT_URL, JsonOption, UrlOption
+from buildarena_cli.output import console, number, print_json
+from buildarena_cli.progress import exit_code, watch_sweep
+
+app = typer.Typer(help="Submit and watch sweeps.", no_args_is_help=True)
+
+SweepId = Annotated[str, typer.Argument(help="Id of the sweep.")]
+
+
+@app.command("run")
+def run_sweep(
+    file: Annotated[Path, typer.Argument(help="YAML file of the sweep.")],
+    *,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Show what it would be and cost; submit nothing.")
+    ] = False,
+    detach: Annotated[bool, typer.Option("--detach", help="Submit and do not wait.")] = False,
+    url: UrlOption = DEFAULT_URL,
+    as_json: JsonOption = False,
+) -> None:
+    """Submit a sweep and watch it. Running the same file again does only what is missing."""
+    client, spec = Client(url), read_yaml(file)
+    if dry_run:
+        _show_estimate(client.post("/v1/sweeps/estimate", spec), as_json=as_json)
+        return
+    accepted = client.post("/v1/sweeps", spec)
+    if not as_json:
+        console.print(f"{accepted['id']}: {accepted['jobs']} jobs, {accepted['added']} of them new")
+    if detach:
+        if as_json:
+            print_json(accepted)
+        return
+    raise typer.Exit(exit_code(_watch(client, accepted["id"], as_json=as_json)))
+
+
+@app.command("status")
+def show_sweep(
+    sweep_id: SweepId,
+    *,
+    watch: Annotated[bool, typer.Option("--watch", help="Wait until every job has ended.")] = False,
+    url: UrlOption = DEFAULT_URL,
+    as_json: JsonOption = False,
+) -> None:
+    """Show how far a sweep is."""
+    client = Client(url)
+    if watch:
+        raise typer.Exit(exit_code(_watch(client, sweep_id, as_json=as_json)))
+    _show(client.get(f"/v1/sweeps/{sweep_id}"), as_json=as_json)
+
+
+@app.command("pause")
+def pause_sweep(
+    sweep_id: SweepId, *, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False
+) -> None:
+    """Hold a sweep's waiting jobs; jobs that have begun go on to their end."""
+    _show(Client(url).post(f"/v1/sweeps/{sweep_id}/pause", {}), as_json=as_json)
+
+
+@app.command("resume")
+def resume_sweep(
+    sweep_id: SweepId, *, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False
+) -> None:
+    """Let a paused sweep go on."""
+    _show(Client(url).post(f"/v1/sweeps/{sweep_id}/resume", {}), as_json=as_json)
+
+
+@app.command("cancel")
+def cancel_sweep(
+    sweep_id: SweepId, *, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False
+) -> None:
+    """End a sweep's jobs that have not ended and that no other sweep wants."""
+    _show(Client(url).post(f"/v1/sweeps/{sweep_id}/cancel", {}), as_json=as_json)
+
+
+def read_yaml(file: Path) -> dict[str, Any]:
+    """The mapping in a YAML file.
+
+    Raises:
+        CommandError: It can't be read, or holds something else.
+    """
+    try:
+        document = yaml.safe_load(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise CommandError(f"{file}: {error.strerror}") from error
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise CommandError(f"{file} is no YAML: {error}") from error
+    if not isinstance(document, dict):
+        raise CommandError(f"{file} must hold a mapping with tasks, models and seeds")
+    return document
+
+
+def _show(sweep: dict[str, Any], *, as_json: bool) -> None:
+    if as_json:
+        print_json(sweep)
+        return
+    progress = sweep["progress"]
+    console.print(f"{sweep['id']} {sweep['name']!r}: {sweep['state']}")
+    console.print(f"{progress['done']} of {progress['total']} jobs ended")
+    for name, count in {**progress["stages"], **progress["outcomes"]}.items():
+        console.print(f"  {count:>6}  {name}")
+    console.print(f"{progress['requests']:,} model requests, ${progress['cost_usd']:.2f}")
+
+
+def _show_estimate(estimate: dict[str, Any], *, as_json: bool) -> None:
+    if as_json:
+        print_json(estimate)
+        return
+    table = Table(
+        title=f"{estimate['jobs']:,} jobs, about ${estimate['cost_usd']:,.2f}",
+        caption="From the mean figures that the paper reports; models without a known price: -",
+        title_justify="left",
+        caption_justify="left",
+    )
+    table.add_column("model")
+    for name in ("jobs", "requests", "tokens in", "tokens out", "USD"):
+        table.add_column(name, justify="right")
+    for model in estimate["models"]:
+        table.add_row(
+            model["model"],
+            f"{model['jobs']:,}",
+            number(model["requests"], 0),
+            number(model["input_tokens"], 0),
+            number(model["output_tokens"], 0),
+            number(model["cost_usd"], 2),
+        )
+    console.print(table)
+
+
+def _watch(client: Client, sweep_id: str, *, as_json: bool) -> dict[str, Any]:
+    if not as_json:
+        return watch_sweep(client, sweep_id)
+    while True:
+        sweep: dict[str, Any] = client.get_patiently(f"/v1/sweeps/{sweep_id}")
+        if sweep["progress"]["done"] == sweep["progress"]["total"]:
+            print_json(sweep)
+            return sweep
+        time.sleep(0.5)
