@@ -28,6 +28,9 @@ def test_the_order_of_trials_does_not_matter() -> None:
     values = np.column_stack([rng.integers(0, 2, 40), rng.normal(size=40)]).astype(float)
     shuffled = values[rng.permutation(40)]
     assert np.array_equal(resampled_means(values, seed=7), resampled_means(shuffled, seed=7))
+    for seed in range(20):
+        many = np.random.default_rng(seed).exponential(0.1, 900)
+        assert mean_interval(many) == mean_interval(rng.permutation(many))
 
 
 def test_figures_of_one_trial_stay_together() -> None:

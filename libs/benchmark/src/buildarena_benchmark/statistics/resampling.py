@@ -57,6 +57,8 @@ def mean_interval(
     """
     if len(values) < 2:  # noqa: PLR2004 - one value says nothing about spread
         return None
+    # Sums depend on the order in their last digits; sorted, equal data give equal intervals.
+    values = np.sort(values)
     mean = float(values.mean())
     away = values - mean
     if not np.any(away) or np.ptp(values) == 0.0:
