@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 from buildarena_store import JobScore
@@ -83,4 +84,10 @@ def test_the_contract_is_the_one_that_clients_know(api) -> None:
 
 
 def test_the_docs_page_is_there(api) -> None:
-    assert api.get("/docs").status_code == 200
+    page = api.get("/docs")
+    assert page.status_code == 200
+    sources = re.findall(r'(?:src|href)="([^"]+)"', page.text)
+    assert sources
+    for source in sources:
+        assert source.startswith("/"), "the page must not need another server"
+        assert api.get(source).status_code == 200

@@ -6,6 +6,7 @@ answered, so that accounts can be compared, and fails on demand.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import socket
 import threading
@@ -121,8 +122,9 @@ class _Handler(BaseHTTPRequestHandler):
         for name, value in {"content-type": "application/json", **headers}.items():
             self.send_header(name, value)
         self.send_header("content-length", str(len(data)))
-        self.end_headers()
-        self.wfile.write(data)
+        with contextlib.suppress(ConnectionError):  # a client that gave up waiting
+            self.end_headers()
+            self.wfile.write(data)
 
 
 def _wire_of(path: str) -> str:
