@@ -33,9 +33,10 @@ class Client:
         given = {name: value for name, value in params.items() if value is not None}
         return self._answer("GET", path, params=given).json()
 
-    def get_bytes(self, path: str) -> bytes:
-        """The bytes of a GET."""
-        return self._answer("GET", path).content
+    def get_bytes(self, path: str, **params: Any) -> bytes:
+        """The bytes of a GET; parameters that are None are left out."""
+        given = {name: value for name, value in params.items() if value is not None}
+        return self._answer("GET", path, params=given or None).content
 
     def post(self, path: str, body: Mapping[str, Any]) -> Any:
         """The JSON answer to a POST."""

@@ -7,12 +7,12 @@ from typing import Annotated
 
 import typer
 
-from buildarena_cli import catalogue, jobs, machine, service, sweeps
+from buildarena_cli import board, catalogue, jobs, machine, report, service, sweeps
 from buildarena_cli.client import Client
 from buildarena_cli.doctor import examine
 from buildarena_cli.errors import FAILED, CommandError
 from buildarena_cli.options import DEFAULT_URL, JsonOption, UrlOption
-from buildarena_cli.output import console, error_console, leaderboard_tables, print_json
+from buildarena_cli.output import error_console
 
 app = typer.Typer(
     help="Find out whether language models can engineer.",
@@ -29,6 +29,8 @@ app.add_typer(machine.app, name="machine")
 app.command()(service.up)
 app.command()(service.demo)
 app.command()(service.migrate)
+for command in (board.leaderboard, board.compare, board.export, board.audit, report.report):
+    app.command()(command)
 
 
 @app.command()
@@ -57,26 +59,6 @@ def mcp(
 
     server = make_server(Client(url)).streamable_http_app()
     uvicorn.run(server, host="127.0.0.1", port=http, log_level="warning")
-
-
-@app.command()
-def leaderboard(
-    task: Annotated[str | None, typer.Option(help="Only this task.")] = None,
-    track: Annotated[str | None, typer.Option(help="Track; default: the first.")] = None,
-    url: UrlOption = DEFAULT_URL,
-    as_json: JsonOption = False,
-) -> None:
-    """Show who builds best on one track."""
-    board = Client(url).get("/v1/leaderboard", task=task, track=track)
-    if as_json:
-        print_json(board)
-        return
-    if not board["tasks"]:
-        console.print("No jobs have ended yet.")
-        return
-    console.print(f"Track {board['track']}", soft_wrap=True)
-    for table in leaderboard_tables(board):
-        console.print(table)
 
 
 def run() -> None:

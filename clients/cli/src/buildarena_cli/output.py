@@ -30,7 +30,8 @@ def leaderboard_tables(board: dict[str, Any]) -> list[Table]:
         table = Table(
             title=f"{task['task']}: {task['indicator']} in {task['unit'] or 'units'}",
             title_justify="left",
-            caption="* baseline; 95 % is the Wilson interval of the success rate",
+            caption="* baseline; # is shared by models that can't be told apart; "
+            "95 % is the Wilson interval of the success rate",
             caption_justify="left",
             box=SIMPLE_HEAD,
             padding=(0, 1, 0, 0),
@@ -39,12 +40,12 @@ def leaderboard_tables(board: dict[str, Any]) -> list[Table]:
         table.add_column("model", no_wrap=True)
         for name in ("success", "95 %", task["indicator"], "parts", "requests", "tokens", "USD"):
             table.add_column(name, justify="right")
-        for place, row in enumerate(task["rows"], start=1):
+        for row in task["rows"]:
             interval = "-"
             if row["success_low"] is not None:
                 interval = f"{100 * row['success_low']:.0f}-{100 * row['success_high']:.0f} %"
             table.add_row(
-                str(place),
+                "-" if row["rank"] is None else str(row["rank"]),
                 row["model"] + ("*" if row["baseline"] else ""),
                 f"{row['successes']}/{row['trials']}",
                 interval,
