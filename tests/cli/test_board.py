@@ -4,26 +4,25 @@ from __future__ import annotations
 
 import csv
 import json
-import os
 import random
 import re
-import subprocess
-import sys
 import threading
 import time
-from pathlib import Path
+from dataclasses import dataclass
 
 import pytest
 from live_api import live_api
 from sqlalchemy import insert, select, update
+from typer.testing import CliRunner
 
 from buildarena_benchmark.leaderboard import published_rows
+from buildarena_cli.errors import CommandError
+from buildarena_cli.main import app
 from buildarena_cli.report import variant
 from buildarena_pipeline.models import load_registry
 from buildarena_pipeline.specs import SweepSpec
 from buildarena_store.tables import jobs, rollouts
 
-BUILDARENA = str(Path(sys.executable).parent / "buildarena")
 TASKS = ["transport-1", "support-1", "support-2", "lift-1", "lift-2"]
 MODELS = ["openai/gpt-5", "xai/grok-4", "anthropic/claude-sonnet-4", "builtin/random"]
 
@@ -97,15 +96,21 @@ def end_jobs(context, *, rounds: int = 1) -> None:
                 )
 
 
-def run_cli(url: str, *words: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [BUILDARENA, *words, "--url", url],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=120,
-        env={**os.environ, "COLUMNS": "100"},
-    )
+@dataclass(frozen=True)
+class Done:
+    returncode: int
+    stdout: str
+    stderr: str
+
+
+def run_cli(url: str, *words: str) -> Done:
+    """Runs a command in this process: a process of its own takes seconds to start."""
+    result = CliRunner().invoke(app, [*words, "--url", url], env={"COLUMNS": "100"})
+    if isinstance(result.exception, CommandError):
+        return Done(result.exception.code, result.stdout, str(result.exception))
+    if result.exception is not None and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    return Done(result.exit_code, result.stdout, result.stderr)
 
 
 def printed(url: str, *words: str) -> str:
@@ -198,6 +203,7 @@ def test_a_closed_loop_beside_single_shots(url, sweep, context, submissions, tmp
     assert "## Closed loop" in text
     assert "openai/gpt-5 (5 rounds + analyst)" in text
     assert "openai/gpt-5 (main)" in text
+    assert re.findall(r"rounds-(.*?)\.png", text) == ["support-2"]
     line = next(
         line
         for line in text.splitlines()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from contextlib import closing
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Any
@@ -41,15 +42,16 @@ def leaderboard(
     as_json: JsonOption = False,
 ) -> None:
     """Show who builds best on one track."""
-    board = Client(url).get(
-        "/v1/leaderboard",
-        task=task,
-        level=level,
-        model=model,
-        since=None if since is None else f"{since.isoformat()}Z",
-        flagged=flagged or None,
-        track=track,
-    )
+    with closing(Client(url)) as client:
+        board = client.get(
+            "/v1/leaderboard",
+            task=task,
+            level=level,
+            model=model,
+            since=None if since is None else f"{since.isoformat()}Z",
+            flagged=flagged or None,
+            track=track,
+        )
     if as_json:
         print_json(board)
         return
@@ -75,9 +77,10 @@ def compare(
     as_json: JsonOption = False,
 ) -> None:
     """Tell whether one model is better than another; tests only where they share seeds."""
-    answer = Client(url).get(
-        "/v1/leaderboard/compare", first=first, second=second, task=task, track=track
-    )
+    with closing(Client(url)) as client:
+        answer = client.get(
+            "/v1/leaderboard/compare", first=first, second=second, task=task, track=track
+        )
     if as_json:
         print_json(answer)
         return
@@ -88,8 +91,9 @@ def compare(
         title_justify="left",
         caption_justify="left",
         box=SIMPLE_HEAD,
+        padding=(0, 1, 0, 0),
     )
-    table.add_column("task")
+    table.add_column("task", no_wrap=True)
     for name in ("first", "second", "difference", "95 %", "pairs", "p success", "p indicator"):
         table.add_column(name, justify="right")
     for row in answer["tasks"]:
@@ -121,15 +125,16 @@ def export(
     kind = FORMATS.get(out.suffix)
     if kind is None:
         raise CommandError(f"{out}: the name must end in {', '.join(FORMATS)}")
-    body = Client(url).get_bytes(
-        "/v1/leaderboard/export",
-        format=kind,
-        task=task,
-        level=level,
-        model=model,
-        flagged=flagged or None,
-        track=track,
-    )
+    with closing(Client(url)) as client:
+        body = client.get_bytes(
+            "/v1/leaderboard/export",
+            format=kind,
+            task=task,
+            level=level,
+            model=model,
+            flagged=flagged or None,
+            track=track,
+        )
     write_file(out, body)
     console.print(f"{out}: {len(body):,} bytes", soft_wrap=True)
 
@@ -145,18 +150,18 @@ def audit(
     as_json: JsonOption = False,
 ) -> None:
     """Replay and simulate a model's results again, and tell every difference."""
-    client = Client(url)
     body = {"model": model, "sample": sample, "seed": seed, "tasks": task, "track": track}
-    accepted = client.post("/v1/leaderboard/verify", body)
     differences: list[dict[str, Any]] = []
-    for id_ in accepted["verifications"]:
-        check = client.get_patiently(f"/v1/verifications/{id_}")
-        while check["state"] != "done":
-            time.sleep(0.3)
+    with closing(Client(url)) as client:
+        accepted = client.post("/v1/leaderboard/verify", body)
+        for id_ in accepted["verifications"]:
             check = client.get_patiently(f"/v1/verifications/{id_}")
-        if not check["report"]["ok"]:
-            wrong = [entry for entry in check["report"]["checks"] if not entry["ok"]]
-            differences.append({"job_id": check["job_id"], "checks": wrong})
+            while check["state"] != "done":
+                time.sleep(0.3)
+                check = client.get_patiently(f"/v1/verifications/{id_}")
+            if not check["report"]["ok"]:
+                wrong = [entry for entry in check["report"]["checks"] if not entry["ok"]]
+                differences.append({"job_id": check["job_id"], "checks": wrong})
     checked = len(accepted["verifications"])
     if as_json:
         print_json({"scored": accepted["scored"], "checked": checked, "differences": differences})

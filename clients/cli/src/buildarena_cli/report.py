@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import closing
 from pathlib import Path
 from typing import Annotated, Any, Final
 
@@ -39,7 +40,8 @@ def report(
     from buildarena_cli.report_document import write_report
     from buildarena_cli.report_sections import sections
 
-    material = collect(Client(url), sweeps)
+    with closing(Client(url)) as client:
+        material = collect(client, sweeps)
     try:
         write_report(sections(material), out)
     except OSError as error:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, cast
 
 from buildarena_benchmark.leaderboard import Cell, OverallRow, PublishedRow
 from buildarena_benchmark.statistics import TokenBin
@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.projections.polar import PolarAxes
 
 COLOURS: Final = (
     "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#999999",
@@ -67,8 +68,8 @@ def radar_plot(rows: Sequence[OverallRow]) -> Figure:
     """Scores along the difficulty dimensions, one line for each ranked model."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(8, 5.5), layout="constrained")
-    axes = figure.add_subplot(projection="polar")
+    figure = Figure(figsize=(9, 5.5), layout="constrained")
+    axes = cast("PolarAxes", figure.add_subplot(projection="polar"))
     names = list(rows[0].dimensions)
     angles = [2 * math.pi * i / len(names) for i in range(len(names))]
     for number, row in enumerate(rows):
@@ -81,8 +82,11 @@ def radar_plot(rows: Sequence[OverallRow]) -> Figure:
             linewidth=2,
             label=row.model,
         )
+    # The first label stands on top, so that of six none is beside the circle at its widest.
+    axes.set_theta_offset(math.pi / 2)
     axes.set_xticks(angles, [name.capitalize() for name in names])
-    axes.tick_params(axis="x", pad=14)
+    axes.tick_params(axis="x", pad=20)
+    axes.set_rlabel_position(360 / len(names) / 2)
     axes.set_ylim(0, 1.02)
     axes.set_yticks([0.25, 0.5, 0.75, 1.0])
     figure.legend(loc="outside right center", frameon=False)

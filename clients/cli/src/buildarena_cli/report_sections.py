@@ -294,16 +294,22 @@ def _cost(material: Material, cells: Mapping[str, Sequence[Cell]]) -> list[Block
 
 
 def _rounds(material: Material) -> list[Block]:
-    longest = max((len(rounds) for rounds in material.rounds.values()), default=0)
-    if longest < 2:  # noqa: PLR2004 - one round is no loop
-        return []
-    blocks: list[Block] = [Heading(text="Closed loop")]
-    for task in dict.fromkeys(trial.task for trial in material.trials):
-        curves: dict[str, list[tuple[float, float]]] = {}
-        trials = [trial for trial in material.trials if trial.task == task and trial.scored]
-        for model in dict.fromkeys(trial.model for trial in trials):
-            runs = [material.rounds[t.job_id] for t in trials if t.model == model]
-            curves[model] = [_after(runs, number_) for number_ in range(1, longest + 1)]
+    """Curves of every model and task that had a second round."""
+    runs: dict[str, dict[str, list[Sequence[tuple[bool, float]]]]] = {}
+    for trial in material.trials:
+        if trial.scored:
+            models = runs.setdefault(trial.task, {})
+            models.setdefault(trial.model, []).append(material.rounds[trial.job_id])
+    blocks: list[Block] = []
+    for task, models in runs.items():
+        looped = {model: found for model, found in models.items() if max(map(len, found)) > 1}
+        if not looped:
+            continue
+        longest = max(len(run) for found in looped.values() for run in found)
+        curves = {
+            model: [_after(found, number_) for number_ in range(1, longest + 1)]
+            for model, found in looped.items()
+        }
         known = builtin_tasks().get(task)
         indicator = known.indicator.name if known else "indicator"
         blocks += [
@@ -322,7 +328,7 @@ def _rounds(material: Material) -> list[Block]:
                 figure=rounds_plot(curves, indicator),
             ),
         ]
-    return blocks
+    return [Heading(text="Closed loop"), *blocks] if blocks else []
 
 
 def _after(runs: Sequence[Sequence[tuple[bool, float]]], rounds: int) -> tuple[float, float]:
