@@ -15,6 +15,7 @@ from pathlib import Path
 from provider_standin import ProviderStandIn
 from running import wait_until
 
+from buildarena_pipeline.documents import machine_bytes
 from buildarena_pipeline.models import load_registry
 from buildarena_pipeline.specs import JobSpec
 from buildarena_pipeline.submission import Submissions
@@ -98,8 +99,6 @@ def test_a_session_that_is_killed_again_and_again_builds_the_same_machine(
     ]
     assert sum(entry.usage.requests for entry in journal) == context.jobs.get(job.id).requests
     (rollout,) = context.rollouts.read(job.id)
-    from buildarena_worker.construct import machine_json
-
-    machine = machine_json(undisturbed.suspended.machine)
+    machine = machine_bytes(undisturbed.suspended.machine)
     assert context.artifacts.get(rollout.machine_hash) == machine
     sys.stdout.write(f"{kills} kills, {extra} requests more than undisturbed\n")

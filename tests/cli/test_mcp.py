@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
+import socket
+import subprocess
 import sys
 from pathlib import Path
 
 from live_api import live_api
 from mcp import ClientSession, StdioServerParameters, stdio_client
+from mcp.client.streamable_http import streamable_http_client
+from running import wait_until
 
+from buildarena_pipeline.embedded import free_port
 from buildarena_pipeline.stages import LeaseKeeper, StageRunner
 from buildarena_simworker.simulate import SimulateHandler
 from buildarena_worker.builtin.designs import DESIGNS
@@ -25,9 +31,8 @@ def simulate_all(context) -> None:
     keeper.stop()
 
 
-async def play(url: str, simulate) -> dict[str, object]:
-    server = StdioServerParameters(command=BUILDARENA, args=["mcp", "--url", url])
-    async with stdio_client(server) as (read, write), ClientSession(read, write) as session:
+async def play(connected, simulate) -> dict[str, object]:
+    async with connected as (read, write, *_), ClientSession(read, write) as session:
         await session.initialize()
         tools = {tool.name for tool in (await session.list_tools()).tools}
         assert {"open_session", "attach_block_to", "submit"} <= tools
@@ -67,9 +72,31 @@ async def said(session: ClientSession, tool: str, arguments: dict[str, object]) 
 
 def test_an_agent_builds_a_bridge_and_gets_its_score(context) -> None:
     with live_api(context) as url:
-        result = asyncio.run(play(url, lambda: simulate_all(context)))
+        server = StdioServerParameters(command=BUILDARENA, args=["mcp", "--url", url])
+        result = asyncio.run(play(stdio_client(server), lambda: simulate_all(context)))
     assert result["outcome"] == "success"
     assert result["indicator"] > 100
     (job,) = context.jobs.page(limit=2)
     report = Verifier(context).verify(job.id)
     assert report["ok"], [check for check in report["checks"] if not check["ok"]]
+
+
+def test_an_agent_builds_over_streamable_http(context) -> None:
+    port = free_port()
+    with live_api(context) as url:
+        command = [BUILDARENA, "mcp", "--url", url, "--http", str(port)]
+        server = subprocess.Popen(command)
+        try:
+            wait_until(lambda: _answers(port), 60, "the MCP server answers")
+            connected = streamable_http_client(f"http://127.0.0.1:{port}/mcp")
+            result = asyncio.run(play(connected, lambda: simulate_all(context)))
+        finally:
+            server.terminate()
+            server.wait()
+    assert result["outcome"] == "success"
+
+
+def _answers(port: int) -> bool:
+    with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", port), timeout=1):
+        return True
+    return False

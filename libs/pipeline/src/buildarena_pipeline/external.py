@@ -12,6 +12,7 @@ from typing import Any
 from buildarena_benchmark import broken_constraint, builtin_tasks, failed_score
 from buildarena_geometry import Machine
 from buildarena_pipeline.context import Context
+from buildarena_pipeline.documents import machine_bytes
 from buildarena_pipeline.errors import FieldError, PipelineError, SubmissionError
 from buildarena_pipeline.queues import simulate_queue
 from buildarena_pipeline.scoring import job_manifest, task_of
@@ -125,7 +126,7 @@ class ExternalSessions:
             _, machine = chosen
             transcript = context.artifacts.put(_transcript(calls), JSON)
             context.results.attach(job_id, "transcript", transcript, connection=connection)
-            kept = context.artifacts.put(_machine_json(machine), JSON)
+            kept = context.artifacts.put(machine_bytes(machine), JSON)
             context.results.attach(job_id, "machine", kept, connection=connection)
             refusals = dict(Counter(c.reason or "refused" for c in calls if not c.ok))
             broken = broken_constraint(task_of(job), machine)
@@ -204,12 +205,6 @@ def _failure(job: Job, machine: Machine, reason: str, detail: str) -> JobScore:
         detail=detail,
         manifest=job_manifest(job, None),
     )
-
-
-def _machine_json(machine: Machine) -> bytes:
-    return json.dumps(
-        machine.to_document(), ensure_ascii=False, sort_keys=True, separators=(",", ":")
-    ).encode()
 
 
 def _transcript(calls: Sequence[ExternalCall]) -> bytes:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 
 from buildarena_benchmark import failed_score
-from buildarena_geometry import Machine
 from buildarena_pipeline.context import Context
+from buildarena_pipeline.documents import machine_bytes
 from buildarena_pipeline.errors import PermanentFaultError, StartupError
 from buildarena_pipeline.models import ModelRegistry
 from buildarena_pipeline.prompt_packs import PromptPack, PromptPacks
@@ -90,7 +89,7 @@ class ConstructHandler:
     def _suspend(self, lease: Lease, session: Session, suspended: SuspendedError) -> None:
         """Keeps the machine and hands the job to its simulator, all in one transaction."""
         context, job = self._context, lease.job
-        machine = context.artifacts.put(machine_json(suspended.machine), JSON)
+        machine = context.artifacts.put(machine_bytes(suspended.machine), JSON)
         transcript = context.artifacts.put(session.transcript.to_json(), JSON)
         engine = str(job.track_config["simulator"])
         controls = None
@@ -143,7 +142,7 @@ class ConstructHandler:
         transcript = context.artifacts.put(session.transcript.to_json(), JSON)
         machine = None
         if session.machine is not None and session.machine.started:
-            machine = context.artifacts.put(machine_json(session.machine), JSON)
+            machine = context.artifacts.put(machine_bytes(session.machine), JSON)
         with context.database.transaction() as connection:
             context.results.attach(job.id, "transcript", transcript, connection=connection)
             if machine is not None:
@@ -158,13 +157,6 @@ def _counts(session: Session) -> dict[str, object]:
         "refused_actions": sum(refusals.values()),
         "refusals": refusals,
     }
-
-
-def machine_json(machine: Machine) -> bytes:
-    """The machine document as it is kept: one spelling per machine."""
-    return json.dumps(
-        machine.to_document(), ensure_ascii=False, sort_keys=True, separators=(",", ":")
-    ).encode()
 
 
 def pack_of(job: Job, packs: PromptPacks) -> PromptPack:

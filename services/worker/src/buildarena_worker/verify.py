@@ -17,6 +17,7 @@ import structlog
 from buildarena_benchmark import failed_score, score
 from buildarena_geometry import KeyPress, Machine
 from buildarena_pipeline.context import Context
+from buildarena_pipeline.documents import machine_bytes
 from buildarena_pipeline.errors import PermanentFaultError
 from buildarena_pipeline.prompt_packs import PromptPacks
 from buildarena_pipeline.queues import EXTERNAL
@@ -24,7 +25,7 @@ from buildarena_pipeline.scoring import best_rollout, task_of
 from buildarena_pipeline.workbench import Workbench
 from buildarena_simulation import SIMULATION_VERSION, MachineNotSimulable, Trajectory, simulate
 from buildarena_store import ExternalCall, Job, RolloutRecord, Usage
-from buildarena_worker.construct import loop_of, machine_json, pack_of
+from buildarena_worker.construct import loop_of, pack_of
 from buildarena_worker.errors import (
     ConstructionFailedError,
     JournalMismatchError,
@@ -159,7 +160,7 @@ class Verifier:
         controls: Sequence[KeyPress] | None,
     ) -> list[Check]:
         name = f"rollout {record.number}"
-        checks = [_compare(f"{name}: machine", record.machine_hash, _hash(machine_json(machine)))]
+        checks = [_compare(f"{name}: machine", record.machine_hash, _hash(machine_bytes(machine)))]
         simulated_by = (record.versions or {}).get("simulation")
         checks.append(_compare(f"{name}: simulation version", simulated_by, SIMULATION_VERSION))
         task = task_of(job)

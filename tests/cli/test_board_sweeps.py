@@ -1,0 +1,45 @@
+"""The sweep files of the paper's experiments can be submitted as they are."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import yaml
+
+from buildarena_benchmark.leaderboard import published_rows
+from buildarena_cli.report import variant
+from buildarena_pipeline.models import load_registry
+from buildarena_pipeline.specs import SweepSpec
+
+FILES = sorted((Path(__file__).parents[2] / "examples" / "sweeps").glob("*.yaml"))
+
+
+def spec_of(file: Path) -> SweepSpec:
+    return SweepSpec.model_validate(yaml.safe_load(file.read_text()))
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
+def test_a_sweep_file_names_what_there_is(submissions, file) -> None:
+    spec = spec_of(file)
+    jobs = submissions.plan(spec)
+    assert len(jobs) == len(spec.tasks) * len(spec.models) * len(spec.all_seeds())
+
+
+def test_the_main_grid_is_the_papers(submissions) -> None:
+    main, more = (
+        spec_of(FILES[0].with_name(f"{name}.yaml")) for name in ("main-grid", "open-weight-models")
+    )
+    assert len(submissions.plan(main)) == 5184
+    registry = load_registry()
+    snapshots = {registry.models[name].model for name in [*main.models, *more.models]}
+    assert snapshots == {row.snapshot for rows in published_rows().values() for row in rows}
+    assert variant(main.model_dump()) == ""
+
+
+@pytest.mark.parametrize("group", ["workflow", "decoding", "prompting", "simulators"])
+def test_files_of_one_ablation_differ_in_one_thing_and_share_seeds(group) -> None:
+    specs = [spec_of(file) for file in FILES if file.stem.startswith(group)]
+    assert len(specs) >= 2
+    assert len({variant(spec.model_dump()) for spec in specs}) == len(specs)
+    assert len({(*spec.tasks, *spec.models, *spec.all_seeds()) for spec in specs}) == 1
