@@ -152,7 +152,7 @@ def _performance(
         *("indicator", "95 %", "paper", "parts", "paper", "flagged"),
     )
     labels = {
-        name: f"{tasks[name].indicator.name} ({tasks[name].indicator.unit or 'units'})"
+        name: _label(tasks[name].indicator.name, tasks[name].indicator.unit)
         for name in cells
         if name in tasks
     }
@@ -369,6 +369,11 @@ def between(low: float | None, high: float | None, factor: float = 1.0) -> str:
     if low is None or high is None:
         return "-"
     return f"{factor * low:.1f}-{factor * high:.1f}"
+
+
+def _label(indicator: str, unit: str) -> str:
+    name = indicator.replace("_", " ")
+    return name if unit in {"", "1"} else f"{name} ({unit})"
 
 
 def _paper(
