@@ -94,7 +94,7 @@ def compare(
         padding=(0, 1, 0, 0),
     )
     table.add_column("task", no_wrap=True)
-    for name in ("first", "second", "difference", "95 %", "pairs", "p success", "p indicator"):
+    for name in ("first", "second", "diff %", "95 %", "pairs", "p success", "p indicator"):
         table.add_column(name, justify="right")
     for row in answer["tasks"]:
         (won_1, won_2), (of_1, of_2) = row["successes"], row["trials"]
@@ -102,8 +102,8 @@ def compare(
             row["task"],
             f"{won_1}/{of_1}",
             f"{won_2}/{of_2}",
-            f"{100 * row['difference']:+.0f} %",
-            f"{100 * row['low']:+.0f}..{100 * row['high']:+.0f} %",
+            f"{100 * row['difference']:+.0f}",
+            f"{100 * row['low']:+.0f}..{100 * row['high']:+.0f}",
             str(row["success"]["pairs"]) if row["success"] else "0",
             number(row["success_p"], 4),
             number(row["indicator_p"], 4),

@@ -23,12 +23,18 @@ def number(value: float | None, digits: int = 1) -> str:
     return "-" if value is None else f"{value:,.{digits}f}"
 
 
+def in_words(indicator: str, unit: str) -> str:
+    """An indicator with its unit, if it has one."""
+    name = indicator.replace("_", " ")
+    return name if unit in {"", "1"} else f"{name} in {unit}"
+
+
 def leaderboard_tables(board: dict[str, Any]) -> list[Table]:
     """One table for each task of a leaderboard answer; each fits 80 columns."""
     tables = []
     for task in board["tasks"]:
         table = Table(
-            title=f"{task['task']}: {task['indicator']} in {task['unit'] or 'units'}",
+            title=f"{task['task']}: {in_words(task['indicator'], task['unit'])}",
             title_justify="left",
             caption="* baseline; # is shared by models that can't be told apart; "
             "95 % is the Wilson interval of the success rate",
@@ -38,7 +44,7 @@ def leaderboard_tables(board: dict[str, Any]) -> list[Table]:
         )
         table.add_column("#", justify="right")
         table.add_column("model", no_wrap=True)
-        for name in ("success", "95 %", task["indicator"], "parts", "requests", "tokens", "USD"):
+        for name in ("success", "95 %", "indicator", "parts", "requests", "tokens", "USD"):
             table.add_column(name, justify="right")
         for row in task["rows"]:
             interval = "-"

@@ -19,6 +19,13 @@ PAGE_IN: Final = (8.27, 11.69)
 """A4."""
 PAGE_LINES: Final = 84
 PAGE_COLUMNS: Final = 108
+MARGIN: Final = 0.06
+"""Of a page, on each side, as a share of its width."""
+TEXT_SIZE: Final = 7.5
+"""In points; pages with wider tables have smaller letters, never cut ones."""
+POINTS_AN_INCH: Final = 72
+CHARACTER_WIDTH: Final = 0.61
+"""Of the monospaced letters that Matplotlib brings, as a share of their size; a little more."""
 STYLE: Final = """
 body { font: 16px/1.5 system-ui, sans-serif; color: #222; max-width: 75rem; margin: 2rem auto;
   padding: 0 1rem; }
@@ -182,9 +189,17 @@ def _page(lines: Sequence[str]) -> Figure:
     from matplotlib.figure import Figure
 
     page = Figure(figsize=PAGE_IN)
-    text = "\n".join(lines)
+    widest = max(map(len, lines), default=0)
+    room = PAGE_IN[0] * (1 - 2 * MARGIN) * POINTS_AN_INCH
+    size = min(TEXT_SIZE, room / (CHARACTER_WIDTH * max(widest, 1)))
     # A dollar sign would begin a formula.
-    page.text(0.06, 0.96, text, family="monospace", size=7.5, va="top", parse_math=False)
+    page.text(
+        *(MARGIN, 1 - MARGIN * PAGE_IN[0] / PAGE_IN[1], "\n".join(lines)),
+        family="monospace",
+        size=size,
+        va="top",
+        parse_math=False,
+    )
     return page
 
 

@@ -19,7 +19,7 @@ from buildarena_benchmark.leaderboard import (
     published_rows,
 )
 from buildarena_benchmark.statistics import detectable_difference, token_bins
-from buildarena_cli.output import number
+from buildarena_cli.output import in_words, number
 from buildarena_cli.report_document import Block, Grid, Heading, Paragraph, Plot
 from buildarena_cli.report_plots import (
     cost_plot,
@@ -152,7 +152,7 @@ def _performance(
         *("indicator", "95 %", "paper", "parts", "paper", "flagged"),
     )
     labels = {
-        name: _label(tasks[name].indicator.name, tasks[name].indicator.unit)
+        name: in_words(tasks[name].indicator.name, tasks[name].indicator.unit)
         for name in cells
         if name in tasks
     }
@@ -369,11 +369,6 @@ def between(low: float | None, high: float | None, factor: float = 1.0) -> str:
     if low is None or high is None:
         return "-"
     return f"{factor * low:.1f}-{factor * high:.1f}"
-
-
-def _label(indicator: str, unit: str) -> str:
-    name = indicator.replace("_", " ")
-    return name if unit in {"", "1"} else f"{name} ({unit})"
 
 
 def _paper(
