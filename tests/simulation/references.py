@@ -105,6 +105,9 @@ def _table() -> dict[str, Reference]:
             "good",
             lambda: d.deck(3, 13, cross=True, along="12", pillars=5, pillar_at=_NINE),
         ),
+        "wide-deck-on-two-pillars": ref(
+            "support-2", "mediocre", lambda: d.deck(3, 13, cross=True, pillars=5)
+        ),
         "wide-deck": ref("support-2", "mediocre", lambda: d.deck(3, 13, cross=True)),
         "wide-beam-too-short": ref("support-2", "bad", lambda: d.beam(9, "tb")),
         "long-deck-trussed": ref(

@@ -13,7 +13,7 @@ from buildarena_simulation.structure.contacts import ContactForces
 from buildarena_simulation.structure.model import FloatArray
 from buildarena_simulation.structure.motion import Motion
 
-_WORLD: Final = -1
+WORLD: Final = -1
 """Ground and terrain count as one body."""
 
 _TOUCHING: Final = 0.005
@@ -50,10 +50,10 @@ def read_contacts(
         first = cluster_of_link.get((contact[1], contact[3]))
         second = cluster_of_link.get((contact[2], contact[4]))
         if first is not None:
-            other = outsiders.get(contact[2], _WORLD) if second is None else second
+            other = outsiders.get(contact[2], WORLD) if second is None else second
             rows.setdefault(first, []).append((*contact[5], x, y, z, nx, ny, nz, other))
         if second is not None:
-            other = outsiders.get(contact[1], _WORLD) if first is None else first
+            other = outsiders.get(contact[1], WORLD) if first is None else first
             rows.setdefault(second, []).append((*contact[6], -x, -y, -z, -nx, -ny, -nz, other))
     return _gathered(
         [_to_blocks(np.array(table), c, shapes[c], motion) for c, table in sorted(rows.items())]

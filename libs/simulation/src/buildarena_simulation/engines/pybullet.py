@@ -6,15 +6,11 @@ PyBullet is wrong, so ours is given; URDFs are cached by file name, so caching i
 damping grows with the square of the speed, so drag is a force of ours.
 """
 
-import contextlib
-import ctypes
 import itertools
 import math
-import os
 import shutil
-import sys
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version as distribution_version
 from pathlib import Path
@@ -35,45 +31,23 @@ from buildarena_simulation.engines.base import (
     quaternion_of,
     rotation_of,
 )
-from buildarena_simulation.engines.bullet_contacts import read_contacts
+from buildarena_simulation.engines.bullet_contacts import WORLD, read_contacts
 from buildarena_simulation.engines.hinges import hinge_frames, hinge_rate
 from buildarena_simulation.engines.jolts import JoltWatch
+from buildarena_simulation.engines.near_contacts import NearContacts
 from buildarena_simulation.engines.nearest import shape_table
+from buildarena_simulation.engines.pushes import Force, drag_forces, thrust_forces
 from buildarena_simulation.engines.ropes import rope_forces
+from buildarena_simulation.engines.silence import silence
 from buildarena_simulation.engines.urdf import urdf_of
 from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.contacts import ContactForces
 from buildarena_simulation.structure.model import FloatArray, IntArray, Role
 from buildarena_simulation.structure.motion import Motion
 
-_STREAMS = (1, 2)
-
-
-@contextlib.contextmanager
-def _silence() -> Iterator[None]:
-    """PyBullet greets on stdout or stderr when it is imported; ours may be JSON there."""
-    sys.stdout.flush()
-    sys.stderr.flush()
-    kept = [os.dup(stream) for stream in _STREAMS]
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    try:
-        for stream in _STREAMS:
-            os.dup2(nowhere, stream)
-        yield
-        # What C has buffered must leave before the streams are put back.
-        ctypes.CDLL(None).fflush(None)
-    finally:
-        for stream, copy in zip(_STREAMS, kept, strict=True):
-            os.dup2(copy, stream)
-            os.close(copy)
-        os.close(nowhere)
-
-
-with _silence():
+# It greets when it is imported, on streams where our own output may be JSON.
+with silence():
     import pybullet
-
-_Push = tuple[int, int, list[float], list[float]]
-_Drag = tuple[int, list[float], list[float]]
 
 _TIME_STEP_S = 1 / 250
 _STEPS_PER_EVALUATION = 10
@@ -104,6 +78,7 @@ class PyBulletEngine:
         self._folder = Path(tempfile.mkdtemp(prefix="buildarena-"))
         self._serial = itertools.count()
         self._pieces: list[_Piece] = []
+        self._near = NearContacts(world)
         self._cargo: int | None = None
         self._start_world()
 
@@ -158,7 +133,8 @@ class PyBulletEngine:
 
     def advance(self, wheel_speeds: FloatArray, thrusts: FloatArray) -> None:
         """See `Engine`."""
-        pushes, drags = self._pushes(thrusts), self._drags()
+        pushes = thrust_forces(self._structure, self._clusters, self._axes, thrusts)
+        drags = drag_forces(self._clusters, self._motion, self._axes, self._moments)
         jolts = JoltWatch(len(wheel_speeds), gravity=self._world.gravity, time_step_s=_TIME_STEP_S)
         velocity = self._free_velocities()
         driven: FloatArray | None = None
@@ -266,14 +242,11 @@ class PyBulletEngine:
                 pybullet.resetJointState(body, link - 1, 0.0, rate, **self._client)
         hinged = list(inside[1:])
         places = [self._place_of_wheel[int(wheel)] for wheel in clusters.wheel[hinged]]
-        every = list(inside)
         return _Piece(
             body=body,
             inside=inside,
             wheel_signs=np.where(clusters.wheel_is_outer[hinged], 1.0, -1.0),
             wheel_places=np.array(places, dtype=np.int64),
-            drag=float(clusters.linear_drag[every] @ clusters.mass[every]),
-            spin_drag=float(clusters.angular_drag[root]),
         )
 
     def _load(self, inside: tuple[int, ...], motion: Motion) -> int:
@@ -331,40 +304,13 @@ class PyBulletEngine:
                     **self._client,
                 )
 
-    def _pushes(self, thrusts: FloatArray) -> list[_Push]:
-        """Body, link, force and point of each thrust, in the link's own frame."""
-        clusters, structure = self._clusters, self._structure
-        pushes = []
-        for cannon, thrust in zip(structure.cannons, thrusts, strict=True):
-            if thrust:
-                c = int(clusters.cluster_of[cannon])
-                to_link = self._axes[c].T
-                arm = to_link @ (structure.shown[cannon] - clusters.center_of_mass[c])
-                force = -thrust * (to_link @ structure.directions[cannon])
-                pushes.append((*self._address[c], force.tolist(), arm.tolist()))
-        return pushes
-
-    def _drags(self) -> list[_Drag]:
-        """Body, force and torque of each piece's drag, in its root's own frame.
-
-        Taken from the velocity now, for all steps to the next evaluation: drag changes little.
-        """
-        motion, drags = self._motion, []
-        for piece in self._pieces:
-            root = piece.inside[0]
-            to_link = (motion.rotation[root] @ self._axes[root]).T
-            force = -piece.drag * (to_link @ motion.velocity[root])
-            torque = -piece.spin_drag * self._moments[root] * (to_link @ motion.spin[root])
-            drags.append((piece.body, force.tolist(), torque.tolist()))
-        return drags
-
-    def _push(self, pushes: list[_Push], drags: list[_Drag]) -> None:
-        frame, client = pybullet.LINK_FRAME, self._client
-        for body, link, force, point in pushes:
-            pybullet.applyExternalForce(body, link, force, point, frame, **client)
-        for body, force, torque in drags:
-            pybullet.applyExternalForce(body, -1, force, _ORIGIN, frame, **client)
-            pybullet.applyExternalTorque(body, -1, torque, frame, **client)
+    def _push(self, thrusts: list[tuple[int, Force]], drags: list[tuple[int, Force]]) -> None:
+        frame, client, address = pybullet.LINK_FRAME, self._client, self._address
+        for c, (force, point) in thrusts:
+            pybullet.applyExternalForce(*address[c], force, point, frame, **client)
+        for c, (force, torque) in drags:
+            pybullet.applyExternalForce(*address[c], force, _ORIGIN, frame, **client)
+            pybullet.applyExternalTorque(*address[c], torque, frame, **client)
         if self._rope_alive.any():
             self._pull_ropes()
 
@@ -425,8 +371,16 @@ class PyBulletEngine:
     def _read_contacts(self) -> ContactForces:
         contacts = pybullet.getContactPoints(**self._client)
         outsiders = {} if self._cargo is None else {self._cargo: _CARGO}
-        return read_contacts(
+        found = read_contacts(
             contacts, self._cluster_of_link, self._shapes, self._motion, outsiders=outsiders
+        )
+        return self._near.beside(
+            found,
+            self._clusters,
+            self._motion,
+            None if self._cargo is None else self.cargo(),
+            world=WORLD,
+            cargo_number=_CARGO,
         )
 
 
@@ -439,13 +393,9 @@ class _Piece:
         inside: Its clusters, the root first.
         wheel_signs: Per hinge, -1 where the link turned is not the wheel's but its mount's.
         wheel_places: Per hinge, which wheel of the structure it is.
-        drag: Linear drag of the whole piece, mass/s.
-        spin_drag: Angular drag of its root, 1/s.
     """
 
     body: int
     inside: tuple[int, ...]
     wheel_signs: FloatArray
     wheel_places: IntArray
-    drag: float
-    spin_drag: float

@@ -1,0 +1,58 @@
+"""Thrust and drag as steady forces in the frames of an engine's bodies.
+
+Both change little from one evaluation to the next, so they are worked out once for the steps
+between; told in a body's own principal frame they turn with it.
+"""
+
+import numpy as np
+
+from buildarena_simulation.structure.clusters import Clusters
+from buildarena_simulation.structure.model import FloatArray, Structure
+from buildarena_simulation.structure.motion import Motion
+
+Force = tuple[list[float], list[float]]
+"""A force and the point it acts on, or a force and a torque about the centre of mass."""
+
+
+def thrust_forces(
+    structure: Structure, clusters: Clusters, axes: FloatArray, thrusts: FloatArray
+) -> list[tuple[int, Force]]:
+    """Cluster, force and point of each cannon that fires.
+
+    Args:
+        structure: The machine.
+        clusters: Its clusters.
+        axes: (C, 3, 3) machine_from_principal.
+        thrusts: (C,) recoil of each cannon, mass·unit/s².
+    """
+    found = []
+    for cannon in np.flatnonzero(thrusts):
+        block = structure.cannons[cannon]
+        c = int(clusters.cluster_of[block])
+        to_body = axes[c].T
+        arm = to_body @ (structure.shown[block] - clusters.center_of_mass[c])
+        force = -thrusts[cannon] * (to_body @ structure.directions[block])
+        found.append((c, (force.tolist(), arm.tolist())))
+    return found
+
+
+def drag_forces(
+    clusters: Clusters, motion: Motion, axes: FloatArray, moments: FloatArray
+) -> list[tuple[int, Force]]:
+    """Root cluster, force and torque of each piece's drag: Unity's v *= 1 - drag·dt as a force.
+
+    Args:
+        clusters: The clusters.
+        motion: Their motion.
+        axes: (C, 3, 3) machine_from_principal.
+        moments: (C, 3) principal moments of inertia.
+    """
+    found = []
+    for piece in clusters.pieces:
+        root, inside = piece[0], list(piece)
+        to_body = (motion.rotation[root] @ axes[root]).T
+        drag = float(clusters.linear_drag[inside] @ clusters.mass[inside])
+        force = -drag * (to_body @ motion.velocity[root])
+        torque = -clusters.angular_drag[root] * moments[root] * (to_body @ motion.spin[root])
+        found.append((root, (force.tolist(), torque.tolist())))
+    return found
