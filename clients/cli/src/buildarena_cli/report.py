@@ -55,7 +55,7 @@ def collect(client: Client, ids: Sequence[str]) -> Any:
     Sweeps of different workflows, prompts or decodings are set side by side: each becomes a row
     of its own, named by what differs from the paper's main experiment.
     """
-    from buildarena_cli.report_sections import Material
+    from buildarena_cli.report_material import Material
 
     found = [client.get(f"/v1/sweeps/{id_}") for id_ in dict.fromkeys(ids)]
     variants = {sweep["id"]: variant(sweep["spec"]) for sweep in found}

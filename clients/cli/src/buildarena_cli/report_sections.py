@@ -4,53 +4,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-
-import numpy as np
 
 from buildarena_benchmark import builtin_tasks
-from buildarena_benchmark.leaderboard import (
-    Board,
-    BoardQuery,
-    Cell,
-    PublishedRow,
-    TrackBoard,
-    Trial,
-    published_rows,
-)
-from buildarena_benchmark.statistics import detectable_difference, token_bins
+from buildarena_benchmark.leaderboard import Board, BoardQuery, Cell, TrackBoard
 from buildarena_cli.output import in_words, number
 from buildarena_cli.report_document import Block, Grid, Heading, Paragraph, Plot
-from buildarena_cli.report_plots import (
-    cost_plot,
-    indicator_plot,
-    radar_plot,
-    rounds_plot,
-    shares_plot,
-    success_plot,
-)
-
-SAMPLES = 64
-"""The paper's samples of each model on each task."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Material:
-    """What a report is made of.
-
-    Attributes:
-        title: What was run.
-        trials: Ended jobs; their models are named as rows of the report.
-        rounds: Of each job by id, for each round: success and indicator.
-        snapshots: The provider's name of each row's model.
-        unfinished: Jobs that have not ended.
-    """
-
-    title: str
-    trials: Sequence[Trial]
-    rounds: Mapping[str, Sequence[tuple[bool, float]]]
-    snapshots: Mapping[str, str]
-    unfinished: int
+from buildarena_cli.report_effort import cost, power, rounds
+from buildarena_cli.report_material import Material, between, paper_rows, percent
+from buildarena_cli.report_plots import indicator_plot, radar_plot, shares_plot, success_plot
 
 
 def sections(material: Material) -> list[Block]:
@@ -73,9 +34,9 @@ def sections(material: Material) -> list[Block]:
         *_performance(board, cells, material),
         *_dimensions(board),
         *_failures(material, cells),
-        *_cost(material, cells),
-        *_rounds(material),
-        *_power(cells),
+        *cost(material, cells),
+        *rounds(material),
+        *power(cells),
     ]
 
 
@@ -123,7 +84,7 @@ def _performance(
     board: Board, cells: Mapping[str, Sequence[Cell]], material: Material
 ) -> list[Block]:
     tasks = builtin_tasks()
-    paper = _paper(cells, material.snapshots)
+    paper = paper_rows(cells, material.snapshots)
     rows = []
     for task in board.tasks:
         for ranked in task.rows:
@@ -246,161 +207,3 @@ def _failures(material: Material, cells: Mapping[str, Sequence[Cell]]) -> list[B
             ),
         ]
     return blocks
-
-
-def _cost(material: Material, cells: Mapping[str, Sequence[Cell]]) -> list[Block]:
-    paper = _paper(cells, material.snapshots)
-    rows = []
-    for task, row in cells.items():
-        for cell in row:
-            reference = paper[task].get(cell.model)
-            rows.append(
-                (
-                    task,
-                    cell.model,
-                    number(cell.input_tokens_mean, 0),
-                    number(reference.input_tokens_mean, 0) if reference else "-",
-                    number(cell.output_tokens_mean, 0),
-                    number(reference.output_tokens_mean, 0) if reference else "-",
-                    number(cell.requests_mean),
-                    number(reference.requests_mean) if reference else "-",
-                    number(cell.cost_usd_mean, 4),
-                    number(cell.cost_per_success_usd, 4),
-                )
-            )
-    columns = (
-        *("task", "model", "input tokens", "paper", "output tokens", "paper", "requests"),
-        *("paper", "USD", "USD a success"),
-    )
-    blocks: list[Block] = [
-        Heading(text="Cost"),
-        Grid(caption="Means of scored jobs", columns=columns, rows=rows, text_columns=2),
-    ]
-    by_category = _normalised(material.trials)
-    if by_category:
-        blocks.append(
-            Plot(
-                name="cost",
-                text="Performance, normalised to the best job, by output tokens",
-                figure=cost_plot(
-                    {
-                        category: token_bins(tokens, performance)
-                        for category, (tokens, performance) in by_category.items()
-                    }
-                ),
-            )
-        )
-    return blocks
-
-
-def _rounds(material: Material) -> list[Block]:
-    """Curves of every model and task that had a second round."""
-    runs: dict[str, dict[str, list[Sequence[tuple[bool, float]]]]] = {}
-    for trial in material.trials:
-        if trial.scored:
-            models = runs.setdefault(trial.task, {})
-            models.setdefault(trial.model, []).append(material.rounds[trial.job_id])
-    blocks: list[Block] = []
-    for task, models in runs.items():
-        looped = {model: found for model, found in models.items() if max(map(len, found)) > 1}
-        if not looped:
-            continue
-        longest = max(len(run) for found in looped.values() for run in found)
-        curves = {
-            model: [_after(found, number_) for number_ in range(1, longest + 1)]
-            for model, found in looped.items()
-        }
-        known = builtin_tasks().get(task)
-        indicator = known.indicator.name if known else "indicator"
-        blocks += [
-            Grid(
-                caption=f"{task}: succeeded after so many simulated rounds, and best indicator "
-                "so far",
-                columns=("model", *(f"round {i}" for i in range(1, longest + 1))),
-                rows=[
-                    (model, *(f"{percent(rate)} / {value:.1f}" for rate, value in curve))
-                    for model, curve in curves.items()
-                ],
-            ),
-            Plot(
-                name=f"rounds-{task}",
-                text=f"{task}: success and indicator by round",
-                figure=rounds_plot(curves, indicator),
-            ),
-        ]
-    return [Heading(text="Closed loop"), *blocks] if blocks else []
-
-
-def _after(runs: Sequence[Sequence[tuple[bool, float]]], rounds: int) -> tuple[float, float]:
-    """Of all runs: the share that has succeeded by then, and the mean of their best so far."""
-    succeeded = [any(success for success, _ in run[:rounds]) for run in runs]
-    best = [max((value for _, value in run[:rounds]), default=0.0) for run in runs]
-    return sum(succeeded) / len(runs), sum(best) / len(runs)
-
-
-def _power(cells: Mapping[str, Sequence[Cell]]) -> list[Block]:
-    counts = sorted({cell.trials for row in cells.values() for cell in row if cell.trials})
-    shown = sorted({counts[0], counts[-1], SAMPLES})
-    rows = []
-    for rate in (0.05, 0.2, 0.5, 0.8):
-        rises = [detectable_difference(rate, trials) for trials in shown]
-        rows.append((percent(rate), *("-" if r is None else f"+{100 * r:.0f} %" for r in rises)))
-    return [
-        Heading(text="What these samples can show"),
-        Paragraph(
-            text="The smallest rise above a success rate that is found in four of five such "
-            "experiments, at an error of 5 %. Smaller differences may be real and stay unseen."
-        ),
-        Grid(
-            caption="By samples of each model on a task",
-            columns=("success rate", *(f"{trials} samples" for trials in shown)),
-            rows=rows,
-        ),
-    ]
-
-
-def percent(share: float | None) -> str:
-    """A share for people."""
-    return "-" if share is None else f"{100 * share:.1f} %"
-
-
-def between(low: float | None, high: float | None, factor: float = 1.0) -> str:
-    """An interval for people."""
-    if low is None or high is None:
-        return "-"
-    return f"{factor * low:.1f}-{factor * high:.1f}"
-
-
-def _paper(
-    cells: Mapping[str, Sequence[Cell]], snapshots: Mapping[str, str]
-) -> dict[str, dict[str, PublishedRow]]:
-    """The paper's rows by task and by the name that the same snapshot has in this report."""
-    found: dict[str, dict[str, PublishedRow]] = {}
-    for task, row in cells.items():
-        by_snapshot = {paper.snapshot: paper for paper in published_rows().get(task, ())}
-        names = {cell.model for cell in row}
-        found[task] = {
-            name: by_snapshot[snapshots[name]]
-            for name in names
-            if snapshots.get(name) in by_snapshot
-        }
-    return found
-
-
-def _normalised(trials: Sequence[Trial]) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Output tokens and performance, relative to the best job of the task, by category."""
-    tasks = builtin_tasks()
-    best: dict[str, float] = {}
-    for trial in trials:
-        best[trial.task] = max(best.get(trial.task, 0.0), trial.indicator)
-    found: dict[str, list[tuple[float, float]]] = {}
-    for trial in trials:
-        if trial.scored and trial.output_tokens:
-            category = tasks[trial.task].category if trial.task in tasks else trial.task
-            top = best[trial.task]
-            relative = trial.indicator / top if top > 0 else 0.0
-            found.setdefault(category, []).append((float(trial.output_tokens), relative))
-    return {
-        category: (np.array([t for t, _ in pairs]), np.array([p for _, p in pairs]))
-        for category, pairs in found.items()
-    }

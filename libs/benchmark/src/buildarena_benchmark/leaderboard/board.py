@@ -5,10 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
+from typing import Final
 
 from buildarena_benchmark.leaderboard.cells import Cell, summarise
 from buildarena_benchmark.leaderboard.overall import OverallRow, Weights, overall_rows, rank_cells
 from buildarena_benchmark.leaderboard.trials import Trial
+
+KEPT_RANKINGS: Final = 256
+"""Rankings of tasks that are kept: the present ones, and those of recent filters."""
 
 CellKey = tuple[str, str, str]
 """Task, task version, configuration."""
@@ -92,6 +96,7 @@ class TrackBoard:
         self._cells: dict[CellKey, dict[str, Trial]] = {}
         self._places: dict[str, CellKey] = {}
         self._summaries: dict[tuple[CellKey, bool], Cell] = {}
+        self._rankings: dict[tuple[int, ...], tuple[list[Cell], list[RankedCell]]] = {}
 
     def put(self, trial: Trial) -> bool:
         """Adds or replaces a trial; returns whether anything changed."""
@@ -138,7 +143,7 @@ class TrackBoard:
                 task=task,
                 version=version,
                 outdated=outdated.get(task, 0),
-                rows=_ranked(list(cells[task].values())),
+                rows=self._ranked(list(cells[task].values())),
             )
             for task, version in chosen
             if cells[task]
@@ -190,6 +195,16 @@ class TrackBoard:
         if place not in self._summaries:
             self._summaries[place] = summarise(trials, include_flagged=query.include_flagged)
         return self._summaries[place]
+
+    def _ranked(self, cells: list[Cell]) -> list[RankedCell]:
+        """The cells with their places; kept as long as none of them changes."""
+        # The kept cells stay alive, so no other cell can have their identity.
+        key = tuple(id(cell) for cell in cells)
+        if key not in self._rankings:
+            if len(self._rankings) >= KEPT_RANKINGS:
+                self._rankings.clear()
+            self._rankings[key] = (cells, _ranked(cells))
+        return self._rankings[key][1]
 
     def _forget(self, key: CellKey) -> None:
         for flagged in (False, True):

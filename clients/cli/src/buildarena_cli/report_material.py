@@ -1,0 +1,55 @@
+"""What reports are made of, and how their figures are spelled."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from buildarena_benchmark.leaderboard import Cell, PublishedRow, Trial, published_rows
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Material:
+    """What a report is made of.
+
+    Attributes:
+        title: What was run.
+        trials: Ended jobs; their models are named as rows of the report.
+        rounds: Of each job by id, for each round: success and indicator.
+        snapshots: The provider's name of each row's model.
+        unfinished: Jobs that have not ended.
+    """
+
+    title: str
+    trials: Sequence[Trial]
+    rounds: Mapping[str, Sequence[tuple[bool, float]]]
+    snapshots: Mapping[str, str]
+    unfinished: int
+
+
+def percent(share: float | None) -> str:
+    """A share for people."""
+    return "-" if share is None else f"{100 * share:.1f} %"
+
+
+def between(low: float | None, high: float | None, factor: float = 1.0) -> str:
+    """An interval for people."""
+    if low is None or high is None:
+        return "-"
+    return f"{factor * low:.1f}-{factor * high:.1f}"
+
+
+def paper_rows(
+    cells: Mapping[str, Sequence[Cell]], snapshots: Mapping[str, str]
+) -> dict[str, dict[str, PublishedRow]]:
+    """The paper's rows by task and by the name that the same snapshot has in this report."""
+    found: dict[str, dict[str, PublishedRow]] = {}
+    for task, row in cells.items():
+        by_snapshot = {paper.snapshot: paper for paper in published_rows().get(task, ())}
+        names = {cell.model for cell in row}
+        found[task] = {
+            name: by_snapshot[snapshots[name]]
+            for name in names
+            if snapshots.get(name) in by_snapshot
+        }
+    return found
