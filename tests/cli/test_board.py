@@ -214,6 +214,38 @@ def test_a_closed_loop_beside_single_shots(url, sweep, context, submissions, tmp
     assert rates[-1] > rates[0]
 
 
+def test_simulators_are_compared_on_the_same_machines(url, context, submissions, tmp_path):
+    sweeps = []
+    for simulator in ("pybullet", "mujoco"):
+        spec = SweepSpec(
+            tasks=["support-1"], models=["openai/gpt-5"], samples=3, simulator=simulator
+        )
+        sweeps.append(submissions.submit_sweep(spec).sweep.id)
+    with context.database.transaction() as connection:
+        for number, job in enumerate(connection.execute(select(jobs).order_by(jobs.c.id)).all()):
+            won = number > 0
+            connection.execute(
+                update(jobs)
+                .where(jobs.c.id == job.id)
+                .values(state="done", outcome="success", success=True, indicator=1.0)
+            )
+            connection.execute(
+                insert(rollouts).values(
+                    job_id=job.id,
+                    number=0,
+                    final=True,
+                    engine="any",
+                    machine_hash=f"machine {job.seed}",
+                    success=won,
+                    indicator=float(job.seed),
+                    finished_at=job.created_at,
+                )
+            )
+    printed(url, "report", *sweeps, "--out", str(tmp_path / "r.md"))
+    text = (tmp_path / "r.md").read_text()
+    assert "| support-1 | mujoco, pybullet | 3 | 66.7 % | 0.00 | 1.00 |" in text
+
+
 def test_a_report_of_nothing_scored_says_so(url, context, submissions, tmp_path) -> None:
     spec = SweepSpec(tasks=["lift-1"], models=["builtin/idle"], samples=1)
     sweep = submissions.submit_sweep(spec).sweep.id

@@ -64,6 +64,7 @@ def collect(client: Client, ids: Sequence[str]) -> Any:
     trials: dict[str, Trial] = {}
     rounds: dict[str, list[tuple[bool, float]]] = {}
     snapshots: dict[str, str] = {}
+    verdicts: dict[tuple[str, str], dict[str, tuple[bool, float]]] = {}
     for sweep in found:
         named = variants[sweep["id"]] or "main"
         for result in client.get(f"/v1/sweeps/{sweep['id']}/results"):
@@ -72,6 +73,9 @@ def collect(client: Client, ids: Sequence[str]) -> Any:
             if not variants[sweep["id"]]:
                 snapshots[row] = registry.get(result["model"], "")
             rounds[result["job_id"]] = [(r["success"], r["indicator"]) for r in result["rounds"]]
+            for made in result["rounds"]:
+                tried = verdicts.setdefault((result["task"], made["machine"]), {})
+                tried[sweep["spec"]["simulator"]] = (made["success"], made["indicator"])
             trials[result["job_id"]] = _trial(result, row)
     progress = [sweep["progress"] for sweep in found]
     return Material(
@@ -79,6 +83,7 @@ def collect(client: Client, ids: Sequence[str]) -> Any:
         trials=list(trials.values()),
         rounds=rounds,
         snapshots=snapshots,
+        verdicts=verdicts,
         unfinished=sum(p["total"] - p["done"] for p in progress),
     )
 

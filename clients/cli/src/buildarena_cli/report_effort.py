@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import combinations
 
 import numpy as np
 
 from buildarena_benchmark import builtin_tasks
 from buildarena_benchmark.leaderboard import Cell, Trial
-from buildarena_benchmark.statistics import detectable_difference, token_bins
+from buildarena_benchmark.statistics import agreement, detectable_difference, token_bins
 from buildarena_cli.output import number
 from buildarena_cli.report_document import Block, Grid, Heading, Paragraph, Plot
 from buildarena_cli.report_material import Material, paper_rows, percent
@@ -100,6 +101,32 @@ def rounds(material: Material) -> list[Block]:
             ),
         ]
     return [Heading(text="Closed loop"), *blocks] if blocks else []
+
+
+def simulators(material: Material) -> list[Block]:
+    """How far two simulators agree on the same machines."""
+    names = sorted({name for tried in material.verdicts.values() for name in tried})
+    rows = []
+    for first, second in combinations(names, 2):
+        for task in dict.fromkeys(task for task, _ in material.verdicts):
+            both = [
+                tried
+                for (name, _), tried in material.verdicts.items()
+                if name == task and first in tried and second in tried
+            ]
+            found = agreement([t[first] for t in both], [t[second] for t in both])
+            if found is not None:
+                kappa, rho = number(found.kappa, 2), number(found.rank_correlation, 2)
+                same = percent(found.same_verdict)
+                rows.append((task, f"{first}, {second}", str(found.trials), same, kappa, rho))
+    if not rows:
+        return []
+    columns = "task", "simulators", "machines", "same verdict", "kappa", "rank correlation"
+    caption = "The same machines in two simulators: success (Cohen's kappa), indicator (Spearman)"
+    return [
+        Heading(text="Agreement of simulators"),
+        Grid(caption=caption, columns=columns, rows=rows, text_columns=2),
+    ]
 
 
 def power(cells: Mapping[str, Sequence[Cell]]) -> list[Block]:

@@ -18,6 +18,7 @@ class Material:
         rounds: Of each job by id, for each round: success and indicator.
         snapshots: The provider's name of each row's model.
         unfinished: Jobs that have not ended.
+        verdicts: By task and machine, for each simulator that tried it: success and indicator.
     """
 
     title: str
@@ -25,6 +26,7 @@ class Material:
     rounds: Mapping[str, Sequence[tuple[bool, float]]]
     snapshots: Mapping[str, str]
     unfinished: int
+    verdicts: Mapping[tuple[str, str], Mapping[str, tuple[bool, float]]]
 
 
 def percent(share: float | None) -> str:

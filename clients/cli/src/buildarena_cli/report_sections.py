@@ -9,7 +9,7 @@ from buildarena_benchmark import builtin_tasks
 from buildarena_benchmark.leaderboard import Board, BoardQuery, Cell, TrackBoard
 from buildarena_cli.output import in_words, number
 from buildarena_cli.report_document import Block, Grid, Heading, Paragraph, Plot
-from buildarena_cli.report_effort import cost, power, rounds
+from buildarena_cli.report_effort import cost, power, rounds, simulators
 from buildarena_cli.report_material import Material, between, paper_rows, percent
 from buildarena_cli.report_plots import indicator_plot, radar_plot, shares_plot, success_plot
 
@@ -36,6 +36,7 @@ def sections(material: Material) -> list[Block]:
         *_failures(material, cells),
         *cost(material, cells),
         *rounds(material),
+        *simulators(material),
         *power(cells),
     ]
 

@@ -59,8 +59,13 @@ class BoardChange:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Round:
-    """One simulated machine of a job: all rollouts of one machine together."""
+    """One simulated machine of a job: all rollouts of one machine together.
 
+    Attributes:
+        machine: Hash of its document: the same machine in another simulator has the same.
+    """
+
+    machine: str
     success: bool
     indicator: float
     parts: int | None
@@ -109,10 +114,10 @@ class Boards:
         )
         with self._database.transaction() as connection:
             found = list(_trials(connection, query))
-            rounds: dict[str, list[tuple[str, Round]]] = {}
+            rounds: dict[str, list[Round]] = {}
             for row in connection.execute(simulated):
                 _add_rollout(rounds.setdefault(row.job_id, []), row)
-        return [(trial, [r for _, r in rounds.get(trial.job_id, [])]) for trial in found]
+        return [(trial, rounds.get(trial.job_id, [])) for trial in found]
 
     def tracks(self) -> list[str]:
         """Every track that has jobs, ended or not."""
@@ -225,12 +230,15 @@ def _trials(connection: Connection, query: Any) -> Iterator[Trial]:
         )
 
 
-def _add_rollout(rounds: list[tuple[str, Round]], row: Row[Any]) -> None:
+def _add_rollout(rounds: list[Round], row: Row[Any]) -> None:
     """Adds a rollout to the round of its machine; the best rollout of a round counts."""
-    parts = (row.metrics or {}).get("parts")
-    new = Round(success=bool(row.success), indicator=row.indicator or 0.0, parts=parts)
-    if rounds and rounds[-1][0] == row.machine_hash:
-        best = max(rounds[-1][1], new, key=lambda r: (r.success, r.indicator))
-        rounds[-1] = (row.machine_hash, best)
+    new = Round(
+        machine=row.machine_hash,
+        success=bool(row.success),
+        indicator=row.indicator or 0.0,
+        parts=(row.metrics or {}).get("parts"),
+    )
+    if rounds and rounds[-1].machine == new.machine:
+        rounds[-1] = max(rounds[-1], new, key=lambda r: (r.success, r.indicator))
     else:
-        rounds.append((row.machine_hash, new))
+        rounds.append(new)

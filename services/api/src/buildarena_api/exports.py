@@ -37,6 +37,7 @@ class RoundView(BaseModel):
 
     model_config = ConfigDict(from_attributes=True)
 
+    machine: str = Field(description="Hash of its document")
     success: bool
     indicator: float
     parts: int | None
