@@ -149,3 +149,24 @@ def test_a_cancelled_job_frees_its_worker(context: Context, add) -> None:
     with pytest.raises(StaleLeaseError), context.database.transaction() as connection:
         context.results.finish(lease, SCORE, connection=connection)
     assert context.jobs.get(job_id).outcome == "cancelled"
+
+
+def test_a_job_that_gets_on_is_not_given_up(context: Context, add) -> None:
+    (job_id,) = add(1)
+    leases = Leases(context.database, duration_s=1, max_faults=2)
+    for sequence in range(4):
+        lease = leases.claim("construct", owner="w")
+        assert lease is not None
+        entry = JournalEntry(
+            sequence=sequence,
+            stage="build",
+            role="builder",
+            request_hash="h",
+            reply={},
+            usage=Usage(),
+            latency_s=0,
+        )
+        context.journal.append(lease, entry)
+        expire(context)
+        leases.recover()
+    assert context.jobs.get(job_id).state == "queued"

@@ -42,7 +42,7 @@ class Settings(BaseSettings):
     ] = {}
     lease_s: Annotated[float, Field(description="Lease without heartbeat, seconds", gt=1)] = 15.0
     max_faults: Annotated[
-        int, Field(description="Infrastructure faults before a job is given up", ge=1)
+        int, Field(description="Faults without progress before a job is given up", ge=1)
     ] = 8
     sessions_per_worker: Annotated[
         int, Field(description="Construction sessions one worker runs at once", ge=1)

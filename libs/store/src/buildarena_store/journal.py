@@ -87,7 +87,8 @@ _APPEND = text(
             output_tokens = output_tokens + :output_tokens,
             cached_tokens = cached_tokens + :cached_tokens,
             reasoning_tokens = reasoning_tokens + :reasoning_tokens,
-            cost_usd = cost_usd + :cost_usd
+            cost_usd = cost_usd + :cost_usd,
+            faults = 0
         WHERE id = :job_id AND lease_token = :token AND state = 'running'
         RETURNING id
     )
@@ -112,6 +113,8 @@ class Journal:
 
     def append(self, lease: Lease, entry: JournalEntry) -> None:
         """Writes a reply and adds its usage to the job, both or neither.
+
+        A job that gets on is not given up for the faults it met before.
 
         Raises:
             StaleLeaseError: The lease is over; nothing was written.

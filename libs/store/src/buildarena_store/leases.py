@@ -55,7 +55,7 @@ class Leases:
     Args:
         database: Where the jobs are.
         duration_s: How long a lease lasts without a heartbeat.
-        max_faults: Infrastructure faults after which a job is given up as errored.
+        max_faults: Infrastructure faults without progress after which a job is given up.
     """
 
     def __init__(
@@ -211,8 +211,10 @@ class Leases:
         Returns:
             True when the job will be tried again.
         """
-        again = lease.job.faults + 1 < self._max_faults
         with self._database.transaction() as connection:
+            met = select(jobs.c.faults).where(jobs.c.id == lease.job.id)
+            faults = int(connection.execute(met).scalar_one()) + 1
+            again = faults < self._max_faults
             if again:
                 self.advance(
                     lease,
@@ -220,7 +222,7 @@ class Leases:
                     result="fault",
                     note=detail,
                     state="queued",
-                    faults=lease.job.faults + 1,
+                    faults=faults,
                     nudged_at=None,
                     available_at=events.now + timedelta(seconds=delay_s),
                     detail=detail,
@@ -239,7 +241,7 @@ class Leases:
             state="done",
             outcome="errored",
             reason=reason,
-            faults=lease.job.faults + 1,
+            faults=jobs.c.faults + 1,
             finished_at=events.now,
             detail=detail,
         )
