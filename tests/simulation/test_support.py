@@ -32,7 +32,9 @@ def test_more_bracing_carries_more(engine: str, tasks: dict[str, Task]) -> None:
 def test_a_braced_deck_carries_more_than_a_bare_one(engine: str, tasks: dict[str, Task]) -> None:
     bare, _ = _trial(tasks["support-1"], deck(5, 7), engine)
     braced, trajectory = _trial(tasks["support-1"], deck(5, 7, cross=True), engine)
-    assert braced.indicator > 1.05 * bare.indicator
+    assert braced.indicator > bare.indicator
+    heavier = braced.metrics["load_at_first_break"], bare.metrics["load_at_first_break"]
+    assert heavier[0] > 1.1 * heavier[1]
     assert min(event.time_s for event in trajectory.breaks) > 5.0  # not while the cargo is light
 
 
@@ -44,7 +46,7 @@ def test_the_one_shot_bridge_carries_what_the_paper_reports(
     assert result.indicator >= 900.0
     first = trajectory.breaks[0]
     assert first.cargo_mass is not None
-    assert first.cargo_mass > 500.0  # the landing does not break it
+    assert first.cargo_mass > 900.0  # the landing does not break it
 
 
 def test_a_beam_that_is_too_short_for_the_gap_scores_nothing(

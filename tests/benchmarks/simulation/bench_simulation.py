@@ -35,6 +35,7 @@ BARS = {
     ("100 blocks, 30 braces", "pybullet"): 0.5,
 }
 INDICATOR_TOLERANCE = 0.25
+_CHOICES: tuple[Any, ...] = ((1, 3, 5), (False, True), ("", "t", "b"), (0, 5))
 
 
 def main() -> int:
@@ -140,9 +141,7 @@ def _agreement() -> dict[str, Any]:
 def _bridges() -> Iterator[tuple[str, Machine]]:
     """Every deck of some widths, lengths, braces and pillars, whatever it is good for."""
     for task, length in (("support-1", 7), ("support-1", 9), ("support-2", 11), ("support-2", 13)):
-        for width, cross, along, pillars in product(
-            (1, 3, 5), (False, True), ("", "t", "b"), (0, 5)
-        ):
+        for width, cross, along, pillars in product(*_CHOICES):
             skipped = (
                 (width == 1 and (cross or pillars))
                 or (width == 5 and along == "t")

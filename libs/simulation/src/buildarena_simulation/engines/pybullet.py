@@ -204,13 +204,12 @@ class PyBulletEngine:
             self._add_box([v / 2 for v in box.size], box.center, mass=0.0, turn=turn)
         if world.cargo is not None:
             cargo = world.cargo
-            half, center = (cargo.size / 2).tolist(), cargo.position.tolist()
-            self._cargo = self._add_box(half, center, mass=cargo.mass)
+            self._cargo = self._add_box(cargo.size / 2, cargo.position, mass=cargo.mass)
 
     def _add_box(
         self,
-        half: Sequence[float],
-        center: Sequence[float],
+        half: Sequence[float] | FloatArray,
+        center: Sequence[float] | FloatArray,
         *,
         mass: float,
         turn: Sequence[float] = (0.0, 0.0, 0.0, 1.0),

@@ -1,0 +1,66 @@
+"""Blocks a hair apart take part in the sharing of a patch."""
+
+import numpy as np
+from tests.simulation.reference_designs import beam, replayed
+
+from buildarena_simulation.engines.base import CargoBox, CargoPose, World
+from buildarena_simulation.engines.near_contacts import NearContacts
+from buildarena_simulation.machine import structure_of
+from buildarena_simulation.scenario import gap_terrain
+from buildarena_simulation.structure.clusters import find_clusters
+from buildarena_simulation.structure.contacts import ContactForces
+from buildarena_simulation.structure.motion import at_rest
+
+WORLD, CARGO = -1, -2
+
+
+def _beside(height: float, cargo_height: float, *, turn: np.ndarray | None = None) -> ContactForces:
+    """What is found for a beam over a gap of 5 whose first end block alone is in touch."""
+    structure = structure_of(replayed(beam(7)))
+    clusters = find_clusters(structure, np.ones(len(structure.members), dtype=bool))
+    box = CargoBox(size=np.array([2.5, 2.5, 1.5]), position=np.zeros(3), mass=5.0)
+    world = World(
+        structure=structure, ground=True, terrain=gap_terrain(5.0), cargo=box, gravity=1.0
+    )
+    ends = np.argsort(structure.positions[:, 1])
+    touching = ContactForces(
+        block=ends[:1],
+        other=np.array([WORLD]),
+        weight=np.ones(1),
+        normal=np.array([[0.0, 0.0, 1.0]]),
+        point=np.array([[0.0, -3.0, 5.0]]),
+        force=np.array([[0.0, 0.0, 9.0]]),
+    )
+    pose = CargoPose(
+        position=np.array([0.0, 0.0, height + 0.5 + 0.75 + cargo_height]),
+        quaternion=np.array([1.0, 0.0, 0.0, 0.0]),
+        velocity=np.zeros(3),
+    )
+    motion = at_rest(clusters, np.array([0.0, 0.0, height]), np.eye(3) if turn is None else turn)
+    found = NearContacts(world).beside(
+        touching, clusters, motion, pose, world=WORLD, cargo_number=CARGO
+    )
+    assert (found.force[1:] == 0.0).all()
+    return found
+
+
+def test_the_other_end_and_all_blocks_below_the_cargo_count_as_touching() -> None:
+    found = _beside(5.5 + 0.01, 0.01)
+    structure = structure_of(replayed(beam(7)))
+    across = np.round(structure.positions[found.block, 1]).astype(int)
+    assert sorted(across[found.other == WORLD]) == [-3, 3]
+    assert sorted(across[found.other == CARGO]) == [-1, 0, 1]
+    assert np.allclose(found.normal[found.other == CARGO], [0, 0, -1])
+    # The end blocks overhang the terrain's edge; their points lie on it.
+    assert (np.abs(found.point[found.other == WORLD, 1]) >= 2.5).all()
+
+
+def test_what_is_farther_than_a_hair_does_not() -> None:
+    found = _beside(5.5 + 0.06, 0.06)
+    assert len(found.block) == 1
+
+
+def test_what_does_not_lie_flat_does_not() -> None:
+    c, s = np.cos(0.5), np.sin(0.5)
+    rolled = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
+    assert len(_beside(5.5, 3.0, turn=rolled).block) == 1
