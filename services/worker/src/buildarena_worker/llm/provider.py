@@ -13,6 +13,7 @@ import threading
 import time
 from collections.abc import Callable, Coroutine, Mapping
 from functools import cache
+from itertools import cycle
 from typing import Any
 
 import structlog
@@ -43,6 +44,9 @@ from buildarena_worker.session_io import Answer
 
 log = structlog.get_logger(__name__)
 
+POOLS = 16
+"""Connection pools per model: a pool looks at all its connections for each request, so that many
+small ones carry hundreds of open requests at less cost than one large one."""
 OUTAGE_DELAY_S = 30.0
 """How long a job waits after its provider failed through all retries."""
 RETRIED_STATUS = frozenset({408, 409, 425, 429, 500, 502, 503, 504, 520, 522, 524, 529})
@@ -76,7 +80,9 @@ class ProviderClient:
         self._entry = entry
         self._policy = policy or RetryPolicy()
         self._wire = provider.wire
-        self._model, self._close = _make_model(entry, provider)
+        shards = [_make_model(entry, provider) for _ in range(POOLS)]
+        self._models = cycle([model for model, _ in shards])
+        self._closers = [close for _, close in shards]
         self._rng = random.Random()  # noqa: S311 - spreads retries, guards nothing
 
     def complete(self, request: Request) -> Answer:
@@ -92,7 +98,8 @@ class ProviderClient:
         """Closes the connections to the provider."""
 
         async def close() -> None:
-            await self._close()
+            for close_pool in self._closers:
+                await close_pool()
             await self._throttle.close()
 
         asyncio.run_coroutine_threadsafe(close(), _loop()).result()
@@ -128,7 +135,7 @@ class ProviderClient:
             try:
                 response = await asyncio.wait_for(
                     model_request(
-                        self._model,
+                        next(self._models),
                         to_wire(request.messages),
                         model_settings=self._settings(request),
                         model_request_parameters=request_parameters(request.tools),
