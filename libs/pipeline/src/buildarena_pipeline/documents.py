@@ -6,8 +6,6 @@ import json
 
 from buildarena_geometry import Machine
 
-MACHINE_TYPE = "application/json"
-
 
 def machine_bytes(machine: Machine) -> bytes:
     """The machine's document with sorted keys and no spaces, as UTF-8."""

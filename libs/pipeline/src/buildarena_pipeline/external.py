@@ -9,20 +9,18 @@ from collections.abc import Mapping, Sequence
 from threading import Lock
 from typing import Any
 
-from buildarena_benchmark import broken_constraint, builtin_tasks, failed_score
-from buildarena_geometry import Machine
+from buildarena_benchmark import broken_constraint, builtin_tasks
 from buildarena_pipeline.context import Context
 from buildarena_pipeline.documents import machine_bytes
 from buildarena_pipeline.errors import FieldError, PipelineError, SubmissionError
 from buildarena_pipeline.queues import simulate_queue
-from buildarena_pipeline.scoring import job_manifest, task_of
+from buildarena_pipeline.scoring import failure_score, task_of
 from buildarena_pipeline.tracks import SIMULATORS, external_track
 from buildarena_pipeline.workbench import Workbench, rebuild
 from buildarena_store import (
     ExternalCall,
     Job,
     JobKey,
-    JobScore,
     Lease,
     NewJob,
     RolloutRequest,
@@ -131,7 +129,10 @@ class ExternalSessions:
             refusals = dict(Counter(c.reason or "refused" for c in calls if not c.ok))
             broken = broken_constraint(task_of(job), machine)
             if broken is not None:
-                score = _failure(job, machine, *broken)
+                reason, detail = broken
+                score = failure_score(
+                    job, machine, outcome="construction_failed", reason=reason, detail=detail
+                )
                 context.results.finish(lease, score, connection=connection, refusals=refusals)
             else:
                 engine = str(job.track_config["simulator"])
@@ -191,20 +192,6 @@ def _check(task: str, agent: str, simulator: str) -> None:
 
 def _unknown(field: str, value: str, choices: Sequence[str]) -> FieldError:
     return FieldError(field=field, message=f"there is no {field} {value!r}", choices=choices)
-
-
-def _failure(job: Job, machine: Machine, reason: str, detail: str) -> JobScore:
-    failed = failed_score(task_of(job), machine)
-    return JobScore(
-        outcome="construction_failed",
-        success=False,
-        indicator=failed.indicator,
-        metrics=failed.metrics,
-        flags=failed.flags,
-        reason=reason,
-        detail=detail,
-        manifest=job_manifest(job, None),
-    )
 
 
 def _transcript(calls: Sequence[ExternalCall]) -> bytes:

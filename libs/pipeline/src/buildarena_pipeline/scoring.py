@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from buildarena_benchmark import Task, builtin_tasks
-from buildarena_geometry import DOCUMENT_VERSION
+from buildarena_benchmark import Task, builtin_tasks, failed_score
+from buildarena_geometry import DOCUMENT_VERSION, Machine
 from buildarena_geometry import __version__ as geometry_version
 from buildarena_pipeline import __version__
 from buildarena_pipeline.errors import PermanentFaultError
@@ -44,6 +44,31 @@ def rollout_score(job: Job, record: RolloutRecord) -> JobScore:
         metrics=record.metrics or {},
         flags=record.flags or (),
         manifest=job_manifest(job, record),
+    )
+
+
+def failure_score(
+    job: Job, machine: Machine | None, *, outcome: str, reason: str, detail: str
+) -> JobScore:
+    """The score of a job that ended without a rollout.
+
+    Args:
+        job: The job.
+        machine: What was built, if anything: its parts are counted.
+        outcome: ``construction_failed`` or ``limit``.
+        reason: Class of the failure.
+        detail: A sentence for people.
+    """
+    failed = failed_score(task_of(job), machine)
+    return JobScore(
+        outcome=outcome,
+        success=failed.success,
+        indicator=failed.indicator,
+        metrics=failed.metrics,
+        flags=failed.flags,
+        reason=reason,
+        detail=detail,
+        manifest=job_manifest(job, None),
     )
 
 

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from buildarena_benchmark import failed_score
 from buildarena_pipeline.context import Context
 from buildarena_pipeline.documents import machine_bytes
 from buildarena_pipeline.errors import PermanentFaultError, StartupError
 from buildarena_pipeline.models import ModelRegistry
 from buildarena_pipeline.prompt_packs import PromptPack, PromptPacks
 from buildarena_pipeline.queues import simulate_queue
-from buildarena_pipeline.scoring import job_manifest, rollout_score, task_of
+from buildarena_pipeline.scoring import failure_score, rollout_score, task_of
 from buildarena_simulation import Trajectory
 from buildarena_store import (
     Job,
@@ -121,16 +120,8 @@ class ConstructHandler:
 
     def _fail(self, lease: Lease, session: Session, outcome: str, reason: str, detail: str) -> None:
         """Scores a session that ended without a simulation; what it built is kept."""
-        failed = failed_score(session.task, session.machine)
-        score = JobScore(
-            outcome=outcome,
-            success=False,
-            indicator=failed.indicator,
-            metrics=failed.metrics,
-            flags=failed.flags,
-            reason=reason,
-            detail=detail,
-            manifest=job_manifest(lease.job, None),
+        score = failure_score(
+            lease.job, session.machine, outcome=outcome, reason=reason, detail=detail
         )
         self._write_end(lease, session, score)
 
