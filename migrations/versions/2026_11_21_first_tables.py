@@ -12,23 +12,6 @@ depends_on = None
 
 def upgrade() -> None:
     op.create_table(
-        "api_keys",
-        sa.Column("id", sa.Text(), nullable=False),
-        sa.Column("name", sa.Text(), nullable=False),
-        sa.Column("digest", sa.LargeBinary(), nullable=False),
-        sa.Column("scopes", postgresql.JSONB(astext_type=sa.Text()), nullable=False),
-        sa.Column(
-            "created_at",
-            sa.DateTime(timezone=True),
-            server_default=sa.text("clock_timestamp()"),
-            nullable=False,
-        ),
-        sa.Column("expires_at", sa.DateTime(timezone=True), nullable=True),
-        sa.Column("revoked_at", sa.DateTime(timezone=True), nullable=True),
-        sa.PrimaryKeyConstraint("id", name=op.f("pk_api_keys")),
-        sa.UniqueConstraint("digest", name=op.f("uq_api_keys_digest")),
-    )
-    op.create_table(
         "artifacts",
         sa.Column("hash", sa.Text(), nullable=False),
         sa.Column("media_type", sa.Text(), nullable=False),
@@ -171,20 +154,6 @@ def upgrade() -> None:
         ),
         sa.PrimaryKeyConstraint("id", name=op.f("pk_sweeps")),
         sa.UniqueConstraint("request_key", name=op.f("uq_sweeps_request_key")),
-    )
-    op.create_table(
-        "tasks",
-        sa.Column("name", sa.Text(), nullable=False),
-        sa.Column("version", sa.Text(), nullable=False),
-        sa.Column("document", sa.Text(), nullable=False),
-        sa.Column("owner", sa.Text(), nullable=True),
-        sa.Column(
-            "created_at",
-            sa.DateTime(timezone=True),
-            server_default=sa.text("clock_timestamp()"),
-            nullable=False,
-        ),
-        sa.PrimaryKeyConstraint("name", "version", name=op.f("pk_tasks")),
     )
     op.create_table(
         "workers",
@@ -353,7 +322,6 @@ def downgrade() -> None:
     op.drop_table("external_calls")
     op.drop_table("attempts")
     op.drop_table("workers")
-    op.drop_table("tasks")
     op.drop_table("sweeps")
     op.drop_index(
         "ix_jobs_waiting", table_name="jobs", postgresql_where=sa.text("state = 'queued'")
@@ -373,4 +341,3 @@ def downgrade() -> None:
     op.drop_index("ix_events_job", table_name="events")
     op.drop_table("events")
     op.drop_table("artifacts")
-    op.drop_table("api_keys")

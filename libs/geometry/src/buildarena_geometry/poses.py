@@ -134,9 +134,6 @@ class Pose:
         return _pose(add(self.xyz, offset), self.wxyz)
 
 
-IDENTITY = Pose()
-
-
 def _pose(xyz: Vector, wxyz: Quaternion) -> Pose:
     """A pose of parts known to be good: the constructor's checks would cost more than the sums."""
     pose = object.__new__(Pose)

@@ -12,7 +12,6 @@ from sqlalchemy import (
     Identity,
     Index,
     Integer,
-    LargeBinary,
     MetaData,
     Numeric,
     Table,
@@ -251,16 +250,6 @@ board_changes = Table(
 Index("ix_board_changes_transaction", board_changes.c.transaction)
 Index("ix_board_changes_track", board_changes.c.track, board_changes.c.id)
 
-tasks = Table(
-    "tasks",
-    metadata,
-    Column("name", Text, primary_key=True),
-    Column("version", Text, primary_key=True),
-    Column("document", Text, nullable=False),
-    Column("owner", Text),
-    _time("created_at", now=True),
-)
-
 events = Table(
     "events",
     metadata,
@@ -286,16 +275,4 @@ workers = Table(
     _time("started_at", now=True),
     _time("seen_at", now=True),
     Column("peak_memory_bytes", BigInteger),
-)
-
-api_keys = Table(
-    "api_keys",
-    metadata,
-    Column("id", Text, primary_key=True),
-    Column("name", Text, nullable=False),
-    Column("digest", LargeBinary, nullable=False, unique=True),
-    Column("scopes", JSONB, nullable=False),
-    _time("created_at", now=True),
-    _time("expires_at"),
-    _time("revoked_at"),
 )

@@ -25,10 +25,6 @@ class Motion:
     velocity: FloatArray
     spin: FloatArray
 
-    def block_positions(self, structure: Structure, clusters: Clusters) -> FloatArray:
-        """Centres of mass of all blocks without connectors, (N, 3), world frame, units."""
-        return self.points(clusters, structure.positions)
-
     def points(self, clusters: Clusters, points: FloatArray) -> FloatArray:
         """World position of one machine-frame point per block, (N, 3)."""
         c = clusters.cluster_of
