@@ -59,6 +59,9 @@ jobs = Table(
     Column("track_config", JSONB, nullable=False),
     Column("seed", BigInteger, nullable=False),
     Column("limits", JSONB, nullable=False, server_default=text("'{}'::jsonb")),
+    # Whose it is: the API key that submitted it, and the sweep whose budget pays for it.
+    Column("owner", Text),
+    Column("payer", Text),
     # Where it is.
     Column("stage", Text, nullable=False),
     Column("queue", Text, nullable=False),
@@ -108,6 +111,8 @@ Index(
 Index("ix_jobs_leased", jobs.c.lease_expires_at, postgresql_where=jobs.c.state == "running")
 Index("ix_jobs_board", jobs.c.track, jobs.c.task, jobs.c.model)
 Index("ix_jobs_newest", jobs.c.created_at.desc(), jobs.c.id)
+Index("ix_jobs_payer", jobs.c.payer, postgresql_where=jobs.c.state != "done")
+Index("ix_jobs_owner", jobs.c.owner, postgresql_where=jobs.c.state != "done")
 
 sweeps = Table(
     "sweeps",
@@ -128,6 +133,54 @@ sweep_jobs = Table(
     Column("sweep_id", Text, ForeignKey("sweeps.id", ondelete="CASCADE"), primary_key=True),
     Column("job_id", Text, ForeignKey("jobs.id"), primary_key=True),
     Index("ix_sweep_jobs_job", "job_id"),
+)
+
+tasks = Table(
+    "tasks",
+    metadata,
+    Column("name", Text, primary_key=True),
+    Column("version", Text, primary_key=True),
+    Column("document", Text, nullable=False),
+    Column("owner", Text),
+    _time("created_at", now=True),
+)
+
+api_keys = Table(
+    "api_keys",
+    metadata,
+    Column("id", Text, primary_key=True),
+    Column("name", Text, nullable=False),
+    Column("secret_hash", Text, nullable=False, unique=True),
+    Column("scopes", JSONB, nullable=False),
+    _time("created_at", now=True),
+    _time("expires_at"),
+    _time("revoked_at"),
+    _time("used_at"),
+)
+
+# A row's id is that of the sweep or key whose budget it is.
+budgets = Table(
+    "budgets",
+    metadata,
+    Column("id", Text, primary_key=True),
+    Column("max_cost_usd", Numeric(14, 6)),
+    Column("max_tokens", BigInteger),
+    Column("max_requests", BigInteger),
+    Column("spent_cost_usd", Numeric(14, 6), nullable=False, server_default=text("0")),
+    _count("spent_tokens"),
+    _count("spent_requests"),
+)
+
+# What one open model request may cost: a job has one at a time.
+reservations = Table(
+    "reservations",
+    metadata,
+    Column("job_id", Text, ForeignKey("jobs.id"), primary_key=True),
+    Column("budget_id", Text, ForeignKey("budgets.id", ondelete="CASCADE"), primary_key=True),
+    Column("token", BigInteger, nullable=False),
+    Column("cost_usd", Numeric(14, 6), nullable=False),
+    Column("tokens", BigInteger, nullable=False),
+    Index("ix_reservations_budget", "budget_id"),
 )
 
 attempts = Table(
