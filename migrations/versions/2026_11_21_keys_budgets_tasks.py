@@ -26,6 +26,8 @@ def upgrade() -> None:
     op.add_column("jobs", sa.Column("payer", sa.Text(), nullable=True))
     op.create_index("ix_jobs_payer", "jobs", ["payer"], postgresql_where=NOT_DONE)
     op.create_index("ix_jobs_owner", "jobs", ["owner"], postgresql_where=NOT_DONE)
+    op.add_column("sweeps", sa.Column("jobs_hash", sa.Text(), nullable=True))
+    op.create_index(op.f("ix_sweeps_jobs_hash"), "sweeps", ["jobs_hash"])
     op.create_table(
         "tasks",
         sa.Column("name", sa.Text(), nullable=False),
@@ -83,5 +85,7 @@ def downgrade() -> None:
         op.drop_table(table)
     op.drop_index("ix_jobs_owner", "jobs")
     op.drop_index("ix_jobs_payer", "jobs")
+    op.drop_index(op.f("ix_sweeps_jobs_hash"), "sweeps")
+    op.drop_column("sweeps", "jobs_hash")
     op.drop_column("jobs", "payer")
     op.drop_column("jobs", "owner")

@@ -45,14 +45,14 @@ def test_a_cancelled_job_is_opened_again_when_it_is_wanted_again(context, new_jo
 def test_only_errored_jobs_are_retried(context: Context, add) -> None:
     (job_id,) = add(1)
     with context.database.transaction() as connection:
-        assert not context.jobs.retry(job_id, connection=connection)
+        assert not context.jobs.retry([job_id], connection=connection)
     lease = context.leases.claim("construct", owner="w")
     assert lease is not None
     with context.database.transaction() as connection:
         context.leases.give_up(lease, "no key", reason="missing_key", connection=connection)
     assert context.jobs.get(job_id).outcome == "errored"
     with context.database.transaction() as connection:
-        assert context.jobs.retry(job_id, connection=connection)
+        assert context.jobs.retry([job_id], connection=connection)
     assert context.jobs.get(job_id).state == "queued"
 
 

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 from buildarena_pipeline.queues import Queues
 from buildarena_pipeline.settings import Settings
 from buildarena_store import (
+    ApiKeys,
     ArtifactStore,
+    Budgets,
     Database,
     Events,
     ExternalCalls,
@@ -40,6 +42,8 @@ class Context:
     workers: Workers
     verifications: Verifications
     external: ExternalCalls
+    keys: ApiKeys
+    budgets: Budgets
 
     def close(self) -> None:
         """Closes the connections."""
@@ -66,4 +70,6 @@ def open_context(settings: Settings, *, pool_size: int = 5) -> Context:
         workers=Workers(database),
         verifications=Verifications(database),
         external=ExternalCalls(database),
+        keys=ApiKeys(database),
+        budgets=Budgets(database),
     )

@@ -54,8 +54,10 @@ class ExternalSessions:
         self._benches: OrderedDict[tuple[str, int], Workbench] = OrderedDict()
         self._guard = Lock()
 
-    def open(self, *, task: str, agent: str, seed: int, simulator: str) -> Job:
-        """Opens a session for one task.
+    def open(
+        self, *, task: str, agent: str, seed: int, simulator: str, owner: str | None = None
+    ) -> Job:
+        """Opens a session for one task, which belongs to the key that opened it.
 
         Raises:
             SubmissionError: Something is unknown, or this agent played this seed already.
@@ -75,6 +77,7 @@ class ExternalSessions:
             model=f"agent/{agent}",
             model_config=config,
             track_config=track.as_config(),
+            owner=owner,
         )
         with self._context.database.transaction() as connection:
             self._context.jobs.add([new], connection=connection)

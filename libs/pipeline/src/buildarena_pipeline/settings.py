@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import Field
+from pydantic import Field, SecretStr
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 DEFAULT_PORT = 8321
@@ -30,6 +30,14 @@ class Settings(BaseSettings):
     ] = None
     host: Annotated[str, Field(description="Address the API binds to")] = "127.0.0.1"
     port: Annotated[int, Field(description="Port of the API", ge=0, le=65535)] = DEFAULT_PORT
+    require_keys: Annotated[bool, Field(description="Whether requests need an API key")] = False
+    admin_key: Annotated[
+        SecretStr | None,
+        Field(description="Secret of the operator's own key, with which others are made"),
+    ] = None
+    rate_limit: Annotated[
+        str, Field(description="Requests a caller may send, for example 600/minute")
+    ] = "6000/minute"
     models_file: Annotated[
         Path | None, Field(description="YAML of further models, added to the built-in registry")
     ] = None

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from decimal import Decimal
 from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, StrictInt, model_validator
+
+from buildarena_store import BudgetLimits
 
 MAX_SEED = 2**53 - 1
 """Largest seed: every JSON reader keeps integers up to here exact."""
@@ -32,6 +35,27 @@ class Limits(BaseModel):
     max_tokens: Annotated[int | None, Field(ge=1, description="Input and output together")] = None
     max_cost_usd: Annotated[float | None, Field(gt=0)] = None
     max_seconds: Annotated[float | None, Field(gt=0)] = None
+
+
+class Budget(BaseModel):
+    """What all jobs of a sweep, or of a key, may spend together; then nothing new starts."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    max_cost_usd: Annotated[float | None, Field(gt=0, le=10_000_000)] = None
+    max_tokens: Annotated[
+        int | None, Field(ge=1, le=MAX_SEED, description="Input and output together")
+    ] = None
+    max_requests: Annotated[int | None, Field(ge=1, le=MAX_SEED)] = None
+
+    def as_limits(self) -> BudgetLimits:
+        """The form that the store keeps."""
+        cost = self.max_cost_usd
+        return BudgetLimits(
+            max_cost_usd=None if cost is None else Decimal(str(cost)),
+            max_tokens=self.max_tokens,
+            max_requests=self.max_requests,
+        )
 
 
 class ClosedLoop(BaseModel):
@@ -77,6 +101,7 @@ class SweepSpec(_Variant):
     samples: Annotated[
         StrictInt | None, Field(ge=1, le=100_000, description="Seeds 0 … samples-1")
     ] = None
+    budget: Budget | None = None
 
     @model_validator(mode="before")
     @classmethod

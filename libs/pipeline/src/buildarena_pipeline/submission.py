@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from buildarena_benchmark import builtin_tasks
@@ -14,7 +14,7 @@ from buildarena_pipeline.extensions import workflow_sources
 from buildarena_pipeline.models import ModelRegistry
 from buildarena_pipeline.prompt_packs import PromptPacks
 from buildarena_pipeline.queues import CONSTRUCT
-from buildarena_pipeline.specs import Decoding, JobSpec, SweepSpec
+from buildarena_pipeline.specs import Budget, Decoding, JobSpec, SweepSpec
 from buildarena_pipeline.sweeper import announce_waiting
 from buildarena_pipeline.tracks import SIMULATORS, make_track
 from buildarena_store import Job, JobKey, NewJob, NewSweep, Sweep
@@ -29,11 +29,13 @@ class Submitted:
         sweep: The sweep.
         jobs: How many jobs it has.
         added: How many of them are new; the others were there before.
+        taken_up: Whether an earlier submission of the same jobs goes on.
     """
 
     sweep: Sweep
     jobs: int
     added: int
+    taken_up: bool = False
 
 
 class Submissions:
@@ -50,8 +52,12 @@ class Submissions:
         self._packs = PromptPacks(context.settings.prompt_packs)
         self._workflows = workflow_sources(context.settings.workflows)
 
-    def submit_job(self, spec: JobSpec) -> tuple[Job, bool]:
+    def submit_job(self, spec: JobSpec, *, owner: str | None = None) -> tuple[Job, bool]:
         """Stores a job and announces it.
+
+        Args:
+            spec: The job.
+            owner: Id of the API key that submits it, if any.
 
         Returns:
             The job, and whether it is new: an equal job is never done twice.
@@ -68,20 +74,41 @@ class Submissions:
             ),
             fields={"tasks[0]": "task", "models[0]": "model"},
         )
+        own = [replace(job, owner=owner) for job in new]
         with self._context.database.transaction() as connection:
-            added = self._context.jobs.add(new, connection=connection)
+            added = self._context.jobs.add(own, connection=connection)
         announce_waiting(self._context, CONSTRUCT)
         return self._context.jobs.get(new[0].key.job_id), added > 0
 
     def submit_sweep(
-        self, spec: SweepSpec, *, owner: str | None = None, request_key: str | None = None
+        self,
+        spec: SweepSpec,
+        *,
+        owner: str | None = None,
+        request_key: str | None = None,
+        take_up: bool = False,
     ) -> Submitted:
         """Stores a sweep with its jobs and announces them.
+
+        Args:
+            spec: The sweep.
+            owner: Id of the API key that submits it, if any.
+            request_key: Idempotency key, if any.
+            take_up: Whether the owner's earlier sweep of just these jobs, if there is one, goes
+                on with this one's budget, instead of a further sweep being stored.
 
         Raises:
             SubmissionError: Something of it is unknown; nothing was stored.
         """
         new = self.plan(spec)
+        job_ids = [job.key.job_id for job in new]
+        jobs_hash = content_hash(sorted(job_ids))
+        if take_up:
+            before = self._context.sweeps.with_jobs(jobs_hash, owner=owner)
+            if before is not None:
+                self.resume(before, spec.budget)
+                found = self._context.sweeps.get(before.id)
+                return Submitted(sweep=found, jobs=len(new), added=0, taken_up=True)
         sweep = NewSweep(
             id=new_id("sweep"),
             name=spec.name,
@@ -89,12 +116,25 @@ class Submissions:
             owner=owner,
             request_key=request_key,
             request_hash=spec_hash(spec),
+            jobs_hash=jobs_hash,
         )
+        own = [replace(job, owner=owner, payer=sweep.id) for job in new]
         with self._context.database.transaction() as connection:
-            added = self._context.jobs.add(new, connection=connection)
-            self._context.sweeps.add(sweep, [job.key.job_id for job in new], connection=connection)
+            if spec.budget is not None:
+                self._context.budgets.set(sweep.id, spec.budget.as_limits(), connection=connection)
+            added = self._context.jobs.add(own, connection=connection)
+            self._context.sweeps.add(sweep, job_ids, connection=connection)
         announce_waiting(self._context, CONSTRUCT)
         return Submitted(sweep=self._context.sweeps.get(sweep.id), jobs=len(new), added=added)
+
+    def resume(self, sweep: Sweep, budget: Budget | None) -> None:
+        """Lets a sweep go on, with another budget if one is given."""
+        with self._context.database.transaction() as connection:
+            if budget is not None:
+                self._context.budgets.set(sweep.id, budget.as_limits(), connection=connection)
+            if sweep.state != "active":
+                self._context.sweeps.resume(sweep.id, connection=connection)
+        announce_waiting(self._context, CONSTRUCT)
 
     def estimate(self, spec: SweepSpec) -> SweepEstimate:
         """What a sweep would use, without storing anything.

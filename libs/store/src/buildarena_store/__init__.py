@@ -6,6 +6,7 @@ Rows leave this room as frozen dataclasses, never as database objects.
 
 from buildarena_store.artifacts import ArtifactInfo, ArtifactStore
 from buildarena_store.boards import BoardChange, BoardFeed, Boards, Round
+from buildarena_store.budgets import Budget, BudgetLimits, Budgets, Need, Shortage
 from buildarena_store.database import Database
 from buildarena_store.errors import (
     ArtifactMissingError,
@@ -18,6 +19,7 @@ from buildarena_store.events import Event, Events
 from buildarena_store.external import ExternalCall, ExternalCalls
 from buildarena_store.jobs import Job, JobKey, Jobs, NewJob
 from buildarena_store.journal import Journal, JournalEntry, Usage
+from buildarena_store.keys import ApiKey, ApiKeys, KeyCheck
 from buildarena_store.leases import Lease, Leases
 from buildarena_store.results import JobScore, Results
 from buildarena_store.rollouts import RolloutRecord, RolloutRequest, Rollouts
@@ -27,12 +29,17 @@ from buildarena_store.verifications import Verification, Verifications
 from buildarena_store.workers import WorkerInfo, Workers
 
 __all__ = [
+    "ApiKey",
+    "ApiKeys",
     "ArtifactInfo",
     "ArtifactMissingError",
     "ArtifactStore",
     "BoardChange",
     "BoardFeed",
     "Boards",
+    "Budget",
+    "BudgetLimits",
+    "Budgets",
     "Database",
     "Event",
     "Events",
@@ -44,8 +51,10 @@ __all__ = [
     "Jobs",
     "Journal",
     "JournalEntry",
+    "KeyCheck",
     "Lease",
     "Leases",
+    "Need",
     "NewJob",
     "NewSweep",
     "Results",
@@ -54,6 +63,7 @@ __all__ = [
     "Rollouts",
     "Round",
     "SchemaVersionError",
+    "Shortage",
     "StaleLeaseError",
     "StoreError",
     "Sweep",

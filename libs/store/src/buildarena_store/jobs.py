@@ -15,10 +15,11 @@ from buildarena_store import events
 from buildarena_store.database import Database
 from buildarena_store.errors import UnknownIdError
 from buildarena_store.ids import content_hash
+from buildarena_store.reservations import release
 from buildarena_store.tables import attempts, job_artifacts, jobs, sweep_jobs
 
 INSERT_CHUNK = 1000
-"""Rows per INSERT: 13 columns each stay far below Postgres' 65,535 parameters."""
+"""Rows per INSERT: 15 columns each stay far below Postgres' 65,535 parameters."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,6 +57,8 @@ class NewJob:
         model_config: The model's configuration, whose hash is in the key.
         track_config: The track's parts, whose spelling is in the key.
         limits: Token, request, cost and time limits of its session.
+        owner: Id of the API key that submits it, if any.
+        payer: Id of the sweep whose budget pays for it, if any.
     """
 
     key: JobKey
@@ -63,6 +66,8 @@ class NewJob:
     model_config: Mapping[str, Any]
     track_config: Mapping[str, Any]
     limits: Mapping[str, Any] = field(default_factory=dict)
+    owner: str | None = None
+    payer: str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -79,6 +84,8 @@ class Job:
     track_config: Mapping[str, Any]
     seed: int
     limits: Mapping[str, Any]
+    owner: str | None
+    payer: str | None
     stage: str
     queue: str
     state: str
@@ -137,7 +144,8 @@ class Jobs:
     def add(self, new: Sequence[NewJob], *, connection: Connection) -> int:
         """Adds the jobs that do not exist yet; the others stay as they are.
 
-        A job that was cancelled before is opened again, because somebody wants it now.
+        A job that was cancelled or held before is opened again, because somebody wants it now,
+        who pays for the rest of it.
 
         Returns:
             How many were added or opened again.
@@ -147,16 +155,17 @@ class Jobs:
             rows = [_new_row(job) for job in new[start : start + INSERT_CHUNK]]
             statement = insert(jobs).values(rows).on_conflict_do_nothing().returning(jobs.c.id)
             ids = [row.id for row in connection.execute(statement)]
-            ids += self._reopen([row["id"] for row in rows], connection)
+            ids += self._reopen(new[start : start + INSERT_CHUNK], connection)
             events.record_jobs(connection, ids, "queued", {"stage": "construct"})
             added += len(ids)
         return added
 
-    def _reopen(self, ids: Sequence[str], connection: Connection) -> list[str]:
+    def _reopen(self, wanted: Sequence[NewJob], connection: Connection) -> list[str]:
+        ids = [job.key.job_id for job in wanted]
         again = connection.execute(
             update(jobs)
-            .where(jobs.c.id.in_(ids), jobs.c.outcome == "cancelled")
-            .values(**REOPENED)
+            .where(jobs.c.id.in_(ids), (jobs.c.outcome == "cancelled") | (jobs.c.state == "held"))
+            .values(**REOPENED, owner=wanted[0].owner, payer=wanted[0].payer)
             .returning(jobs.c.id)
         )
         return [row.id for row in again]
@@ -246,25 +255,25 @@ class Jobs:
             .returning(jobs.c.id)
         )
         cancelled = [row.id for row in rows]
+        release(cancelled, connection=connection)
         events.record_jobs(connection, cancelled, "done", {"outcome": "cancelled"})
         return cancelled
 
-    def retry(self, job_id: str, *, connection: Connection) -> bool:
-        """Queues an errored job again at the stage where it failed; never re-rolls a score.
+    def retry(self, ids: Sequence[str], *, connection: Connection) -> list[str]:
+        """Queues errored jobs again at the stage where they failed; never re-rolls a score.
 
         Returns:
-            False when the job has not errored.
+            The ids that were queued: those that had errored.
         """
-        row = connection.execute(
+        rows = connection.execute(
             update(jobs)
-            .where(jobs.c.id == job_id, jobs.c.outcome == "errored")
+            .where(jobs.c.id.in_(ids), jobs.c.outcome == "errored")
             .values(**REOPENED)
             .returning(jobs.c.id)
-        ).first()
-        if row is None:
-            return False
-        events.record_jobs(connection, [job_id], "queued", {"why": "retry"})
-        return True
+        )
+        queued = [row.id for row in rows]
+        events.record_jobs(connection, queued, "queued", {"why": "retry"})
+        return queued
 
 
 REOPENED: dict[str, Any] = {
@@ -292,6 +301,8 @@ def _new_row(job: NewJob) -> dict[str, Any]:
         "track_config": dict(job.track_config),
         "seed": key.seed,
         "limits": dict(job.limits),
+        "owner": job.owner,
+        "payer": job.payer,
         "stage": "construct",
         "queue": "construct",
         "state": "queued",

@@ -90,7 +90,18 @@ _APPEND = text(
             cost_usd = cost_usd + :cost_usd,
             faults = 0
         WHERE id = :job_id AND lease_token = :token AND state = 'running'
-        RETURNING id
+        RETURNING id, payer, owner
+    ), settled AS (
+        DELETE FROM reservations USING held WHERE reservations.job_id = held.id
+    ), paying AS (
+        SELECT budgets.id FROM budgets JOIN held ON budgets.id IN (held.payer, held.owner)
+        ORDER BY budgets.id FOR UPDATE OF budgets
+    ), charged AS (
+        UPDATE budgets SET
+            spent_cost_usd = spent_cost_usd + :cost_usd,
+            spent_tokens = spent_tokens + :input_tokens + :output_tokens,
+            spent_requests = spent_requests + :requests
+        FROM paying WHERE budgets.id = paying.id
     )
     INSERT INTO journal (
         job_id, sequence, token, stage, role, request_hash, reply, input_tokens, output_tokens,
@@ -112,7 +123,7 @@ class Journal:
         self._database = database
 
     def append(self, lease: Lease, entry: JournalEntry) -> None:
-        """Writes a reply and adds its usage to the job, both or neither.
+        """Writes a reply and charges its usage to the job and its budgets, all or nothing.
 
         A job that gets on is not given up for the faults it met before.
 

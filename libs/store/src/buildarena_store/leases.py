@@ -28,6 +28,7 @@ from buildarena_store import events
 from buildarena_store.database import Database
 from buildarena_store.errors import StaleLeaseError
 from buildarena_store.jobs import JOB_COLUMNS, Job, job_from_row
+from buildarena_store.reservations import release
 from buildarena_store.tables import attempts, jobs
 
 RENUDGE_AFTER = timedelta(seconds=10)
@@ -172,6 +173,7 @@ class Leases:
         )
         if changed.rowcount != 1:
             raise StaleLeaseError(lease.job.id, lease.token)
+        release([lease.job.id], connection=connection)
         _end_attempt(connection, lease.job.id, lease.token, result, note)
         shown = {name: values[name] for name in ("stage", "outcome", "reason") if values.get(name)}
         events.record_jobs(connection, [lease.job.id], str(values["state"]), shown)
@@ -278,6 +280,7 @@ class Leases:
                 )
                 .returning(jobs.c.id, jobs.c.state, jobs.c.lease_token, jobs.c.stage)
             ).all()
+            release([row.id for row in rows], connection=connection)
             for row in rows:
                 _end_attempt(connection, row.id, row.lease_token, "lost", "no heartbeat came")
                 shown: Mapping[str, str] = {"stage": row.stage, "why": "lost worker"}

@@ -29,6 +29,7 @@ class NewSweep:
         owner: Id of the API key that submitted it, if any.
         request_key: Idempotency key of the submission, if any.
         request_hash: Content hash of the submission.
+        jobs_hash: Content hash of its jobs' ids.
     """
 
     id: str
@@ -37,6 +38,7 @@ class NewSweep:
     owner: str | None = None
     request_key: str | None = None
     request_hash: str | None = None
+    jobs_hash: str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,6 +99,7 @@ class Sweeps:
                 owner=sweep.owner,
                 request_key=sweep.request_key,
                 request_hash=sweep.request_hash,
+                jobs_hash=sweep.jobs_hash,
             )
         )
         for start in range(0, len(job_ids), INSERT_CHUNK):
@@ -120,6 +123,22 @@ class Sweeps:
     def by_request_key(self, request_key: str) -> Sweep | None:
         """The sweep that was submitted with this idempotency key, if any."""
         return self._find(sweeps.c.request_key == request_key)
+
+    def with_jobs(self, jobs_hash: str, *, owner: str | None) -> Sweep | None:
+        """An owner's newest sweep of just these jobs that was not cancelled, if any."""
+        query = (
+            select(sweeps.c.id)
+            .where(
+                sweeps.c.jobs_hash == jobs_hash,
+                sweeps.c.owner.is_not_distinct_from(owner),
+                sweeps.c.state != "cancelled",
+            )
+            .order_by(sweeps.c.created_at.desc())
+            .limit(1)
+        )
+        with self._database.transaction() as connection:
+            found = connection.execute(query).scalar()
+        return None if found is None else self.get(found)
 
     def _find(self, condition: Any) -> Sweep | None:
         columns = [sweeps.c[name] for name in Sweep.__dataclass_fields__]
@@ -191,9 +210,10 @@ class Sweeps:
         """Keeps waiting jobs from being taken, unless another active sweep wants them."""
         self._move(sweep_id, "queued", "held", connection)
 
-    def release(self, sweep_id: str, *, connection: Connection) -> None:
-        """Lets the sweep's held jobs be taken again."""
+    def resume(self, sweep_id: str, *, connection: Connection) -> None:
+        """Lets a paused or stopped sweep go on, and its held jobs be taken again."""
         self._move(sweep_id, "held", "queued", connection)
+        self.set_state(sweep_id, "active", connection=connection)
 
     def _move(self, sweep_id: str, before: str, after: str, connection: Connection) -> None:
         own = self.own_jobs(sweep_id, connection=connection)

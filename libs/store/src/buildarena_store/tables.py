@@ -124,6 +124,7 @@ sweeps = Table(
     Column("owner", Text),
     Column("request_key", Text, unique=True),
     Column("request_hash", Text),
+    Column("jobs_hash", Text, index=True),
     _time("created_at", now=True),
 )
 

@@ -6,6 +6,7 @@ import sys
 
 import uvicorn
 
+from buildarena_api.access import check_binding
 from buildarena_api.app import create_app
 from buildarena_pipeline.context import open_context
 from buildarena_pipeline.errors import StartupError
@@ -22,6 +23,7 @@ def main() -> None:
     settings = Settings()
     set_up_logs(settings.log_level)
     try:
+        check_binding(settings)
         registry = load_registry(settings.models_file)
         context = open_context(settings, pool_size=POOL_SIZE)
         context.database.require_schema()

@@ -5,23 +5,26 @@ from __future__ import annotations
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
-from fastapi import FastAPI
+from fastapi import Depends, FastAPI
 from fastapi_offline import FastAPIOffline
 
 from buildarena_api import (
     catalogue,
     health,
     jobs,
+    keys,
     leaderboard,
     sessions,
     streams,
     sweeps,
     verifications,
 )
+from buildarena_api.access import caller_of
 from buildarena_api.board_cache import BoardCache
 from buildarena_api.event_hub import EventHub
 from buildarena_api.guards import Guards
-from buildarena_api.problems import add_problem_handlers
+from buildarena_api.problems import add_problem_handlers, problem_responses
+from buildarena_api.rate_limits import RateLimits
 from buildarena_pipeline import __version__
 from buildarena_pipeline.context import Context
 from buildarena_pipeline.external import ExternalSessions
@@ -66,7 +69,15 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
     app.state.boards = BoardCache(context.results.boards)
     app.state.submissions = Submissions(context, registry)
     app.state.external = ExternalSessions(context)
+    app.state.rate_limits = RateLimits(
+        context.settings.required_broker_url(), context.settings.rate_limit
+    )
     add_problem_handlers(app)
-    for room in (verifications, sessions, streams, jobs, sweeps, leaderboard, catalogue, health):
-        app.include_router(room.router)
+    app.include_router(health.router)
+    for room in (verifications, sessions, streams, jobs, sweeps, leaderboard, catalogue, keys):
+        app.include_router(
+            room.router,
+            dependencies=[Depends(caller_of)],
+            responses=problem_responses(401, 403, 429),
+        )
     return app

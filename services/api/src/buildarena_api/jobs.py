@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Query, Response
 
 from buildarena_api import cursors
+from buildarena_api.access import CallerDep
 from buildarena_api.dependencies import ContextDep, SubmissionsDep
 from buildarena_api.problems import ProblemError, problem_responses
 from buildarena_api.schemas import AttemptView, JobDetail, JobPage, JobView
@@ -24,9 +25,11 @@ ARTIFACT_TYPES = {
 
 
 @router.post("", status_code=202, responses=problem_responses(422, 503))
-def submit_job(spec: JobSpec, response: Response, submissions: SubmissionsDep) -> JobView:
+def submit_job(
+    spec: JobSpec, response: Response, submissions: SubmissionsDep, caller: CallerDep
+) -> JobView:
     """Submits one job. An equal job that exists already is returned as it is, never redone."""
-    job, _ = submissions.submit_job(spec)
+    job, _ = submissions.submit_job(spec, owner=caller.key_id)
     response.headers["Location"] = f"/v1/jobs/{job.id}"
     return JobView.of(job)
 
@@ -75,9 +78,9 @@ def show_job(job_id: str, context: ContextDep) -> JobDetail:
 
 
 @router.post("/{job_id}/cancel", responses=problem_responses(404, 409, 503))
-def cancel_job(job_id: str, context: ContextDep) -> JobView:
+def cancel_job(job_id: str, context: ContextDep, caller: CallerDep) -> JobView:
     """Ends a job that has not ended; its worker stops before its next model request."""
-    context.jobs.get(job_id)
+    caller.require_owner(context.jobs.get(job_id).owner, f"job {job_id}")
     with context.database.transaction() as connection:
         cancelled = context.jobs.cancel([job_id], connection=connection)
     if not cancelled:
@@ -86,11 +89,12 @@ def cancel_job(job_id: str, context: ContextDep) -> JobView:
 
 
 @router.post("/{job_id}/retry", status_code=202, responses=problem_responses(404, 409, 503))
-def retry_job(job_id: str, context: ContextDep) -> JobView:
+def retry_job(job_id: str, context: ContextDep, caller: CallerDep) -> JobView:
     """Queues an errored job again where it failed. A scored job is never rolled again."""
     job = context.jobs.get(job_id)
+    caller.require_owner(job.owner, f"job {job_id}")
     with context.database.transaction() as connection:
-        again = context.jobs.retry(job_id, connection=connection)
+        again = context.jobs.retry([job_id], connection=connection)
     if not again:
         state = job.outcome or job.state
         raise ProblemError(409, f"only errored jobs are retried; job {job_id} is {state}")

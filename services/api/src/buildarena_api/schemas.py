@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from buildarena_store import Job, SweepProgress
+from buildarena_store import Budget, Job, SweepProgress
 
 Outcome = Literal["success", "unsuccessful", "construction_failed", "limit", "errored", "cancelled"]
 
@@ -48,6 +48,7 @@ class JobView(_Answer):
     model: str = Field(examples=["builtin/expert"])
     track: str
     seed: int
+    owner: str | None = Field(description="Id of the API key that submitted it")
     state: Literal["queued", "held", "running", "done"]
     stage: Literal["construct", "simulate"]
     outcome: Outcome | None = Field(description="How it ended; null while it goes on")
@@ -112,14 +113,47 @@ class ProgressView(_Answer):
         return ProgressView.model_validate(progress)
 
 
+class BudgetView(_Answer):
+    """What may be spent, and what was."""
+
+    max_cost_usd: float | None
+    max_tokens: int | None
+    max_requests: int | None
+    spent_cost_usd: float
+    spent_tokens: int
+    spent_requests: int
+
+    @staticmethod
+    def of(budget: Budget | None) -> BudgetView | None:
+        """The view of a budget, if there is one."""
+        if budget is None:
+            return None
+        limits = budget.limits
+        return BudgetView(
+            max_cost_usd=None if limits.max_cost_usd is None else float(limits.max_cost_usd),
+            max_tokens=limits.max_tokens,
+            max_requests=limits.max_requests,
+            spent_cost_usd=float(budget.spent_cost_usd),
+            spent_tokens=budget.spent_tokens,
+            spent_requests=budget.spent_requests,
+        )
+
+
+SweepState = Literal["active", "paused", "limit", "cancelled", "done"]
+
+
 class SweepView(_Answer):
     """A sweep with its progress."""
 
     id: str = Field(examples=["sweep_0a1b2c3d4e5f60718293"])
     name: str
-    state: str = Field(description="active, paused, cancelled, or done when every job has ended")
+    state: SweepState = Field(
+        description="limit when a budget is used up; done when every job has ended"
+    )
+    owner: str | None = Field(description="Id of the API key that submitted it")
     created_at: datetime
     spec: dict[str, Any]
+    budget: BudgetView | None
     progress: ProgressView
 
 
@@ -129,6 +163,9 @@ class SweepAccepted(_Answer):
     id: str
     jobs: int = Field(description="Jobs it consists of")
     added: int = Field(description="Jobs that are new; the others had been submitted before")
+    taken_up: bool = Field(
+        default=False, description="Whether an earlier submission of the same jobs goes on"
+    )
 
 
 class ModelEstimate(_Answer):

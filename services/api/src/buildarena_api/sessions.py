@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import contextlib
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Response
 from pydantic import BaseModel, ConfigDict, Field
 
-from buildarena_api.dependencies import ExternalDep
+from buildarena_api.access import Caller, CallerDep
+from buildarena_api.dependencies import ContextDep, ExternalDep
 from buildarena_api.problems import ProblemError, problem_responses
 from buildarena_api.schemas import JobView
 from buildarena_benchmark import builtin_tasks
+from buildarena_pipeline.context import Context
 from buildarena_pipeline.external import NothingToSubmitError, SessionClosedError
 from buildarena_pipeline.specs import Name, Seed
 from buildarena_pipeline.workbench import ASSEMBLY, MAIN, agent_tools
+from buildarena_store import UnknownIdError
 
 router = APIRouter(prefix="/v1/sessions", tags=["sessions"])
 
@@ -71,9 +75,17 @@ class ToolOutcome(BaseModel):
 
 
 @router.post("", status_code=201, responses=problem_responses(422, 503))
-def open_session(body: OpenSession, response: Response, sessions: ExternalDep) -> SessionOpened:
+def open_session(
+    body: OpenSession, response: Response, sessions: ExternalDep, caller: CallerDep
+) -> SessionOpened:
     """Opens a session in which an agent of yours builds for one task."""
-    job = sessions.open(task=body.task, agent=body.agent, seed=body.seed, simulator=body.simulator)
+    job = sessions.open(
+        task=body.task,
+        agent=body.agent,
+        seed=body.seed,
+        simulator=body.simulator,
+        owner=caller.key_id,
+    )
     response.headers["Location"] = f"/v1/jobs/{job.id}"
     return SessionOpened(
         id=job.id,
@@ -86,8 +98,11 @@ def open_session(body: OpenSession, response: Response, sessions: ExternalDep) -
 
 
 @router.post("/{session_id}/calls", responses=problem_responses(404, 409, 422, 503))
-def call_tool(session_id: str, body: ToolCall, sessions: ExternalDep) -> ToolOutcome:
+def call_tool(
+    session_id: str, body: ToolCall, sessions: ExternalDep, context: ContextDep, caller: CallerDep
+) -> ToolOutcome:
     """Carries out one action; a refused one changes nothing."""
+    _require_own(session_id, context, caller)
     try:
         done = sessions.call(
             session_id, machine=body.machine, tool=body.tool, arguments=body.arguments
@@ -98,11 +113,26 @@ def call_tool(session_id: str, body: ToolCall, sessions: ExternalDep) -> ToolOut
 
 
 @router.post("/{session_id}/submit", status_code=202, responses=problem_responses(404, 409, 503))
-def submit_session(session_id: str, response: Response, sessions: ExternalDep) -> JobView:
+def submit_session(
+    session_id: str,
+    response: Response,
+    sessions: ExternalDep,
+    context: ContextDep,
+    caller: CallerDep,
+) -> JobView:
     """Ends the building; the machine is simulated and scored."""
+    _require_own(session_id, context, caller)
     try:
         job = sessions.submit(session_id)
     except (SessionClosedError, NothingToSubmitError) as error:
         raise ProblemError(409, str(error)) from error
     response.headers["Location"] = f"/v1/jobs/{job.id}"
     return JobView.of(job)
+
+
+def _require_own(session_id: str, context: Context, caller: Caller) -> None:
+    """An agent plays its own session only. An unknown one is for the session room to refuse."""
+    if caller.scope == "admin":
+        return
+    with contextlib.suppress(UnknownIdError):
+        caller.require_owner(context.jobs.get(session_id).owner, f"session {session_id}")

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Header, Query, Response
+from pydantic import BaseModel, ConfigDict
 from sqlalchemy.exc import IntegrityError
 
 from buildarena_api import cursors
+from buildarena_api.access import Caller, CallerDep
 from buildarena_api.dependencies import ContextDep, SubmissionsDep
 from buildarena_api.problems import ProblemError, problem_responses
 from buildarena_api.schemas import (
+    BudgetView,
     ProgressView,
     SweepAccepted,
     SweepEstimate,
@@ -19,7 +22,7 @@ from buildarena_api.schemas import (
 )
 from buildarena_pipeline.context import Context
 from buildarena_pipeline.queues import CONSTRUCT
-from buildarena_pipeline.specs import SweepSpec
+from buildarena_pipeline.specs import Budget, SweepSpec
 from buildarena_pipeline.submission import spec_hash
 from buildarena_pipeline.sweeper import announce_waiting
 from buildarena_store import Sweep
@@ -38,21 +41,45 @@ RequestKey = Annotated[
 ]
 
 
+TakeUp = Annotated[
+    bool,
+    Query(
+        description="Let the caller's earlier sweep of just these jobs, if there is one, go on "
+        "with this one's budget, instead of storing a further sweep"
+    ),
+]
+
+
+class Resumption(BaseModel):
+    """How a sweep is to go on."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    budget: Budget | None = None
+
+
 @router.post("", status_code=202, responses=problem_responses(409, 422, 503))
 def submit_sweep(
     spec: SweepSpec,
     response: Response,
+    *,
     context: ContextDep,
     submissions: SubmissionsDep,
+    caller: CallerDep,
     request_key: RequestKey = None,
+    take_up: TakeUp = False,
 ) -> SweepAccepted:
     """Submits every task with every model and every seed; all of it is stored, or nothing."""
     if request_key is not None:
+        # One key's idempotency keys are not another's.
+        request_key = f"{caller.key_id or ''}/{request_key}"
         before = context.sweeps.by_request_key(request_key)
         if before is not None:
             return _accepted_before(before, spec, response, context)
     try:
-        done = submissions.submit_sweep(spec, request_key=request_key)
+        done = submissions.submit_sweep(
+            spec, owner=caller.key_id, request_key=request_key, take_up=take_up
+        )
     except IntegrityError:
         # Another request with this key was quicker.
         before = None if request_key is None else context.sweeps.by_request_key(request_key)
@@ -60,7 +87,7 @@ def submit_sweep(
             raise
         return _accepted_before(before, spec, response, context)
     response.headers["Location"] = f"/v1/sweeps/{done.sweep.id}"
-    return SweepAccepted(id=done.sweep.id, jobs=done.jobs, added=done.added)
+    return SweepAccepted(id=done.sweep.id, jobs=done.jobs, added=done.added, taken_up=done.taken_up)
 
 
 def _accepted_before(
@@ -80,42 +107,66 @@ def estimate_sweep(spec: SweepSpec, submissions: SubmissionsDep) -> SweepEstimat
 
 
 @router.post("/{sweep_id}/pause", responses=problem_responses(404, 409, 503))
-def pause_sweep(sweep_id: str, context: ContextDep) -> SweepView:
+def pause_sweep(sweep_id: str, context: ContextDep, caller: CallerDep) -> SweepView:
     """Holds the sweep's waiting jobs; jobs that have begun go on to their end."""
-    return _change(context, sweep_id, "paused")
+    _changeable(context, caller, sweep_id, "paused")
+    with context.database.transaction() as connection:
+        context.sweeps.hold(sweep_id, connection=connection)
+        context.sweeps.set_state(sweep_id, "paused", connection=connection)
+    return _view(context, context.sweeps.get(sweep_id))
 
 
-@router.post("/{sweep_id}/resume", responses=problem_responses(404, 409, 503))
-def resume_sweep(sweep_id: str, context: ContextDep) -> SweepView:
-    """Lets a paused sweep go on."""
-    return _change(context, sweep_id, "active")
+@router.post("/{sweep_id}/resume", responses=problem_responses(404, 409, 422, 503))
+def resume_sweep(
+    sweep_id: str,
+    context: ContextDep,
+    caller: CallerDep,
+    submissions: SubmissionsDep,
+    body: Resumption | None = None,
+) -> SweepView:
+    """Lets a sweep go on that was paused or whose budget is used up, with more budget if given."""
+    sweep = _changeable(context, caller, sweep_id, "active")
+    submissions.resume(sweep, None if body is None else body.budget)
+    return _view(context, context.sweeps.get(sweep_id))
 
 
 @router.post("/{sweep_id}/cancel", responses=problem_responses(404, 409, 503))
-def cancel_sweep(sweep_id: str, context: ContextDep) -> SweepView:
+def cancel_sweep(sweep_id: str, context: ContextDep, caller: CallerDep) -> SweepView:
     """Ends the sweep's jobs that have not ended and that no other active sweep wants."""
-    return _change(context, sweep_id, "cancelled")
+    _changeable(context, caller, sweep_id, "cancelled")
+    with context.database.transaction() as connection:
+        own = context.sweeps.own_jobs(sweep_id, connection=connection)
+        context.jobs.cancel(own, connection=connection)
+        context.sweeps.set_state(sweep_id, "cancelled", connection=connection)
+    return _view(context, context.sweeps.get(sweep_id))
 
 
-ALLOWED = {"paused": {"active"}, "active": {"paused"}, "cancelled": {"active", "paused"}}
+@router.post("/{sweep_id}/retry", status_code=202, responses=problem_responses(404, 503))
+def retry_sweep(sweep_id: str, context: ContextDep, caller: CallerDep) -> SweepView:
+    """Queues the sweep's errored jobs again where they failed; scored ones are never redone."""
+    sweep = context.sweeps.get(sweep_id)
+    caller.require_owner(sweep.owner, f"sweep {sweep_id}")
+    with context.database.transaction() as connection:
+        context.jobs.retry(context.sweeps.job_ids(sweep_id), connection=connection)
+    announce_waiting(context, CONSTRUCT)
+    return _view(context, sweep)
+
+
+ALLOWED = {
+    "paused": {"active"},
+    "active": {"paused", "limit"},
+    "cancelled": {"active", "paused", "limit"},
+}
 """From which states a sweep may come into one."""
 
 
-def _change(context: Context, sweep_id: str, state: str) -> SweepView:
+def _changeable(context: Context, caller: Caller, sweep_id: str, state: str) -> Sweep:
+    """The sweep, as long as the caller may bring it into the state now."""
     sweep = context.sweeps.get(sweep_id)
+    caller.require_owner(sweep.owner, f"sweep {sweep_id}")
     if sweep.state not in ALLOWED[state]:
         raise ProblemError(409, f"sweep {sweep_id} is {sweep.state}; it can't become {state}")
-    with context.database.transaction() as connection:
-        if state == "paused":
-            context.sweeps.hold(sweep_id, connection=connection)
-        elif state == "active":
-            context.sweeps.release(sweep_id, connection=connection)
-        else:
-            own = context.sweeps.own_jobs(sweep_id, connection=connection)
-            context.jobs.cancel(own, connection=connection)
-        context.sweeps.set_state(sweep_id, state, connection=connection)
-    announce_waiting(context, CONSTRUCT)
-    return _view(context, context.sweeps.get(sweep_id))
+    return sweep
 
 
 @router.get("", responses=problem_responses(422, 503))
@@ -144,11 +195,14 @@ def show_sweep(sweep_id: str, context: ContextDep) -> SweepView:
 def _view(context: Context, sweep: Sweep) -> SweepView:
     progress = context.sweeps.progress(sweep.id)
     ended = sweep.state == "active" and progress.done == progress.total
+    state: Any = "done" if ended else sweep.state
     return SweepView(
         id=sweep.id,
         name=sweep.name,
-        state="done" if ended else sweep.state,
+        state=state,
+        owner=sweep.owner,
         created_at=sweep.created_at,
         spec=dict(sweep.spec),
+        budget=BudgetView.of(context.budgets.get(sweep.id)),
         progress=ProgressView.of(progress),
     )

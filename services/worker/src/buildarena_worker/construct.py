@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from decimal import Decimal
 
 from buildarena_pipeline.context import Context
 from buildarena_pipeline.documents import machine_bytes
 from buildarena_pipeline.errors import PermanentFaultError, StartupError
 from buildarena_pipeline.models import ModelRegistry
+from buildarena_pipeline.prices import price_usd
 from buildarena_pipeline.prompt_packs import PromptPack, PromptPacks
 from buildarena_pipeline.queues import simulate_queue
 from buildarena_pipeline.scoring import failure_score, rollout_score, task_of
@@ -20,6 +22,7 @@ from buildarena_store import (
     RolloutRequest,
     StaleLeaseError,
 )
+from buildarena_worker.budget_guard import BudgetGuard, BudgetUsedUpError, Price
 from buildarena_worker.errors import (
     ConstructionFailedError,
     JournalMismatchError,
@@ -45,6 +48,7 @@ class ConstructHandler:
 
     def __init__(self, context: Context, registry: ModelRegistry) -> None:
         self._context = context
+        self._registry = registry
         self._clients = ModelClients(registry, context.settings.broker_url)
         self._packs = PromptPacks(context.settings.prompt_packs)
         self._workflows = Workflows(context.settings.workflows)
@@ -52,6 +56,7 @@ class ConstructHandler:
     def __call__(self, lease: Lease, still_held: Callable[[], bool]) -> None:
         """Runs the job's session as far as it gets: to a simulation, or to its end."""
         job = lease.job
+        guard = BudgetGuard(self._context.budgets, lease, self._price_of(job), still_held)
         task = task_of(job)
         pack = pack_of(job, self._packs)
         io = SessionIO(
@@ -64,6 +69,7 @@ class ConstructHandler:
             load_trajectory=lambda digest: Trajectory.from_parquet(
                 self._context.artifacts.get(digest)
             ),
+            reserve=guard,
         )
         session = Session(task=task, seed=job.seed, model_config=job.model_config, pack=pack, io=io)
         try:
@@ -71,6 +77,8 @@ class ConstructHandler:
             end = run_session(session, workflow, loop_of(job))
         except SuspendedError as suspended:
             self._suspend(lease, session, suspended)
+        except BudgetUsedUpError as used_up:
+            self._stop(lease, used_up)
         except ConstructionFailedError as failure:
             self._fail(lease, session, "construction_failed", failure.reason, str(failure))
         except LimitReachedError as limit:
@@ -83,7 +91,39 @@ class ConstructHandler:
             self._finish(lease, session, end)
 
     def _append(self, lease: Lease, entry: JournalEntry) -> None:
-        self._context.journal.append(lease, entry)
+        try:
+            self._context.journal.append(lease, entry)
+        except StaleLeaseError:
+            # The job was cancelled or lost meanwhile, but its budgets did pay for the reply.
+            self._context.budgets.charge_lost(lease, entry.usage)
+            raise
+
+    def _price_of(self, job: Job) -> Price:
+        entry = self._registry.models.get(job.model)
+
+        def price(input_tokens: int, output_tokens: int) -> Decimal:
+            if entry is None:
+                return Decimal()
+            return price_usd(
+                entry, input_tokens=input_tokens, output_tokens=output_tokens, cached_tokens=0
+            )
+
+        return price
+
+    def _stop(self, lease: Lease, used_up: BudgetUsedUpError) -> None:
+        """Hands the job back as it is and stops the sweep whose budget is used up."""
+        context, detail = self._context, str(used_up)
+        with context.database.transaction() as connection:
+            context.leases.advance(
+                lease,
+                connection=connection,
+                result="limit",
+                note=detail,
+                state="queued",
+                nudged_at=None,
+                detail=detail,
+            )
+            context.budgets.stop(used_up.shortage.budget_id, detail, connection=connection)
 
     def _suspend(self, lease: Lease, session: Session, suspended: SuspendedError) -> None:
         """Keeps the machine and hands the job to its simulator, all in one transaction."""

@@ -100,6 +100,7 @@ class SessionIO:
         still_held: Tells whether the lease goes on.
         limits: The job's limits.
         load_trajectory: Reads a kept trajectory by its hash.
+        reserve: Puts aside what a new request may cost, before it is sent.
     """
 
     def __init__(
@@ -112,7 +113,9 @@ class SessionIO:
         still_held: Callable[[], bool],
         limits: Mapping[str, Any],
         load_trajectory: Callable[[str], Trajectory],
+        reserve: Callable[[Request], None] = lambda _: None,
     ) -> None:
+        self._reserve = reserve
         self._load_trajectory = load_trajectory
         self._client = client
         self._entries = entries
@@ -158,6 +161,7 @@ class SessionIO:
             raise JournalMismatchError(f"the journal ends at entry {self.sequence}")
         if not self._still_held():
             raise LeaseLostError("the lease is over")
+        self._reserve(request)
         answer = self._client.complete(request)
         entry = JournalEntry(
             sequence=self.sequence,

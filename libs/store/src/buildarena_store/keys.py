@@ -1,0 +1,165 @@
+"""API keys: who may do what. Only the hash of a key's secret is kept."""
+
+from __future__ import annotations
+
+import hashlib
+import secrets
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+
+from sqlalchemy import func, insert, select, update
+
+from buildarena_store import events
+from buildarena_store.database import Database
+from buildarena_store.errors import UnknownIdError
+from buildarena_store.ids import new_id
+from buildarena_store.tables import api_keys
+
+SECRET_PREFIX = "ba_"  # noqa: S105 - what secrets begin with, for scanners that look for leaks
+NOTED_EVERY = timedelta(minutes=1)
+"""How exact the time of a key's last use is."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ApiKey:
+    """A key without its secret.
+
+    Attributes:
+        id: Its identifier, which also names its holder's sweeps and budget.
+        name: Who holds it, for people.
+        scopes: What it may do: ``read``, ``submit``, ``admin``.
+        created_at: When it was made.
+        expires_at: When it ends, if ever.
+        revoked_at: When it was revoked, if it was.
+        used_at: When it was last used, to the minute.
+    """
+
+    id: str
+    name: str
+    scopes: Sequence[str]
+    created_at: datetime
+    expires_at: datetime | None
+    revoked_at: datetime | None
+    used_at: datetime | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KeyCheck:
+    """What a presented secret is.
+
+    Attributes:
+        key: The key that has it.
+        refusal: ``revoked`` or ``expired``; None when the key is good.
+    """
+
+    key: ApiKey
+    refusal: str | None
+
+
+class ApiKeys:
+    """Makes, finds and revokes keys."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def create(
+        self, *, name: str, scopes: Sequence[str], lasts: timedelta | None = None
+    ) -> tuple[ApiKey, str]:
+        """Makes a key.
+
+        Args:
+            name: Who holds it.
+            scopes: What it may do.
+            lasts: How long it is good; None for ever.
+
+        Returns:
+            The key, and its secret, which can't be read again.
+        """
+        secret = SECRET_PREFIX + secrets.token_urlsafe(32)
+        statement = (
+            insert(api_keys)
+            .values(
+                id=new_id("key"),
+                name=name,
+                secret_hash=secret_hash(secret),
+                scopes=list(scopes),
+                expires_at=None if lasts is None else events.now + lasts,
+            )
+            .returning(*_COLUMNS)
+        )
+        with self._database.transaction() as connection:
+            row = connection.execute(statement).one()
+        return ApiKey(**row._mapping), secret  # noqa: SLF001 - the documented way to a mapping
+
+    def check(self, secret: str) -> KeyCheck | None:
+        """The key that has this secret, and whether it is still good; None when nobody has it."""
+        expired = (api_keys.c.expires_at <= events.now).label("expired")
+        stale = func.coalesce(api_keys.c.used_at < events.now - NOTED_EVERY, True).label("stale")
+        with self._database.transaction() as connection:
+            row = connection.execute(
+                select(*_COLUMNS, expired, stale).where(
+                    api_keys.c.secret_hash == secret_hash(secret)
+                )
+            ).first()
+            if row is None:
+                return None
+            key = ApiKey(**{name: getattr(row, name) for name in ApiKey.__dataclass_fields__})
+            if key.revoked_at is not None:
+                return KeyCheck(key=key, refusal="revoked")
+            if row.expired:
+                return KeyCheck(key=key, refusal="expired")
+            if row.stale:
+                connection.execute(
+                    update(api_keys).where(api_keys.c.id == key.id).values(used_at=events.now)
+                )
+        return KeyCheck(key=key, refusal=None)
+
+    def all(self) -> list[ApiKey]:
+        """Every key, oldest first, those that ended included."""
+        query = select(*_COLUMNS).order_by(api_keys.c.created_at, api_keys.c.id)
+        with self._database.transaction() as connection:
+            return [ApiKey(**row._mapping) for row in connection.execute(query)]  # noqa: SLF001
+
+    def get(self, key_id: str) -> ApiKey:
+        """The key with this id.
+
+        Raises:
+            UnknownIdError: Nobody has it.
+        """
+        query = select(*_COLUMNS).where(api_keys.c.id == key_id)
+        with self._database.transaction() as connection:
+            row = connection.execute(query).first()
+        if row is None:
+            raise UnknownIdError("key", key_id)
+        return ApiKey(**row._mapping)  # noqa: SLF001
+
+    def revoke(self, key_id: str) -> ApiKey:
+        """Ends a key at once; revoking it again changes nothing.
+
+        Raises:
+            UnknownIdError: There is no such key.
+        """
+        statement = (
+            update(api_keys)
+            .where(api_keys.c.id == key_id)
+            .values(revoked_at=func.coalesce(api_keys.c.revoked_at, events.now))
+            .returning(*_COLUMNS)
+        )
+        with self._database.transaction() as connection:
+            row = connection.execute(statement).first()
+        if row is None:
+            raise UnknownIdError("key", key_id)
+        return ApiKey(**row._mapping)  # noqa: SLF001
+
+
+def secret_hash(secret: str) -> str:
+    """What is kept of a secret.
+
+    A plain SHA-256 is enough: secrets are 256 random bits, which nobody can guess from a hash,
+    unlike a password.
+    """
+    return hashlib.sha256(secret.encode()).hexdigest()
+
+
+_COLUMNS = [api_keys.c[name] for name in ApiKey.__dataclass_fields__]

@@ -1,0 +1,87 @@
+"""The budget guard: no model request is sent before its means are put aside."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from decimal import Decimal
+
+from buildarena_store import Budgets, Lease, Need, Shortage
+from buildarena_worker.errors import LeaseLostError, WorkerError
+from buildarena_worker.messages import Request
+
+LOOK_AGAIN_S = 5.0
+"""A budget that is given to a sweep while its jobs go on takes effect within this time."""
+WAIT_S = 0.2
+CHARACTERS_PER_TOKEN = 3
+"""English has about four; fewer puts aside a little too much rather than too little."""
+OUTPUT_TOKENS = 4096
+"""Put aside for a reply whose length is not limited: more than nearly all replies have."""
+
+Price = Callable[[int, int], Decimal]
+"""US dollars for input and output tokens."""
+
+
+class BudgetUsedUpError(WorkerError):
+    """A budget can't pay for the job's next request.
+
+    Attributes:
+        shortage: Which budget, and what is lacking.
+    """
+
+    def __init__(self, shortage: Shortage) -> None:
+        super().__init__(shortage.detail)
+        self.shortage = shortage
+
+
+class BudgetGuard:
+    """Reserves the means of one job's requests.
+
+    Args:
+        budgets: Where budgets are.
+        lease: The hold on the job.
+        price: What tokens of the job's model cost.
+        still_held: Tells whether the hold goes on.
+    """
+
+    def __init__(
+        self, budgets: Budgets, lease: Lease, price: Price, still_held: Callable[[], bool]
+    ) -> None:
+        self._budgets = budgets
+        self._lease = lease
+        self._price = price
+        self._still_held = still_held
+        self._has_any = False
+        self._looked_at: float | None = None
+
+    def __call__(self, request: Request) -> None:
+        """Puts aside what a request may cost; waits while open requests may give back enough.
+
+        Raises:
+            BudgetUsedUpError: No budget is left for it.
+            LeaseLostError: The hold ended while it waited.
+        """
+        if not self._any_budget():
+            return
+        need = self._need(request)
+        while (shortage := self._budgets.reserve(self._lease, need)) is not None:
+            if not shortage.passing:
+                raise BudgetUsedUpError(shortage)
+            if not self._still_held():
+                raise LeaseLostError("the lease ended while the job waited for its budget")
+            time.sleep(WAIT_S)
+
+    def _any_budget(self) -> bool:
+        now = time.monotonic()
+        if self._looked_at is None or now - self._looked_at > LOOK_AGAIN_S:
+            self._has_any = bool(self._budgets.of_job(self._lease.job.id))
+            self._looked_at = now
+        return self._has_any
+
+    def _need(self, request: Request) -> Need:
+        given = request.model_config["decoding"].get("max_tokens")
+        output = OUTPUT_TOKENS if given is None else int(given)
+        characters = sum(len(message.text) for message in request.messages)
+        characters += sum(len(f"{tool.description}{tool.parameters}") for tool in request.tools)
+        sent = characters // CHARACTERS_PER_TOKEN
+        return Need(cost_usd=self._price(sent, output), tokens=sent + output)

@@ -1,0 +1,201 @@
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import replace
+from decimal import Decimal
+
+import pytest
+
+from buildarena_pipeline.context import Context
+from buildarena_store import (
+    BudgetLimits,
+    JournalEntry,
+    Lease,
+    Need,
+    NewSweep,
+    StaleLeaseError,
+    Usage,
+)
+
+NEED = Need(cost_usd=Decimal("0.30"), tokens=300)
+
+
+def reply(sequence: int = 0, cost: str = "0.25") -> JournalEntry:
+    usage = Usage(requests=1, input_tokens=200, output_tokens=50, cost_usd=Decimal(cost))
+    return JournalEntry(
+        sequence=sequence,
+        stage="build",
+        role="builder",
+        request_hash="h",
+        reply={},
+        usage=usage,
+        latency_s=0.1,
+    )
+
+
+@pytest.fixture
+def sweep(context: Context, new_job) -> Callable[..., str]:
+    """Stores a sweep of jobs with these seeds and, if given, a budget."""
+
+    def make(*seeds: int, name: str = "sweep_a", owner: str | None = None, **limits: object) -> str:
+        new = [replace(new_job(seed), owner=owner, payer=name) for seed in seeds]
+        with context.database.transaction() as connection:
+            if limits:
+                context.budgets.set(name, BudgetLimits(**limits), connection=connection)
+            context.jobs.add(new, connection=connection)
+            context.sweeps.add(
+                NewSweep(id=name, name=name, spec={}, owner=owner),
+                [job.key.job_id for job in new],
+                connection=connection,
+            )
+        return name
+
+    return make
+
+
+def claim(context: Context) -> Lease:
+    lease = context.leases.claim("construct", owner="w")
+    assert lease is not None
+    return lease
+
+
+def test_what_is_reserved_can_not_be_reserved_again(context: Context, sweep) -> None:
+    sweep(0, 1, 2, max_cost_usd=Decimal("0.70"))
+    first, second, third = (claim(context) for _ in range(3))
+    assert context.budgets.reserve(first, NEED) is None
+    assert context.budgets.reserve(second, NEED) is None
+    shortage = context.budgets.reserve(third, NEED)
+    assert shortage is not None
+    assert shortage.passing, "open requests may cost less than was put aside"
+    context.journal.append(first, reply(cost="0.05"))
+    assert context.budgets.reserve(third, NEED) is None
+
+
+@pytest.mark.parametrize(
+    "limits", [{"max_cost_usd": Decimal("0.5")}, {"max_tokens": 500}, {"max_requests": 1}]
+)
+def test_a_used_up_budget_says_what_is_lacking(context: Context, sweep, limits) -> None:
+    name = sweep(0, **limits)
+    lease = claim(context)
+    assert context.budgets.reserve(lease, NEED) is None
+    context.journal.append(lease, reply())
+    shortage = context.budgets.reserve(lease, NEED)
+    assert shortage is not None
+    assert not shortage.passing
+    assert shortage.budget_id == name
+    assert next(iter(limits)) in shortage.detail
+    budget = context.budgets.get(name)
+    assert budget is not None
+    assert (budget.spent_cost_usd, budget.spent_tokens) == (Decimal("0.250000"), 250)
+    assert budget.spent_requests == 1
+
+
+def test_a_key_pays_beside_its_sweep(context: Context, sweep) -> None:
+    sweep(0, owner="key_k", max_cost_usd=Decimal(10))
+    with context.database.transaction() as connection:
+        limits = BudgetLimits(max_requests=1)
+        context.budgets.set("key_k", limits, connection=connection)
+    lease = claim(context)
+    assert sorted(context.budgets.of_job(lease.job.id)) == ["key_k", "sweep_a"]
+    assert context.budgets.reserve(lease, NEED) is None
+    context.journal.append(lease, reply())
+    shortage = context.budgets.reserve(lease, NEED)
+    assert shortage is not None
+    assert shortage.budget_id == "key_k"
+    for name in ("key_k", "sweep_a"):
+        budget = context.budgets.get(name)
+        assert budget is not None
+        assert budget.spent_requests == 1
+
+
+def test_a_budget_that_comes_later_counts_what_was_spent(context: Context, sweep) -> None:
+    name = sweep(0)
+    context.journal.append(claim(context), reply())
+    with context.database.transaction() as connection:
+        context.budgets.set(name, BudgetLimits(max_requests=5), connection=connection)
+    budget = context.budgets.get(name)
+    assert budget is not None
+    assert (budget.spent_requests, budget.spent_tokens) == (1, 250)
+
+
+def test_the_end_of_a_hold_gives_its_reservation_back(context: Context, sweep) -> None:
+    sweep(0, 1, max_requests=1)
+    first, second = claim(context), claim(context)
+    assert context.budgets.reserve(first, NEED) is None
+    assert context.budgets.reserve(second, NEED) is not None
+    context.leases.hand_back(first)
+    assert context.budgets.reserve(second, NEED) is None
+    with context.database.transaction() as connection:
+        context.jobs.cancel([second.job.id], connection=connection)
+    assert context.budgets.reserve(claim(context), NEED) is None
+
+
+def test_a_reply_that_came_too_late_was_paid_for(context: Context, sweep) -> None:
+    name = sweep(0, max_requests=5)
+    lease = claim(context)
+    with context.database.transaction() as connection:
+        context.jobs.cancel([lease.job.id], connection=connection)
+    with pytest.raises(StaleLeaseError):
+        context.journal.append(lease, reply())
+    context.budgets.charge_lost(lease, reply().usage)
+    budget = context.budgets.get(name)
+    assert budget is not None
+    assert budget.spent_requests == 1
+
+
+def test_a_stopped_sweep_passes_on_what_another_wants_and_holds_the_rest(
+    context: Context, sweep
+) -> None:
+    sweep(0, 1, max_requests=1)
+    sweep(1, 2, name="sweep_b", owner="key_b")
+    with context.database.transaction() as connection:
+        assert context.budgets.stop("sweep_a", "used up", connection=connection) == ["sweep_a"]
+    jobs = {job.seed: job for job in context.jobs.page(limit=10)}
+    assert {seed: (job.state, job.payer, job.owner) for seed, job in jobs.items()} == {
+        0: ("held", "sweep_a", None),
+        1: ("queued", "sweep_b", "key_b"),
+        2: ("queued", "sweep_b", "key_b"),
+    }
+    assert context.sweeps.get("sweep_a").state == "limit"
+    with context.database.transaction() as connection:
+        context.sweeps.resume("sweep_a", connection=connection)
+    assert context.jobs.get(jobs[0].id).state == "queued"
+
+
+def test_a_held_job_that_is_wanted_again_is_paid_by_who_wants_it(context: Context, sweep) -> None:
+    sweep(0, max_requests=1)
+    with context.database.transaction() as connection:
+        context.budgets.stop("sweep_a", "used up", connection=connection)
+    sweep(0, name="sweep_b")
+    (job,) = context.jobs.page(limit=2)
+    assert (job.state, job.payer) == ("queued", "sweep_b")
+
+
+def test_many_workers_together_never_reserve_more_than_there_is(context: Context, sweep) -> None:
+    name = sweep(*range(8), owner="key_k", max_requests=20)
+    with context.database.transaction() as connection:
+        context.budgets.set("key_k", BudgetLimits(max_requests=25), connection=connection)
+    leases = [claim(context) for _ in range(8)]
+    errors: list[BaseException] = []
+
+    def work(lease: Lease) -> None:
+        try:
+            for sequence in range(5):
+                while (shortage := context.budgets.reserve(lease, NEED)) is not None:
+                    if not shortage.passing:
+                        return
+                context.journal.append(lease, reply(sequence))
+        except BaseException as error:
+            errors.append(error)
+            raise
+
+    threads = [threading.Thread(target=work, args=(lease,)) for lease in leases]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not errors
+    budget = context.budgets.get(name)
+    assert budget is not None
+    assert budget.spent_requests == 20
