@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import time
+import weakref
 from collections.abc import Mapping
 from typing import Any
 
@@ -11,6 +13,8 @@ import httpx
 from buildarena_cli.errors import CommandError
 
 TIMEOUT_S = 60.0
+KEY_VARIABLE = "BUILDARENA_KEY"
+"""The environment variable of the API key: on a command line, others could read it."""
 PATIENCE_S = 60.0
 """How long a watching command puts up with a service that is being restarted."""
 
@@ -20,13 +24,20 @@ class Client:
 
     Args:
         url: Where the API is, for example ``http://127.0.0.1:8321``.
+        key: The API key; by default the one in BUILDARENA_KEY, if any.
     """
 
-    def __init__(self, url: str) -> None:
+    def __init__(self, url: str, key: str | None = None) -> None:
         self.url = url.rstrip("/")
+        key = key or os.environ.get(KEY_VARIABLE)
         self._http = httpx.Client(
-            base_url=self.url, timeout=TIMEOUT_S, transport=httpx.HTTPTransport(retries=2)
+            base_url=self.url,
+            timeout=TIMEOUT_S,
+            transport=httpx.HTTPTransport(retries=2),
+            headers={"Authorization": f"Bearer {key}"} if key else None,
         )
+        # Commands let go of their client when they end.
+        weakref.finalize(self, self._http.close)
 
     def get(self, path: str, **params: Any) -> Any:
         """The JSON answer to a GET; parameters that are None are left out."""
@@ -41,6 +52,10 @@ class Client:
     def post(self, path: str, body: Mapping[str, Any]) -> Any:
         """The JSON answer to a POST."""
         return self._answer("POST", path, json=dict(body)).json()
+
+    def put(self, path: str, body: Mapping[str, Any]) -> Any:
+        """The JSON answer to a PUT."""
+        return self._answer("PUT", path, json=dict(body)).json()
 
     def get_patiently(self, path: str) -> Any:
         """As get, but waits while the service is unreachable or says 503."""
@@ -69,6 +84,8 @@ class Client:
             ) from error
         if response.status_code == httpx.codes.SERVICE_UNAVAILABLE and path != "/v1/health":
             raise UnreachableError(_problem(response))
+        if response.status_code == httpx.codes.UNAUTHORIZED:
+            raise CommandError(f"{_problem(response)}: set {KEY_VARIABLE} to a good one")
         if response.is_error and path != "/v1/health":
             raise CommandError(_problem(response))
         return response

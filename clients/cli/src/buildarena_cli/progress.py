@@ -5,7 +5,14 @@ from __future__ import annotations
 import time
 from typing import Any
 
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 
 from buildarena_cli.client import Client
 from buildarena_cli.errors import DONE, PARTIAL
@@ -26,9 +33,19 @@ def watch_sweep(client: Client, sweep_id: str) -> dict[str, Any]:
 
 
 def exit_code(sweep: dict[str, Any]) -> int:
-    """0 when every job was scored, 3 when some errored or were cancelled."""
-    outcomes = sweep["progress"]["outcomes"]
-    return PARTIAL if any(outcomes.get(name) for name in FAULTS) else DONE
+    """0 when every job was scored, 3 when some errored, were cancelled, or had to stop."""
+    progress = sweep["progress"]
+    faults = any(progress["outcomes"].get(name) for name in FAULTS)
+    return PARTIAL if faults or progress["done"] < progress["total"] else DONE
+
+
+def ended(sweep: dict[str, Any]) -> bool:
+    """Whether nothing more will happen: every job has ended, or all others are held."""
+    progress = sweep["progress"]
+    moving = [name for name in progress["stages"] if not name.endswith(" held")]
+    return not moving and (
+        progress["done"] == progress["total"] or sweep["state"] in {"limit", "paused"}
+    )
 
 
 def _watch_bars(client: Client, sweep_id: str) -> dict[str, Any]:
@@ -37,6 +54,8 @@ def _watch_bars(client: Client, sweep_id: str) -> dict[str, Any]:
         BarColumn(),
         MofNCompleteColumn(),
         TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
         TextColumn("{task.fields[note]}"),
         console=console,
     )
@@ -52,15 +71,15 @@ def _watch_bars(client: Client, sweep_id: str) -> dict[str, Any]:
                 built,
                 total=progress["total"],
                 completed=progress["total"] - building,
-                note=f"{progress['requests']:,} requests",
+                note=f"{progress['requests']:,} requests  {_counted(stages)}",
             )
             bars.update(
                 scored,
                 total=progress["total"],
                 completed=progress["done"],
-                note=f"${progress['cost_usd']:.2f}  {_outcomes(progress)}",
+                note=f"${progress['cost_usd']:.2f}  {_counted(progress['outcomes'])}",
             )
-            if progress["done"] == progress["total"]:
+            if ended(sweep):
                 return sweep
             time.sleep(POLL_S)
 
@@ -72,15 +91,16 @@ def _watch_lines(client: Client, sweep_id: str) -> dict[str, Any]:
         progress = sweep["progress"]
         line = (
             f"{progress['done']}/{progress['total']} jobs ended, "
-            f"{progress['requests']:,} requests, ${progress['cost_usd']:.2f}  {_outcomes(progress)}"
+            f"{progress['requests']:,} requests, ${progress['cost_usd']:.2f}  "
+            f"{_counted(progress['outcomes'])}"
         )
         if line != shown:
             console.print(line, soft_wrap=True)
             shown = line
-        if progress["done"] == progress["total"]:
+        if ended(sweep):
             return sweep
         time.sleep(PLAIN_POLL_S if progress["done"] else POLL_S)
 
 
-def _outcomes(progress: dict[str, Any]) -> str:
-    return ", ".join(f"{count} {name}" for name, count in sorted(progress["outcomes"].items()))
+def _counted(jobs: dict[str, int]) -> str:
+    return ", ".join(f"{count} {name}" for name, count in sorted(jobs.items()))

@@ -35,9 +35,16 @@ DataOption = Annotated[Path | None, typer.Option("--data", help="Folder of datab
 PortOption = Annotated[int | None, typer.Option("--port", help="Port of the API.")]
 
 
-def up(data: DataOption = None, port: PortOption = None) -> None:
+def up(
+    data: DataOption = None,
+    port: PortOption = None,
+    *,
+    keys: Annotated[
+        bool, typer.Option("--keys", help="Ask for API keys; the operator's is kept in DATA.")
+    ] = False,
+) -> None:
     """Start the whole service on this machine and keep it up until Ctrl-C."""
-    settings = _settings(data, port)
+    settings = _settings(data, port, require_keys=keys or None)
     stopping = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stopping.set())
@@ -57,7 +64,7 @@ def demo(data: DataOption = None, port: PortOption = None) -> None:
     if not (settings.data / "lock").exists() or _unlocked(settings):
         shutil.rmtree(settings.data, ignore_errors=True)
     with Stack(settings, tell=_tell) as stack:
-        client = Client(stack.url)
+        client = Client(stack.url, key=stack.admin_key)
         sweep_id = client.post("/v1/sweeps", DEMO_SWEEP)["id"]
         sweep = watch_sweep(client, sweep_id)
         stack.require_running()
@@ -85,8 +92,8 @@ def migrate() -> None:
     database.close()
 
 
-def _settings(data: Path | None, port: int | None) -> Settings:
-    given: dict[str, Any] = {"data": data, "port": port}
+def _settings(data: Path | None, port: int | None, *, require_keys: bool | None = None) -> Settings:
+    given: dict[str, Any] = {"data": data, "port": port, "require_keys": require_keys}
     try:
         return Settings(**{name: value for name, value in given.items() if value is not None})
     except ValidationError as error:

@@ -30,6 +30,7 @@ from buildarena_pipeline.processes import die_with_parent, tree_memory_bytes
 from buildarena_pipeline.settings import Settings
 from buildarena_pipeline.tracks import SIMULATORS
 from buildarena_store import Database
+from buildarena_store.keys import new_secret
 
 READY_WITHIN_S = 60.0
 MEMORY_EVERY_S = 0.5
@@ -52,6 +53,7 @@ class Stack:
         simulators: tuple[str, ...] = SIMULATORS,
     ) -> None:
         self.settings = settings
+        self.admin_key: str | None = None
         self.url = f"http://{settings.host}:{settings.port}"
         self.supervisor = Supervisor()
         self.peak_memory_bytes = 0
@@ -157,13 +159,31 @@ class Stack:
                 f"BUILDARENA_{name.upper()}": (
                     json.dumps(value) if isinstance(value, dict) else str(value)
                 )
-                for name, value in settings.model_dump(mode="json", exclude_none=True).items()
+                for name, value in settings.model_dump(
+                    mode="json", exclude_none=True, exclude={"admin_key"}
+                ).items()
             },
+            **self._key_environment(data),
             "BUILDARENA_DATA": str(data),
             "BUILDARENA_DATABASE_URL": database_url,
             "BUILDARENA_BROKER_URL": broker_url,
             "PYTHONUNBUFFERED": "1",
         }
+
+    def _key_environment(self, data: Path) -> dict[str, str]:
+        """The operator's own key: the one that was set, or one that is kept in the folder."""
+        if not self.settings.require_keys:
+            return {}
+        if self.settings.admin_key is not None:
+            self.admin_key = self.settings.admin_key.get_secret_value()
+        else:
+            file = data / "admin.key"
+            if not file.exists():
+                file.touch(mode=0o600)
+                file.write_text(new_secret() + "\n")
+            self.admin_key = file.read_text().strip()
+            self._tell(f"the operator's key is in {file}")
+        return {"BUILDARENA_ADMIN_KEY": self.admin_key}
 
     def _launch_server(self, server: EmbeddedServer) -> None:
         self._tell(f"starting {server.name}")

@@ -12,9 +12,18 @@ from rich.table import Table
 
 from buildarena_cli.client import Client
 from buildarena_cli.errors import CommandError
-from buildarena_cli.options import DEFAULT_URL, JsonOption, UrlOption
+from buildarena_cli.keys import spent
+from buildarena_cli.options import (
+    DEFAULT_URL,
+    JsonOption,
+    MaxCostOption,
+    MaxRequestsOption,
+    MaxTokensOption,
+    UrlOption,
+    budget_of,
+)
 from buildarena_cli.output import console, number, print_json
-from buildarena_cli.progress import exit_code, watch_sweep
+from buildarena_cli.progress import ended, exit_code, watch_sweep
 
 app = typer.Typer(help="Submit and watch sweeps.", no_args_is_help=True)
 
@@ -29,17 +38,24 @@ def run_sweep(
         bool, typer.Option("--dry-run", help="Show what it would be and cost; submit nothing.")
     ] = False,
     detach: Annotated[bool, typer.Option("--detach", help="Submit and do not wait.")] = False,
+    max_cost_usd: MaxCostOption = None,
+    max_tokens: MaxTokensOption = None,
+    max_requests: MaxRequestsOption = None,
     url: UrlOption = DEFAULT_URL,
     as_json: JsonOption = False,
 ) -> None:
-    """Submit a sweep and watch it. Running the same file again does only what is missing."""
+    """Submit a sweep and watch it. Running the same file again takes it up where it was."""
     client, spec = Client(url), read_yaml(file)
+    budget = budget_of(max_cost_usd, max_tokens, max_requests)
+    if budget is not None:
+        spec["budget"] = budget
     if dry_run:
         _show_estimate(client.post("/v1/sweeps/estimate", spec), as_json=as_json)
         return
-    accepted = client.post("/v1/sweeps", spec)
+    accepted = client.post("/v1/sweeps?take_up=true", spec)
     if not as_json:
-        console.print(f"{accepted['id']}: {accepted['jobs']} jobs, {accepted['added']} of them new")
+        news = "taken up again" if accepted["taken_up"] else f"{accepted['added']} of them new"
+        console.print(f"{accepted['id']}: {accepted['jobs']} jobs, {news}")
     if detach:
         if as_json:
             print_json(accepted)
@@ -72,10 +88,26 @@ def pause_sweep(
 
 @app.command("resume")
 def resume_sweep(
+    sweep_id: SweepId,
+    *,
+    max_cost_usd: MaxCostOption = None,
+    max_tokens: MaxTokensOption = None,
+    max_requests: MaxRequestsOption = None,
+    url: UrlOption = DEFAULT_URL,
+    as_json: JsonOption = False,
+) -> None:
+    """Let a sweep go on that was paused, or that used up its budget and now gets more."""
+    budget = budget_of(max_cost_usd, max_tokens, max_requests)
+    body = {"budget": budget}
+    _show(Client(url).post(f"/v1/sweeps/{sweep_id}/resume", body), as_json=as_json)
+
+
+@app.command("retry")
+def retry_sweep(
     sweep_id: SweepId, *, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False
 ) -> None:
-    """Let a paused sweep go on."""
-    _show(Client(url).post(f"/v1/sweeps/{sweep_id}/resume", {}), as_json=as_json)
+    """Queue a sweep's errored jobs again where they failed; scored ones are never redone."""
+    _show(Client(url).post(f"/v1/sweeps/{sweep_id}/retry", {}), as_json=as_json)
 
 
 @app.command("cancel")
@@ -113,6 +145,14 @@ def _show(sweep: dict[str, Any], *, as_json: bool) -> None:
     for name, count in {**progress["stages"], **progress["outcomes"]}.items():
         console.print(f"  {count:>6}  {name}")
     console.print(f"{progress['requests']:,} model requests, ${progress['cost_usd']:.2f}")
+    if sweep["budget"] is not None:
+        console.print(f"budget: {spent(sweep['budget'])}")
+    if sweep["state"] == "limit":
+        console.print(
+            f"The budget is used up: `buildarena sweep resume {sweep['id']} --max-cost-usd …` "
+            "gives it more.",
+            soft_wrap=True,
+        )
 
 
 def _show_estimate(estimate: dict[str, Any], *, as_json: bool) -> None:
@@ -145,7 +185,7 @@ def _watch(client: Client, sweep_id: str, *, as_json: bool) -> dict[str, Any]:
         return watch_sweep(client, sweep_id)
     while True:
         sweep: dict[str, Any] = client.get_patiently(f"/v1/sweeps/{sweep_id}")
-        if sweep["progress"]["done"] == sweep["progress"]["total"]:
+        if ended(sweep):
             print_json(sweep)
             return sweep
         time.sleep(0.5)

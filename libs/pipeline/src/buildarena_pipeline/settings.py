@@ -33,7 +33,7 @@ class Settings(BaseSettings):
     require_keys: Annotated[bool, Field(description="Whether requests need an API key")] = False
     admin_key: Annotated[
         SecretStr | None,
-        Field(description="Secret of the operator's own key, with which others are made"),
+        Field(description="Secret of the operator's own key, which makes others", min_length=16),
     ] = None
     rate_limit: Annotated[
         str, Field(description="Requests a caller may send, for example 600/minute")

@@ -76,7 +76,7 @@ class ApiKeys:
         Returns:
             The key, and its secret, which can't be read again.
         """
-        secret = SECRET_PREFIX + secrets.token_urlsafe(32)
+        secret = new_secret()
         statement = (
             insert(api_keys)
             .values(
@@ -151,6 +151,11 @@ class ApiKeys:
         if row is None:
             raise UnknownIdError("key", key_id)
         return ApiKey(**row._mapping)  # noqa: SLF001
+
+
+def new_secret() -> str:
+    """256 random bits in letters."""
+    return SECRET_PREFIX + secrets.token_urlsafe(32)
 
 
 def secret_hash(secret: str) -> str:

@@ -1,0 +1,82 @@
+"""Keys and budgets as an operator and a researcher use them, against a real API."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+
+import pytest
+import yaml
+from live_api import live_api
+from pydantic import SecretStr
+from typer.testing import CliRunner, Result
+
+from buildarena_cli.errors import CommandError
+from buildarena_cli.main import app
+from buildarena_pipeline.context import open_context
+
+ADMIN = "operator-secret-that-is-long-enough"
+Call = Callable[..., Result]
+
+
+@pytest.fixture
+def call(context, monkeypatch) -> Iterator[Call]:
+    """Runs commands with a key against an API that asks for one."""
+    changes = {"require_keys": True, "admin_key": SecretStr(ADMIN)}
+    own = open_context(context.settings.model_copy(update=changes))
+    with live_api(own) as url:
+        monkeypatch.setenv("BUILDARENA_URL", url)
+
+        def run(*words: str, key: str | None = ADMIN) -> Result:
+            result = CliRunner().invoke(app, words, env={"BUILDARENA_KEY": key})
+            if result.exception is not None and not isinstance(result.exception, SystemExit):
+                raise result.exception
+            return result
+
+        yield run
+    own.close()
+
+
+def made(call: Call, *words: str) -> dict[str, str]:
+    return json.loads(call("key", "create", "ada", *words, "--json").stdout)
+
+
+def test_a_key_is_made_used_listed_and_revoked(call) -> None:
+    key = made(call, "--scope", "submit", "--days", "30", "--max-cost-usd", "12.5")
+    assert call("task", "list", key=key["secret"]).exit_code == 0
+    listed = call("key", "list").stdout
+    assert key["id"][:8] in listed
+    assert "$0.00 of" in listed
+    assert key["secret"] not in listed
+    call("key", "budget", key["id"], "--max-requests", "7")
+    (shown,) = json.loads(call("key", "list", "--json").stdout)
+    assert (shown["budget"]["max_requests"], shown["budget"]["max_cost_usd"]) == (7, None)
+    assert "revoked" in call("key", "revoke", key["id"]).stdout
+    with pytest.raises(CommandError, match=r"is revoked: set BUILDARENA_KEY"):
+        call("task", "list", key=key["secret"])
+
+
+def test_without_a_key_the_command_says_what_to_set(call) -> None:
+    with pytest.raises(CommandError, match=r"an API key is needed.*BUILDARENA_KEY"):
+        call("job", "list", key=None)
+
+
+def test_a_wrong_scope_is_named_with_the_choices(call) -> None:
+    with pytest.raises(CommandError, match="'read', 'submit' or 'admin'"):
+        call("key", "create", "x", "--scope", "root")
+
+
+def test_running_a_file_again_takes_the_sweep_up_with_another_budget(call, tmp_path) -> None:
+    key = made(call)["secret"]
+    file = tmp_path / "sweep.yaml"
+    wish = {"tasks": ["lift-1"], "models": ["builtin/idle"], "seeds": [0]}
+    file.write_text(yaml.safe_dump({**wish, "budget": {"max_requests": 5}}))
+    first = json.loads(call("sweep", "run", str(file), "--detach", "--json", key=key).stdout)
+    more = ("--max-requests", "9")
+    again = json.loads(call("sweep", "run", str(file), "--detach", "--json", *more, key=key).stdout)
+    assert (again["id"], again["taken_up"], again["added"]) == (first["id"], True, 0)
+    shown = call("sweep", "status", first["id"], key=key).stdout
+    assert "budget: 0 of 9 requests" in shown
+    call("sweep", "pause", first["id"], key=key)
+    assert "active" in call("sweep", "resume", first["id"], "--max-cost-usd", "3", key=key).stdout
+    assert "$0.00 of $3.00" in call("sweep", "status", first["id"], key=key).stdout
