@@ -111,13 +111,17 @@ def test_what_cannot_change_a_score_keeps_the_version() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "parts"),
     [
-        ("  min_time_s: 3", "  min_tim_s: 3", ["line 18", "scoring.min_tim_s", "min_time_s"]),
+        (
+            "  min_time_s: 3",
+            "  min_tim_s: 3",
+            ["task:18: scoring.min_tim_s: there is no such field", "min_time_s"],
+        ),
         ("name: support\n", "name: suport\n", ["scoring", "'transport', 'support'"]),
-        ("gap: 10}", "gap: -1}", ["line 15", "scenario.placement.gap", "greater than 0"]),
+        ("gap: 10}", "gap: -1}", ["task:15: scenario.placement.gap: ", "greater than 0"]),
         ("kind: span", "kind: hover", ["placement", "'ground', 'span'"]),
         ("duration_s: 10", "duration_s: 10.01", ["duration_s", "0.04"]),
         ("title: A suspended bridge\n", "", ["title", "required"]),
-        ("max_blocks: 100", "max_blocks: many", ["line 8", "constraints.max_blocks", "integer"]),
+        ("max_blocks: 100", "max_blocks: many", ["task:8: constraints.max_blocks: ", "integer"]),
         ("indicator: {", "indicator: [", ["no valid YAML"]),
     ],
 )
@@ -127,6 +131,85 @@ def test_an_error_names_line_field_and_choices(old: str, new: str, parts: list[s
         load_task(OWN.replace(old, new))
     for part in parts:
         assert part in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("duration_s: 10", "duration_s: 601", "less than or equal to 600"),
+        ("duration_s: 10", "duration_s: 100", "50,000 block-seconds; at most 20,000"),
+        ("max_blocks: 100", "max_blocks: 401", "20,050 block-seconds"),
+        ("max_blocks: 100", "max_blocks: 1001", "constraints.max_blocks"),
+        ("max_sub_structures: 5", "max_sub_structures: 21", "constraints.max_sub_structures"),
+        ("final_mass: 300", "final_mass: 1e6", "scenario.cargo.final_mass"),
+        ("final_mass: 300", "final_mass: .nan", "scenario.cargo.final_mass"),
+        ("final_mass: 300", "final_mass: .inf", "scenario.cargo.final_mass"),
+        ("final_mass: 300", f"final_mass: {'9' * 4000}", "scenario.cargo.final_mass"),
+        ("ramp_s: 8", "ramp_s: 8, ramp_start_s: .inf", "scenario.cargo.ramp_start_s"),
+        ("size: [2.5, 2.5, 1.5]", "size: [1e300, 1, 1]", "scenario.cargo.size[0]"),
+        ("size: [2.5, 2.5, 1.5]", "size: [1e-9, 1, 1]", "scenario.cargo.size[0]"),
+        ("size: [30, 20, 5]", "size: [1e9, 20, 5]", "scenario.terrain[0].size[0]"),
+        ("gap: 10}", "gap: 1e9}", "scenario.placement.gap"),
+        ("min_time_s: 3", "min_time_s: .inf", "scoring.min_time_s"),
+        ("indicator: {name: load", 'indicator: {name: "$x$"', "indicator.name"),
+        ("title: A suspended", 'title: "\\e[31m', "title: "),
+        ("title: A suspended bridge", 'title: "\\ud800"', "title: "),
+    ],
+)
+def test_a_trial_that_is_out_of_bounds_is_refused(old: str, new: str, says: str) -> None:
+    assert old in OWN
+    text = OWN.replace(old, new, 1)
+    if new.startswith('title: "\\e'):
+        text = text.replace("31m bridge", '31m bridge"')
+    with pytest.raises(TaskError) as caught:
+        load_task(text)
+    assert says in str(caught.value)
+
+
+def test_more_terrain_than_is_simulated_is_refused() -> None:
+    box = "    - {center: [0, 0, 0], size: [1, 1, 1]}\n"
+    with pytest.raises(TaskError, match=r"task:11: scenario\.terrain: .*at most 64"):
+        load_task(OWN.replace("  terrain:\n", "  terrain:\n" + 63 * box))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("  max_blocks: 100", "  min_sub_structures: 6", "constraints.max_sub_structures: is 5"),
+        ("  max_blocks: 100", "  modules: [Winch, Rocket]", "modules[1]: there is no module 'Roc"),
+        ("  max_blocks: 100", "  min_modules: {Rope: 2}", "min_modules.Rope: there is no module"),
+        ("  max_blocks: 100", "  modules: []", "constraints.modules"),
+        (
+            "  max_blocks: 100",
+            "  modules: [Brace]\n  min_modules: {Winch: 2}",
+            "Winch is not among the task's modules",
+        ),
+        ("  duration_s: 10", "  duration_s: 10\n  tracked_blocks: []", "tracked_blocks"),
+        ("  cargo: {", "  # cargo: {", "scoring: the cargo is judged, but scenario has no cargo"),
+        ("  min_time_s: 3", "  min_time_s: 11", "longer than the trial"),
+        (
+            "  name: support\n  min_time_s: 3",
+            "  name: transport\n  subject: cargo",
+            "scenario.control.mode must be agent",
+        ),
+        ("  name: support\n  min_time_s: 3", "  name: height", "nothing fires"),
+        (
+            "  placement: {kind: span, gap: 10}\nscoring:\n  name: support\n  min_time_s: 3",
+            "  control: {mode: held}\nscoring:\n  name: height",
+            "windows within the trial",
+        ),
+    ],
+)
+def test_a_task_that_nobody_can_pass_is_refused(old: str, new: str, says: str) -> None:
+    assert old in OWN
+    with pytest.raises(TaskError) as caught:
+        load_task(OWN.replace(old, new))
+    assert says in str(caught.value)
+
+
+def test_a_tasks_document_is_the_task_again(tasks: dict[str, Task]) -> None:
+    for task in (*tasks.values(), load_task(OWN)):
+        assert load_task(yaml.safe_dump(dict(task.as_document()))) == task
 
 
 def test_a_missing_file_is_named() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 from buildarena_benchmark.tasks.task import Task
 from buildarena_geometry import Machine
 
@@ -21,14 +23,35 @@ def broken_constraint(task: Task, machine: Machine) -> tuple[str, str] | None:
         return "empty_machine", "no machine was started"
     if len(machine.blocks) == 1 and not machine.connectors:
         return "empty_machine", "the machine is nothing but its starting block"
-    if constraints.max_blocks is not None and machine.part_count > constraints.max_blocks:
+    crowded = _crowded(task, machine)
+    if crowded is not None:
+        return "constraint_violated", crowded
+    used = Counter(block.module.name for block in machine.blocks.values())
+    used.update(connector.module.name for connector in machine.connectors.values())
+    if constraints.modules is not None:
+        foreign = set(used) - {*constraints.modules, "Starting Block"}
+        if foreign:
+            return "constraint_violated", f"{min(foreign)} is not among the task's modules"
+    for name, least in constraints.min_modules.items():
+        if used[name] < least:
+            return (
+                "constraint_violated",
+                f"the machine has {used[name]} of {name}, the task asks for {least} or more",
+            )
+    return None
+
+
+def _crowded(task: Task, machine: Machine) -> str | None:
+    """Which limit on blocks the machine or one of its sub-structures exceeds, if any."""
+    limits = task.constraints
+    if len(machine.blocks) > limits.most_blocks:
         return (
-            "constraint_violated",
-            f"the machine has {machine.part_count} parts, the task allows {constraints.max_blocks}",
+            f"the machine has {len(machine.blocks)} blocks, the task allows {limits.most_blocks} "
+            "in all"
         )
-    used = {block.module.name for block in machine.blocks.values()}
-    used |= {connector.module.name for connector in machine.connectors.values()}
-    allowed = {*(constraints.modules or used), "Starting Block"}
-    if not used <= allowed:
-        return "constraint_violated", f"{min(used - allowed)} is not among the task's modules"
+    sizes = Counter(block.structure for block in machine.blocks.values())
+    for letter, size in sizes.items():
+        if size > limits.max_blocks:
+            named = f"sub-structure {letter}" if letter else "the machine"
+            return f"{named} has {size} blocks, the task allows {limits.max_blocks} in one"
     return None

@@ -1,19 +1,26 @@
 """What a machine is put through: terrain, cargo, placement, control and duration.
 
 A scenario is a document (it is read from task files and hashed into task versions), so it is a
-frozen pydantic model: everything it does not know is refused, with the field's name.
+frozen pydantic model: everything it does not know is refused, with the field's name. Task files
+may come from strangers, so every number has bounds within which the engines stay sound.
 """
 
 import math
-from typing import Annotated, Literal, Self
+from typing import Annotated, Final, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
 
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+MAX_DURATION_S: Final = 600.0
+
 Coordinate = Annotated[float, Field(allow_inf_nan=False, ge=-1e4, le=1e4)]
-Size = tuple[Positive, Positive, Positive]
+Distance = Annotated[float, Field(gt=0, le=1000)]
+TerrainExtent = Annotated[float, Field(ge=0.1, le=1000)]
+CargoExtent = Annotated[float, Field(ge=0.1, le=100)]
+Mass = Annotated[float, Field(ge=0.01, le=100_000)]
+Instant = Annotated[float, Field(ge=0, le=MAX_DURATION_S)]
+BlockId = Annotated[str, Field(min_length=1, max_length=40)]
 
 
 class _Document(BaseModel):
@@ -31,7 +38,7 @@ class TerrainBox(_Document):
     """
 
     center: tuple[Coordinate, Coordinate, Coordinate]
-    size: Size
+    size: tuple[TerrainExtent, TerrainExtent, TerrainExtent]
     slope_deg: Annotated[float, Field(gt=-90, lt=90)] = 0.0
 
 
@@ -47,12 +54,12 @@ class Cargo(_Document):
         ramp_s: How long the ramp lasts, seconds.
     """
 
-    size: Size
+    size: tuple[CargoExtent, CargoExtent, CargoExtent]
     drop_height: Annotated[float, Field(ge=0, le=100)] = 3.0
-    initial_mass: Positive = 5.0
-    final_mass: Positive
-    ramp_start_s: Annotated[float, Field(ge=0)] = 0.5
-    ramp_s: Positive
+    initial_mass: Mass = 5.0
+    final_mass: Mass
+    ramp_start_s: Instant = 0.5
+    ramp_s: Annotated[float, Field(gt=0, le=MAX_DURATION_S)]
 
     def mass_at(self, time_s: float) -> float:
         """Mass of the cargo at a time, mass units.
@@ -79,8 +86,8 @@ class SpanPlacement(_Document):
     """
 
     kind: Literal["span"] = "span"
-    gap: Positive
-    lowest_center: Positive = 6.0
+    gap: Distance
+    lowest_center: Distance = 6.0
 
 
 class Control(_Document):
@@ -93,7 +100,7 @@ class Control(_Document):
     """
 
     mode: Literal["agent", "held", "none"] = "none"
-    from_s: Annotated[float, Field(ge=0)] = 0.0
+    from_s: Instant = 0.0
 
 
 class Scenario(_Document):
@@ -110,14 +117,16 @@ class Scenario(_Document):
         tracked_blocks: Ids of the blocks whose poses are recorded, or "all".
     """
 
-    duration_s: Annotated[float, Field(gt=0, le=600)]
+    duration_s: Annotated[float, Field(gt=0, le=MAX_DURATION_S)]
     terrain: Annotated[tuple[TerrainBox, ...], Field(max_length=64)] = ()
     cargo: Cargo | None = None
     placement: Annotated[GroundPlacement | SpanPlacement, Field(discriminator="kind")] = (
         GroundPlacement()
     )
     control: Control = Control()
-    tracked_blocks: Literal["all"] | tuple[str, ...] = "all"
+    tracked_blocks: (
+        Literal["all"] | Annotated[tuple[BlockId, ...], Field(min_length=1, max_length=1000)]
+    ) = "all"
 
     @model_validator(mode="after")
     def _duration_is_whole_samples(self) -> Self:

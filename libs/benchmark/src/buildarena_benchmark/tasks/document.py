@@ -1,18 +1,49 @@
 """The task file's format, as pydantic models.
 
 Whatever a task file may say is declared here, so that its schema, its errors and its hash all come
-from one place.
+from one place. A task may come from a stranger: what it says cannot make a trial long or large,
+and what nobody could ever pass is refused.
 """
 
-from typing import Annotated, Literal
+import unicodedata
+from typing import Annotated, Final, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationInfo, field_validator
+from pydantic_core import PydanticCustomError
 
+from buildarena_geometry import load_catalogue
 from buildarena_simulation import Scenario
 
+MAX_BLOCK_SECONDS: Final = 20_000
+"""Most blocks x seconds of a trial: about two minutes of work for the slower engine (measured:
+0.005 to 0.006 s a block-second, whatever the number of blocks) and 100 MB of trajectory."""
+
+
+def _plain(text: str) -> str:
+    """Refuses control characters and halves of characters: they steer terminals, break encoders."""
+    for character in text:
+        if unicodedata.category(character) in {"Cc", "Cs"} and character not in "\n\t":
+            raise ValueError(f"has the character {character!r}, which is no text")
+    return text
+
+
+def _known_module(name: str) -> str:
+    # Cargo is placed by the scenario, never by a builder.
+    known = [module.name for module in load_catalogue().values() if module.kind != "cargo"]
+    if name not in known:
+        message = f"there is no module {name!r}"
+        raise PydanticCustomError("unknown_module", message, {"choices": sorted(known)})
+    return name
+
+
 Weight = Annotated[int, Field(ge=1, le=3)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Coordinate = Annotated[float, Field(ge=-1e4, le=1e4)]
+Threshold = Annotated[float, Field(ge=0, le=1e6)]
+Count = Annotated[int, Field(ge=0, le=1000)]
+Text = Annotated[str, AfterValidator(_plain)]
+Word = Annotated[str, Field(pattern=r"^[\w .,/²³·%°-]+$", min_length=1, max_length=60)]
+"""Stands in tables, plots and TeX: no sign that means something there."""
+ModuleName = Annotated[str, AfterValidator(_known_module)]
 
 
 class _Document(BaseModel):
@@ -25,16 +56,43 @@ class Constraints(_Document):
     Attributes:
         min_sub_structures: Fewest sub-structures.
         max_sub_structures: Most sub-structures.
-        max_blocks: Most blocks per sub-structure, connectors not counted.
+        max_blocks: Most blocks per sub-structure, connectors not counted; the whole machine may
+            have as many for each sub-structure that is allowed.
         modules: Names of the modules that may be used; None for all.
-        min_wheels: Fewest powered wheels.
+        min_modules: Fewest blocks or connectors of a module, by its name.
+        min_wheels: Fewest powered wheels; told to builders, judged by the scorer.
     """
 
-    min_sub_structures: Annotated[int, Field(ge=1)] = 1
-    max_sub_structures: Annotated[int, Field(ge=1)] = 1
-    max_blocks: Annotated[int, Field(ge=1, le=1000)] = 200
-    modules: tuple[str, ...] | None = None
-    min_wheels: Annotated[int, Field(ge=0)] = 0
+    min_sub_structures: Annotated[int, Field(ge=1, le=20)] = 1
+    max_sub_structures: Annotated[int, Field(ge=1, le=20, validate_default=True)] = 1
+    max_blocks: Annotated[int, Field(ge=2, le=1000)] = 200
+    modules: Annotated[tuple[ModuleName, ...], Field(min_length=1, max_length=50)] | None = None
+    min_modules: dict[ModuleName, Annotated[int, Field(ge=1, le=1000)]] = {}
+    min_wheels: Count = 0
+
+    @property
+    def most_blocks(self) -> int:
+        """Most blocks of the whole machine."""
+        return self.max_sub_structures * self.max_blocks
+
+    @field_validator("max_sub_structures")
+    @classmethod
+    def _room_for_the_fewest(cls, most: int, info: ValidationInfo) -> int:
+        least = info.data.get("min_sub_structures", 1)
+        if most < least:
+            raise ValueError(f"is {most}, less than min_sub_structures, {least}")
+        return most
+
+    @field_validator("min_modules")
+    @classmethod
+    def _wanted_modules_are_allowed(
+        cls, wanted: dict[str, int], info: ValidationInfo
+    ) -> dict[str, int]:
+        allowed = info.data.get("modules")
+        for name in wanted:
+            if allowed is not None and name not in allowed:
+                raise ValueError(f"{name} is not among the task's modules")
+        return wanted
 
 
 class TransportScoring(_Document):
@@ -50,10 +108,10 @@ class TransportScoring(_Document):
 
     name: Literal["transport"]
     subject: Literal["starting_block", "cargo"]
-    min_distance: NonNegative = 10.0
-    min_wheels: Annotated[int, Field(ge=0)] = 0
-    max_start_height: NonNegative = 20.0
-    target: tuple[Finite, Finite] = (10.0, 10.0)
+    min_distance: Threshold = 10.0
+    min_wheels: Count = 0
+    max_start_height: Threshold = 20.0
+    target: tuple[Coordinate, Coordinate] = (10.0, 10.0)
 
 
 class SupportScoring(_Document):
@@ -66,9 +124,9 @@ class SupportScoring(_Document):
     """
 
     name: Literal["support"]
-    fall_height: NonNegative = 4.0
-    min_time_s: NonNegative = 2.0
-    max_start_height: NonNegative = 20.0
+    fall_height: Threshold = 4.0
+    min_time_s: Threshold = 2.0
+    max_start_height: Threshold = 20.0
 
 
 class ThrustScoring(_Document):
@@ -79,7 +137,7 @@ class ThrustScoring(_Document):
     """
 
     name: Literal["thrust"]
-    min_ratio: NonNegative = 1.0
+    min_ratio: Threshold = 1.0
 
 
 class HeightScoring(_Document):
@@ -93,10 +151,10 @@ class HeightScoring(_Document):
     """
 
     name: Literal["height"]
-    min_height: NonNegative = 30.0
-    early_s: tuple[NonNegative, NonNegative] = (2.0, 7.0)
-    late_s: tuple[NonNegative, NonNegative] = (7.0, 12.0)
-    min_rise: NonNegative = 5.0
+    min_height: Threshold = 30.0
+    early_s: tuple[Threshold, Threshold] = (2.0, 7.0)
+    late_s: tuple[Threshold, Threshold] = (7.0, 12.0)
+    min_rise: Threshold = 5.0
 
 
 Scoring = Annotated[
@@ -113,8 +171,8 @@ class Indicator(_Document):
         unit: Its unit; "1" for a ratio.
     """
 
-    name: str
-    unit: str
+    name: Word
+    unit: Word
 
 
 class Difficulty(_Document):
@@ -132,12 +190,57 @@ class TaskDocument(_Document):
     """A task file; see `Task` for what the fields mean."""
 
     name: Annotated[str, Field(pattern=r"^[a-z0-9]+(-[a-z0-9]+)*$", max_length=60)]
-    title: Annotated[str, Field(min_length=1, max_length=120)]
+    title: Annotated[Text, Field(min_length=1, max_length=120)]
     category: Annotated[str, Field(pattern=r"^[a-z0-9]+(-[a-z0-9]+)*$", max_length=40)]
     level: Annotated[int, Field(ge=1, le=9)] = 1
-    statement: Annotated[str, Field(min_length=1, max_length=20_000)]
+    statement: Annotated[Text, Field(min_length=1, max_length=20_000)]
     constraints: Constraints = Constraints()
     scenario: Scenario
     scoring: Scoring
     indicator: Indicator
     difficulty: Difficulty | None = None
+
+    @field_validator("scenario")
+    @classmethod
+    def _trial_is_bounded(cls, scenario: Scenario, info: ValidationInfo) -> Scenario:
+        constraints: Constraints | None = info.data.get("constraints")
+        if constraints is None:
+            return scenario
+        size = constraints.most_blocks * scenario.duration_s
+        if size > MAX_BLOCK_SECONDS:
+            raise ValueError(
+                f"duration_s {scenario.duration_s:g} with up to {constraints.max_sub_structures} x "
+                f"{constraints.max_blocks} blocks makes {size:,.0f} block-seconds; "
+                f"at most {MAX_BLOCK_SECONDS:,} are simulated"
+            )
+        return scenario
+
+    @field_validator("scoring")
+    @classmethod
+    def _somebody_could_pass(cls, scoring: Scoring, info: ValidationInfo) -> Scoring:
+        scenario: Scenario | None = info.data.get("scenario")
+        problem = None if scenario is None else _hopeless(scoring, scenario)
+        if problem is not None:
+            raise ValueError(problem)
+        return scoring
+
+
+def _hopeless(scoring: Scoring, scenario: Scenario) -> str | None:
+    """Why no machine can pass: the scorer asks for what the scenario does not have."""
+    wants_cargo = isinstance(scoring, SupportScoring) or (
+        isinstance(scoring, TransportScoring) and scoring.subject == "cargo"
+    )
+    mode, problem = scenario.control.mode, None
+    if wants_cargo and scenario.cargo is None:
+        problem = "the cargo is judged, but scenario has no cargo"
+    elif isinstance(scoring, TransportScoring) and mode != "agent":
+        problem = "a vehicle is judged, but nobody drives: scenario.control.mode must be agent"
+    elif isinstance(scoring, SupportScoring) and scoring.min_time_s > scenario.duration_s:
+        problem = f"min_time_s {scoring.min_time_s:g} is longer than the trial"
+    elif isinstance(scoring, HeightScoring):
+        (start, end), (later, last) = scoring.early_s, scoring.late_s
+        if mode == "none":
+            problem = "a rocket is judged, but nothing fires: scenario.control.mode must be held"
+        elif not start < end <= later < last <= scenario.duration_s:
+            problem = "early_s and late_s must be windows within the trial, one after the other"
+    return problem

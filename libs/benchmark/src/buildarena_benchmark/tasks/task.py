@@ -5,13 +5,14 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 from buildarena_benchmark.tasks.document import Constraints, Indicator, Scoring, TaskDocument
 from buildarena_simulation import Scenario
 
-SCORER_VERSION: Final = 1
-"""Rises with every change of a scorer that can change a score; part of every task's version."""
+SCORER_VERSION: Final = 2
+"""Rises with every change of a scorer, or of a constraint's check, that can change a score; part
+of every task's version."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,6 +55,21 @@ class Task:
     def control(self) -> Literal["agent", "held", "none"]:
         """Who presses the keys."""
         return self.scenario.control.mode
+
+    def as_document(self) -> Mapping[str, Any]:
+        """All that a task file says, defaults included, as JSON values."""
+        return {
+            "name": self.name,
+            "title": self.title,
+            "category": self.category,
+            "level": self.level,
+            "statement": self.statement,
+            **{
+                part: getattr(self, part).model_dump(mode="json")
+                for part in ("constraints", "scenario", "scoring", "indicator")
+            },
+            "difficulty": dict(self.difficulty) or None,
+        }
 
 
 def task_of(document: TaskDocument) -> Task:

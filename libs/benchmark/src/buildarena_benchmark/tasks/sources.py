@@ -1,0 +1,243 @@
+"""YAML texts that people write: read with care, and every fault named with its line.
+
+Nothing in a text can make reading it costly: its size and depth are bounded, and anchors, aliases
+and merge keys, with which a few lines can stand for gigabytes, are refused.
+"""
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final, TypeVar
+
+import yaml
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from buildarena_benchmark.errors import Fault, SourceError
+
+MOST_BYTES: Final = 64 * 1024
+"""Largest text: the longest built-in task has 3 KiB, a sweep of 10,000 named seeds 60."""
+
+MOST_LEVELS: Final = 16
+"""Deepest nesting; a task has five levels."""
+
+Path = Sequence[int | str]
+"""Where in a document: keys and indices from the top."""
+
+_Schema = Mapping[str, Any]
+_Model = TypeVar("_Model", bound=BaseModel)
+_STEPS = re.compile(r"([^.\[\]]+)|\[(\d+)\]")
+_MAPPING_WANTED = frozenset({"model_type", "model_attributes_type", "dict_type"})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Source:
+    """A YAML text that was read.
+
+    Attributes:
+        origin: What it is called in messages, such as a file's name.
+        content: Its plain values.
+        root: Its nodes, which know their lines; None when the text is empty.
+    """
+
+    origin: str
+    content: Any
+    root: yaml.Node | None
+
+    def line_of(self, path: Path) -> int | None:
+        """The line of a field, or of the nearest thing around it; from 1."""
+        return self._located(path)[1]
+
+    def faults(self, error: ValidationError, model: type[BaseModel]) -> tuple[Fault, ...]:
+        """What a model says against the content, in words, with lines and valid choices."""
+        schema = model.model_json_schema()
+        found = [self._fault(item, schema) for item in error.errors(include_url=False)]
+        return tuple(dict.fromkeys(found))
+
+    def _fault(self, item: ErrorDetails, schema: _Schema) -> Fault:
+        field, line = self._located(item["loc"])
+        choices: Sequence[str] = item.get("ctx", {}).get("choices", ())
+        message = item["msg"].removeprefix("Value error, ")
+        if item["type"] == "extra_forbidden":
+            message, choices = "there is no such field", _fields_beside(item["loc"], schema)
+        elif item["type"] in _MAPPING_WANTED:
+            message = "must be a mapping of fields"
+        return Fault(field=field, line=line, message=message, choices=tuple(choices))
+
+    def _located(self, path: Path) -> tuple[str, int | None]:
+        node, spelled = self.root, ""
+        line = node.start_mark.line + 1 if node else None
+        for step in path:
+            below = _child(node, step)
+            if below is not None:
+                node, line = below
+            elif not isinstance(node, yaml.MappingNode) or (spelled and step != path[-1]):
+                # Unions add the chosen member's name to a path; the text has no such field.
+                continue
+            spelled += f"[{step}]" if isinstance(step, int) else f".{step}" if spelled else step
+        return spelled, line
+
+
+def read_source(text: str, *, origin: str, most_bytes: int = MOST_BYTES) -> Source:
+    """Reads a YAML text.
+
+    Args:
+        text: One YAML document.
+        origin: What it is called in messages.
+        most_bytes: Largest size accepted, as UTF-8.
+
+    Raises:
+        SourceError: It is too large, no YAML, or uses what is refused.
+    """
+    size = len(text.encode("utf-8", "surrogatepass"))
+    if size > most_bytes:
+        message = f"{size:,} bytes; at most {most_bytes:,} are read"
+        raise SourceError([Fault(message=message)], origin=origin)
+    try:
+        loader = _CarefulLoader(text)
+        try:
+            root = loader.get_single_node()
+            content = None if root is None else loader.construct_document(root)
+        finally:
+            loader.dispose()
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        line = None if mark is None else mark.line + 1
+        message = str(error.problem or error.context)
+        if not isinstance(error, _Refused):
+            message = f"no valid YAML: {message}"
+        raise SourceError([Fault(message=message, line=line)], origin=origin) from error
+    except yaml.reader.ReaderError as error:
+        line = text.count("\n", 0, error.position) + 1
+        message = f"no valid YAML: {error.reason}"
+        raise SourceError([Fault(message=message, line=line)], origin=origin) from error
+    if faults := list(_key_faults(root, "")):
+        raise SourceError(faults, origin=origin)
+    return Source(origin=origin, content=content, root=root)
+
+
+def read_model(text: str, model: type[_Model], *, origin: str) -> _Model:
+    """What a YAML text says, as a model.
+
+    Raises:
+        SourceError: It cannot be read, or is not what the model wants.
+    """
+    source = read_source(text, origin=origin)
+    try:
+        return model.model_validate(source.content)
+    except ValidationError as error:
+        raise SourceError(source.faults(error, model), origin=origin) from error
+
+
+def path_of(field: str) -> Path:
+    """The path that a field's spelling means: ``models[1]`` is ("models", 1)."""
+    return [int(index) if index else name for name, index in _STEPS.findall(field)]
+
+
+class _Refused(yaml.MarkedYAMLError):
+    """Good YAML that is not accepted here."""
+
+
+class _CarefulLoader(yaml.SafeLoader):
+    """Makes plain values, from texts without anchors, aliases and great depth."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(text)
+        self._level = 0
+
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
+        event: Any = self.peek_event()  # type: ignore[no-untyped-call]  # its stub lacks it
+        if isinstance(event, yaml.AliasEvent) or getattr(event, "anchor", None):
+            message = "anchors and aliases are not allowed: write the value out"
+            raise _Refused(problem=message, problem_mark=event.start_mark)
+        if self._level >= MOST_LEVELS:
+            message = f"more than {MOST_LEVELS} levels inside each other"
+            raise _Refused(problem=message, problem_mark=event.start_mark)
+        self._level += 1
+        node = super().compose_node(parent, index)
+        self._level -= 1
+        return node
+
+    def flatten_mapping(self, node: yaml.MappingNode) -> None:
+        for key, _ in node.value:
+            if key.tag == "tag:yaml.org,2002:merge":
+                message = "merge keys are not allowed: write the fields out"
+                raise _Refused(problem=message, problem_mark=key.start_mark)
+
+    def construct_object(self, node: yaml.Node, deep: bool = False) -> Any:
+        try:
+            return super().construct_object(node, deep=deep)
+        except (ValueError, OverflowError) as error:
+            # A number of ten thousand digits, a thirteenth month.
+            message = f"the value cannot be read: {error}"
+            raise _Refused(problem=message, problem_mark=node.start_mark) from error
+
+
+def _key_faults(node: yaml.Node | None, around: str) -> Iterator[Fault]:
+    """Keys that are no words, or that stand twice in one mapping."""
+    if isinstance(node, yaml.SequenceNode):
+        for index, item in enumerate(node.value):
+            yield from _key_faults(item, f"{around}[{index}]")
+    if not isinstance(node, yaml.MappingNode):
+        return
+    lines: dict[str, int] = {}
+    for key, value in node.value:
+        line = key.start_mark.line + 1
+        if not isinstance(key, yaml.ScalarNode) or key.tag != "tag:yaml.org,2002:str":
+            told = key.value if isinstance(key, yaml.ScalarNode) else "a collection"
+            yield Fault(field=around, line=line, message=f"the key {told} is no word")
+            continue
+        field = f"{around}.{key.value}" if around else key.value
+        if key.value in lines:
+            message = f"stands twice, first in line {lines[key.value]}"
+            yield Fault(field=field, line=line, message=message)
+        lines.setdefault(key.value, line)
+        yield from _key_faults(value, field)
+
+
+def _child(node: yaml.Node | None, step: int | str) -> tuple[yaml.Node, int] | None:
+    """What lies below a node, and the line of its key or of itself."""
+    if isinstance(node, yaml.MappingNode):
+        for key, value in node.value:
+            if key.value == step:
+                return value, key.start_mark.line + 1
+    if isinstance(node, yaml.SequenceNode) and isinstance(step, int) and step < len(node.value):
+        item = node.value[step]
+        return item, item.start_mark.line + 1
+    return None
+
+
+def _fields_beside(path: Path, schema: _Schema) -> tuple[str, ...]:
+    """Names of the fields that are valid where an unknown one was found."""
+    here: _Schema = schema
+    for step in path[:-1]:
+        here = _resolved(here, schema)
+        options = [_resolved(o, schema) for o in here.get("oneOf") or here.get("anyOf") or ()]
+        if options:
+            fitting = (o for o in options if step in (_tag(o), *o.get("properties", {})))
+            here = next(fitting, {})
+            if _tag(here) == step:
+                continue
+        here = here.get("properties", {}).get(step) or here.get("items") or {}
+    here = _resolved(here, schema)
+    if "anyOf" in here:  # a field that may be null
+        here = next(
+            (o for o in (_resolved(o, schema) for o in here["anyOf"]) if o.get("properties")), {}
+        )
+    return tuple(here.get("properties", {}))
+
+
+def _resolved(part: _Schema, schema: _Schema) -> _Schema:
+    reference = part.get("$ref")
+    if reference is None:
+        return part
+    found: _Schema = schema["$defs"][reference.rsplit("/", 1)[1]]
+    return found
+
+
+def _tag(option: _Schema) -> str | None:
+    for name in ("name", "kind"):
+        tag = option.get("properties", {}).get(name, {}).get("const")
+        if tag:
+            return str(tag)
+    return None
