@@ -139,7 +139,9 @@ def _used(body: dict[str, Any], reply: Reply) -> tuple[int, int, int]:
     return size // 4, 1 + len(json.dumps(reply.to_json())) // 4, size // 16
 
 
-class _OpenAI:
+class OpenAIWire:
+    """OpenAI's chat completions, from the provider's side."""
+
     @staticmethod
     def read(body: dict[str, Any]) -> Request:
         messages = []
@@ -310,7 +312,7 @@ class _Google:
         }
 
 
-_WIRES: dict[str, Any] = {"openai": _OpenAI, "anthropic": _Anthropic, "google": _Google}
+_WIRES: dict[str, Any] = {"openai": OpenAIWire, "anthropic": _Anthropic, "google": _Google}
 
 
 def _part(text: str) -> dict[str, Any]:

@@ -25,18 +25,10 @@ from buildarena_pipeline.models import load_registry
 from buildarena_pipeline.settings import Settings
 from buildarena_pipeline.specs import SweepSpec
 from buildarena_pipeline.submission import Submissions
-from buildarena_pipeline.sweeper import announce_waiting
 
-SUPPORT = Path(__file__).parents[2] / "support"
-STANDIN = """
-import sys, time
-sys.path.insert(0, sys.argv[1])
-from provider_standin import ProviderStandIn
-with ProviderStandIn("expert", latency_s=float(sys.argv[2])) as standin:
-    print(standin.url, flush=True)
-    sys.stdin.read()
-"""
+STANDIN = Path(__file__).with_name("standin.py")
 MEBIBYTE = 1024 * 1024
+POLL_S = 0.2
 
 
 def main() -> None:
@@ -48,81 +40,95 @@ def main() -> None:
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
         folder.chmod(0o755)
-        standin = subprocess.Popen(
-            [sys.executable, "-c", STANDIN, str(SUPPORT), str(given.latency)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
+        provider = subprocess.Popen(
+            [sys.executable, str(STANDIN), str(given.latency)], stdout=subprocess.PIPE
         )
-        stack.callback(standin.wait)
-        stack.callback(standin.kill)
-        assert standin.stdout is not None
-        url = standin.stdout.readline().decode().strip()
-        figures = _measure(stack, folder, url, given.sessions, given.latency)
+        stack.callback(provider.wait)
+        stack.callback(provider.kill)
+        assert provider.stdout is not None
+        url = provider.stdout.readline().decode().strip()
+        service = Service(stack, folder, url, given.sessions)
+        figures = _measure(service, provider.pid, given.sessions, given.latency)
     sys.stdout.write(json.dumps(figures, indent=2) + "\n")
 
 
-def _measure(
-    stack: ExitStack, folder: Path, url: str, sessions: int, latency_s: float
-) -> dict[str, object]:
-    context, environment, registry_file = _service(stack, folder, url, sessions)
-    log = stack.enter_context((folder / "worker.log").open("wb"))
-    worker = subprocess.Popen(
-        [sys.executable, "-m", "buildarena_worker"], env=environment, stdout=log, stderr=log
-    )
-    stack.callback(worker.wait)
-    stack.callback(worker.terminate)
-    process = psutil.Process(worker.pid)
-    while not [w for w in context.workers.all() if w.alive]:
-        time.sleep(0.1)
-    submissions = Submissions(context, load_registry(registry_file))
-    busy = _cpu_s(process)
-    started = time.monotonic()
-    sweep = submissions.submit_sweep(
-        SweepSpec(
-            tasks=["support-1"], models=["standin/expert"], samples=sessions, simulator="mujoco"
+class Service:
+    """A database, a broker and one construct worker, stopped with the stack."""
+
+    def __init__(self, stack: ExitStack, folder: Path, url: str, sessions: int) -> None:
+        self.context, environment, registry_file = _backends(stack, folder, url, sessions)
+        self._log = folder / "worker.log"
+        log = stack.enter_context(self._log.open("wb"))
+        self.worker = subprocess.Popen(
+            [sys.executable, "-m", "buildarena_worker"], env=environment, stdout=log, stderr=log
         )
-    ).sweep
-    peak = 0
-    while context.sweeps.progress(sweep.id).stages.get("simulate queued", 0) < sessions:
-        announce_waiting(context, "construct")
-        peak = max(peak, process.memory_info().rss)
-        time.sleep(0.2)
-        assert worker.poll() is None, (folder / "worker.log").read_text()[-2000:]
-    wall_s = time.monotonic() - started
-    busy = _cpu_s(process) - busy
-    progress = context.sweeps.progress(sweep.id)
-    turns = progress.requests
-    longest = max(_turns(context, sweep.id))
+        stack.callback(self.worker.wait)
+        stack.callback(self.worker.terminate)
+        while not [w for w in self.context.workers.all() if w.alive]:
+            time.sleep(POLL_S)
+        self._submissions = Submissions(self.context, load_registry(registry_file))
+
+    def run(self, seeds: list[int]) -> tuple[str, float]:
+        """The id of a new sweep, and the seconds until all its machines were built."""
+        started = time.monotonic()
+        spec = SweepSpec(
+            tasks=["support-1"], models=["standin/expert"], seeds=seeds, simulator="mujoco"
+        )
+        sweep = self._submissions.submit_sweep(spec).sweep
+        while self._built(sweep.id) < len(seeds):
+            time.sleep(POLL_S)
+            assert self.worker.poll() is None, self._log.read_text()[-2000:]
+        return sweep.id, time.monotonic() - started
+
+    def _built(self, sweep_id: str) -> int:
+        return self.context.sweeps.progress(sweep_id).stages.get("simulate queued", 0)
+
+
+def _measure(service: Service, provider: int, sessions: int, latency_s: float) -> dict[str, object]:
+    # What a process loads once is not what a session costs: it has run a session before.
+    _, first_s = service.run([sessions])
+    worker = service.worker.pid
+    before = _cpu_s(worker), _cpu_s(provider)
+    sweep_id, wall_s = service.run(list(range(sessions)))
+    busy_s, provider_s = _cpu_s(worker) - before[0], _cpu_s(provider) - before[1]
+    context = service.context
+    requests = [job.requests for job in context.jobs.page(limit=1000, sweep_id=sweep_id)]
+    turns, ideal_s = sum(requests), max(requests) * latency_s
     waits = [
         entry.latency_s
-        for job in context.jobs.page(limit=5, sweep_id=sweep.id)
+        for job in context.jobs.page(limit=20, sweep_id=sweep_id)
         for entry in context.journal.read(job.id)
     ]
     return {
         "sessions": sessions,
         "latency_s": latency_s,
         "turns": turns,
+        "first_session_s": round(first_s, 2),
         "wall_s": round(wall_s, 2),
-        "ideal_s": round(longest * latency_s, 2),
-        "share_of_ideal": round(longest * latency_s / wall_s, 3),
-        "cpu_ms_per_turn": round(1000 * busy / turns, 2),
+        "ideal_s": round(ideal_s, 2),
+        "share_of_ideal": round(ideal_s / wall_s, 3),
+        "cpu_ms_per_turn": round(1000 * busy_s / turns, 2),
+        "provider_cpu_ms_per_turn": round(1000 * provider_s / turns, 2),
         "median_latency_s": round(statistics.median(waits), 3),
-        "peak_rss_mib": round(peak / MEBIBYTE),
+        "peak_rss_mib": round(_peak_rss(worker) / MEBIBYTE),
+        "load_average": round(os.getloadavg()[0], 1),
         "bars": {"share_of_ideal": ">= 0.9", "cpu_ms_per_turn": "<= 5", "peak_rss_mib": "< 700"},
     }
 
 
-def _turns(context: Context, sweep_id: str) -> list[int]:
-    jobs = context.jobs.page(limit=1000, sweep_id=sweep_id)
-    return [job.requests for job in jobs]
+def _peak_rss(pid: int) -> int:
+    """The most memory that a process had at once, as the kernel knows it, in bytes."""
+    lines = Path(f"/proc/{pid}/status").read_text().splitlines()
+    (peak,) = (line.split()[1] for line in lines if line.startswith("VmHWM:"))
+    return int(peak) * 1024
 
 
-def _cpu_s(process: psutil.Process) -> float:
-    times = process.cpu_times()
+def _cpu_s(pid: int) -> float:
+    times = psutil.Process(pid).cpu_times()
     return float(times.user + times.system)
 
 
-def _service(
+def _backends(
     stack: ExitStack, folder: Path, url: str, sessions: int
 ) -> tuple[Context, dict[str, str], Path]:
     postgres = EmbeddedPostgres(folder / "pg", folder / "pg.log")

@@ -38,7 +38,7 @@ def reply(request: Request) -> Reply:
     return speak() if speak else Reply(text=DONE)
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=1024)  # sessions that one process may play at once
 def _design(task: str, seed: int) -> Design:
     return DESIGNS[task](seed)
 
