@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from buildarena_pipeline.queues import Queues
 from buildarena_pipeline.settings import Settings
+from buildarena_pipeline.task_catalogue import TaskCatalogue
 from buildarena_store import (
     ApiKeys,
     ArtifactStore,
@@ -20,6 +21,7 @@ from buildarena_store import (
     Rollouts,
     Sweeps,
     Verifications,
+    Tasks,
     Workers,
 )
 
@@ -45,6 +47,8 @@ class Context:
     keys: ApiKeys
     budgets: Budgets
 
+    tasks: Tasks
+    catalogue: TaskCatalogue
     def close(self) -> None:
         """Closes the connections."""
         self.queues.close()
@@ -55,6 +59,7 @@ def open_context(settings: Settings, *, pool_size: int = 5) -> Context:
     """Connects to what the settings name; nothing is contacted before it is used."""
     database = Database(settings.required_database_url(), pool_size=pool_size)
     leases = Leases(database, duration_s=settings.lease_s, max_faults=settings.max_faults)
+    tasks = Tasks(database)
     return Context(
         settings=settings,
         database=database,
@@ -73,3 +78,5 @@ def open_context(settings: Settings, *, pool_size: int = 5) -> Context:
         keys=ApiKeys(database),
         budgets=Budgets(database),
     )
+        tasks=tasks,
+        catalogue=TaskCatalogue(tasks),

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from threading import Lock
 from typing import Any
 
-from buildarena_benchmark import broken_constraint, builtin_tasks
+from buildarena_benchmark import Task, broken_constraint
 from buildarena_pipeline.context import Context
 from buildarena_pipeline.documents import machine_bytes
 from buildarena_pipeline.errors import FieldError, PipelineError, SubmissionError
@@ -62,12 +62,12 @@ class ExternalSessions:
         Raises:
             SubmissionError: Something is unknown, or this agent played this seed already.
         """
-        _check(task, agent, simulator)
+        chosen = self._check(task, agent, simulator)
         track = external_track(simulator)
         config = {"name": f"agent/{agent}", "provider": "external", "model": agent}
         key = JobKey(
             task=task,
-            task_version=builtin_tasks()[task].version,
+            task_version=chosen.version,
             model_hash=content_hash(config),
             track=track.id,
             seed=seed,
@@ -130,11 +130,12 @@ class ExternalSessions:
             kept = context.artifacts.put(machine_bytes(machine), JSON)
             context.results.attach(job_id, "machine", kept, connection=connection)
             refusals = dict(Counter(c.reason or "refused" for c in calls if not c.ok))
-            broken = broken_constraint(task_of(job), machine)
+            task = task_of(job, context.catalogue)
+            broken = broken_constraint(task, machine)
             if broken is not None:
                 reason, detail = broken
                 score = failure_score(
-                    job, machine, outcome="construction_failed", reason=reason, detail=detail
+                    job, task, machine, outcome="construction_failed", reason=reason, detail=detail
                 )
                 context.results.finish(lease, score, connection=connection, refusals=refusals)
             else:
@@ -153,6 +154,21 @@ class ExternalSessions:
         if engine is not None:
             context.queues.announce(simulate_queue(engine), [job_id])
         return context.jobs.get(job_id)
+
+    def _check(self, task: str, agent: str, simulator: str) -> Task:
+        """The newest version of the task, if all that was named is there."""
+        errors = []
+        found = self._context.catalogue.named([task]).get(task)
+        if found is None:
+            errors.append(_unknown("task", task, sorted(self._context.catalogue.newest())))
+        if simulator not in SIMULATORS:
+            errors.append(_unknown("simulator", simulator, SIMULATORS))
+        if not AGENT_NAME.match(agent):
+            message = "1 to 80 letters, digits, dots, dashes and underscores"
+            errors.append(FieldError(field="agent", message=message))
+        if errors or found is None:
+            raise SubmissionError(errors)
+        return found
 
     def _lease(self, job_id: str, connection: Any) -> Lease:
         lease = self._context.external.lease(job_id, connection=connection)
@@ -178,19 +194,6 @@ class ExternalSessions:
             self._benches[job_id, count] = bench
             while len(self._benches) > CACHED_BENCHES:
                 self._benches.popitem(last=False)
-
-
-def _check(task: str, agent: str, simulator: str) -> None:
-    errors = []
-    if task not in builtin_tasks():
-        errors.append(_unknown("task", task, sorted(builtin_tasks())))
-    if simulator not in SIMULATORS:
-        errors.append(_unknown("simulator", simulator, SIMULATORS))
-    if not AGENT_NAME.match(agent):
-        message = "1 to 80 letters, digits, dots, dashes and underscores"
-        errors.append(FieldError(field="agent", message=message))
-    if errors:
-        raise SubmissionError(errors)
 
 
 def _unknown(field: str, value: str, choices: Sequence[str]) -> FieldError:

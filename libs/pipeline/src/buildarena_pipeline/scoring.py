@@ -5,22 +5,23 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from buildarena_benchmark import Task, builtin_tasks, failed_score
+from buildarena_benchmark import Task, failed_score
 from buildarena_geometry import DOCUMENT_VERSION, Machine
 from buildarena_geometry import __version__ as geometry_version
 from buildarena_pipeline import __version__
 from buildarena_pipeline.errors import PermanentFaultError
+from buildarena_pipeline.task_catalogue import TaskCatalogue
 from buildarena_store import Job, JobScore, RolloutRecord
 
 
-def task_of(job: Job) -> Task:
-    """The job's task, as long as it is still the version that the job was submitted for.
+def task_of(job: Job, catalogue: TaskCatalogue) -> Task:
+    """The job's task, in the version that the job was submitted for.
 
     Raises:
-        PermanentFaultError: The task is gone or has changed.
+        PermanentFaultError: It is gone, or is no longer scored as it was.
     """
-    task = builtin_tasks().get(job.task)
-    if task is None or task.version != job.task_version:
+    task = catalogue.exact(job.task, job.task_version)
+    if task is None:
         raise PermanentFaultError(
             f"task {job.task} is no longer at version {job.task_version[:12]}: submit it again",
             reason="task_changed",
@@ -48,18 +49,19 @@ def rollout_score(job: Job, record: RolloutRecord) -> JobScore:
 
 
 def failure_score(
-    job: Job, machine: Machine | None, *, outcome: str, reason: str, detail: str
+    job: Job, task: Task, machine: Machine | None, *, outcome: str, reason: str, detail: str
 ) -> JobScore:
     """The score of a job that ended without a rollout.
 
     Args:
         job: The job.
+        task: Its task.
         machine: What was built, if anything: its parts are counted.
         outcome: ``construction_failed`` or ``limit``.
         reason: Class of the failure.
         detail: A sentence for people.
     """
-    failed = failed_score(task_of(job), machine)
+    failed = failed_score(task, machine)
     return JobScore(
         outcome=outcome,
         success=failed.success,

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from buildarena_benchmark import builtin_tasks
+from buildarena_benchmark import Task
 from buildarena_pipeline.context import Context
 from buildarena_pipeline.errors import FieldError, SubmissionError
 from buildarena_pipeline.estimates import SweepEstimate, estimate
@@ -154,8 +154,8 @@ class Submissions:
         Raises:
             SubmissionError: Something of it is unknown, or it is too large.
         """
-        self._check(spec, fields or {})
-        tasks = builtin_tasks()
+        tasks = self._context.catalogue.named(spec.tasks)
+        self._check(spec, tasks, fields or {})
         track = make_track(
             self._workflows[spec.workflow],
             spec.simulator,
@@ -189,9 +189,12 @@ class Submissions:
                 ]
         return new
 
-    def _check(self, spec: SweepSpec, fields: dict[str, str]) -> None:
+    def _check(self, spec: SweepSpec, tasks: Mapping[str, Task], fields: dict[str, str]) -> None:
+        if any(name not in tasks for name in spec.tasks):
+            # The choices are all there are.
+            tasks = self._context.catalogue.newest()
         errors = [
-            *_unknown("tasks", "task", spec.tasks, builtin_tasks()),
+            *_unknown("tasks", "task", spec.tasks, tasks),
             *_unknown("models", "model", spec.models, self._registry.models),
             *_unknown("workflow", "workflow", [spec.workflow], self._workflows),
             *_unknown("simulator", "simulator", [spec.simulator], SIMULATORS),

@@ -25,6 +25,7 @@ from buildarena_store.results import JobScore, Results
 from buildarena_store.rollouts import RolloutRecord, RolloutRequest, Rollouts
 from buildarena_store.sweeps import NewSweep, Sweep, SweepProgress, Sweeps
 from buildarena_store.text import clean
+from buildarena_store.tasks import StoredTask, Tasks
 from buildarena_store.verifications import Verification, Verifications
 from buildarena_store.workers import WorkerInfo, Workers
 
@@ -70,9 +71,11 @@ __all__ = [
     "SweepProgress",
     "Sweeps",
     "UnknownIdError",
+    "StoredTask",
     "Usage",
     "Verification",
     "Verifications",
+    "Tasks",
     "WorkerInfo",
     "Workers",
     "clean",

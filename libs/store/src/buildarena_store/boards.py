@@ -12,7 +12,7 @@ from sqlalchemy import Connection, Integer, Row, cast, func, select, text
 
 from buildarena_benchmark.leaderboard import Trial
 from buildarena_store.database import Database
-from buildarena_store.tables import board_changes, jobs, rollouts, sweep_jobs
+from buildarena_store.tables import board_changes, jobs, rollouts, sweep_jobs, tasks
 
 CHUNK = 5000
 """Rows that are in memory twice at a time while all are read."""
@@ -26,11 +26,13 @@ class BoardFeed:
         mark: Give it to read on from here.
         put: Trials that are new or may have changed.
         gone: Ids of jobs that are no longer ended.
+        task_versions: How many versions of tasks were ever uploaded.
     """
 
     mark: int
     put: Sequence[Trial]
     gone: Sequence[str]
+    task_versions: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,18 +88,21 @@ class Boards:
         with self._database.transaction() as connection:
             connection.execute(text("SET TRANSACTION ISOLATION LEVEL REPEATABLE READ, READ ONLY"))
             oldest = func.pg_snapshot_xmin(func.pg_current_snapshot())
-            new_mark = int(connection.execute(select(oldest.op("::")(text("text")))).scalar_one())
+            uploaded = select(func.count()).select_from(tasks).scalar_subquery()
+            marks = connection.execute(select(oldest.op("::")(text("text")), uploaded)).one()
+            new_mark, task_versions = int(marks[0]), int(marks[1])
             if mark is None:
                 query = select(*_COLUMNS).where(jobs.c.state == "done")
-                return BoardFeed(mark=new_mark, put=list(_trials(connection, query)), gone=())
+                put = list(_trials(connection, query))
+                return BoardFeed(mark=new_mark, put=put, gone=(), task_versions=task_versions)
             changed = select(board_changes.c.job_id).where(board_changes.c.transaction >= mark)
             ids = {row.job_id for row in connection.execute(changed.distinct())}
-            put: list[Trial] = []
+            put = []
             if ids:
                 query = select(*_COLUMNS).where(jobs.c.state == "done", jobs.c.id.in_(ids))
                 put = list(_trials(connection, query))
         gone = sorted(ids - {trial.job_id for trial in put})
-        return BoardFeed(mark=new_mark, put=put, gone=gone)
+        return BoardFeed(mark=new_mark, put=put, gone=gone, task_versions=task_versions)
 
     def of_sweep(self, sweep_id: str) -> list[tuple[Trial, list[Round]]]:
         """A sweep's ended jobs with their rounds, in a fixed order."""

@@ -66,7 +66,7 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
     app.state.context = context
     app.state.hub = EventHub(context)
     app.state.registry = registry
-    app.state.boards = BoardCache(context.results.boards)
+    app.state.boards = BoardCache(context.results.boards, context.catalogue)
     app.state.submissions = Submissions(context, registry)
     app.state.external = ExternalSessions(context)
     app.state.rate_limits = RateLimits(

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import threading
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from hashlib import sha256
 from typing import Final
 
-from buildarena_benchmark import builtin_tasks
+from buildarena_benchmark import Task
 from buildarena_benchmark.leaderboard import Board, BoardQuery, TrackBoard, Trial
+from buildarena_pipeline.task_catalogue import TaskCatalogue
 from buildarena_store import Boards
 
 KEPT_ANSWERS: Final = 256
@@ -33,10 +34,14 @@ class BoardCache:
 
     Args:
         boards: Where ended jobs and their changes are read.
+        catalogue: Where tasks are read, when one was uploaded.
     """
 
-    def __init__(self, boards: Boards) -> None:
+    def __init__(self, boards: Boards, catalogue: TaskCatalogue) -> None:
         self._boards = boards
+        self._catalogue = catalogue
+        self._task_versions: int | None = None
+        self._tasks: Mapping[str, Task] = {}
         self._lock = threading.Lock()
         self._mark: int | None = None
         self._tracks: dict[str, TrackBoard] = {}
@@ -49,6 +54,13 @@ class BoardCache:
         with self._lock:
             self._refresh()
             return sorted(track for track, board in self._tracks.items() if len(board))
+
+    def tasks(self) -> Mapping[str, Task]:
+        """Every task by name in its newest version, as of the last question."""
+        with self._lock:
+            if self._task_versions is None:
+                self._refresh()
+            return self._tasks
 
     def answer(
         self, track: str, query: BoardQuery, kind: str, render: Callable[[Board], bytes]
@@ -86,6 +98,11 @@ class BoardCache:
     def _refresh(self) -> None:
         feed = self._boards.feed(self._mark)
         changed: set[str] = set()
+        if feed.task_versions != self._task_versions:
+            self._tasks, self._task_versions = self._catalogue.newest(), feed.task_versions
+            changed.update(self._tracks)
+            for board in self._tracks.values():
+                board.use(*self._known())
         for trial in feed.put:
             if self._track(trial.track).put(trial):
                 changed.add(trial.track)
@@ -100,9 +117,13 @@ class BoardCache:
 
     def _track(self, track: str) -> TrackBoard:
         if track not in self._tracks:
-            tasks = builtin_tasks()
-            self._tracks[track] = TrackBoard(
-                {name: task.version for name, task in tasks.items()},
-                {name: task.difficulty for name, task in tasks.items() if task.difficulty},
-            )
+            self._tracks[track] = TrackBoard(*self._known())
         return self._tracks[track]
+
+    def _known(self) -> tuple[dict[str, str], dict[str, Mapping[str, int]]]:
+        """Versions and difficulty weights of the tasks."""
+        tasks = self._tasks.values()
+        return (
+            {task.name: task.version for task in tasks},
+            {task.name: task.difficulty for task in tasks if task.difficulty},
+        )

@@ -50,7 +50,7 @@ def select_board(
     tracks = boards.tracks()
     if track is not None and track not in tracks:
         raise unknown("track", track, tracks)
-    tasks = builtin_tasks()
+    tasks = boards.tasks()
     for name in task or ():
         if name not in tasks:
             raise unknown("task", name, sorted(tasks))
@@ -80,6 +80,9 @@ def select_board(
             since=since,
             until=until,
             include_flagged=flagged,
+            # A task of somebody's own does not take from the others that are ranked over all
+            # tasks, unless it is asked for.
+            overall=None if task else frozenset(builtin_tasks()),
         ),
     )
 

@@ -12,6 +12,7 @@ from buildarena_benchmark import builtin_tasks
 from buildarena_benchmark.leaderboard import Board as RankedBoard
 from buildarena_benchmark.leaderboard import Cell, published_overall, published_rows
 from buildarena_pipeline.models import ModelRegistry
+from buildarena_pipeline.task_catalogue import TaskCatalogue
 
 
 class _View(BaseModel):
@@ -82,6 +83,7 @@ class TaskBoard(_View):
 
     task: str
     version: str
+    custom: bool = Field(description="Whether somebody uploaded the task")
     outdated: int = Field(description="Ended jobs of other versions, which are left out")
     indicator: str
     unit: str
@@ -90,7 +92,7 @@ class TaskBoard(_View):
 
 
 class OverallView(_View):
-    """One model configuration over all tasks of the board."""
+    """One model configuration over the built-in tasks of the board, or over those asked for."""
 
     rank: int | None = Field(description="null when a task is missing")
     rank_low: int | None
@@ -151,10 +153,19 @@ class ChangePage(_View):
 
 
 def board_view(
-    board: RankedBoard, *, track: str, tracks: list[str], registry: ModelRegistry
+    board: RankedBoard,
+    *,
+    track: str,
+    tracks: list[str],
+    registry: ModelRegistry,
+    catalogue: TaskCatalogue,
 ) -> Board:
     """A ranked board as it is answered."""
-    tasks = builtin_tasks()
+    newest = catalogue.named({found.task for found in board.tasks})
+    tasks = {
+        found.task: catalogue.exact(found.task, found.version) or newest.get(found.task)
+        for found in board.tasks
+    }
 
     def is_baseline(model: str) -> bool:
         return model in registry.models and registry.models[model].baseline
@@ -182,13 +193,14 @@ def board_view(
             TaskBoard(
                 task=found.task,
                 version=found.version,
+                custom=found.task not in builtin_tasks(),
                 outdated=found.outdated,
-                indicator=tasks[found.task].indicator.name if found.task in tasks else "indicator",
-                unit=tasks[found.task].indicator.unit if found.task in tasks else "",
+                indicator=task.indicator.name if task else "indicator",
+                unit=task.indicator.unit if task else "",
                 rows=[row(ranked, found.task) for ranked in found.rows],
                 published=_published(found.task, registry),
             )
-            for found in board.tasks
+            for found, task in ((found, tasks[found.task]) for found in board.tasks)
         ],
         overall=[
             OverallView.model_validate(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from types import UnionType
 from typing import Annotated, Any, Literal, get_args, get_origin
 
@@ -18,8 +18,12 @@ from buildarena_api.dependencies import ContextDep, RegistryDep
 from buildarena_api.problems import problem_responses
 from buildarena_benchmark import builtin_tasks
 from buildarena_benchmark.leaderboard import Board as RankedBoard
-from buildarena_benchmark.leaderboard import cost_table, performance_table, published_rows
-from buildarena_pipeline.models import ModelRegistry
+from buildarena_benchmark.leaderboard import (
+    cost_table,
+    performance_table,
+    plain_table,
+    published_rows,
+)
 
 router = APIRouter()
 
@@ -84,19 +88,30 @@ def export(
     boards: BoardsDep,
     selection: SelectionDep,
     registry: RegistryDep,
+    context: ContextDep,
     format: Annotated[Literal["csv", "parquet", "latex"], Query()] = "csv",  # noqa: A002 - its name in the URL
 ) -> Response:
     """The leaderboard as a file; the paper's figures are in it as rows of source `published`."""
     track, tracks = selection.track, selection.tracks
+
+    def render(board: RankedBoard) -> bytes:
+        return _rendered(
+            format,
+            board,
+            lambda ranked: board_view(
+                ranked,
+                track=track or "",
+                tracks=tracks,
+                registry=registry,
+                catalogue=context.catalogue,
+            ),
+        )
+
     if track is None:
-        body = _rendered(format, RankedBoard(tasks=(), overall=()), "", [], registry)
+        body = render(RankedBoard(tasks=(), overall=()))
     else:
-        body = boards.answer(
-            track,
-            selection.query,
-            f"{format} {' '.join(tracks)}",
-            lambda board: _rendered(format, board, track, tracks, registry),
-        ).body
+        kind = f"{format} {' '.join(tracks)}"
+        body = boards.answer(track, selection.query, kind, render).body
     name = f"leaderboard.{'tex' if format == 'latex' else format}"
     headers = {"Content-Disposition": f'attachment; filename="{name}"'}
     return Response(body, media_type=MEDIA_TYPES[format], headers=headers)
@@ -118,13 +133,10 @@ def sweep_results(sweep_id: str, context: ContextDep) -> list[Result]:
     ]
 
 
-def _rendered(
-    kind: str, ranked: RankedBoard, track: str, tracks: list[str], registry: ModelRegistry
-) -> bytes:
+def _rendered(kind: str, ranked: RankedBoard, as_view: Callable[[RankedBoard], Board]) -> bytes:
     if kind == "latex":
         return _latex(ranked).encode()
-    board = board_view(ranked, track=track, tracks=tracks, registry=registry)
-    rows = _flat(board)
+    rows = _flat(as_view(ranked))
     return _csv(rows) if kind == "csv" else _parquet(rows)
 
 
@@ -186,10 +198,12 @@ def _kind(name: str) -> type:
 
 
 def _latex(ranked: RankedBoard) -> str:
-    """Our two tables and the paper's two, for the tasks that follow the paper's naming."""
-    known = builtin_tasks()
-    ours = {b.task: [r.cell for r in b.rows] for b in ranked.tasks if b.task in known}
+    """Our two tables and the paper's two; tasks of users' own in tables of their own."""
+    cells = {board.task: [row.cell for row in board.rows] for board in ranked.tasks}
+    ours = {task: row for task, row in cells.items() if task in builtin_tasks()}
+    own = {task: row for task, row in cells.items() if task not in ours}
     paper = {task: rows for task, rows in published_rows().items() if task in ours}
+    others = ["% Measured: tasks of users' own", plain_table(own)] if own else []
     return "\n".join(
         [
             "% Needs the packages booktabs and multirow.",
@@ -197,6 +211,7 @@ def _latex(ranked: RankedBoard) -> str:
             performance_table(ours),
             "% Measured: cost",
             cost_table(ours),
+            *others,
             "% Published in the paper, measured in the game itself: performance",
             performance_table(paper),
             "% Published in the paper: cost",

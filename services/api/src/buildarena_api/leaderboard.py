@@ -90,7 +90,11 @@ class VerifyAccepted(BaseModel):
 
 @router.get("/leaderboard", response_model=Board, responses=problem_responses(422, 503))
 def leaderboard(
-    boards: BoardsDep, selection: SelectionDep, registry: RegistryDep, request: Request
+    boards: BoardsDep,
+    selection: SelectionDep,
+    registry: RegistryDep,
+    context: ContextDep,
+    request: Request,
 ) -> Any:
     """Ranks the models of one track, on each task and overall; tracks are never mixed."""
     track, tracks = selection.track, selection.tracks
@@ -101,7 +105,9 @@ def leaderboard(
         selection.query,
         "json " + " ".join(tracks),
         lambda board: (
-            board_view(board, track=track, tracks=tracks, registry=registry)
+            board_view(
+                board, track=track, tracks=tracks, registry=registry, catalogue=context.catalogue
+            )
             .model_dump_json()
             .encode()
         ),

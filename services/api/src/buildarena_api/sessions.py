@@ -12,9 +12,9 @@ from buildarena_api.access import Caller, CallerDep
 from buildarena_api.dependencies import ContextDep, ExternalDep
 from buildarena_api.problems import ProblemError, problem_responses
 from buildarena_api.schemas import JobView
-from buildarena_benchmark import builtin_tasks
 from buildarena_pipeline.context import Context
 from buildarena_pipeline.external import NothingToSubmitError, SessionClosedError
+from buildarena_pipeline.scoring import task_of
 from buildarena_pipeline.specs import Name, Seed
 from buildarena_pipeline.workbench import ASSEMBLY, MAIN, agent_tools
 from buildarena_store import UnknownIdError
@@ -76,7 +76,11 @@ class ToolOutcome(BaseModel):
 
 @router.post("", status_code=201, responses=problem_responses(422, 503))
 def open_session(
-    body: OpenSession, response: Response, sessions: ExternalDep, caller: CallerDep
+    body: OpenSession,
+    response: Response,
+    sessions: ExternalDep,
+    context: ContextDep,
+    caller: CallerDep,
 ) -> SessionOpened:
     """Opens a session in which an agent of yours builds for one task."""
     job = sessions.open(
@@ -89,7 +93,7 @@ def open_session(
     response.headers["Location"] = f"/v1/jobs/{job.id}"
     return SessionOpened(
         id=job.id,
-        statement=builtin_tasks()[body.task].statement,
+        statement=task_of(job, context.catalogue).statement,
         tools=[
             ToolView(name=tool.name, description=tool.description, parameters=dict(tool.parameters))
             for tool in agent_tools()

@@ -66,7 +66,8 @@ class SimulateHandler:
             values = {name: getattr(same, name) for name in MADE} | {"wall_s": 0.0}
             trajectory = None
         else:
-            done = self._simulate(task_of(job), request, lambda: _require(lease, still_held))
+            task = task_of(job, context.catalogue)
+            done = self._simulate(task, request, lambda: _require(lease, still_held))
             values, trajectory = _values(request, done), done.trajectory
         with context.database.transaction() as connection:
             if trajectory is not None:

@@ -57,7 +57,7 @@ class ConstructHandler:
         """Runs the job's session as far as it gets: to a simulation, or to its end."""
         job = lease.job
         guard = BudgetGuard(self._context.budgets, lease, self._price_of(job), still_held)
-        task = task_of(job)
+        task = task_of(job, self._context.catalogue)
         pack = pack_of(job, self._packs)
         io = SessionIO(
             client=self._clients.for_config(job.model_config),
@@ -161,7 +161,7 @@ class ConstructHandler:
     def _fail(self, lease: Lease, session: Session, outcome: str, reason: str, detail: str) -> None:
         """Scores a session that ended without a simulation; what it built is kept."""
         score = failure_score(
-            lease.job, session.machine, outcome=outcome, reason=reason, detail=detail
+            lease.job, session.task, session.machine, outcome=outcome, reason=reason, detail=detail
         )
         self._write_end(lease, session, score)
 

@@ -3,26 +3,27 @@
 from __future__ import annotations
 
 from buildarena_benchmark import Task
-from buildarena_pipeline.errors import PermanentFaultError
 from buildarena_pipeline.prompt_packs import PromptPack
 from buildarena_worker.builtin.designs import DESIGNS
 
 EXAMPLE_SEED = 0
+ALIKE = {
+    "transport": "transport-1",
+    "support": "support-1",
+    "thrust": "lift-1",
+    "height": "lift-2",
+}
+"""By scorer: the built-in task with an example of the kind."""
 
 
 def example_for(task: Task, pack: PromptPack) -> str:
-    """An example of the task's category: the expert's design for its first level.
+    """An example of the task's kind: the expert's design for the first level of its category.
 
-    Raises:
-        PermanentFaultError: There is no example for the category.
+    A task of a category of its own gets the example of the category that is scored like it.
     """
     name = f"{task.category}-1"
     if name not in DESIGNS:
-        raise PermanentFaultError(
-            f"no example construction for the category {task.category!r}; there are examples for "
-            f"{', '.join(sorted({known.rsplit('-', 1)[0] for known in DESIGNS}))}",
-            reason="no_example",
-        )
+        name = ALIKE[task.scorer]
     part = next(iter(DESIGNS[name](EXAMPLE_SEED).parts.values()))
     actions = "\n".join(
         f"{number}. {action}({', '.join(f'{key}={value!r}' for key, value in arguments.items())})"

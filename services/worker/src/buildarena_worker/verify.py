@@ -139,7 +139,7 @@ class Verifier:
         )
         io.machines = []
         session = Session(
-            task=task_of(job),
+            task=task_of(job, self._context.catalogue),
             seed=job.seed,
             model_config=job.model_config,
             pack=pack_of(job, self._packs),
@@ -163,7 +163,7 @@ class Verifier:
         checks = [_compare(f"{name}: machine", record.machine_hash, _hash(machine_bytes(machine)))]
         simulated_by = (record.versions or {}).get("simulation")
         checks.append(_compare(f"{name}: simulation version", simulated_by, SIMULATION_VERSION))
-        task = task_of(job)
+        task = task_of(job, self._context.catalogue)
         try:
             trajectory = simulate(
                 machine,
@@ -188,7 +188,7 @@ class Verifier:
             best = best_rollout(records)
             wanted = {name: _plain(getattr(best, name)) for name in SCORED}
         else:
-            failed = failed_score(task_of(job), machine)
+            failed = failed_score(task_of(job, self._context.catalogue), machine)
             wanted = {name: _plain(getattr(failed, name)) for name in SCORED}
         return [_compare(f"score: {n}", _plain(getattr(job, n)), v) for n, v in wanted.items()]
 

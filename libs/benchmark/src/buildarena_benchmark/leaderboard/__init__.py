@@ -3,7 +3,7 @@
 from buildarena_benchmark.leaderboard.board import Board, BoardQuery, TaskBoard, TrackBoard
 from buildarena_benchmark.leaderboard.cells import Cell, summarise
 from buildarena_benchmark.leaderboard.duels import Duel, TaskDuel, duel
-from buildarena_benchmark.leaderboard.latex import cost_table, performance_table
+from buildarena_benchmark.leaderboard.latex import cost_table, performance_table, plain_table
 from buildarena_benchmark.leaderboard.overall import OverallRow
 from buildarena_benchmark.leaderboard.published import (
     PublishedRow,
@@ -27,6 +27,7 @@ __all__ = [
     "cost_table",
     "duel",
     "performance_table",
+    "plain_table",
     "published_overall",
     "published_rows",
     "summarise",

@@ -28,6 +28,7 @@ class BoardQuery:
         since: Only jobs that ended then or later.
         until: Only jobs that ended before.
         include_flagged: Whether flagged successes count.
+        overall: Tasks that the overall ranking is over, as far as they are on the board.
     """
 
     tasks: frozenset[str] | None = None
@@ -35,6 +36,7 @@ class BoardQuery:
     since: datetime | None = None
     until: datetime | None = None
     include_flagged: bool = False
+    overall: frozenset[str] | None = None
 
     def holds(self, trial: Trial) -> bool:
         """Whether a trial ended in the time that was asked for."""
@@ -98,6 +100,10 @@ class TrackBoard:
         self._summaries: dict[tuple[CellKey, bool], Cell] = {}
         self._rankings: dict[tuple[int, ...], tuple[list[Cell], list[RankedCell]]] = {}
 
+    def use(self, versions: Mapping[str, str], weights: Weights) -> None:
+        """Takes other tasks for known from now on; arguments as for the constructor."""
+        self._versions, self._weights = versions, weights
+
     def put(self, trial: Trial) -> bool:
         """Adds or replaces a trial; returns whether anything changed."""
         key = (trial.task, trial.task_version, trial.configuration)
@@ -148,7 +154,11 @@ class TrackBoard:
             for task, version in chosen
             if cells[task]
         ]
-        filled = {task: row for task, row in cells.items() if row}
+        filled = {
+            task: row
+            for task, row in cells.items()
+            if row and (query.overall is None or task in query.overall)
+        }
         return Board(tasks=boards, overall=overall_rows(filled, self._weights))
 
     def _chosen(

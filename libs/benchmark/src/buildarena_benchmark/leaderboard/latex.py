@@ -47,6 +47,27 @@ def cost_table(cells: Cells) -> str:
     return _table(cells, COST)
 
 
+def plain_table(cells: Cells) -> str:
+    """Performance and cost of each model on tasks that follow no levels, a line for each."""
+    columns = (*PERFORMANCE, *COST)
+    lines = [
+        r"\begin{tabular}{ll" + "c" * len(columns) + "}",
+        r"\toprule",
+        f"Task & Model & {' & '.join(heading for heading, *_ in columns)} \\\\",
+    ]
+    for task, rows in cells.items():
+        lines += [r"\midrule", rf"\multirow{{{len(rows)}}}{{*}}{{{_escaped(task)}}}"]
+        texts = [
+            _marked([_scaled(getattr(row, name), power) for row in rows], more=more)
+            for _, name, power, more in columns
+        ]
+        lines += [
+            rf"& {_escaped(row.model)} & {' & '.join(column[i] for column in texts)} \\"
+            for i, row in enumerate(rows)
+        ]
+    return "\n".join([*lines, r"\bottomrule", r"\end{tabular}"]) + "\n"
+
+
 def _table(cells: Cells, columns: Sequence[Column]) -> str:
     groups = " & ".join(rf"\multicolumn{{3}}{{c}}{{{heading}}}" for heading, *_ in columns)
     levels = " & ".join(f"Lv.{level}" for _ in columns for level in LEVELS)

@@ -1,0 +1,213 @@
+"""All tasks that can be named: the built-in ones and those that users uploaded.
+
+New submissions get a task's newest version; a job keeps the version it was submitted for, to its
+end and for every verification after it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+
+import structlog
+
+from buildarena_benchmark import Fault, Task, TaskError, builtin_tasks, parse_task
+from buildarena_benchmark.tasks.sources import read_source
+from buildarena_pipeline.errors import PipelineError
+from buildarena_store import StoredTask, Tasks, UnknownIdError
+from buildarena_store.tasks import TaskKey
+
+log = structlog.get_logger(__name__)
+
+MOST_PARSED = 2000
+"""Parsed tasks in memory at the most; each is a few kilobytes, at worst a hundred."""
+
+
+class TaskChangedError(PipelineError):
+    """A version is there already, but says something else that is not part of the version."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CatalogueEntry:
+    """A version of a task, and where it is from.
+
+    Attributes:
+        task: The task.
+        custom: Whether somebody uploaded it.
+        current: Whether new submissions get this version.
+        owner: Id of the API key that uploaded it, if any.
+        created_at: When it was uploaded; None for built-in tasks.
+    """
+
+    task: Task
+    custom: bool = False
+    current: bool = True
+    owner: str | None = None
+    created_at: datetime | None = None
+
+
+class TaskCatalogue:
+    """Finds tasks. One serves a whole process, from any thread.
+
+    A version's text never changes, so each is read and parsed once a process.
+
+    Args:
+        tasks: Where uploaded tasks are kept.
+    """
+
+    def __init__(self, tasks: Tasks) -> None:
+        self._tasks = tasks
+        self._parsed: dict[TaskKey, Task | None] = {}
+
+    def newest(self) -> Mapping[str, Task]:
+        """Every task by name, the built-in ones first, each in its newest version."""
+        return {entry.task.name: entry.task for entry in self.entries()}
+
+    def entries(self) -> Sequence[CatalogueEntry]:
+        """As `newest`, with where each is from."""
+        builtin = [CatalogueEntry(task=task) for task in builtin_tasks().values()]
+        return [*builtin, *self._entries(self._tasks.newest())]
+
+    def named(self, names: Collection[str]) -> Mapping[str, Task]:
+        """The newest versions of those of the names that there are.
+
+        The database is asked only when a name is not a built-in task's.
+        """
+        builtin = builtin_tasks()
+        found = {name: builtin[name] for name in names if name in builtin}
+        others = {name for name in names if name not in builtin}
+        if others:
+            entries = self._entries(self._tasks.newest(others))
+            found |= {entry.task.name: entry.task for entry in entries}
+        return found
+
+    def exact(self, name: str, version: str) -> Task | None:
+        """This very version, or None when it is not there, or no longer scored as it was."""
+        builtin = builtin_tasks().get(name)
+        if builtin is not None and builtin.version == version:
+            return builtin
+        return self._load([(name, version)])[name, version]
+
+    def find(self, name: str, version: str | None = None) -> CatalogueEntry:
+        """A version of a task, by default the newest.
+
+        Raises:
+            UnknownIdError: There is no such task, or no such version.
+        """
+        builtin = builtin_tasks().get(name)
+        if builtin is not None and version in {None, builtin.version}:
+            return CatalogueEntry(task=builtin)
+        stored = self._tasks.versions(name)
+        current = builtin or next((e.task for e in self._entries(stored[:1])), None)
+        if version is None and current is not None:
+            version = current.version
+        task = None if version is None else self.exact(name, version)
+        if task is None:
+            raise UnknownIdError("task", name if version is None else f"{name} version {version}")
+        row = next((row for row in stored if row.version == version), stored[0])
+        return CatalogueEntry(
+            task=task,
+            custom=True,
+            current=current is not None and current.version == version,
+            owner=row.owner,
+            created_at=row.created_at,
+        )
+
+    def check(self, text: str, *, origin: str = "task") -> Task:
+        """The task that a YAML text describes, if it may be uploaded.
+
+        Raises:
+            TaskError: It is no valid task, or its name is a built-in task's.
+        """
+        task = parse_task(text, origin=origin)
+        if task.name in builtin_tasks():
+            line = read_source(text, origin=origin).line_of(["name"])
+            message = f"{task.name} is a built-in task: choose another name"
+            raise TaskError([Fault(field="name", line=line, message=message)], origin=origin)
+        return task
+
+    def add(self, task: Task, text: str, *, owner: str | None = None) -> bool:
+        """Stores a task, unless this version of it is there.
+
+        Args:
+            task: What `check` made of the text.
+            text: The YAML text.
+            owner: Id of the API key that uploads it, if any.
+
+        Returns:
+            Whether it is new.
+
+        Raises:
+            TaskChangedError: The version is there with another title, category, level, indicator
+                or difficulty.
+        """
+        added = self._tasks.add(name=task.name, version=task.version, document=text, owner=owner)
+        kept = self.exact(task.name, task.version)
+        if kept is not None and kept != task:
+            fields = ("title", "category", "level", "indicator", "difficulty")
+            changed = [name for name in fields if getattr(kept, name) != getattr(task, name)]
+            raise TaskChangedError(
+                f"version {task.version} of {task.name} is there with another "
+                f"{' and '.join(changed)}, which cannot be changed alone: they stay as they were "
+                "first uploaded, or choose another name"
+            )
+        return added
+
+    def _entries(self, rows: Sequence[StoredTask]) -> list[CatalogueEntry]:
+        """Stored tasks as they count now; those that can no longer be read are left out."""
+        parsed = self._load([(row.name, row.version) for row in rows])
+        found = []
+        for row in rows:
+            task = parsed[row.name, row.version] or self._renewed(row)
+            if task is not None and task.name not in builtin_tasks():
+                found.append(
+                    CatalogueEntry(
+                        task=task, custom=True, owner=row.owner, created_at=row.created_at
+                    )
+                )
+        return found
+
+    def _renewed(self, row: StoredTask) -> Task | None:
+        """The task's text under the version that it has now.
+
+        Scorers are part of a version: after they changed, a text is another version, which new
+        submissions get, while the old one can no longer be scored as it was.
+        """
+        key = (row.name, row.version)
+        text = self._tasks.documents([key])[key]
+        try:
+            task = parse_task(text, origin=row.name)
+        except TaskError as error:
+            log.warning("task_unreadable", task=row.name, version=row.version, error=str(error))
+            return None
+        self._tasks.add(name=row.name, version=task.version, document=text, owner=row.owner)
+        self._keep(task.name, task.version, task)
+        return task
+
+    def _load(self, keys: Sequence[TaskKey]) -> Mapping[TaskKey, Task | None]:
+        """Tasks by key; None for those that are not there under this version."""
+        parsed = self._parsed
+        found = {key: parsed[key] for key in keys if key in parsed}
+        missing = [key for key in keys if key not in found]
+        if missing:
+            texts = self._tasks.documents(missing)
+            for key in missing:
+                found[key] = None
+                if key in texts:
+                    found[key] = _read(key, texts[key])
+                    self._keep(*key, found[key])
+        return found
+
+    def _keep(self, name: str, version: str, task: Task | None) -> None:
+        if len(self._parsed) >= MOST_PARSED:
+            self._parsed = {}  # a new one: other threads read the old one
+        self._parsed[name, version] = task
+
+
+def _read(key: TaskKey, text: str) -> Task | None:
+    try:
+        task = parse_task(text, origin=key[0])
+    except TaskError:
+        return None
+    return task if task.version == key[1] else None

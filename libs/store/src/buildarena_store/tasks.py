@@ -1,0 +1,93 @@
+"""Users' own tasks: every version that was ever uploaded, for jobs may still need it."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any
+
+from sqlalchemy import Select, select, tuple_
+from sqlalchemy.dialects.postgresql import distinct_on, insert
+
+from buildarena_store.database import Database
+from buildarena_store.tables import tasks
+
+TaskKey = tuple[str, str]
+"""Name and version."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StoredTask:
+    """One version of a task that somebody uploaded, without its text.
+
+    Attributes:
+        name: Its name.
+        version: Hash of all that can change a score.
+        owner: Id of the API key that uploaded it, if any.
+        created_at: When it was first uploaded.
+    """
+
+    name: str
+    version: str
+    owner: str | None
+    created_at: datetime
+
+
+class Tasks:
+    """Adds and finds uploaded tasks. A version never changes and is never taken away."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def add(self, *, name: str, version: str, document: str, owner: str | None = None) -> bool:
+        """Stores a version with its YAML text, unless it is there.
+
+        Returns:
+            Whether it is new.
+        """
+        statement = (
+            insert(tasks)
+            .values(name=name, version=version, document=document, owner=owner)
+            .on_conflict_do_nothing()
+            .returning(tasks.c.version)
+        )
+        with self._database.transaction() as connection:
+            return connection.execute(statement).first() is not None
+
+    def newest(self, names: Collection[str] | None = None) -> list[StoredTask]:
+        """The newest version of each task, by name.
+
+        Args:
+            names: Only these tasks; None for all.
+        """
+        query = (
+            select(*_COLUMNS)
+            .ext(distinct_on(tasks.c.name))
+            .order_by(tasks.c.name, tasks.c.created_at.desc(), tasks.c.version)
+        )
+        return self._read(query if names is None else query.where(tasks.c.name.in_(names)))
+
+    def versions(self, name: str) -> list[StoredTask]:
+        """All versions of a task, the newest first."""
+        query = select(*_COLUMNS).where(tasks.c.name == name)
+        return self._read(query.order_by(tasks.c.created_at.desc(), tasks.c.version))
+
+    def documents(self, keys: Collection[TaskKey]) -> Mapping[TaskKey, str]:
+        """The YAML texts of these versions, as far as they were ever uploaded."""
+        query = select(tasks.c.name, tasks.c.version, tasks.c.document).where(
+            tuple_(tasks.c.name, tasks.c.version).in_(keys)
+        )
+        with self._database.transaction() as connection:
+            return {(row.name, row.version): row.document for row in connection.execute(query)}
+
+    def _read(self, query: Select[Any]) -> list[StoredTask]:
+        names = StoredTask.__dataclass_fields__
+        with self._database.transaction() as connection:
+            return [
+                StoredTask(**{name: getattr(row, name) for name in names})
+                for row in connection.execute(query)
+            ]
+
+
+_COLUMNS = [tasks.c[name] for name in StoredTask.__dataclass_fields__]
