@@ -26,6 +26,7 @@ def upgrade() -> None:
     op.add_column("jobs", sa.Column("payer", sa.Text(), nullable=True))
     op.create_index("ix_jobs_payer", "jobs", ["payer"], postgresql_where=NOT_DONE)
     op.create_index("ix_jobs_owner", "jobs", ["owner"], postgresql_where=NOT_DONE)
+    op.add_column("workers", sa.Column("clock_ahead_s", sa.Double(), nullable=True))
     op.add_column("sweeps", sa.Column("jobs_hash", sa.Text(), nullable=True))
     op.create_index(op.f("ix_sweeps_jobs_hash"), "sweeps", ["jobs_hash"])
     op.create_table(
@@ -87,5 +88,6 @@ def downgrade() -> None:
     op.drop_index("ix_jobs_payer", "jobs")
     op.drop_index(op.f("ix_sweeps_jobs_hash"), "sweeps")
     op.drop_column("sweeps", "jobs_hash")
+    op.drop_column("workers", "clock_ahead_s")
     op.drop_column("jobs", "payer")
     op.drop_column("jobs", "owner")

@@ -14,14 +14,15 @@ from buildarena_store import (
     Database,
     Events,
     ExternalCalls,
+    Figures,
     Jobs,
     Journal,
     Leases,
     Results,
     Rollouts,
     Sweeps,
-    Verifications,
     Tasks,
+    Verifications,
     Workers,
 )
 
@@ -46,9 +47,10 @@ class Context:
     external: ExternalCalls
     keys: ApiKeys
     budgets: Budgets
-
+    figures: Figures
     tasks: Tasks
     catalogue: TaskCatalogue
+
     def close(self) -> None:
         """Closes the connections."""
         self.queues.close()
@@ -58,8 +60,8 @@ class Context:
 def open_context(settings: Settings, *, pool_size: int = 5) -> Context:
     """Connects to what the settings name; nothing is contacted before it is used."""
     database = Database(settings.required_database_url(), pool_size=pool_size)
-    leases = Leases(database, duration_s=settings.lease_s, max_faults=settings.max_faults)
     tasks = Tasks(database)
+    leases = Leases(database, duration_s=settings.lease_s, max_faults=settings.max_faults)
     return Context(
         settings=settings,
         database=database,
@@ -77,6 +79,7 @@ def open_context(settings: Settings, *, pool_size: int = 5) -> Context:
         external=ExternalCalls(database),
         keys=ApiKeys(database),
         budgets=Budgets(database),
-    )
+        figures=Figures(database),
         tasks=tasks,
         catalogue=TaskCatalogue(tasks),
+    )

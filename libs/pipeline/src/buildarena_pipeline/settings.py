@@ -59,6 +59,9 @@ class Settings(BaseSettings):
         int, Field(description="Simulations one worker runs at once", ge=1)
     ] = 2
     max_sweep_jobs: Annotated[int, Field(description="Largest sweep accepted", ge=1)] = 100_000
+    otlp_endpoint: Annotated[
+        str | None, Field(description="OTLP/HTTP collector of traces; none are made without")
+    ] = None
     log_level: Annotated[str, Field(description="debug, info, warning or error")] = "info"
 
     @property

@@ -13,6 +13,7 @@ from sqlalchemy.exc import OperationalError
 
 from buildarena_pipeline.context import Context
 from buildarena_pipeline.errors import PassingFaultError, PermanentFaultError
+from buildarena_pipeline.tracing import span
 from buildarena_store import Lease, StaleLeaseError
 
 log = structlog.get_logger(__name__)
@@ -128,10 +129,14 @@ class StageRunner:
         if lease is None:
             return
         started = time.perf_counter()
-        bound = log.bind(job=lease.job.id, stage=lease.job.stage, token=lease.token)
-        with self._keeper.keeping(lease) as still_held:
+        bound = log.bind(stage=lease.job.stage, token=lease.token)
+        with (
+            structlog.contextvars.bound_contextvars(job=lease.job.id),
+            self._keeper.keeping(lease) as still_held,
+        ):
             try:
-                self._handler(lease, still_held)
+                with span(lease.job.stage, job=lease.job.id, token=lease.token):
+                    self._handler(lease, still_held)
             except StaleLeaseError:
                 bound.warning("lease_over")
             except PassingFaultError as fault:
@@ -148,20 +153,20 @@ class StageRunner:
                 bound.info("stage_done", seconds=round(time.perf_counter() - started, 3))
 
     def _report(self, lease: Lease, fault: PassingFaultError) -> None:
-        log.warning("passing_fault", job=lease.job.id, reason=fault.reason, detail=str(fault))
+        log.warning("passing_fault", reason=fault.reason, detail=str(fault))
         try:
             self._context.leases.fault(
                 lease, str(fault), delay_s=fault.delay_s, reason=fault.reason
             )
         except (StaleLeaseError, OperationalError) as error:
-            log.warning("fault_not_recorded", job=lease.job.id, error=str(error))
+            log.warning("fault_not_recorded", error=str(error))
 
     def _give_up(self, lease: Lease, fault: PermanentFaultError) -> None:
-        log.error("permanent_fault", job=lease.job.id, reason=fault.reason, detail=str(fault))
+        log.error("permanent_fault", reason=fault.reason, detail=str(fault))
         try:
             with self._context.database.transaction() as connection:
                 self._context.leases.give_up(
                     lease, str(fault), reason=fault.reason, connection=connection
                 )
         except (StaleLeaseError, OperationalError) as error:
-            log.warning("fault_not_recorded", job=lease.job.id, error=str(error))
+            log.warning("fault_not_recorded", error=str(error))

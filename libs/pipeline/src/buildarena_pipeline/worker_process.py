@@ -9,6 +9,7 @@ import socket
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from typing import Any
 
 import structlog
@@ -22,6 +23,7 @@ from buildarena_pipeline.queues import LOOK
 from buildarena_pipeline.settings import Settings
 from buildarena_pipeline.stages import LeaseKeeper, StageHandler, StageRunner
 from buildarena_pipeline.sweeper import Sweeper
+from buildarena_pipeline.tracing import Tracing
 from buildarena_store import SchemaVersionError
 
 log = structlog.get_logger(__name__)
@@ -56,6 +58,7 @@ class _Runtime:
     def __init__(self, spec: WorkerSpec, settings: Settings) -> None:
         pool_size = 5 if spec.pool != "threads" else 8
         self.context = open_context(settings, pool_size=pool_size)
+        self.tracing = Tracing(f"{spec.kind}-worker", settings.otlp_endpoint)
         self.id = f"{spec.kind}@{socket.gethostname()}:{os.getpid()}"
         self._spec = spec
         self.keeper = LeaseKeeper(self.context, self.report)
@@ -75,6 +78,7 @@ class _Runtime:
             pid=os.getpid(),
             versions=self._spec.versions,
             peak_memory_bytes=peak_kib * 1024,
+            own_time=datetime.now(UTC),
         )
 
     def start(self) -> None:
@@ -87,6 +91,7 @@ class _Runtime:
         self.keeper.stop()
         self.context.workers.leave(self.id)
         self.context.close()
+        self.tracing.close()
 
 
 def run_worker(spec: WorkerSpec, settings: Settings) -> None:

@@ -17,6 +17,7 @@ from buildarena_store.errors import (
 )
 from buildarena_store.events import Event, Events
 from buildarena_store.external import ExternalCall, ExternalCalls
+from buildarena_store.figures import STAGE_SECONDS, Figures, ServiceFigures
 from buildarena_store.jobs import Job, JobKey, Jobs, NewJob
 from buildarena_store.journal import Journal, JournalEntry, Usage
 from buildarena_store.keys import ApiKey, ApiKeys, KeyCheck
@@ -24,12 +25,13 @@ from buildarena_store.leases import Lease, Leases
 from buildarena_store.results import JobScore, Results
 from buildarena_store.rollouts import RolloutRecord, RolloutRequest, Rollouts
 from buildarena_store.sweeps import NewSweep, Sweep, SweepProgress, Sweeps
-from buildarena_store.text import clean
 from buildarena_store.tasks import StoredTask, Tasks
+from buildarena_store.text import clean
 from buildarena_store.verifications import Verification, Verifications
 from buildarena_store.workers import WorkerInfo, Workers
 
 __all__ = [
+    "STAGE_SECONDS",
     "ApiKey",
     "ApiKeys",
     "ArtifactInfo",
@@ -46,6 +48,7 @@ __all__ = [
     "Events",
     "ExternalCall",
     "ExternalCalls",
+    "Figures",
     "Job",
     "JobKey",
     "JobScore",
@@ -64,18 +67,19 @@ __all__ = [
     "Rollouts",
     "Round",
     "SchemaVersionError",
+    "ServiceFigures",
     "Shortage",
     "StaleLeaseError",
     "StoreError",
+    "StoredTask",
     "Sweep",
     "SweepProgress",
     "Sweeps",
+    "Tasks",
     "UnknownIdError",
-    "StoredTask",
     "Usage",
     "Verification",
     "Verifications",
-    "Tasks",
     "WorkerInfo",
     "Workers",
     "clean",

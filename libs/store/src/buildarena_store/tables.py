@@ -329,4 +329,5 @@ workers = Table(
     _time("started_at", now=True),
     _time("seen_at", now=True),
     Column("peak_memory_bytes", BigInteger),
+    Column("clock_ahead_s", Double),
 )

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Any
 
-from sqlalchemy import delete, select
+from sqlalchemy import ColumnElement, cast, delete, func, select
 from sqlalchemy.dialects.postgresql import insert
+from sqlalchemy.types import DateTime, Double
 
 from buildarena_store import events
 from buildarena_store.database import Database
@@ -32,6 +33,7 @@ class WorkerInfo:
         seen_at: When it last reported.
         alive: Whether it reported within the last 15 seconds, by the database's clock.
         peak_memory_bytes: The most memory it and its children ever had, if it says so.
+        clock_ahead_s: How far its clock is ahead of the database's, if it says so.
     """
 
     id: str
@@ -44,6 +46,7 @@ class WorkerInfo:
     seen_at: datetime
     alive: bool
     peak_memory_bytes: int | None
+    clock_ahead_s: float | None
 
 
 class Workers:
@@ -63,6 +66,7 @@ class Workers:
         pid: int,
         versions: Mapping[str, Any],
         peak_memory_bytes: int | None = None,
+        own_time: datetime | None = None,
     ) -> None:
         """Says that a worker is alive; forgets those that have not spoken for an hour."""
         row = {
@@ -72,6 +76,7 @@ class Workers:
             "pid": pid,
             "versions": dict(versions),
             "peak_memory_bytes": peak_memory_bytes,
+            "clock_ahead_s": None if own_time is None else _ahead(own_time),
         }
         statement = insert(workers).values(id=worker_id, **row)
         with self._database.transaction() as connection:
@@ -98,3 +103,9 @@ class Workers:
                 WorkerInfo(**{name: getattr(row, name) for name in WorkerInfo.__dataclass_fields__})
                 for row in connection.execute(query)
             ]
+
+
+def _ahead(own_time: datetime) -> ColumnElement[float]:
+    """Seconds from the database's clock to a process' own."""
+    difference = cast(own_time, DateTime(timezone=True)) - events.now
+    return cast(func.extract("epoch", difference), Double)

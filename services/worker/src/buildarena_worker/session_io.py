@@ -13,6 +13,7 @@ from decimal import Decimal
 from typing import Any, Protocol
 
 from buildarena_geometry import KeyPress, Machine
+from buildarena_pipeline.tracing import span
 from buildarena_simulation import Trajectory
 from buildarena_store import JournalEntry, RolloutRecord, Usage
 from buildarena_worker.errors import JournalMismatchError, LeaseLostError, LimitReachedError
@@ -162,7 +163,8 @@ class SessionIO:
         if not self._still_held():
             raise LeaseLostError("the lease is over")
         self._reserve(request)
-        answer = self._client.complete(request)
+        with span("model request", stage=stage, role=role, sequence=self.sequence):
+            answer = self._client.complete(request)
         entry = JournalEntry(
             sequence=self.sequence,
             stage=stage,
