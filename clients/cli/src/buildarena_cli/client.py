@@ -6,6 +6,7 @@ import os
 import time
 import weakref
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import httpx
@@ -52,6 +53,24 @@ class Client:
     def post(self, path: str, body: Mapping[str, Any]) -> Any:
         """The JSON answer to a POST."""
         return self._answer("POST", path, json=dict(body)).json()
+
+    def download(self, path: str, target: Path) -> None:
+        """Writes the answer to a GET into a file, which is there whole or not at all."""
+        partial = target.with_name(target.name + ".partial")
+        with self._http.stream("GET", path, timeout=None) as response:
+            if response.is_error:
+                response.read()
+                raise CommandError(_problem(response))
+            with partial.open("wb") as file:
+                for chunk in response.iter_bytes():
+                    file.write(chunk)
+        partial.replace(target)
+
+    def upload(self, path: str, source: Path, media_type: str) -> Any:
+        """The JSON answer to a POST of a file."""
+        with source.open("rb") as file:
+            headers = {"Content-Type": media_type}
+            return self._answer("POST", path, content=file, headers=headers, timeout=None).json()
 
     def put(self, path: str, body: Mapping[str, Any]) -> Any:
         """The JSON answer to a PUT."""

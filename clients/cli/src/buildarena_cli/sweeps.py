@@ -118,6 +118,40 @@ def cancel_sweep(
     _show(Client(url).post(f"/v1/sweeps/{sweep_id}/cancel", {}), as_json=as_json)
 
 
+@app.command("export")
+def export_sweep(
+    sweep_id: SweepId,
+    *,
+    out: Annotated[Path | None, typer.Option(help="File to write; SWEEP.zip without.")] = None,
+    url: UrlOption = DEFAULT_URL,
+) -> None:
+    """Write a whole sweep, artifacts included, into one ZIP file."""
+    target = out or Path(f"{sweep_id}.zip")
+    try:
+        Client(url).download(f"/v1/sweeps/{sweep_id}/archive", target)
+    except OSError as error:
+        raise CommandError(f"{target}: {error.strerror}") from error
+    console.print(f"{target}: {target.stat().st_size:,} bytes")
+
+
+@app.command("import")
+def import_sweep(
+    file: Annotated[Path, typer.Argument(help="ZIP file that `sweep export` wrote.")],
+    *,
+    url: UrlOption = DEFAULT_URL,
+    as_json: JsonOption = False,
+) -> None:
+    """Take an exported sweep in; jobs that are there already stay as they are."""
+    try:
+        done = Client(url).upload("/v1/archives", file, "application/zip")
+    except OSError as error:
+        raise CommandError(f"{file}: {error.strerror}") from error
+    if as_json:
+        print_json(done)
+    else:
+        console.print(f"{done['sweep_id']}: {done['jobs']} jobs, {done['added']} of them new")
+
+
 def read_yaml(file: Path) -> dict[str, Any]:
     """The mapping in a YAML file.
 

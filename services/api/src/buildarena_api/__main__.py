@@ -13,6 +13,7 @@ from buildarena_pipeline.errors import StartupError
 from buildarena_pipeline.logs import set_up_logs
 from buildarena_pipeline.models import load_registry
 from buildarena_pipeline.settings import Settings
+from buildarena_pipeline.tracing import Tracing
 from buildarena_store import SchemaVersionError
 
 POOL_SIZE = 10
@@ -24,6 +25,7 @@ def main() -> None:
     set_up_logs(settings.log_level)
     try:
         check_binding(settings)
+        tracing = Tracing("api", settings.otlp_endpoint)
         registry = load_registry(settings.models_file)
         context = open_context(settings, pool_size=POOL_SIZE)
         context.database.require_schema()
@@ -40,6 +42,7 @@ def main() -> None:
         )
     finally:
         context.close()
+        tracing.close()
 
 
 main()

@@ -98,6 +98,7 @@ def caller_of(
         _count(limits, f"refused:{address}")
         raise
     _count(limits, caller.key_id or f"address:{address}")
+    request.state.caller = caller
     caller.require("read" if request.method in READING else "submit")
     return caller
 

@@ -18,6 +18,7 @@ from buildarena_pipeline.tracks import SIMULATORS
 router = APIRouter(prefix="/v1", tags=["health"])
 
 LOW_DISK_BYTES = 1_000_000_000
+CLOCK_TOLERANCE_S = 5.0
 
 
 class Check(BaseModel):
@@ -44,6 +45,8 @@ def health(context: ContextDep, response: Response) -> Health:
     """Checks database, broker, workers and disk. Answers 503 when jobs can't be accepted."""
     database = _database(context)
     checks = [database, _broker(context), *_workers(context, database), _disk(context)]
+    if database.ok:
+        checks.append(_clocks(context))
     if not database.ok:
         response.status_code = 503
         return Health(status="down", checks=checks)
@@ -95,6 +98,22 @@ def _workers(context: Context, database: Check) -> list[Check]:
             )
         )
     return checks
+
+
+def _clocks(context: Context) -> Check:
+    """Leases go by the database's clock; but limits in seconds and logs go by each process' own."""
+    wrong = [
+        f"{worker.id} is {abs(worker.clock_ahead_s):.0f} s "
+        + ("ahead" if worker.clock_ahead_s > 0 else "behind")
+        for worker in context.workers.all()
+        if worker.alive and worker.clock_ahead_s and abs(worker.clock_ahead_s) > CLOCK_TOLERANCE_S
+    ]
+    return Check(
+        name="clocks",
+        ok=not wrong,
+        detail="; ".join(wrong) or "workers and database agree",
+        advice="set these machines' clocks by NTP" if wrong else "",
+    )
 
 
 def _disk(context: Context) -> Check:

@@ -1,0 +1,110 @@
+"""Metrics, the request log and health: what an operator sees."""
+
+from __future__ import annotations
+
+import json
+from datetime import UTC, datetime, timedelta
+
+import pytest
+import structlog
+from prometheus_client.parser import text_string_to_metric_families
+
+from buildarena_store import JournalEntry, Usage
+
+
+def samples(api) -> dict[str, list[tuple[dict[str, str], float]]]:
+    text = api.get("/v1/metrics").text
+    found: dict[str, list[tuple[dict[str, str], float]]] = {}
+    for family in text_string_to_metric_families(text):
+        for sample in family.samples:
+            found.setdefault(sample.name, []).append((sample.labels, sample.value))
+    return found
+
+
+def test_metrics_say_what_the_jobs_say(api, context, sweep) -> None:
+    api.post("/v1/sweeps", json={**sweep, "seeds": [0, 1, 2]})
+    first = context.leases.claim("construct", owner="w")
+    usage = Usage(requests=1, input_tokens=70, output_tokens=7)
+    context.journal.append(
+        first,
+        JournalEntry(
+            sequence=0, stage="plan", role="planner", request_hash="h", reply={}, usage=usage,
+            latency_s=0.1,
+        ),
+    )  # fmt: skip
+    with context.database.transaction() as connection:
+        context.leases.give_up(first, "no key", reason="missing_key", connection=connection)
+    found = samples(api)
+    queued = {"state": "queued", "stage": "construct", "outcome": ""}
+    assert (queued, 2.0) in found["buildarena_jobs"]
+    assert found["buildarena_errored_jobs"] == [({"reason": "missing_key"}, 1.0)]
+    assert found["buildarena_queue_jobs"] == [({"queue": "construct"}, 2.0)]
+    assert found["buildarena_queue_oldest_seconds"][0][1] >= 0
+    model = {"model": "builtin/idle"}
+    assert found["buildarena_model_requests_total"] == [(model, 1.0)]
+    assert ({**model, "direction": "input"}, 70.0) in found["buildarena_model_tokens_total"]
+    assert found["buildarena_sweeps"] == [({"state": "active"}, 1.0)]
+    held = {"stage": "construct", "result": "fault"}
+    assert (held, 1.0) in found["buildarena_stage_seconds_count"]
+    assert ({**held, "le": "+Inf"}, 1.0) in found["buildarena_stage_seconds_bucket"]
+
+
+def test_metrics_count_requests_by_route_and_status(api) -> None:
+    for _ in range(3):
+        api.get("/v1/jobs/job_x")
+    counted = samples(api)["buildarena_http_request_seconds_count"]
+    assert ({"route": "/v1/jobs/{job_id}", "method": "GET", "status": "404"}, 3.0) in counted
+
+
+@pytest.mark.parametrize(
+    ("given", "kept"),
+    [
+        ("order-17.a_B", True),
+        ("", False),
+        ("x" * 65, False),
+        ('a" level="error', False),
+        ("a\tb", False),
+    ],
+)
+def test_a_request_has_an_id_of_its_own_or_a_harmless_given_one(api, given, kept) -> None:
+    answer = api.get("/v1/models", headers={"X-Request-ID": given})
+    assert (answer.headers["x-request-id"] == given) is kept
+    assert answer.headers["x-request-id"]
+
+
+def test_each_request_is_a_line_in_the_log(api) -> None:
+    with structlog.testing.capture_logs(
+        processors=[structlog.contextvars.merge_contextvars]
+    ) as lines:
+        api.get("/v1/jobs/job_x", headers={"X-Request-ID": "r1"})
+    (line,) = [line for line in lines if line["event"] == "request"]
+    assert (line["path"], line["status"], line["request_id"]) == ("/v1/jobs/job_x", 404, "r1")
+
+
+def test_what_people_write_can_not_forge_lines_of_the_log(api, capfd) -> None:
+    from buildarena_pipeline.logs import set_up_logs
+
+    set_up_logs("info")
+    try:
+        forged = '/v1/jobs/x%0A{"event": "stage_done", "job": "job_1"}'
+        api.get(forged)
+        api.post("/v1/jobs", json={"task": '\n{"event": "forged"}\n', "model": "x\r\ny"})
+    finally:
+        structlog.reset_defaults()
+    lines = [line for line in capfd.readouterr().err.splitlines() if line]
+    assert lines
+    events = [json.loads(line)["event"] for line in lines]
+    assert set(events) == {"request"}, lines
+
+
+def test_health_names_a_worker_whose_clock_is_wrong(api, context) -> None:
+    report = {"kind": "construct", "queues": ["construct"], "host": "h", "versions": {}}
+    now = datetime.now(UTC)
+    context.workers.report(worker_id="good", pid=1, own_time=now, **report)
+    context.workers.report(worker_id="late", pid=2, own_time=now - timedelta(hours=1), **report)
+    checks = {check["name"]: check for check in api.get("/v1/health").json()["checks"]}
+    clocks = checks["clocks"]
+    assert not clocks["ok"]
+    assert "late is 3600 s behind" in clocks["detail"]
+    assert "good" not in clocks["detail"]
+    assert "NTP" in clocks["advice"]
