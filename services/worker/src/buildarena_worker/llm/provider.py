@@ -9,10 +9,8 @@ from __future__ import annotations
 import asyncio
 import os
 import random
-import threading
 import time
 from collections.abc import Callable, Coroutine, Mapping
-from functools import cache
 from itertools import cycle
 from typing import Any
 
@@ -36,6 +34,7 @@ from buildarena_pipeline.errors import PassingFaultError, PermanentFaultError
 from buildarena_pipeline.models import ModelEntry, ProviderEntry
 from buildarena_pipeline.prices import price_usd
 from buildarena_store import Usage
+from buildarena_worker.llm.request_loop import RequestLoop
 from buildarena_worker.llm.retries import RetryPolicy
 from buildarena_worker.llm.throttle import Throttle
 from buildarena_worker.llm.wire import from_wire, request_parameters, to_wire
@@ -52,11 +51,7 @@ OUTAGE_DELAY_S = 30.0
 RETRIED_STATUS = frozenset({408, 409, 425, 429, 500, 502, 503, 504, 520, 522, 524, 529})
 
 
-@cache
-def _loop() -> asyncio.AbstractEventLoop:
-    loop = asyncio.new_event_loop()
-    threading.Thread(target=loop.run_forever, name="model-requests", daemon=True).start()
-    return loop
+REQUESTS = RequestLoop()
 
 
 class ProviderClient:
@@ -92,7 +87,7 @@ class ProviderClient:
             PassingFaultError: The provider failed through all tries.
             PermanentFaultError: The provider refuses the key, the model or the account.
         """
-        return asyncio.run_coroutine_threadsafe(self._complete(request), _loop()).result()
+        return REQUESTS.run(self._complete(request))
 
     def close(self) -> None:
         """Closes the connections to the provider."""
@@ -102,7 +97,7 @@ class ProviderClient:
                 await close_pool()
             await self._throttle.close()
 
-        asyncio.run_coroutine_threadsafe(close(), _loop()).result()
+        REQUESTS.run(close())
 
     async def _complete(self, request: Request) -> Answer:
         started = time.monotonic()
