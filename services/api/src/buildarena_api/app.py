@@ -17,6 +17,7 @@ from buildarena_api import (
     sessions,
     streams,
     sweeps,
+    tasks,
     verifications,
 )
 from buildarena_api.access import caller_of
@@ -74,7 +75,17 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
     )
     add_problem_handlers(app)
     app.include_router(health.router)
-    for room in (verifications, sessions, streams, jobs, sweeps, leaderboard, catalogue, keys):
+    for room in (
+        verifications,
+        sessions,
+        streams,
+        jobs,
+        sweeps,
+        leaderboard,
+        tasks,
+        catalogue,
+        keys,
+    ):
         app.include_router(
             room.router,
             dependencies=[Depends(caller_of)],

@@ -5,10 +5,9 @@ from __future__ import annotations
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from hashlib import sha256
 from typing import Final
 
+from buildarena_api.etags import Answer
 from buildarena_benchmark import Task
 from buildarena_benchmark.leaderboard import Board, BoardQuery, TrackBoard, Trial
 from buildarena_pipeline.task_catalogue import TaskCatalogue
@@ -16,14 +15,6 @@ from buildarena_store import Boards
 
 KEPT_ANSWERS: Final = 256
 """Answers in memory at the most; one of a full board is about 200 kB."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Answer:
-    """A body and the hash by which a reader can tell that it has it already."""
-
-    body: bytes
-    etag: str
 
 
 class BoardCache:
@@ -82,7 +73,7 @@ class BoardCache:
                 self._answers.move_to_end(key)
                 return kept[1]
             body = render(self._track(track).board(query))
-            answer = Answer(body=body, etag=f'"{sha256(body).hexdigest()[:32]}"')
+            answer = Answer.of(body)
             self._answers[key] = (generation, answer)
             self._answers.move_to_end(key)
             while len(self._answers) > KEPT_ANSWERS:

@@ -1,4 +1,4 @@
-"""Routes of what can be named in a submission: tasks, models, modules."""
+"""Routes of what can be named besides tasks: models and modules."""
 
 from __future__ import annotations
 
@@ -6,23 +6,9 @@ from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
 from buildarena_api.dependencies import RegistryDep
-from buildarena_benchmark import builtin_tasks
 from buildarena_geometry import load_catalogue
 
 router = APIRouter(prefix="/v1", tags=["catalogue"])
-
-
-class TaskView(BaseModel):
-    """A task that jobs can name."""
-
-    name: str = Field(examples=["support-1"])
-    version: str = Field(description="Content hash of all that can change a score")
-    title: str
-    category: str
-    level: int
-    statement: str = Field(description="What the model is told")
-    indicator: str
-    unit: str
 
 
 class ModelView(BaseModel):
@@ -42,24 +28,6 @@ class ModuleView(BaseModel):
     mass: float
     cost: float
     description: str
-
-
-@router.get("/tasks")
-def list_tasks() -> list[TaskView]:
-    """Lists the tasks."""
-    return [
-        TaskView(
-            name=task.name,
-            version=task.version,
-            title=task.title,
-            category=task.category,
-            level=task.level,
-            statement=task.statement,
-            indicator=task.indicator.name,
-            unit=task.indicator.unit,
-        )
-        for task in builtin_tasks().values()
-    ]
 
 
 @router.get("/models")

@@ -5,14 +5,14 @@ from __future__ import annotations
 import random
 from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import APIRouter, Query, Request
 from pydantic import BaseModel, ConfigDict, Field
 
 from buildarena_api import exports
-from buildarena_api.board_cache import Answer
 from buildarena_api.board_filters import BoardsDep, SelectionDep, unknown
 from buildarena_api.board_views import Board, ChangePage, ChangeView, board_view
 from buildarena_api.dependencies import ContextDep, RegistryDep
+from buildarena_api.etags import conditional
 from buildarena_api.problems import problem_responses
 from buildarena_benchmark.leaderboard import SCORED, BoardQuery, TaskDuel, duel
 from buildarena_pipeline.queues import VERIFY
@@ -215,15 +215,6 @@ def verify(body: VerifyRequest, context: ContextDep, boards: BoardsDep) -> Verif
     asked = [context.verifications.request(job_id) for job_id in chosen]
     context.queues.announce(VERIFY, asked)
     return VerifyAccepted(scored=len(scored), verifications=asked)
-
-
-def conditional(request: Request, answer: Answer, media_type: str) -> Response:
-    """The answer, or 304 when the reader has it."""
-    headers = {"ETag": answer.etag, "Cache-Control": "no-cache"}
-    known = [tag.strip() for tag in request.headers.get("if-none-match", "").split(",")]
-    if answer.etag in known or "*" in known:
-        return Response(status_code=304, headers=headers)
-    return Response(answer.body, media_type=media_type, headers=headers)
 
 
 router.include_router(exports.router)

@@ -11,7 +11,7 @@ from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from pydantic import BaseModel, Field
-from sqlalchemy.exc import OperationalError
+from sqlalchemy.exc import DataError, OperationalError
 from starlette.exceptions import HTTPException
 
 from buildarena_pipeline.errors import SubmissionError
@@ -27,6 +27,7 @@ class FieldProblem(BaseModel):
 
     field: str = Field(description="Where, for example tasks[1]", examples=["tasks[0]"])
     message: str = Field(examples=["there is no task 'support-9'"])
+    line: int | None = Field(default=None, description="Line of an uploaded text, from 1")
     choices: list[str] = Field(default=[], description="What would be valid, where known")
 
 
@@ -126,7 +127,16 @@ def add_problem_handlers(app: FastAPI) -> None:
     @app.exception_handler(HTTPException)
     async def on_http(_: Request, error: HTTPException) -> JSONResponse:
         headers = dict(error.headers) if error.headers else None
-        return _answer(error.status_code, str(error.detail), headers=headers)
+        status = error.status_code
+        if status == HTTPStatus.BAD_REQUEST:
+            # A body that is no text is as wrong as one that is no JSON, and answered like it.
+            status = HTTPStatus.UNPROCESSABLE_ENTITY
+        return _answer(status, str(error.detail), headers=headers)
+
+    @app.exception_handler(DataError)
+    async def on_unstorable(_: Request, error: DataError) -> JSONResponse:
+        log.info("unstorable", error=str(error.orig))
+        return _answer(422, "a text or number of the request is none that can be stored or found")
 
     @app.exception_handler(OperationalError)
     async def on_database(_: Request, error: OperationalError) -> JSONResponse:
