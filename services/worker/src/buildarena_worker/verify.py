@@ -55,7 +55,8 @@ class _ReplayIO(SessionIO):
     def simulate(
         self, machine: Machine, controls: Sequence[KeyPress] | None, *, final: bool
     ) -> RolloutRecord:
-        self.machines.append((machine, controls))
+        # A copy: what an analyst looks up in the machine later is added to its log.
+        self.machines.append((machine.copy(), controls))
         return super().simulate(machine, controls, final=final)
 
 
