@@ -21,6 +21,8 @@ from buildarena_worker.session import Session
 DRAFT_TURNS = 50
 BUILD_TURNS = 300
 """Replies a stage may take. Source: the paper's workflow appendix."""
+SHOWN = 200
+"""Characters of a reply that a failure quotes."""
 
 
 def plan_stage(session: Session) -> Plan:
@@ -45,7 +47,8 @@ def plan_stage(session: Session) -> Plan:
             plan = read_plan(text)
         except PlanError as error:
             if last:
-                raise ConstructionFailedError("plan_unreadable", str(error)) from error
+                told = f"{error}; the planner said {text[:SHOWN]!r}"
+                raise ConstructionFailedError("plan_unreadable", told) from error
             also = pack.say("plan_again", error=str(error))
         else:
             _check_plan(session, plan)

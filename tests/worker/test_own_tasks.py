@@ -1,0 +1,151 @@
+"""Tasks that users uploaded, from submission to score and verification, on the real database."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+import yaml
+
+from buildarena_api.tasks import EXAMPLE
+from buildarena_benchmark import builtin_tasks
+from buildarena_pipeline.external import ExternalSessions
+from buildarena_pipeline.models import load_registry
+from buildarena_pipeline.specs import JobSpec
+from buildarena_pipeline.stages import LeaseKeeper, StageRunner
+from buildarena_pipeline.submission import Submissions
+from buildarena_simworker.simulate import SimulateHandler
+from buildarena_store import Job
+from buildarena_worker.builtin.designs import DESIGNS
+from buildarena_worker.construct import ConstructHandler
+from buildarena_worker.verify import Verifier
+
+OTHER = EXAMPLE.replace("final_mass: 200", "final_mass: 300")
+
+
+@pytest.fixture
+def finish(context) -> Callable[[str], Job]:
+    """Works on a job until it has ended."""
+
+    def work(job_id: str) -> Job:
+        keeper = LeaseKeeper(context, lambda: None)
+        keeper.start()
+        handlers = {
+            "construct": ConstructHandler(context, load_registry()),
+            "simulate": SimulateHandler(context),
+        }
+        for _ in range(20):
+            job = context.jobs.get(job_id)
+            if job.state == "done":
+                break
+            StageRunner(context, handlers[job.stage], keeper, "w").look(job.queue, job.id)
+        keeper.stop()
+        return job
+
+    return work
+
+
+@pytest.fixture
+def submit(context) -> Callable[..., Job]:
+    def work(**spec: object) -> Job:
+        given = {"model": "builtin/random", "simulator": "mujoco", **spec}
+        job, _ = Submissions(context, load_registry()).submit_job(JobSpec.model_validate(given))
+        return job
+
+    return work
+
+
+@pytest.fixture
+def play(context) -> Callable[..., Job]:
+    """Builds the expert's bridge of another task, as an outside agent, and submits it."""
+
+    def work(task: str, design: str = "support-1", seed: int = 0) -> Job:
+        sessions = ExternalSessions(context)
+        job = sessions.open(task=task, agent="me", seed=seed, simulator="mujoco")
+        for tool, arguments in next(iter(DESIGNS[design](0).parts.values())).actions:
+            done = sessions.call(job.id, machine="main", tool=tool, arguments=arguments)
+            assert done.ok, done.feedback
+        return sessions.submit(job.id)
+
+    return work
+
+
+def add(context, text: str) -> str:
+    task = context.catalogue.check(text)
+    context.catalogue.add(task, text)
+    return task.version
+
+
+def own(name: str, builtin: str, **changes: object) -> str:
+    document = dict(builtin_tasks()[builtin].as_document())
+    return yaml.safe_dump({**document, "name": name, "category": "own", **changes})
+
+
+def assert_verified(context, job: Job) -> None:
+    report = Verifier(context).verify(job.id)
+    assert report["ok"], [check for check in report["checks"] if not check["ok"]]
+
+
+def test_an_agents_bridge_is_simulated_scored_and_verified(context, play, finish) -> None:
+    version = add(context, EXAMPLE)
+    job = finish(play("narrow-gap").id)
+    assert (job.outcome, job.success, job.indicator) == ("success", True, 200.0)
+    assert job.manifest["task"] == {"name": "narrow-gap", "version": version}
+    assert_verified(context, job)
+
+
+def test_a_job_in_work_is_tried_and_verified_with_its_own_version(context, play, finish) -> None:
+    add(context, EXAMPLE)
+    old = play("narrow-gap")
+    add(context, OTHER)
+    new = play("narrow-gap", seed=1)
+    assert (finish(old.id).indicator, finish(new.id).indicator) == (200.0, 300.0)
+    for job in (old, new):
+        assert_verified(context, context.jobs.get(job.id))
+
+
+def test_what_a_task_asks_of_modules_is_checked(context, play) -> None:
+    add(context, EXAMPLE.replace("scenario:", "constraints: {min_modules: {Winch: 2}}\nscenario:"))
+    job = play("narrow-gap")
+    assert (job.outcome, job.reason) == ("construction_failed", "constraint_violated")
+    assert "0 of Winch" in job.detail
+
+
+@pytest.mark.parametrize("model", ["builtin/expert", "builtin/random", "builtin/idle"])
+@pytest.mark.parametrize("workflow", ["five-role", "guidance-builder", "builder"])
+def test_built_in_models_end_with_a_score(context, submit, finish, model, workflow) -> None:
+    add(context, EXAMPLE)
+    job = finish(submit(task="narrow-gap", model=model, workflow=workflow).id)
+    assert job.outcome in {"construction_failed", "unsuccessful"}, job.detail
+    assert (job.success, job.indicator) == (False, 0.0)
+    assert_verified(context, job)
+
+
+def test_the_expert_says_that_it_has_no_design(context, submit, finish) -> None:
+    add(context, EXAMPLE)
+    job = finish(submit(task="narrow-gap", model="builtin/expert").id)
+    assert (job.outcome, job.reason) == ("construction_failed", "plan_unreadable")
+    assert "I have no design for narrow-gap" in job.detail
+
+
+@pytest.mark.parametrize("builtin", ["transport-2", "support-2", "lift-1", "lift-3"])
+@pytest.mark.parametrize(
+    "more", [{"one_shot": True}, {"closed_loop": {"rounds": 2, "analyst": True}}]
+)
+def test_every_kind_of_task_and_variant_ends_with_a_score(
+    context, submit, finish, builtin, more
+) -> None:
+    scenario = dict(builtin_tasks()[builtin].as_document()["scenario"]) | {"duration_s": 13}
+    add(context, own("mine", builtin, scenario=scenario))
+    job = finish(submit(task="mine", **more).id)
+    assert job.outcome in {"construction_failed", "unsuccessful", "success"}, job.detail
+    assert_verified(context, job)
+
+
+@pytest.mark.parametrize("builtin", ["transport-1", "transport-2", "support-1", "lift-1", "lift-2"])
+def test_a_trial_that_tracks_one_block_only_is_scored(context, play, finish, builtin) -> None:
+    scenario = dict(builtin_tasks()[builtin].as_document()["scenario"])
+    add(context, own("mine", builtin, scenario={**scenario, "tracked_blocks": ["1"]}))
+    job = finish(play("mine", builtin).id)
+    assert job.outcome in {"unsuccessful", "success"}, job.detail
+    assert_verified(context, job)
