@@ -126,3 +126,17 @@ def test_what_is_not_there_is_a_problem(api, path) -> None:
     answer = api.get(path)
     assert answer.status_code == 404
     assert answer.headers["content-type"] == "application/problem+json"
+
+
+@pytest.mark.parametrize(
+    ("path", "params"),
+    [("/v1/jobs", {"task": "\0"}), ("/v1/jobs/a%00b", {}), ("/v1/leaderboard", {"task": "\0"})],
+)
+def test_texts_that_no_database_holds_are_refused(api, path, params) -> None:
+    assert api.get(path, params=params).status_code in {404, 422}
+
+
+@pytest.mark.parametrize("name", ["a\0b", "two\nlines", ""])
+def test_a_name_is_one_printable_line(api, sweep, name) -> None:
+    answer = api.post("/v1/sweeps", json={**sweep, "name": name})
+    assert (answer.status_code, answer.json()["errors"][0]["field"]) == (422, "name")

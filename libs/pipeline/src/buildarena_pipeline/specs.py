@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from decimal import Decimal
-from typing import Annotated, Any
+from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, StrictInt, model_validator
+from pydantic import BaseModel, ConfigDict, Field, StrictInt, ValidationInfo, field_validator
 
 from buildarena_store import BudgetLimits
 
@@ -14,6 +14,10 @@ MAX_SEED = 2**53 - 1
 
 Seed = Annotated[StrictInt, Field(ge=0, le=MAX_SEED)]
 Name = Annotated[str, Field(min_length=1, max_length=200)]
+Title = Annotated[
+    str, Field(min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\x7f]+$")
+]
+"""What people call something of theirs: one line, of characters that can be stored."""
 
 
 class Decoding(BaseModel):
@@ -94,7 +98,7 @@ class JobSpec(_Variant):
 class SweepSpec(_Variant):
     """A matrix of jobs: every task with every model and every seed."""
 
-    name: Annotated[str, Field(min_length=1, max_length=200)] = "sweep"
+    name: Title = "sweep"
     tasks: Annotated[list[Name], Field(min_length=1, max_length=1000)]
     models: Annotated[list[Name], Field(min_length=1, max_length=1000)]
     seeds: Annotated[list[Seed] | None, Field(min_length=1, max_length=100_000)] = None
@@ -103,12 +107,12 @@ class SweepSpec(_Variant):
     ] = None
     budget: Budget | None = None
 
-    @model_validator(mode="before")
+    @field_validator("samples")
     @classmethod
-    def _seeds_or_samples(cls, data: Any) -> Any:
-        if isinstance(data, dict) and data.get("seeds") is not None and "samples" in data:
+    def _seeds_or_samples(cls, samples: int | None, info: ValidationInfo) -> int | None:
+        if info.data.get("seeds") is not None:
             raise ValueError("give either seeds or samples, not both")
-        return data
+        return samples
 
     def all_seeds(self) -> list[int]:
         """The seeds, each once, in their order; the paper's 64 samples by default."""

@@ -9,11 +9,13 @@ from fastapi import Depends, FastAPI
 from fastapi_offline import FastAPIOffline
 
 from buildarena_api import (
+    archives,
     catalogue,
     health,
     jobs,
     keys,
     leaderboard,
+    metrics,
     sessions,
     streams,
     sweeps,
@@ -24,8 +26,10 @@ from buildarena_api.access import caller_of
 from buildarena_api.board_cache import BoardCache
 from buildarena_api.event_hub import EventHub
 from buildarena_api.guards import Guards
+from buildarena_api.metrics import ServiceMetrics
 from buildarena_api.problems import add_problem_handlers, problem_responses
 from buildarena_api.rate_limits import RateLimits
+from buildarena_api.request_log import RequestLog
 from buildarena_pipeline import __version__
 from buildarena_pipeline.context import Context
 from buildarena_pipeline.external import ExternalSessions
@@ -61,9 +65,13 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
         lifespan=lifespan,
         docs_url="/docs",
         redoc_url=None,
+        # Short names for the functions of generated clients.
+        generate_unique_id_function=lambda route: route.name,
         license_info={"name": "Apache-2.0", "identifier": "Apache-2.0"},
     )
+    app.state.metrics = ServiceMetrics(context)
     app.add_middleware(Guards)
+    app.add_middleware(RequestLog, metrics=app.state.metrics)
     app.state.context = context
     app.state.hub = EventHub(context)
     app.state.registry = registry
@@ -85,6 +93,8 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
         tasks,
         catalogue,
         keys,
+        metrics,
+        archives,
     ):
         app.include_router(
             room.router,

@@ -14,7 +14,7 @@ from buildarena_api.problems import problem_responses
 from buildarena_api.schemas import BudgetView
 from buildarena_pipeline.context import Context
 from buildarena_pipeline.queues import CONSTRUCT
-from buildarena_pipeline.specs import Budget
+from buildarena_pipeline.specs import Budget, Title
 from buildarena_pipeline.sweeper import announce_waiting
 from buildarena_store import ApiKey
 
@@ -26,9 +26,7 @@ class NewKey(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
 
-    name: Annotated[
-        str, Field(min_length=1, max_length=100, description="Who holds it", examples=["ada"])
-    ]
+    name: Annotated[Title, Field(description="Who holds it", examples=["ada"])]
     scopes: Annotated[
         list[Literal["read", "submit", "admin"]],
         Field(min_length=1, max_length=3, description="Each includes those before it"),

@@ -116,14 +116,6 @@ def add_problem_handlers(app: FastAPI) -> None:
         detail = "; ".join(f"{entry.field}: {entry.message}" for entry in errors)
         return _answer(422, detail, errors)
 
-    @app.exception_handler(UnknownIdError)
-    async def on_unknown(_: Request, error: UnknownIdError) -> JSONResponse:
-        return _answer(404, str(error))
-
-    @app.exception_handler(ArtifactMissingError)
-    async def on_missing(_: Request, error: ArtifactMissingError) -> JSONResponse:
-        return _answer(404, str(error))
-
     @app.exception_handler(HTTPException)
     async def on_http(_: Request, error: HTTPException) -> JSONResponse:
         headers = dict(error.headers) if error.headers else None
@@ -132,6 +124,23 @@ def add_problem_handlers(app: FastAPI) -> None:
             # A body that is no text is as wrong as one that is no JSON, and answered like it.
             status = HTTPStatus.UNPROCESSABLE_ENTITY
         return _answer(status, str(error.detail), headers=headers)
+
+    @app.exception_handler(Exception)
+    async def on_bug(request: Request, error: Exception) -> JSONResponse:
+        log.error("unexpected", path=request.url.path, exc_info=error)
+        return _answer(500, "something went wrong here; it is in the log")
+
+    _add_store_handlers(app)
+
+
+def _add_store_handlers(app: FastAPI) -> None:
+    @app.exception_handler(UnknownIdError)
+    async def on_unknown(_: Request, error: UnknownIdError) -> JSONResponse:
+        return _answer(404, str(error))
+
+    @app.exception_handler(ArtifactMissingError)
+    async def on_missing(_: Request, error: ArtifactMissingError) -> JSONResponse:
+        return _answer(404, str(error))
 
     @app.exception_handler(DataError)
     async def on_unstorable(_: Request, error: DataError) -> JSONResponse:
@@ -144,11 +153,6 @@ def add_problem_handlers(app: FastAPI) -> None:
         return _answer(
             503, "the database can't be reached; nothing was stored", headers={"Retry-After": "2"}
         )
-
-    @app.exception_handler(Exception)
-    async def on_bug(request: Request, error: Exception) -> JSONResponse:
-        log.error("unexpected", path=request.url.path, exc_info=error)
-        return _answer(500, "something went wrong here; it is in the log")
 
 
 def _field(location: Sequence[str | int]) -> str:

@@ -13,7 +13,7 @@ from buildarena_api.access import CallerDep
 from buildarena_api.dependencies import ContextDep
 from buildarena_api.etags import Answer, conditional
 from buildarena_api.problems import FieldProblem, ProblemError, problem_responses
-from buildarena_benchmark import TaskError
+from buildarena_benchmark import TaskError, parse_own_task
 from buildarena_benchmark.tasks.sources import MOST_BYTES
 from buildarena_pipeline.task_catalogue import CatalogueEntry, TaskChangedError
 from buildarena_store import UnknownIdError
@@ -114,7 +114,7 @@ def add_task(
     """Uploads a task, or a new version of one of your own; new submissions get it from then on."""
     catalogue = context.catalogue
     try:
-        task = catalogue.check(text)
+        task = parse_own_task(text, origin="task")
     except TaskError as error:
         raise _refusal(error) from error
     with contextlib.suppress(UnknownIdError):

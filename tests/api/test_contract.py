@@ -1,0 +1,74 @@
+"""The whole OpenAPI contract under generated requests: no 5xx, no undocumented answer."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import schemathesis
+from hypothesis import HealthCheck, given, settings, strategies
+from live_api import live_api
+from pydantic import SecretStr
+from schemathesis import GenerationMode
+from schemathesis.checks import not_a_server_error
+from schemathesis.specs.openapi.checks import (
+    content_type_conformance,
+    response_headers_conformance,
+    response_schema_conformance,
+    status_code_conformance,
+)
+
+from buildarena_pipeline.specs import SweepSpec
+
+ADMIN = "operator-secret-that-is-long-enough"
+CONTRACT = Path(__file__).parents[1] / "data" / "openapi.json"
+CHECKS = [
+    not_a_server_error,
+    status_code_conformance,
+    content_type_conformance,
+    response_headers_conformance,
+    response_schema_conformance,
+]
+schemathesis.serializer.alias(["application/zip"], "application/octet-stream")
+schemathesis.openapi.media_type("application/zip", strategies.binary(max_size=100))
+# Streams have no end; test_operating.py reads them.
+SCHEMA = schemathesis.openapi.from_path(CONTRACT).exclude(path_regex="/events$")
+OPERATIONS = {found.ok().label: found.ok() for found in SCHEMA.get_all_operations()}
+
+
+@pytest.fixture
+def service(context, submissions) -> Iterator[str]:
+    """A live service that holds a few jobs and counts no requests."""
+    submissions.submit_sweep(SweepSpec(tasks=["lift-1"], models=["builtin/idle"], seeds=[0, 1]))
+    changes = {"rate_limit": "1000000/minute", "admin_key": SecretStr(ADMIN)}
+    settings = context.settings.model_copy(update=changes)
+    with live_api(replace(context, settings=settings)) as url:
+        yield url
+
+
+# What takes no input can't be asked wrongly.
+WAYS = [
+    (label, mode)
+    for label, operation in OPERATIONS.items()
+    for mode in GenerationMode
+    if mode is GenerationMode.POSITIVE or operation.body or list(operation.iter_parameters())
+]
+
+
+@pytest.mark.parametrize(("label", "mode"), WAYS)
+def test_every_answer_is_a_documented_one(service, label, mode) -> None:
+    @settings(
+        max_examples=12,
+        deadline=None,
+        derandomize=True,
+        database=None,
+        suppress_health_check=list(HealthCheck),
+    )
+    @given(case=OPERATIONS[label].as_strategy(generation_mode=mode))
+    def ask(case) -> None:
+        headers = {"Authorization": f"Bearer {ADMIN}"}
+        case.call_and_validate(base_url=service, headers=headers, checks=CHECKS, timeout=30)
+
+    ask()
