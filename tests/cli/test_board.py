@@ -8,16 +8,13 @@ import random
 import re
 import threading
 import time
-from dataclasses import dataclass
 
 import pytest
+from commands import printed, run_cli
 from live_api import live_api
 from sqlalchemy import insert, select, update
-from typer.testing import CliRunner
 
 from buildarena_benchmark.leaderboard import published_rows
-from buildarena_cli.errors import CommandError
-from buildarena_cli.main import app
 from buildarena_cli.report import variant
 from buildarena_pipeline.models import load_registry
 from buildarena_pipeline.specs import SweepSpec
@@ -94,29 +91,6 @@ def end_jobs(context, *, rounds: int = 1) -> None:
                         finished_at=job.created_at,
                     )
                 )
-
-
-@dataclass(frozen=True)
-class Done:
-    returncode: int
-    stdout: str
-    stderr: str
-
-
-def run_cli(url: str, *words: str) -> Done:
-    """Runs a command in this process: a process of its own takes seconds to start."""
-    result = CliRunner().invoke(app, [*words, "--url", url], env={"COLUMNS": "100"})
-    if isinstance(result.exception, CommandError):
-        return Done(result.exception.code, result.stdout, str(result.exception))
-    if result.exception is not None and not isinstance(result.exception, SystemExit):
-        raise result.exception
-    return Done(result.exit_code, result.stdout, result.stderr)
-
-
-def printed(url: str, *words: str) -> str:
-    done = run_cli(url, *words)
-    assert done.returncode == 0, done.stderr
-    return done.stdout
 
 
 @pytest.mark.usefixtures("sweep")

@@ -6,7 +6,7 @@ import pytest
 from sqlalchemy import event
 
 from buildarena_api.tasks import EXAMPLE
-from buildarena_benchmark import TaskError, builtin_tasks
+from buildarena_benchmark import TaskError, builtin_tasks, parse_own_task
 from buildarena_benchmark.tasks import task as task_module
 from buildarena_pipeline.errors import PermanentFaultError, SubmissionError
 from buildarena_pipeline.scoring import task_of
@@ -31,7 +31,7 @@ def queries(context):
 
 
 def add(context, text: str) -> str:
-    task = context.catalogue.check(text)
+    task = parse_own_task(text, origin="task")
     context.catalogue.add(task, text)
     return task.version
 
@@ -58,22 +58,22 @@ def test_the_newest_version_is_named_and_every_version_is_kept(context) -> None:
 
 
 def test_the_same_content_is_stored_once(context) -> None:
-    task = context.catalogue.check(EXAMPLE)
+    task = parse_own_task(EXAMPLE, origin="task")
     assert context.catalogue.add(task, EXAMPLE, owner=None)
     assert not context.catalogue.add(task, EXAMPLE + "# again\n")
     assert len(context.tasks.versions("narrow-gap")) == 1
 
 
-def test_a_built_in_tasks_name_is_taken(context) -> None:
+def test_a_built_in_tasks_name_is_taken() -> None:
     with pytest.raises(TaskError, match=r"task:1: name: support-1 is a built-in task"):
-        context.catalogue.check(EXAMPLE.replace("narrow-gap", "support-1"))
+        parse_own_task(EXAMPLE.replace("narrow-gap", "support-1"), origin="task")
 
 
 def test_a_title_alone_does_not_change(context) -> None:
     add(context, EXAMPLE)
     text = EXAMPLE.replace("A bridge", "No bridge").replace("unit: mass units", "unit: kg")
     with pytest.raises(TaskChangedError, match="another title and indicator"):
-        context.catalogue.add(context.catalogue.check(text), text)
+        context.catalogue.add(parse_own_task(text, origin="task"), text)
 
 
 def test_a_job_keeps_its_version_when_the_task_changes(context, submissions) -> None:

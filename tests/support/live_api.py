@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import sys
 import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+import structlog
 import uvicorn
 
 from buildarena_api.app import create_app
@@ -18,6 +20,9 @@ from buildarena_pipeline.models import load_registry
 @contextmanager
 def live_api(context: Context) -> Iterator[str]:
     """Serves the API of a context; yields its URL."""
+    # Commands run in this process too: its log must not be part of what they print.
+    usual_logs = structlog.get_config()
+    structlog.configure(logger_factory=structlog.PrintLoggerFactory(file=sys.__stderr__))
     port = free_port()
     config = uvicorn.Config(
         create_app(context, load_registry()), host="127.0.0.1", port=port, log_config=None
@@ -32,3 +37,4 @@ def live_api(context: Context) -> Iterator[str]:
     finally:
         server.should_exit = True
         thread.join()
+        structlog.configure(**usual_logs)

@@ -8,7 +8,7 @@ import pytest
 import yaml
 
 from buildarena_api.tasks import EXAMPLE
-from buildarena_benchmark import builtin_tasks
+from buildarena_benchmark import builtin_tasks, parse_own_task
 from buildarena_pipeline.external import ExternalSessions
 from buildarena_pipeline.models import load_registry
 from buildarena_pipeline.specs import JobSpec
@@ -71,7 +71,7 @@ def play(context) -> Callable[..., Job]:
 
 
 def add(context, text: str) -> str:
-    task = context.catalogue.check(text)
+    task = parse_own_task(text, origin="task")
     context.catalogue.add(task, text)
     return task.version
 

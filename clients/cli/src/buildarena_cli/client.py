@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import time
 import weakref
@@ -106,8 +107,24 @@ class Client:
         if response.status_code == httpx.codes.UNAUTHORIZED:
             raise CommandError(f"{_problem(response)}: set {KEY_VARIABLE} to a good one")
         if response.is_error and path != "/v1/health":
-            raise CommandError(_problem(response))
+            raise RefusedError(response)
         return response
+
+
+class RefusedError(CommandError):
+    """The service refused a request.
+
+    Attributes:
+        status: The HTTP status.
+        errors: Its field errors: ``field``, ``message``, ``line`` and ``choices`` of each.
+    """
+
+    def __init__(self, response: httpx.Response) -> None:
+        super().__init__(_problem(response))
+        self.status = response.status_code
+        self.errors: list[dict[str, Any]] = []
+        with contextlib.suppress(ValueError, KeyError, TypeError):
+            self.errors = list(response.json()["errors"])
 
 
 class UnreachableError(CommandError):

@@ -9,11 +9,11 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from buildarena_cli.client import Client
+from buildarena_cli.client import Client, RefusedError
 from buildarena_cli.errors import DONE, FAILED
 from buildarena_cli.options import DEFAULT_URL, JsonOption, UrlOption
 from buildarena_cli.output import console, number, print_json
-from buildarena_cli.sweeps import read_yaml
+from buildarena_cli.sweep_files import read_fields
 
 app = typer.Typer(help="Submit and look at jobs.", no_args_is_help=True)
 
@@ -33,9 +33,15 @@ def submit_job(
     as_json: JsonOption = False,
 ) -> None:
     """Submit one job; an equal one that exists is never done again."""
-    more = {} if options is None else read_yaml(options)
-    job = Client(url).post("/v1/jobs", {**more, "task": task, "model": model, "seed": seed})
-    _show(job, as_json=as_json)
+    body = {"task": task, "model": model, "seed": seed}
+    if options is None:
+        _show(Client(url).post("/v1/jobs", body), as_json=as_json)
+        return
+    more = read_fields(options).with_words(body)
+    try:
+        _show(Client(url).post("/v1/jobs", more.content), as_json=as_json)
+    except RefusedError as error:
+        raise more.refused(error) from error
 
 
 @app.command("list")

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from rich.markup import escape
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
@@ -217,7 +218,7 @@ def _report(task: Task, result: Score, rollout: Trajectory | None) -> dict[str, 
 
 def _table(task: Task, result: Score, rollout: Trajectory | None) -> Table:
     engine = f" on {rollout.engine} {rollout.engine_version}" if rollout else ""
-    table = Table(title=f"{task.title}{engine}", title_justify="left", show_header=False)
+    table = Table(title=escape(f"{task.title}{engine}"), title_justify="left", show_header=False)
     table.add_row("verdict", "success" if result.success else "failure")
     unit = "" if task.indicator.unit == "1" else f" {task.indicator.unit}"
     table.add_row(task.indicator.name, f"{result.indicator:,.2f}{unit}")

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from buildarena_cli import board, catalogue, jobs, keys, machine, report, service, sweeps
+from buildarena_cli import board, catalogue, jobs, keys, machine, report, service, sweeps, tasks
 from buildarena_cli.client import Client
 from buildarena_cli.doctor import examine
 from buildarena_cli.errors import FAILED, CommandError
@@ -23,7 +23,7 @@ app = typer.Typer(
 app.add_typer(sweeps.app, name="sweep")
 app.add_typer(jobs.app, name="job")
 app.add_typer(keys.app, name="key")
-app.add_typer(catalogue.tasks, name="task")
+app.add_typer(tasks.app, name="task")
 app.add_typer(catalogue.models, name="model")
 app.add_typer(machine.app, name="machine")
 
@@ -67,5 +67,5 @@ def run() -> None:
     try:
         app()
     except CommandError as error:
-        error_console.print(str(error), soft_wrap=True)
+        error_console.print(str(error), soft_wrap=True, markup=False)
         sys.exit(error.code)

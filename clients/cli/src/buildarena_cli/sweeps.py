@@ -7,10 +7,9 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-import yaml
 from rich.table import Table
 
-from buildarena_cli.client import Client
+from buildarena_cli.client import Client, RefusedError
 from buildarena_cli.errors import CommandError
 from buildarena_cli.keys import spent
 from buildarena_cli.options import (
@@ -24,6 +23,7 @@ from buildarena_cli.options import (
 )
 from buildarena_cli.output import console, number, print_json
 from buildarena_cli.progress import ended, exit_code, watch_sweep
+from buildarena_cli.sweep_files import read_sweep, sweep_schema
 
 app = typer.Typer(help="Submit and watch sweeps.", no_args_is_help=True)
 
@@ -38,6 +38,19 @@ def run_sweep(
         bool, typer.Option("--dry-run", help="Show what it would be and cost; submit nothing.")
     ] = False,
     detach: Annotated[bool, typer.Option("--detach", help="Submit and do not wait.")] = False,
+    task: Annotated[
+        list[str] | None, typer.Option("--task", help="In the place of the file's tasks.")
+    ] = None,
+    model: Annotated[
+        list[str] | None, typer.Option("--model", help="In the place of the file's models.")
+    ] = None,
+    samples: Annotated[
+        int | None, typer.Option("--samples", help="In the place of the file's samples or seeds.")
+    ] = None,
+    seed: Annotated[
+        list[int] | None,
+        typer.Option("--seed", help="In the place of the file's seeds or samples."),
+    ] = None,
     max_cost_usd: MaxCostOption = None,
     max_tokens: MaxTokensOption = None,
     max_requests: MaxRequestsOption = None,
@@ -45,14 +58,23 @@ def run_sweep(
     as_json: JsonOption = False,
 ) -> None:
     """Submit a sweep and watch it. Running the same file again takes it up where it was."""
-    client, spec = Client(url), read_yaml(file)
-    budget = budget_of(max_cost_usd, max_tokens, max_requests)
-    if budget is not None:
-        spec["budget"] = budget
-    if dry_run:
-        _show_estimate(client.post("/v1/sweeps/estimate", spec), as_json=as_json)
-        return
-    accepted = client.post("/v1/sweeps?take_up=true", spec)
+    if samples is not None and seed:
+        raise typer.BadParameter("give either --samples or --seed, not both")
+    flags = {
+        "tasks": task or None,
+        "models": model or None,
+        "samples": samples,
+        "seeds": seed or None,
+        "budget": budget_of(max_cost_usd, max_tokens, max_requests),
+    }
+    client, sweep = Client(url), read_sweep(file, flags)
+    try:
+        if dry_run:
+            _show_estimate(client.post("/v1/sweeps/estimate", sweep.content), as_json=as_json)
+            return
+        accepted = client.post("/v1/sweeps?take_up=true", sweep.content)
+    except RefusedError as error:
+        raise sweep.refused(error) from error
     if not as_json:
         news = "taken up again" if accepted["taken_up"] else f"{accepted['added']} of them new"
         console.print(f"{accepted['id']}: {accepted['jobs']} jobs, {news}")
@@ -61,6 +83,12 @@ def run_sweep(
             print_json(accepted)
         return
     raise typer.Exit(exit_code(_watch(client, accepted["id"], as_json=as_json)))
+
+
+@app.command("schema")
+def print_schema() -> None:
+    """Print the JSON schema of sweep files, for editors; docs/sweep.schema.json holds it."""
+    print_json(sweep_schema())
 
 
 @app.command("status")
@@ -150,23 +178,6 @@ def import_sweep(
         print_json(done)
     else:
         console.print(f"{done['sweep_id']}: {done['jobs']} jobs, {done['added']} of them new")
-
-
-def read_yaml(file: Path) -> dict[str, Any]:
-    """The mapping in a YAML file.
-
-    Raises:
-        CommandError: It can't be read, or holds something else.
-    """
-    try:
-        document = yaml.safe_load(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise CommandError(f"{file}: {error.strerror}") from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise CommandError(f"{file} is no YAML: {error}") from error
-    if not isinstance(document, dict):
-        raise CommandError(f"{file} must hold a mapping with tasks, models and seeds")
-    return document
 
 
 def _show(sweep: dict[str, Any], *, as_json: bool) -> None:

@@ -3,7 +3,7 @@
 from buildarena_benchmark.constraints import broken_constraint
 from buildarena_benchmark.errors import BenchmarkError, Fault, SourceError, TaskError
 from buildarena_benchmark.scores import Score, failed_score, score
-from buildarena_benchmark.tasks.loading import builtin_tasks, load_task, parse_task
+from buildarena_benchmark.tasks.loading import builtin_tasks, load_task, parse_own_task, parse_task
 from buildarena_benchmark.tasks.task import Task
 
 __all__ = [
@@ -17,6 +17,7 @@ __all__ = [
     "builtin_tasks",
     "failed_score",
     "load_task",
+    "parse_own_task",
     "parse_task",
     "score",
 ]

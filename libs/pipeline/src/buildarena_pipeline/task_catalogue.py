@@ -12,8 +12,7 @@ from datetime import datetime
 
 import structlog
 
-from buildarena_benchmark import Fault, Task, TaskError, builtin_tasks, parse_task
-from buildarena_benchmark.tasks.sources import read_source
+from buildarena_benchmark import Task, TaskError, builtin_tasks, parse_task
 from buildarena_pipeline.errors import PipelineError
 from buildarena_store import StoredTask, Tasks, UnknownIdError
 from buildarena_store.tasks import TaskKey
@@ -114,24 +113,11 @@ class TaskCatalogue:
             created_at=row.created_at,
         )
 
-    def check(self, text: str, *, origin: str = "task") -> Task:
-        """The task that a YAML text describes, if it may be uploaded.
-
-        Raises:
-            TaskError: It is no valid task, or its name is a built-in task's.
-        """
-        task = parse_task(text, origin=origin)
-        if task.name in builtin_tasks():
-            line = read_source(text, origin=origin).line_of(["name"])
-            message = f"{task.name} is a built-in task: choose another name"
-            raise TaskError([Fault(field="name", line=line, message=message)], origin=origin)
-        return task
-
     def add(self, task: Task, text: str, *, owner: str | None = None) -> bool:
         """Stores a task, unless this version of it is there.
 
         Args:
-            task: What `check` made of the text.
+            task: What `parse_own_task` made of the text.
             text: The YAML text.
             owner: Id of the API key that uploads it, if any.
 

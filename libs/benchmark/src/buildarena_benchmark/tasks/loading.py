@@ -9,7 +9,7 @@ from typing import Final
 
 from buildarena_benchmark.errors import Fault, SourceError, TaskError
 from buildarena_benchmark.tasks.document import TaskDocument
-from buildarena_benchmark.tasks.sources import read_model
+from buildarena_benchmark.tasks.sources import read_model, read_source
 from buildarena_benchmark.tasks.task import Task, task_of
 
 _ORDER: Final = tuple(
@@ -63,3 +63,17 @@ def parse_task(text: str, *, origin: str) -> Task:
         return task_of(read_model(text, TaskDocument, origin=origin))
     except SourceError as error:
         raise TaskError(error.faults, origin=origin) from error
+
+
+def parse_own_task(text: str, *, origin: str) -> Task:
+    """A user's own task from a YAML text: as `parse_task`, but for names that are taken.
+
+    Raises:
+        TaskError: It is no valid task, or its name is a built-in task's.
+    """
+    task = parse_task(text, origin=origin)
+    if task.name in builtin_tasks():
+        line = read_source(text, origin=origin).line_of(["name"])
+        message = f"{task.name} is a built-in task: choose another name"
+        raise TaskError([Fault(field="name", line=line, message=message)], origin=origin)
+    return task

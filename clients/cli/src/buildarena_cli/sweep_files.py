@@ -1,0 +1,127 @@
+"""Sweep files: read with care, overridden by flags, and every mistake told with line and field."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Final
+
+from pydantic import ValidationError
+
+from buildarena_benchmark import Fault, SourceError
+from buildarena_benchmark.tasks.sources import Source, path_of, read_source
+from buildarena_cli.client import RefusedError
+from buildarena_cli.errors import CommandError
+from buildarena_pipeline.specs import SweepSpec
+
+MOST_BYTES: Final = 2 * 1024 * 1024
+"""Largest file: room for the 100,000 seeds that a sweep can name."""
+FLAGS: Final[Mapping[str, str]] = {
+    "tasks": "--task",
+    "models": "--model",
+    "samples": "--samples",
+    "seeds": "--seed",
+    "budget": "--max-cost-usd, --max-tokens, --max-requests",
+    "task": "TASK",
+    "model": "MODEL",
+    "seed": "--seed",
+}
+"""Words of the command line by the field that they take the place of."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SpecFile:
+    """A file of fields that the API takes.
+
+    Attributes:
+        source: What the file says, with lines.
+        content: What is sent: the file's fields, some of them overridden.
+        overridden: Fields that the command line gave.
+    """
+
+    source: Source
+    content: dict[str, Any]
+    overridden: frozenset[str] = field(default_factory=frozenset)
+
+    def with_words(self, given: Mapping[str, Any]) -> SpecFile:
+        """The same file with values from the command line in the place of its fields."""
+        return replace(self, content={**self.content, **given}, overridden=frozenset(given))
+
+    def refusal(self, faults: Sequence[Fault]) -> CommandError:
+        """Faults in words, each with its line of the file or the flag that it came from."""
+        return CommandError("\n".join(self._told(fault) for fault in faults))
+
+    def refused(self, error: RefusedError) -> CommandError:
+        """What the service says against the content, in words."""
+        if not error.errors:
+            return error
+        return self.refusal(
+            [
+                Fault(
+                    field=entry["field"],
+                    message=entry["message"],
+                    line=self.source.line_of(path_of(entry["field"])),
+                    choices=tuple(entry["choices"]),
+                )
+                for entry in error.errors
+            ]
+        )
+
+    def _told(self, fault: Fault) -> str:
+        top = next(iter(path_of(fault.field)), "")
+        if top not in self.overridden:
+            return fault.told(self.source.origin)
+        given = Fault(field=fault.field, message=fault.message, choices=fault.choices)
+        return given.told(FLAGS[str(top)])
+
+
+def read_fields(file: Path) -> SpecFile:
+    """The fields in a YAML file.
+
+    Raises:
+        CommandError: It can't be read, or holds something else than a mapping.
+    """
+    try:
+        text = file.read_text(encoding="utf-8")
+        source = read_source(text, origin=str(file), most_bytes=MOST_BYTES)
+    except OSError as error:
+        raise CommandError(f"{file}: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise CommandError(f"{file}: no UTF-8: {error.reason}") from error
+    except SourceError as error:
+        raise CommandError(str(error)) from error
+    if not isinstance(source.content, dict):
+        raise CommandError(f"{file}:1: must be a mapping of fields, such as tasks: [support-1]")
+    return SpecFile(source=source, content=dict(source.content))
+
+
+def read_sweep(file: Path, flags: Mapping[str, Any]) -> SpecFile:
+    """A sweep file with what flags put in the place of its fields.
+
+    Args:
+        file: The file.
+        flags: Values by field; None for flags that were not given.
+
+    Raises:
+        CommandError: The file, or what the flags make of it, is no sweep.
+    """
+    given = {name: value for name, value in flags.items() if value is not None}
+    sweep = read_fields(file).with_words(given)
+    for one, other in (("samples", "seeds"), ("seeds", "samples")):
+        if one in given:
+            sweep.content.pop(other, None)
+    try:
+        SweepSpec.model_validate(sweep.content)
+    except ValidationError as error:
+        raise sweep.refusal(sweep.source.faults(error, SweepSpec)) from error
+    return sweep
+
+
+def sweep_schema() -> dict[str, Any]:
+    """The JSON schema of sweep files, for editors."""
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        **SweepSpec.model_json_schema(),
+        "title": "BuildArena sweep file",
+    }
