@@ -7,6 +7,7 @@ answered, so that accounts can be compared, and fails on demand.
 from __future__ import annotations
 
 import contextlib
+import gzip
 import json
 import socket
 import threading
@@ -20,7 +21,7 @@ from buildarena_worker.builtin import MODELS
 from buildarena_worker.messages import Message, Reply, Request, Tool, ToolCall
 
 Fault = Callable[[int], str | None]
-"""From the number of a request to what goes wrong: '429', '500', 'drop', 'slow', 'garbage'."""
+"""From the number of a request to what goes wrong: '429', '500', 'drop', 'slow', …."""
 
 
 @dataclass
@@ -93,9 +94,12 @@ class _Handler(BaseHTTPRequestHandler):
             self.connection.shutdown(socket.SHUT_RDWR)
             self.close_connection = True
             return
-        if fault in {"429", "500", "503", "401", "404"}:
+        if fault in {"429", "429 gzip", "500", "503", "401", "404"}:
             error = {"error": {"message": "stand-in says no", "type": "error", "status": "X"}}
-            self._send(int(fault), error, {"retry-after": "0"} if fault == "429" else {})
+            headers = {"retry-after": "0"} if "429" in fault else {}
+            if "gzip" in fault:
+                headers["content-encoding"] = "gzip"
+            self._send(int(fault[:3]), error, headers)
             return
         if fault == "overflow":
             message = "This model's maximum context length is 8192 tokens."
@@ -118,6 +122,8 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _send(self, status: int, body: dict[str, Any], headers: dict[str, str]) -> None:
         data = json.dumps(body).encode()
+        if headers.get("content-encoding") == "gzip":
+            data = gzip.compress(data)
         self.send_response(status)
         for name, value in {"content-type": "application/json", **headers}.items():
             self.send_header(name, value)

@@ -44,8 +44,8 @@ from buildarena_worker.session_io import Answer
 log = structlog.get_logger(__name__)
 
 POOLS = 16
-"""Connection pools per model: a pool looks at all its connections for each request, so that many
-small ones carry hundreds of open requests at less cost than one large one."""
+"""Connection pools per model over httpx: it looks at all connections of a pool for each request,
+so that many small pools carry hundreds of open requests at less cost than one large one."""
 OUTAGE_DELAY_S = 30.0
 """How long a job waits after its provider failed through all retries."""
 RETRIED_STATUS = frozenset({408, 409, 425, 429, 500, 502, 503, 504, 520, 522, 524, 529})
@@ -75,7 +75,8 @@ class ProviderClient:
         self._entry = entry
         self._policy = policy or RetryPolicy()
         self._wire = provider.wire
-        shards = [_make_model(entry, provider) for _ in range(POOLS)]
+        pools = 1 if provider.wire == "openai" else POOLS
+        shards = [_make_model(entry, provider) for _ in range(pools)]
         self._models = cycle([model for model, _ in shards])
         self._closers = [close for _, close in shards]
         self._rng = random.Random()  # noqa: S311 - spreads retries, guards nothing
@@ -196,9 +197,9 @@ def _make_model(
         from pydantic_ai.models.openai import OpenAIChatModel
         from pydantic_ai.providers.openai import OpenAIProvider
 
-        from buildarena_worker.llm.openai_direct import direct_client
+        from buildarena_worker.llm.openai_direct import DirectClient
 
-        client = direct_client(base_url=provider.base_url, api_key=key)
+        client = DirectClient(base_url=provider.base_url, api_key=key)
         model = OpenAIChatModel(entry.model, provider=OpenAIProvider(openai_client=client))
         return model, client.close
     if provider.wire == "anthropic":
