@@ -7,8 +7,10 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import Connection, func, insert, or_, select
+from sqlalchemy import Connection, cast, func, insert, literal, or_, select
+from sqlalchemy.dialects.postgresql import JSONB
 
+from buildarena_store.bulk import bound_texts
 from buildarena_store.database import Database
 from buildarena_store.tables import events, sweep_jobs
 
@@ -33,8 +35,12 @@ def record_jobs(
 ) -> None:
     """Writes one event for each job, in the transaction that made it true."""
     if job_ids:
-        rows = [{"job_id": job_id, "kind": kind, "data": dict(data)} for job_id in job_ids]
-        connection.execute(insert(events), rows)
+        rows = select(
+            func.unnest(bound_texts(job_ids)),
+            literal(kind),
+            cast(dict(data), JSONB),
+        )
+        connection.execute(insert(events).from_select(["job_id", "kind", "data"], rows))
 
 
 def record_sweep(connection: Connection, sweep_id: str, kind: str, data: Mapping[str, Any]) -> None:

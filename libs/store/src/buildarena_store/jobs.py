@@ -8,18 +8,16 @@ from datetime import datetime
 from decimal import Decimal
 from typing import Any
 
-from sqlalchemy import Connection, Row, and_, or_, select, update
+from sqlalchemy import Connection, Row, and_, any_, or_, select, update
 from sqlalchemy.dialects.postgresql import insert
 
 from buildarena_store import events
+from buildarena_store.bulk import bound_texts, rows_of
 from buildarena_store.database import Database
 from buildarena_store.errors import UnknownIdError
 from buildarena_store.ids import content_hash
 from buildarena_store.reservations import release
 from buildarena_store.tables import attempts, job_artifacts, jobs, sweep_jobs
-
-INSERT_CHUNK = 1000
-"""Rows per INSERT: 15 columns each stay far below Postgres' 65,535 parameters."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -150,25 +148,29 @@ class Jobs:
         Returns:
             How many were added or opened again.
         """
-        added = 0
-        for start in range(0, len(new), INSERT_CHUNK):
-            rows = [_new_row(job) for job in new[start : start + INSERT_CHUNK]]
-            statement = insert(jobs).values(rows).on_conflict_do_nothing().returning(jobs.c.id)
-            ids = [row.id for row in connection.execute(statement)]
-            ids += self._reopen(new[start : start + INSERT_CHUNK], connection)
-            events.record_jobs(connection, ids, "queued", {"stage": "construct"})
-            added += len(ids)
-        return added
+        rows = [_new_row(job) for job in new]
+        columns = [jobs.c[name] for name in rows[0]]
+        # One JSON text instead of a bound value for each column of each row: ten times as fast.
+        given = rows_of(rows, columns)
+        statement = insert(jobs).from_select([column.name for column in columns], select(given))
+        inserted = connection.execute(statement.on_conflict_do_nothing().returning(jobs.c.id))
+        ids = list(inserted.scalars())
+        if len(ids) < len(rows):
+            ids += self._reopen([row["id"] for row in rows], new[0], connection)
+        events.record_jobs(connection, ids, "queued", {"stage": "construct"})
+        return len(ids)
 
-    def _reopen(self, wanted: Sequence[NewJob], connection: Connection) -> list[str]:
-        ids = [job.key.job_id for job in wanted]
+    def _reopen(self, ids: Sequence[str], wanted: NewJob, connection: Connection) -> list[str]:
         again = connection.execute(
             update(jobs)
-            .where(jobs.c.id.in_(ids), (jobs.c.outcome == "cancelled") | (jobs.c.state == "held"))
-            .values(**REOPENED, owner=wanted[0].owner, payer=wanted[0].payer)
+            .where(
+                jobs.c.id == any_(bound_texts(ids)),
+                (jobs.c.outcome == "cancelled") | (jobs.c.state == "held"),
+            )
+            .values(**REOPENED, owner=wanted.owner, payer=wanted.payer)
             .returning(jobs.c.id)
         )
-        return [row.id for row in again]
+        return list(again.scalars())
 
     def get(self, job_id: str) -> Job:
         """The job with this id.

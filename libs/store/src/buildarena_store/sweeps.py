@@ -12,9 +12,9 @@ from sqlalchemy import Connection, func, literal, select, update
 from sqlalchemy.dialects.postgresql import insert
 
 from buildarena_store import events
+from buildarena_store.bulk import bound_texts
 from buildarena_store.database import Database
 from buildarena_store.errors import UnknownIdError
-from buildarena_store.jobs import INSERT_CHUNK
 from buildarena_store.tables import jobs, sweep_jobs, sweeps
 
 
@@ -102,11 +102,8 @@ class Sweeps:
                 jobs_hash=sweep.jobs_hash,
             )
         )
-        for start in range(0, len(job_ids), INSERT_CHUNK):
-            chunk = job_ids[start : start + INSERT_CHUNK]
-            connection.execute(
-                insert(sweep_jobs).values([{"sweep_id": sweep.id, "job_id": id_} for id_ in chunk])
-            )
+        members = select(literal(sweep.id), func.unnest(bound_texts(job_ids)))
+        connection.execute(insert(sweep_jobs).from_select(["sweep_id", "job_id"], members))
         events.record_sweep(connection, sweep.id, "submitted", {"jobs": len(job_ids)})
 
     def get(self, sweep_id: str) -> Sweep:
