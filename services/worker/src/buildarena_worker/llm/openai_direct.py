@@ -11,6 +11,7 @@ from __future__ import annotations
 import json
 from http import HTTPStatus
 from typing import Any
+from urllib.request import getproxies, proxy_bypass
 
 import aiohttp
 from httpx2 import Request, Response
@@ -29,6 +30,7 @@ class DirectClient(AsyncOpenAI):
         super().__init__(base_url=base_url, api_key=api_key, max_retries=0)
         self._endpoint = f"{self.base_url}chat/completions"
         self._own_headers = _given({**self.default_headers, **self.auth_headers})
+        self._proxy = _proxy_for(self.base_url.scheme, self.base_url.host)
         self._http: aiohttp.ClientSession | None = None
         # `completions` is a cached property of the SDK: what stands in its place is used.
         vars(self.chat)["completions"] = _DirectCompletions(self)
@@ -46,7 +48,7 @@ class DirectClient(AsyncOpenAI):
                 connector=aiohttp.TCPConnector(limit=0),  # the shared throttle limits
                 timeout=aiohttp.ClientTimeout(total=None, sock_connect=CONNECT_S),
                 cookie_jar=aiohttp.DummyCookieJar(),
-                trust_env=True,
+                proxy=self._proxy,
             )
         try:
             async with self._http.post(
@@ -84,6 +86,11 @@ class _DirectCompletions(AsyncCompletions):
         headers, more = given.pop("extra_headers", None) or {}, given.pop("extra_body", None) or {}
         given.pop("timeout", None)
         return await self._direct.complete(_given({**given, **more}), _given(headers))
+
+
+def _proxy_for(scheme: str, host: str) -> str | None:
+    """The environment's proxy; aiohttp itself would ask for it in another thread each time."""
+    return None if proxy_bypass(host) else getproxies().get(scheme)
 
 
 def _given(values: dict[str, Any]) -> dict[str, Any]:
