@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -9,10 +11,14 @@ from pathlib import Path
 from alembic import command
 from alembic.config import Config
 from alembic.script import ScriptDirectory
-from sqlalchemy import Connection, Engine, create_engine, inspect, text
+from sqlalchemy import Connection, Engine, create_engine, event, inspect, text
+from sqlalchemy.engine.interfaces import DBAPIConnection
+from sqlalchemy.exc import DisconnectionError
+from sqlalchemy.pool import ConnectionPoolEntry
 
 from buildarena_store.errors import SchemaVersionError
 
+IDLE_S = 2.0
 MIGRATION_LOCK = 0x6275696C64  # "build": two processes that migrate at once take turns
 
 
@@ -38,6 +44,27 @@ def expected_schema() -> str:
     return head
 
 
+def ping_after_idling(engine: Engine) -> None:
+    """Has connections that were not used for a while tried before they are used again.
+
+    A server that was restarted is noticed so, at the cost of a round trip for rare uses only; a
+    busy connection's break shows itself as an OperationalError, which all callers expect.
+    """
+
+    @event.listens_for(engine, "checkin")
+    def _note(_: object, record: ConnectionPoolEntry) -> None:
+        record.info["used_at"] = time.monotonic()
+
+    @event.listens_for(engine, "checkout")
+    def _try(connection: DBAPIConnection, record: ConnectionPoolEntry, _: object) -> None:
+        if time.monotonic() - record.info.get("used_at", math.inf) <= IDLE_S:
+            return
+        try:
+            engine.dialect.do_ping(connection)
+        except engine.dialect.loaded_dbapi.Error as error:
+            raise DisconnectionError from error
+
+
 class Database:
     """A pool of connections to one Postgres database.
 
@@ -52,15 +79,25 @@ class Database:
             self.url,
             pool_size=pool_size,
             max_overflow=pool_size,
-            pool_pre_ping=True,
             pool_recycle=1800,
             connect_args={"connect_timeout": 5, "application_name": "buildarena"},
         )
+        ping_after_idling(self.engine)
+        self._autocommit = self.engine.execution_options(isolation_level="AUTOCOMMIT")
 
     @contextmanager
     def transaction(self) -> Iterator[Connection]:
         """A connection whose work is committed at the end, or undone when an error leaves it."""
         with self.engine.begin() as connection:
+            yield connection
+
+    @contextmanager
+    def statement(self) -> Iterator[Connection]:
+        """A connection for one statement, which is a transaction by itself.
+
+        It saves the round trips of BEGIN and COMMIT where one statement is all there is.
+        """
+        with self._autocommit.connect() as connection:
             yield connection
 
     def migrate(self) -> str:

@@ -131,7 +131,7 @@ class Journal:
             StaleLeaseError: The lease is over; nothing was written.
         """
         usage = entry.usage
-        with self._database.transaction() as connection:
+        with self._database.statement() as connection:
             written = connection.execute(
                 _APPEND,
                 {
