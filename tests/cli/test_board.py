@@ -96,7 +96,7 @@ def end_jobs(context, *, rounds: int = 1) -> None:
 @pytest.mark.usefixtures("sweep")
 def test_the_leaderboard_shows_shared_ranks_and_the_paper_when_asked(url) -> None:
     text = printed(url, "leaderboard", "--task", "support-1", "--task", "lift-1", "--published")
-    assert "All tasks" in text
+    assert "All tasks together" in text
     assert "openai/gpt-5" in text
     assert "as published" in text
     assert "55/64" in text

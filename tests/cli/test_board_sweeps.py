@@ -7,12 +7,22 @@ from pathlib import Path
 import pytest
 import yaml
 
+from buildarena_benchmark import parse_own_task
 from buildarena_benchmark.leaderboard import published_rows
 from buildarena_cli.report import variant
 from buildarena_pipeline.models import load_registry
 from buildarena_pipeline.specs import SweepSpec
 
-FILES = sorted((Path(__file__).parents[2] / "examples" / "sweeps").glob("*.yaml"))
+EXAMPLES = Path(__file__).parents[2] / "examples"
+FILES = sorted((EXAMPLES / "sweeps").glob("*.yaml"))
+
+
+@pytest.fixture(autouse=True)
+def own_tasks(context) -> None:
+    """The tasks that come as examples, uploaded."""
+    for file in (EXAMPLES / "tasks").glob("*.yaml"):
+        text = file.read_text()
+        context.catalogue.add(parse_own_task(text, origin=file.name), text)
 
 
 def spec_of(file: Path) -> SweepSpec:

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
 import yaml
+from suspension_bridge import suspension_bridge
 
 from buildarena_api.tasks import EXAMPLE
 from buildarena_benchmark import builtin_tasks, parse_own_task
 from buildarena_pipeline.external import ExternalSessions
 from buildarena_pipeline.models import load_registry
+from buildarena_pipeline.prompt_packs import PromptPacks
 from buildarena_pipeline.specs import JobSpec
 from buildarena_pipeline.stages import LeaseKeeper, StageRunner
 from buildarena_pipeline.submission import Submissions
@@ -18,8 +22,11 @@ from buildarena_simworker.simulate import SimulateHandler
 from buildarena_store import Job
 from buildarena_worker.builtin.designs import DESIGNS
 from buildarena_worker.construct import ConstructHandler
+from buildarena_worker.session import Session
+from buildarena_worker.session_io import SessionIO
 from buildarena_worker.verify import Verifier
 
+BRIDGE = Path(__file__).parents[2] / "examples" / "tasks" / "suspension-bridge.yaml"
 OTHER = EXAMPLE.replace("final_mass: 200", "final_mass: 300")
 
 
@@ -149,3 +156,40 @@ def test_a_trial_that_tracks_one_block_only_is_scored(context, play, finish, bui
     job = finish(play("mine", builtin).id)
     assert job.outcome in {"unsuccessful", "success"}, job.detail
     assert_verified(context, job)
+
+
+@pytest.mark.parametrize("roped", [True, False])
+def test_the_papers_suspension_bridge_is_built_from_parts_and_scored(
+    context, finish, roped
+) -> None:
+    add(context, BRIDGE.read_text())
+    sessions = ExternalSessions(context)
+    job = sessions.open(task="suspension-bridge", agent="me", seed=0, simulator="mujoco")
+    for machine, actions in suspension_bridge(roped=roped).items():
+        for tool, arguments in actions:
+            done = sessions.call(job.id, machine=machine, tool=tool, arguments=arguments)
+            assert done.ok, done.feedback
+    job = finish(sessions.submit(job.id).id)
+    assert_verified(context, job)
+    if roped:
+        assert (job.outcome, job.flags) == ("success", [])
+        assert 900 < job.indicator < 1400
+    else:
+        assert (job.outcome, job.reason) == ("construction_failed", "constraint_violated")
+        assert "0 of Winch" in job.detail
+
+
+def test_a_prompt_pack_without_the_task_uses_the_tasks_own_words() -> None:
+    pack = replace(PromptPacks().load("default"), statements={"support-1": "Of another task."})
+    task = parse_own_task(EXAMPLE, origin="task")
+    io = SessionIO(
+        client=None,
+        entries=[],
+        rollouts=[],
+        append=lambda _: None,
+        still_held=lambda: True,
+        limits={},
+        load_trajectory=dict.__getitem__,
+    )
+    session = Session(task=task, seed=0, model_config={}, pack=pack, io=io)
+    assert session.statement == task.statement.strip()

@@ -63,7 +63,7 @@ def leaderboard(
         console.print(table)
         if published:
             console.print(_published_table(board["tasks"][number_]))
-    if len(board["tasks"]) > 1:
+    if len(board["tasks"]) > 1 and board["overall"]:
         console.print(_overall_table(board))
 
 
@@ -193,9 +193,9 @@ def write_file(path: Path, body: bytes) -> None:
 
 def _overall_table(board: dict[str, Any]) -> Table:
     table = Table(
-        title="All tasks",
+        title="All tasks together",
         caption="# shared by models that can't be told apart; place: 95 % interval; "
-        "+ nothing else is both better and cheaper",
+        "+ nothing else is both better and cheaper; users' own tasks count when asked for",
         title_justify="left",
         caption_justify="left",
         box=SIMPLE_HEAD,

@@ -56,6 +56,7 @@ def collect(client: Client, ids: Sequence[str]) -> Any:
     of its own, named by what differs from the paper's main experiment.
     """
     from buildarena_cli.report_material import Material
+    from buildarena_cli.report_own_tasks import read_tasks
 
     found = [client.get(f"/v1/sweeps/{id_}") for id_ in dict.fromkeys(ids)]
     variants = {sweep["id"]: variant(sweep["spec"]) for sweep in found}
@@ -80,6 +81,7 @@ def collect(client: Client, ids: Sequence[str]) -> Any:
     progress = [sweep["progress"] for sweep in found]
     return Material(
         title=", ".join(dict.fromkeys(sweep["name"] for sweep in found)),
+        tasks=read_tasks(client, list(trials.values())),
         trials=list(trials.values()),
         rounds=rounds,
         snapshots=snapshots,

@@ -7,8 +7,7 @@ from itertools import combinations
 
 import numpy as np
 
-from buildarena_benchmark import builtin_tasks
-from buildarena_benchmark.leaderboard import Cell, Trial
+from buildarena_benchmark.leaderboard import Cell
 from buildarena_benchmark.statistics import agreement, detectable_difference, token_bins
 from buildarena_cli.output import number
 from buildarena_cli.report_document import Block, Grid, Heading, Paragraph, Plot
@@ -48,7 +47,7 @@ def cost(material: Material, cells: Mapping[str, Sequence[Cell]]) -> list[Block]
         Heading(text="Cost"),
         Grid(caption="Means of scored jobs", columns=columns, rows=rows, text_columns=2),
     ]
-    by_category = _normalised(material.trials)
+    by_category = _normalised(material)
     if by_category:
         blocks.append(
             Plot(
@@ -82,8 +81,8 @@ def rounds(material: Material) -> list[Block]:
             model: [_after(found, number_) for number_ in range(1, longest + 1)]
             for model, found in looped.items()
         }
-        known = builtin_tasks().get(task)
-        indicator = known.indicator.name if known else "indicator"
+        known = material.tasks.get(task)
+        indicator = known.indicator if known else "indicator"
         blocks += [
             Grid(
                 caption=f"{task}: succeeded after so many simulated rounds, and best indicator "
@@ -158,14 +157,14 @@ def _after(runs: Sequence[Sequence[tuple[bool, float]]], rounds: int) -> tuple[f
     return sum(succeeded) / len(runs), sum(best) / len(runs)
 
 
-def _normalised(trials: Sequence[Trial]) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+def _normalised(material: Material) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Output tokens and performance, relative to the best job of the task, by category."""
-    tasks = builtin_tasks()
+    tasks = material.tasks
     best: dict[str, float] = {}
-    for trial in trials:
+    for trial in material.trials:
         best[trial.task] = max(best.get(trial.task, 0.0), trial.indicator)
     found: dict[str, list[tuple[float, float]]] = {}
-    for trial in trials:
+    for trial in material.trials:
         if trial.scored and trial.output_tokens:
             category = tasks[trial.task].category if trial.task in tasks else trial.task
             top = best[trial.task]

@@ -4,8 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from buildarena_benchmark.leaderboard import Cell, PublishedRow, Trial, published_rows
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReportTask:
+    """A task as a report needs it.
+
+    Attributes:
+        name: Its name.
+        version: The version whose results are reported.
+        category: Tasks of one category are pooled.
+        indicator: Name of the figure it is ranked by.
+        unit: The figure's unit.
+        difficulty: Weight of each difficulty dimension; empty if not stated.
+        document: Its whole document, if it is a user's own.
+    """
+
+    name: str
+    version: str
+    category: str
+    indicator: str
+    unit: str
+    difficulty: Mapping[str, int]
+    document: Mapping[str, Any] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -14,6 +38,7 @@ class Material:
 
     Attributes:
         title: What was run.
+        tasks: The tasks by name, the built-in ones first; also such as were not run.
         trials: Ended jobs; their models are named as rows of the report.
         rounds: Of each job by id, for each round: success and indicator.
         snapshots: The provider's name of each row's model.
@@ -22,6 +47,7 @@ class Material:
     """
 
     title: str
+    tasks: Mapping[str, ReportTask]
     trials: Sequence[Trial]
     rounds: Mapping[str, Sequence[tuple[bool, float]]]
     snapshots: Mapping[str, str]

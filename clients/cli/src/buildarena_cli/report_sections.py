@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 
-from buildarena_benchmark import builtin_tasks
 from buildarena_benchmark.leaderboard import Board, BoardQuery, Cell, TrackBoard
 from buildarena_cli.output import in_words, number
 from buildarena_cli.report_document import Block, Grid, Heading, Paragraph, Plot
 from buildarena_cli.report_effort import cost, power, rounds, simulators
 from buildarena_cli.report_material import Material, between, paper_rows, percent
+from buildarena_cli.report_own_tasks import own_tasks
 from buildarena_cli.report_plots import indicator_plot, radar_plot, shares_plot, success_plot
 
 
@@ -19,10 +19,10 @@ def sections(material: Material) -> list[Block]:
     blocks: list[Block] = [Heading(text=material.title, level=1), _opening(material)]
     if not any(trial.scored for trial in material.trials):
         return [*blocks, *_failures(material, {}), Paragraph(text="No job was scored.")]
-    tasks = builtin_tasks()
+    tasks = material.tasks.values()
     kept = TrackBoard(
-        {name: task.version for name, task in tasks.items()},
-        {name: task.difficulty for name, task in tasks.items() if task.difficulty},
+        {task.name: task.version for task in tasks},
+        {task.name: task.difficulty for task in tasks if task.difficulty},
     )
     for trial in material.trials:
         kept.put(trial)
@@ -30,6 +30,7 @@ def sections(material: Material) -> list[Block]:
     cells = {task.task: [row.cell for row in task.rows] for task in board.tasks}
     return [
         *blocks,
+        *own_tasks(material, board),
         *_overall(board),
         *_performance(board, cells, material),
         *_dimensions(board),
@@ -84,7 +85,6 @@ def _overall(board: Board) -> list[Block]:
 def _performance(
     board: Board, cells: Mapping[str, Sequence[Cell]], material: Material
 ) -> list[Block]:
-    tasks = builtin_tasks()
     paper = paper_rows(cells, material.snapshots)
     rows = []
     for task in board.tasks:
@@ -114,9 +114,9 @@ def _performance(
         *("indicator", "95 %", "paper", "parts", "paper", "flagged"),
     )
     labels = {
-        name: in_words(tasks[name].indicator.name, tasks[name].indicator.unit)
+        name: in_words(material.tasks[name].indicator, material.tasks[name].unit)
         for name in cells
-        if name in tasks
+        if name in material.tasks
     }
     return [
         Heading(text="Performance"),

@@ -69,16 +69,22 @@ class Draft:
         return made
 
     def connect(
-        self, first: str, second: str, way: Direction, other_way: Direction | None = None
+        self,
+        first: str,
+        second: str,
+        way: Direction,
+        other_way: Direction | None = None,
+        *,
+        connector: str = BRACE,
     ) -> None:
-        """Braces a side of one block to a side of another, by default the one that looks alike."""
+        """Joins a side of one block to a side of another, by default the one that looks alike."""
         self.do(
             "connect_blocks",
             block_a=first,
             face_a=self._face(first, way),
             block_b=second,
             face_b=self._face(second, other_way or way),
-            connector=BRACE,
+            connector=connector,
             note="",
         )
 
