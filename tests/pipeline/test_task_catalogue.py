@@ -140,8 +140,9 @@ def test_a_changed_scorer_makes_a_new_version_of_an_own_task(
     assert TaskCatalogue(context.tasks).newest()["narrow-gap"] == renewed
 
 
-def test_a_text_that_no_longer_is_a_task_is_left_out(context, submissions) -> None:
-    context.tasks.add(name="broken", version="0" * 12, document="name: broken\n")
+@pytest.mark.parametrize("document", ["name: broken\n", EXAMPLE])
+def test_a_row_that_is_no_task_of_its_name_is_left_out(context, submissions, document) -> None:
+    context.tasks.add(name="broken", version="0" * 12, document=document)
     assert list(context.catalogue.newest()) == list(builtin_tasks())
     with pytest.raises(SubmissionError, match="broken"):
         submissions.plan(SweepSpec(tasks=["broken"], models=["builtin/idle"]))

@@ -28,6 +28,7 @@ from buildarena_api.app import create_app
 from buildarena_benchmark import builtin_tasks
 from buildarena_pipeline.context import Context, open_context
 from buildarena_pipeline.embedded import EmbeddedPostgres
+from buildarena_pipeline.logs import set_up_logs
 from buildarena_pipeline.models import load_registry
 from buildarena_pipeline.settings import Settings
 from buildarena_store import Database
@@ -190,6 +191,7 @@ def main() -> None:
     parser.add_argument("--requests", type=int, default=100)
     parser.add_argument("--url", help="Measure a filled database; used for the child process.")
     given = parser.parse_args()
+    set_up_logs("warning")
     if given.url:
         sys.stdout.write(json.dumps(measure(given.url, given.requests)))
         return

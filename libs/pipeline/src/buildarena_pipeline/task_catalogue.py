@@ -162,10 +162,9 @@ class TaskCatalogue:
         """
         key = (row.name, row.version)
         text = self._tasks.documents([key])[key]
-        try:
-            task = parse_task(text, origin=row.name)
-        except TaskError as error:
-            log.warning("task_unreadable", task=row.name, version=row.version, error=str(error))
+        task = _parsed(text, row.name)
+        if task is None:
+            log.warning("task_unreadable", task=row.name, version=row.version)
             return None
         self._tasks.add(name=row.name, version=task.version, document=text, owner=row.owner)
         self._keep(task.name, task.version, task)
@@ -181,7 +180,8 @@ class TaskCatalogue:
             for key in missing:
                 found[key] = None
                 if key in texts:
-                    found[key] = _read(key, texts[key])
+                    task = _parsed(texts[key], key[0])
+                    found[key] = task if task and task.version == key[1] else None
                     self._keep(*key, found[key])
         return found
 
@@ -191,9 +191,10 @@ class TaskCatalogue:
         self._parsed[name, version] = task
 
 
-def _read(key: TaskKey, text: str) -> Task | None:
+def _parsed(text: str, name: str) -> Task | None:
+    """The task of a stored text, if it has the row's name: rows also come from archives."""
     try:
-        task = parse_task(text, origin=key[0])
+        task = parse_task(text, origin=name)
     except TaskError:
         return None
-    return task if task.version == key[1] else None
+    return task if task.name == name else None
