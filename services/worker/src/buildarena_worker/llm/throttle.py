@@ -4,6 +4,9 @@ The limit adapts: it halves when the provider says that it is too much, and grow
 for each limit's worth of answers (additive increase, multiplicative decrease; Chiu and Jain,
 1989). Until the provider's limit was met once, it grows by one with each answer (slow start).
 It lives in the broker's key-value store; without it, each process goes on by itself.
+
+A process gathers what its requests want for a few milliseconds and asks the store for all of it
+in one message over one connection, because a message costs more than what it asks for.
 """
 
 from __future__ import annotations
@@ -17,7 +20,6 @@ from typing import Any
 
 import structlog
 from redis.asyncio import Redis
-from redis.exceptions import RedisError
 
 log = structlog.get_logger(__name__)
 
@@ -26,6 +28,8 @@ HOLD_S = 900
 """A slot whose holder died is free again after this time; no request may take longer."""
 CALM_S = 2
 """Several complaints within this time count as one: they speak of the same crowd."""
+GATHER_S = 0.005
+"""How long what is to be asked gathers before it is sent: little beside a model's seconds."""
 
 _TAKE = """
 local now = tonumber(redis.call('TIME')[1])
@@ -66,6 +70,8 @@ class Throttle:
             f"buildarena:throttle:{provider}:{part}" for part in ("open", "limit", "calm", "met")
         ]
         self._start = start
+        self._asked: list[tuple[tuple[Any, ...], asyncio.Future[Any]]] = []
+        self._sender: asyncio.Task[None] | None = None
 
     @asynccontextmanager
     async def slot(self) -> AsyncIterator[Slot]:
@@ -76,15 +82,17 @@ class Throttle:
             yield slot
         finally:
             if taken:
-                await self._give(slot)
+                self._give(slot)
 
     async def limit(self) -> float:
         """The limit now."""
-        raw = None if self._redis is None else await self._redis.get(self._keys[1])
+        raw = None if self._redis is None else await self._ask("GET", self._keys[1])
         return self._start if raw is None else float(raw)
 
     async def close(self) -> None:
-        """Closes the connections."""
+        """Closes the connections, after what is still to be said."""
+        if self._sender is not None:
+            await self._sender
         if self._redis is not None:
             await self._redis.aclose()
 
@@ -92,20 +100,50 @@ class Throttle:
         while self._redis is not None:
             try:
                 arguments = [slot_id, HOLD_S, self._start]
-                if await self._redis.eval(_TAKE, 2, *self._keys[:2], *arguments):
+                if await self._ask("EVAL", _TAKE, 2, *self._keys[:2], *arguments):
                     return True
-            except (RedisError, OSError) as error:
-                log.warning("throttle_unreachable", error=str(error))
+            except Exception:  # noqa: BLE001 - logged; requests go on without the limit
                 return False
             await asyncio.sleep(random.uniform(0.02, 0.1))  # noqa: S311 - spreads waits
         return False
 
-    async def _give(self, slot: Slot) -> None:
+    def _give(self, slot: Slot) -> None:
+        """Frees a slot soon; the request that held it does not wait for that."""
         arguments = [slot.id, slot.verdict, self._start, LEAST, MOST, CALM_S]
-        try:
-            await self._redis.eval(_GIVE, 4, *self._keys, *arguments)
-        except (RedisError, OSError) as error:
-            log.warning("throttle_unreachable", error=str(error))
+        told = self._ask("EVAL", _GIVE, 4, *self._keys, *arguments)
+        told.add_done_callback(asyncio.Future.exception)  # logged; the slot expires by itself
+
+    def _ask(self, *command: Any) -> asyncio.Future[Any]:
+        """The store's answer to a command, in order with all others."""
+        answer: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
+        self._asked.append((command, answer))
+        if self._sender is None:
+            self._sender = asyncio.create_task(self._send())
+        return answer
+
+    async def _send(self) -> None:
+        while self._asked:
+            await asyncio.sleep(GATHER_S)
+            asked, self._asked = self._asked, []
+            pipeline = self._redis.pipeline(transaction=False)
+            for command, _ in asked:
+                pipeline.execute_command(*command)
+            answers: list[Any]
+            try:
+                answers = await pipeline.execute(raise_on_error=False)
+            except Exception as error:  # noqa: BLE001 - whatever it is, nobody may wait forever
+                answers = [error] * len(asked)
+            errors = [answer for answer in answers if isinstance(answer, Exception)]
+            if errors:
+                log.warning("throttle_failed", requests=len(errors), error=str(errors[0]))
+            for (_, waiting), answer in zip(asked, answers, strict=True):
+                if waiting.done():  # who asked was cancelled
+                    continue
+                if isinstance(answer, Exception):
+                    waiting.set_exception(answer)
+                else:
+                    waiting.set_result(answer)
+        self._sender = None
 
 
 class Slot:
