@@ -195,7 +195,7 @@ def _overall_table(board: dict[str, Any]) -> Table:
     table = Table(
         title="All tasks together",
         caption="# shared by models that can't be told apart; place: 95 % interval; "
-        "+ nothing else is both better and cheaper; users' own tasks count when asked for",
+        "+ nothing else is both better and cheaper; custom tasks count when asked for",
         title_justify="left",
         caption_justify="left",
         box=SIMPLE_HEAD,

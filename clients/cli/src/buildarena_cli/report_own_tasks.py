@@ -58,7 +58,7 @@ def own_tasks(material: Material, board: Board) -> list[Block]:
         *("at least", "trial", "jobs of other versions"),
     )
     return [
-        Heading(text="Tasks of our own"),
+        Heading(text="Custom tasks"),
         Paragraph(
             text="The paper has no figures for them. Only results of one version are compared; "
             "jobs of other versions are left out."

@@ -28,7 +28,7 @@ def list_tasks(*, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) -> 
     if as_json:
         print_json(found)
         return
-    table = Table(caption="+ added by a user", caption_justify="left")
+    table = Table(caption="+ custom task, added by a user", caption_justify="left")
     for name in ("task", "title", "indicator", "version"):
         table.add_column(name, overflow="fold")
     for task in found:

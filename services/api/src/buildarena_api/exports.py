@@ -203,7 +203,7 @@ def _latex(ranked: RankedBoard) -> str:
     ours = {task: row for task, row in cells.items() if task in builtin_tasks()}
     own = {task: row for task, row in cells.items() if task not in ours}
     paper = {task: rows for task, rows in published_rows().items() if task in ours}
-    others = ["% Measured: tasks of users' own", plain_table(own)] if own else []
+    others = ["% Measured: custom tasks", plain_table(own)] if own else []
     return "\n".join(
         [
             "% Needs the packages booktabs and multirow.",
