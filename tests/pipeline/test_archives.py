@@ -140,7 +140,7 @@ def changed(file: Path, name: str, change: Callable[[bytes], bytes | None]) -> P
         ),
         ("rows/jobs", lambda data: data.replace(b'"faults": 0', b'"faults": "x"'), "a value"),
         ("rows/jobs", lambda _: b"{", "no sound archive"),
-        ("rows/jobs", lambda _: b"[1]\n", "no sound archive"),
+        ("rows/jobs", lambda _: b"[1]\n", "other columns"),
         ("rows/sweeps", lambda _: b"", "no sound archive"),
         ("manifest", lambda _: None, "no sound archive"),
         ("manifest", lambda data: data.replace(b'"format": 1', b'"format": 9'), "format 9"),

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
-from buildarena_benchmark import builtin_tasks
+from buildarena_benchmark import Task, builtin_tasks
 from buildarena_pipeline.models import load_registry
 from buildarena_pipeline.prompt_packs import PromptPack, PromptPacks
 from buildarena_pipeline.specs import Decoding
@@ -41,7 +41,7 @@ class Player:
         self,
         model: str = "builtin/expert",
         *,
-        task: str = "support-1",
+        task: str | Task = "support-1",
         seed: int = 0,
         workflow: str = "five-role",
         client: ModelClient | None = None,
@@ -70,7 +70,7 @@ class Player:
             load_trajectory=trajectories.__getitem__,
         )
         session = Session(
-            task=builtin_tasks()[task],
+            task=builtin_tasks()[task] if isinstance(task, str) else task,
             seed=seed,
             model_config=config,
             pack=pack or PromptPacks().load("default"),

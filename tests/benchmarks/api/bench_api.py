@@ -43,12 +43,13 @@ def main() -> None:
     parser.add_argument("--rate", type=float, default=50.0, help="submissions per second")
     parser.add_argument("--seconds", type=float, default=20.0, help="how long to submit")
     parser.add_argument("--listeners", type=int, default=500)
-    parser.add_argument("--overhead-jobs", type=int, default=200)
+    parser.add_argument("--overhead-jobs", type=int, default=500)
     parser.add_argument("--json", type=Path, help="also write the figures to this file")
     given = parser.parse_args()
     figures: dict[str, Any] = {"load_average_before": os.getloadavg()[0]}
     with service() as (url, process):
         figures["large_sweep"] = _large_sweeps(url, given.jobs)
+        asyncio.run(_submit_steadily(url, given.rate, 1, "lift-3"))  # warm
         figures["submitting"] = asyncio.run(_submit_steadily(url, given.rate, given.seconds))
         figures["listeners"] = asyncio.run(_listen(url, given.listeners, process))
     figures["overhead"] = measure_overhead(given.overhead_jobs)
@@ -113,14 +114,16 @@ def _large_sweeps(url: str, jobs: int) -> dict[str, Any]:
     return {"jobs": jobs, "accepted_s": round(median, 3), "bar_s": 5, "ratio": round(median / 5, 3)}
 
 
-async def _submit_steadily(url: str, rate: float, seconds: float) -> dict[str, Any]:
+async def _submit_steadily(
+    url: str, rate: float, seconds: float, task: str = "lift-2"
+) -> dict[str, Any]:
     """Submits at a fixed rate, whether or not earlier answers have come."""
     latencies: list[float] = []
     limits = httpx.Limits(max_connections=100)
     async with httpx.AsyncClient(base_url=url, timeout=30, limits=limits) as client:
 
         async def submit(number: int) -> None:
-            body = {"task": "lift-2", "model": "builtin/idle", "seed": number}
+            body = {"task": task, "model": "builtin/idle", "seed": number}
             started = time.perf_counter()
             answer = await client.post("/v1/jobs", json=body)
             latencies.append(time.perf_counter() - started)

@@ -126,9 +126,9 @@ class ExternalSessions:
                 )
             _, machine = chosen
             transcript = context.artifacts.put(_transcript(calls), JSON)
-            context.results.attach(job_id, "transcript", transcript, connection=connection)
             kept = context.artifacts.put(machine_bytes(machine), JSON)
-            context.results.attach(job_id, "machine", kept, connection=connection)
+            made = {"machine": kept, "transcript": transcript}
+            context.results.attach(job_id, made, connection=connection)
             refusals = dict(Counter(c.reason or "refused" for c in calls if not c.ok))
             task = task_of(job, context.catalogue)
             broken = broken_constraint(task, machine)

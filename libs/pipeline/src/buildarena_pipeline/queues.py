@@ -22,6 +22,8 @@ EXTERNAL = "external"
 """Where jobs of outside agents are while they build: no worker serves it."""
 BATCH = 200
 """Messages kept waiting per queue; more are sent as workers take them."""
+PLENTY = 50
+"""Messages that are enough for a queue until the sweeper looks again, a second later."""
 
 log = structlog.get_logger(__name__)
 
@@ -84,10 +86,20 @@ class Queues:
             return False
         return True
 
+    def nudge(self, queue: str, job_id: str) -> None:
+        """Tells of one more job, unless so many messages wait that workers will come anyway.
+
+        Any message makes a worker take whatever waits, and the sweeper adds messages as they are
+        taken; asking how many wait costs a tenth of sending one.
+        """
+        waiting = self.waiting(queue)
+        if waiting is not None and waiting < PLENTY:
+            self.announce(queue, [job_id])
+
     def waiting(self, queue: str) -> int | None:
         """Messages that no worker has taken, or None when the broker can't be reached."""
         try:
-            with self.app.connection_for_read() as connection:
+            with self.app.pool.acquire(block=True) as connection:
                 channel = connection.default_channel
                 return int(channel.client.llen(queue))
         except (OperationalError, RedisError, OSError) as error:

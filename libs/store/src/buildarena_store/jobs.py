@@ -178,7 +178,7 @@ class Jobs:
         Raises:
             UnknownIdError: Nobody has it.
         """
-        with self._database.transaction() as connection:
+        with self._database.statement() as connection:
             row = connection.execute(select(*JOB_COLUMNS).where(jobs.c.id == job_id)).first()
         if row is None:
             raise UnknownIdError("job", job_id)
@@ -217,13 +217,13 @@ class Jobs:
                 )
             )
         query = query.order_by(jobs.c.created_at.desc(), jobs.c.id).limit(limit)
-        with self._database.transaction() as connection:
+        with self._database.statement() as connection:
             return [job_from_row(row) for row in connection.execute(query)]
 
     def attempts(self, job_id: str) -> list[Attempt]:
         """Every hold on the job, oldest first."""
         query = select(attempts).where(attempts.c.job_id == job_id).order_by(attempts.c.token)
-        with self._database.transaction() as connection:
+        with self._database.statement() as connection:
             return [
                 Attempt(**{name: getattr(row, name) for name in Attempt.__dataclass_fields__})
                 for row in connection.execute(query)
@@ -234,7 +234,7 @@ class Jobs:
         query = select(job_artifacts.c.name, job_artifacts.c.hash).where(
             job_artifacts.c.job_id == job_id
         )
-        with self._database.transaction() as connection:
+        with self._database.statement() as connection:
             return {row.name: row.hash for row in connection.execute(query)}
 
     def cancel(self, ids: Sequence[str], *, connection: Connection) -> list[str]:

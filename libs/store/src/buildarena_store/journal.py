@@ -159,7 +159,7 @@ class Journal:
     def read(self, job_id: str) -> list[JournalEntry]:
         """All entries of a job in their order."""
         query = select(journal).where(journal.c.job_id == job_id).order_by(journal.c.sequence)
-        with self._database.transaction() as connection:
+        with self._database.statement() as connection:
             return [
                 JournalEntry(
                     sequence=row.sequence,

@@ -7,19 +7,21 @@ the database's, so a worker with a wrong clock does no harm.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import timedelta
 from typing import Any
 
 from sqlalchemy import (
+    Boolean,
     ColumnElement,
     Connection,
     case,
-    insert,
+    column,
     literal,
     select,
-    true,
+    text,
     tuple_,
     update,
 )
@@ -43,11 +45,58 @@ class Lease:
         job: The job as it was when claimed.
         owner: The worker's id.
         token: The fencing token that goes with every write.
+        budgeted: Whether a budget paid for the job when it was claimed.
     """
 
     job: Job
     owner: str
     token: int
+    budgeted: bool = False
+
+
+# One statement each, because every stage of every job waits for them.
+_WAITS = "state = 'queued' AND queue = :queue AND available_at <= clock_timestamp()"
+_CLAIM = text(
+    f"""
+    WITH taken AS (
+        UPDATE jobs SET
+            state = 'running',
+            lease_owner = :owner,
+            lease_token = lease_token + 1,
+            lease_expires_at = clock_timestamp() + :duration,
+            started_at = COALESCE(started_at, clock_timestamp())
+        WHERE id = COALESCE(
+            (SELECT id FROM jobs WHERE {_WAITS} AND faults > 0
+             ORDER BY created_at, id LIMIT 1 FOR UPDATE SKIP LOCKED),
+            (SELECT id FROM jobs WHERE {_WAITS} AND id = CAST(:hint AS text)
+             FOR UPDATE SKIP LOCKED),
+            (SELECT id FROM jobs WHERE {_WAITS}
+             ORDER BY created_at, id LIMIT 1 FOR UPDATE SKIP LOCKED)
+        )
+        RETURNING *
+    ), held AS (
+        INSERT INTO attempts (job_id, token, stage, worker)
+        SELECT id, lease_token, stage, lease_owner FROM taken
+    ), told AS (
+        INSERT INTO events (job_id, kind, data)
+        SELECT id, 'running', jsonb_build_object('stage', stage, 'worker', lease_owner) FROM taken
+    )
+    SELECT {", ".join(column.name for column in JOB_COLUMNS)},
+        EXISTS (SELECT 1 FROM budgets WHERE budgets.id IN (payer, owner)) AS budgeted
+    FROM taken
+    """  # noqa: S608 - made of our own column names
+).columns(*JOB_COLUMNS, column("budgeted", Boolean))
+_END_HOLD = text(
+    """
+    WITH released AS (
+        DELETE FROM reservations WHERE job_id = :job_id
+    ), ended AS (
+        UPDATE attempts SET ended_at = clock_timestamp(), result = :result, detail = :note
+        WHERE job_id = :job_id AND token = :token
+    )
+    INSERT INTO events (job_id, kind, data) VALUES (:job_id, :kind, CAST(:data AS jsonb))
+    """
+)
 
 
 class Leases:
@@ -77,55 +126,13 @@ class Leases:
         Returns:
             The lease, or None when nothing waits.
         """
-        preferences: list[ColumnElement[bool]] = [jobs.c.faults > 0]
-        if hint is not None:
-            preferences.append(jobs.c.id == hint)
-        preferences.append(true())
-        with self._database.transaction() as connection:
-            for preference in preferences:
-                lease = self._claim_one(connection, queue, owner, preference)
-                if lease is not None:
-                    return lease
-        return None
-
-    def _claim_one(
-        self, connection: Connection, queue: str, owner: str, preference: ColumnElement[bool]
-    ) -> Lease | None:
-        waiting = (
-            select(jobs.c.id)
-            .where(
-                jobs.c.state == "queued",
-                jobs.c.queue == queue,
-                jobs.c.available_at <= events.now,
-                preference,
-            )
-            .order_by(jobs.c.created_at, jobs.c.id)
-            .limit(1)
-            .with_for_update(skip_locked=True)
-            .scalar_subquery()
-        )
-        row = connection.execute(
-            update(jobs)
-            .where(jobs.c.id == waiting)
-            .values(
-                state="running",
-                lease_owner=owner,
-                lease_token=jobs.c.lease_token + 1,
-                lease_expires_at=events.now + self.duration,
-                started_at=case((jobs.c.started_at.is_(None), events.now), else_=jobs.c.started_at),
-            )
-            .returning(*JOB_COLUMNS)
-        ).first()
+        given = {"queue": queue, "owner": owner, "hint": hint, "duration": self.duration}
+        with self._database.statement() as connection:
+            row = connection.execute(_CLAIM, given).first()
         if row is None:
             return None
         job = job_from_row(row)
-        connection.execute(
-            insert(attempts).values(
-                job_id=job.id, token=job.lease_token, stage=job.stage, worker=owner
-            )
-        )
-        events.record_jobs(connection, [job.id], "running", {"stage": job.stage, "worker": owner})
-        return Lease(job=job, owner=owner, token=job.lease_token)
+        return Lease(job=job, owner=owner, token=job.lease_token, budgeted=row.budgeted)
 
     def heartbeat(self, leases: Sequence[Lease]) -> set[str]:
         """Renews leases.
@@ -173,10 +180,16 @@ class Leases:
         )
         if changed.rowcount != 1:
             raise StaleLeaseError(lease.job.id, lease.token)
-        release([lease.job.id], connection=connection)
-        _end_attempt(connection, lease.job.id, lease.token, result, note)
         shown = {name: values[name] for name in ("stage", "outcome", "reason") if values.get(name)}
-        events.record_jobs(connection, [lease.job.id], str(values["state"]), shown)
+        ended = {
+            "job_id": lease.job.id,
+            "token": lease.token,
+            "result": result,
+            "note": note,
+            "kind": str(values["state"]),
+            "data": json.dumps(shown),
+        }
+        connection.execute(_END_HOLD, ended)
 
     def queue_again(
         self, lease: Lease, *, stage: str, queue: str, connection: Connection, **values: Any

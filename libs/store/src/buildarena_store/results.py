@@ -6,15 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from sqlalchemy import Connection
-from sqlalchemy.dialects.postgresql import insert
+from sqlalchemy import Connection, text
 
 from buildarena_store import events
 from buildarena_store.artifacts import ArtifactInfo
 from buildarena_store.boards import Boards
 from buildarena_store.database import Database
 from buildarena_store.leases import Lease, Leases
-from buildarena_store.tables import artifacts, job_artifacts
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,17 +82,33 @@ class Results:
         )
 
     def attach(
-        self, job_id: str, name: str, artifact: ArtifactInfo, *, connection: Connection
+        self, job_id: str, made: Mapping[str, ArtifactInfo], *, connection: Connection
     ) -> None:
-        """Ties an artifact that the artifact store holds to a job under a name."""
-        connection.execute(
-            insert(artifacts)
-            .values(hash=artifact.hash, media_type=artifact.media_type, size=artifact.size)
-            .on_conflict_do_nothing()
-        )
-        statement = insert(job_artifacts).values(job_id=job_id, name=name, hash=artifact.hash)
-        connection.execute(
-            statement.on_conflict_do_update(
-                index_elements=["job_id", "name"], set_={"hash": artifact.hash}
-            )
-        )
+        """Ties artifacts that the artifact store holds to a job, by their names."""
+        infos = list(made.values())
+        given = {
+            "job_id": job_id,
+            "names": list(made),
+            "hashes": [info.hash for info in infos],
+            "types": [info.media_type for info in infos],
+            "sizes": [info.size for info in infos],
+        }
+        connection.execute(_ATTACH, given)
+
+
+_ATTACH = text(
+    """
+    WITH given AS (
+        SELECT * FROM unnest(
+            CAST(:names AS text[]), CAST(:hashes AS text[]),
+            CAST(:types AS text[]), CAST(:sizes AS bigint[])
+        ) AS given (name, hash, media_type, size)
+    ), kept AS (
+        INSERT INTO artifacts (hash, media_type, size)
+        SELECT DISTINCT ON (hash) hash, media_type, size FROM given ORDER BY hash
+        ON CONFLICT DO NOTHING
+    )
+    INSERT INTO job_artifacts (job_id, name, hash) SELECT :job_id, name, hash FROM given
+    ON CONFLICT (job_id, name) DO UPDATE SET hash = excluded.hash
+    """
+)

@@ -96,7 +96,7 @@ class Rollouts:
             connection: A transaction whose own writes are to be seen.
         """
         query = select(rollouts).where(rollouts.c.job_id == job_id).order_by(rollouts.c.number)
-        with nullcontext(connection) if connection else self._database.transaction() as reader:
+        with nullcontext(connection) if connection else self._database.statement() as reader:
             return [
                 RolloutRecord(
                     **{name: getattr(row, name) for name in RolloutRecord.__dataclass_fields__}

@@ -139,7 +139,7 @@ class Sweeps:
 
     def _find(self, condition: Any) -> Sweep | None:
         columns = [sweeps.c[name] for name in Sweep.__dataclass_fields__]
-        with self._database.transaction() as connection:
+        with self._database.statement() as connection:
             row = connection.execute(select(*columns).where(condition)).first()
         if row is None:
             return None
@@ -155,7 +155,7 @@ class Sweeps:
                 (sweeps.c.created_at < created_at)
                 | ((sweeps.c.created_at == created_at) & (sweeps.c.id > id_))
             )
-        with self._database.transaction() as connection:
+        with self._database.statement() as connection:
             return [
                 Sweep(**{name: getattr(row, name) for name in Sweep.__dataclass_fields__})
                 for row in connection.execute(query)
@@ -225,7 +225,7 @@ class Sweeps:
     def job_ids(self, sweep_id: str) -> list[str]:
         """Ids of all the sweep's jobs."""
         query = select(sweep_jobs.c.job_id).where(sweep_jobs.c.sweep_id == sweep_id)
-        with self._database.transaction() as connection:
+        with self._database.statement() as connection:
             return [row.job_id for row in connection.execute(query)]
 
     def own_jobs(self, sweep_id: str, *, connection: Connection) -> list[str]:

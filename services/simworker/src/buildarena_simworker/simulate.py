@@ -71,9 +71,8 @@ class SimulateHandler:
             values, trajectory = _values(request, done), done.trajectory
         with context.database.transaction() as connection:
             if trajectory is not None:
-                context.results.attach(
-                    job.id, f"trajectory-{request.number}", trajectory, connection=connection
-                )
+                made = {f"trajectory-{request.number}": trajectory}
+                context.results.attach(job.id, made, connection=connection)
             context.rollouts.complete(job.id, request.number, connection=connection, **values)
             if request.final:
                 records = context.rollouts.read(job.id, connection=connection)
@@ -84,7 +83,7 @@ class SimulateHandler:
                     lease, stage="construct", queue=CONSTRUCT, connection=connection
                 )
         if not request.final:
-            context.queues.announce(CONSTRUCT, [job.id])
+            context.queues.nudge(CONSTRUCT, job.id)
 
     def _simulate(
         self, task: Task, request: RolloutRecord, require_held: Callable[[], None]

@@ -51,8 +51,8 @@ class BudgetGuard:
         self._lease = lease
         self._price = price
         self._still_held = still_held
-        self._has_any = False
-        self._looked_at: float | None = None
+        self._has_any = lease.budgeted
+        self._looked_at = time.monotonic()
 
     def __call__(self, request: Request) -> None:
         """Puts aside what a request may cost; waits while open requests may give back enough.
@@ -73,7 +73,7 @@ class BudgetGuard:
 
     def _any_budget(self) -> bool:
         now = time.monotonic()
-        if self._looked_at is None or now - self._looked_at > LOOK_AGAIN_S:
+        if now - self._looked_at > LOOK_AGAIN_S:
             self._has_any = bool(self._budgets.of_job(self._lease.job.id))
             self._looked_at = now
         return self._has_any

@@ -146,8 +146,8 @@ class ConstructHandler:
         )
         queue = simulate_queue(engine)
         with context.database.transaction() as connection:
-            context.results.attach(job.id, "machine", machine, connection=connection)
-            context.results.attach(job.id, "transcript", transcript, connection=connection)
+            made = {"machine": machine, "transcript": transcript}
+            context.results.attach(job.id, made, connection=connection)
             context.rollouts.request(job.id, request, connection=connection)
             context.leases.queue_again(
                 lease,
@@ -156,7 +156,7 @@ class ConstructHandler:
                 connection=connection,
                 **_counts(session),
             )
-        context.queues.announce(queue, [job.id])
+        context.queues.nudge(queue, job.id)
 
     def _fail(self, lease: Lease, session: Session, outcome: str, reason: str, detail: str) -> None:
         """Scores a session that ended without a simulation; what it built is kept."""
@@ -170,14 +170,11 @@ class ConstructHandler:
 
     def _write_end(self, lease: Lease, session: Session, score: JobScore) -> None:
         context, job = self._context, lease.job
-        transcript = context.artifacts.put(session.transcript.to_json(), JSON)
-        machine = None
+        made = {"transcript": context.artifacts.put(session.transcript.to_json(), JSON)}
         if session.machine is not None and session.machine.started:
-            machine = context.artifacts.put(machine_bytes(session.machine), JSON)
+            made["machine"] = context.artifacts.put(machine_bytes(session.machine), JSON)
         with context.database.transaction() as connection:
-            context.results.attach(job.id, "transcript", transcript, connection=connection)
-            if machine is not None:
-                context.results.attach(job.id, "machine", machine, connection=connection)
+            context.results.attach(job.id, made, connection=connection)
             context.results.finish(lease, score, connection=connection, **_counts(session))
 
 
