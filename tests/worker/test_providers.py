@@ -3,6 +3,7 @@ from __future__ import annotations
 import random
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import pytest
 from provider_standin import ProviderStandIn
@@ -13,7 +14,7 @@ from buildarena_store import Usage
 from buildarena_worker.errors import ConstructionFailedError
 from buildarena_worker.llm.provider import ProviderClient
 from buildarena_worker.llm.retries import RetryPolicy
-from buildarena_worker.messages import Message, Reply, Request, ToolCall
+from buildarena_worker.messages import Message, Reply, Request, Tool, ToolCall
 
 QUICK = RetryPolicy(tries=5, first_wait_s=0.01, longest_wait_s=0.05, timeout_s=2.0)
 PRICE = Price(input=2.0, output=8.0, cached=0.5)
@@ -130,6 +131,24 @@ def test_decoding_and_seed_go_over_the_wire(client) -> None:
         client(standin).complete(ask())
     (body,) = standin.counts.bodies
     assert (body["temperature"], body["top_p"], body["seed"]) == (0.5, 0.7, 3)
+
+
+def test_every_request_carries_its_own_tools(client) -> None:
+    def tool(name: str, unit: str) -> Tool:
+        parameters = {"type": "object", "properties": {unit: {"type": "number"}}}
+        return Tool(name=name, description=f"Moves by {unit}.", parameters=parameters)
+
+    asked = [[tool("move", "metres")], [tool("move", "feet")], [tool("move", "metres")], []]
+    with ProviderStandIn("idle") as standin:
+        one = client(standin)
+        for tools in asked:
+            one.complete(replace(ask(), tools=tools))
+    first, second, third, bare = standin.counts.bodies
+    assert first == third
+    assert "metres" in first["tools"][0]["function"]["parameters"]["properties"]
+    assert "feet" in second["tools"][0]["function"]["parameters"]["properties"]
+    assert first["parallel_tool_calls"] is False
+    assert "tools" not in bare
 
 
 def test_arguments_that_are_no_json_reach_the_session_as_text(client) -> None:

@@ -18,9 +18,41 @@ from httpx2 import Request, Response
 from openai import APIConnectionError, AsyncOpenAI, NotGiven, Omit
 from openai.resources.chat.completions import AsyncCompletions
 from openai.types.chat import ChatCompletion
+from pydantic_ai.models import ModelRequestParameters
+from pydantic_ai.models.openai import OpenAIChatModel
 
 CONNECT_S = 10.0
 """Longest wait for a connection; the retry policy's own timeout rules the whole."""
+MOST_TOOL_SETS = 256
+"""Sets of tools kept in a provider's form; a role has one, and a process few roles."""
+
+
+class RememberingChatModel(OpenAIChatModel):
+    """Brings each set of tools into the provider's form once, not for every request.
+
+    Our requests differ in nothing else that is customised.
+    """
+
+    # pydantic-ai makes its models dataclasses that set fields of their own.
+    _known_tools: dict[str, ModelRequestParameters] | None = None
+
+    def customize_request_parameters(
+        self, model_request_parameters: ModelRequestParameters
+    ) -> ModelRequestParameters:
+        """The parameters with the tools in the provider's form."""
+        if self._known_tools is None or len(self._known_tools) >= MOST_TOOL_SETS:
+            self._known_tools = {}
+        key = json.dumps(
+            [
+                (tool.name, tool.description, tool.parameters_json_schema)
+                for tool in model_request_parameters.function_tools
+            ]
+        )
+        known = self._known_tools.get(key)
+        if known is None:
+            known = super().customize_request_parameters(model_request_parameters)
+            self._known_tools[key] = known
+        return known
 
 
 class DirectClient(AsyncOpenAI):

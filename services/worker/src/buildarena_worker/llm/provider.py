@@ -194,13 +194,12 @@ def _make_model(
             reason="missing_key",
         )
     if provider.wire == "openai":
-        from pydantic_ai.models.openai import OpenAIChatModel
         from pydantic_ai.providers.openai import OpenAIProvider
 
-        from buildarena_worker.llm.openai_direct import DirectClient
+        from buildarena_worker.llm.openai_direct import DirectClient, RememberingChatModel
 
         client = DirectClient(base_url=provider.base_url, api_key=key)
-        model = OpenAIChatModel(entry.model, provider=OpenAIProvider(openai_client=client))
+        model = RememberingChatModel(entry.model, provider=OpenAIProvider(openai_client=client))
         return model, client.close
     if provider.wire == "anthropic":
         from anthropic import AsyncAnthropic
