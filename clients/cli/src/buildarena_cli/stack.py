@@ -43,6 +43,9 @@ class Stack:
         settings: Where data lies and which port the API takes.
         tell: Gets one line for each thing that was started.
         simulators: Engines to start workers for.
+
+    Attributes:
+        environment: The variables that its programs were started with; further workers need them.
     """
 
     def __init__(
@@ -54,6 +57,7 @@ class Stack:
     ) -> None:
         self.settings = settings
         self.admin_key: str | None = None
+        self.environment: dict[str, str] = {}
         self.url = f"http://{settings.host}:{settings.port}"
         self.supervisor = Supervisor()
         self.peak_memory_bytes = 0
@@ -102,7 +106,7 @@ class Stack:
     def _start(self) -> None:
         self._take_folder()
         _require_free_port(self.settings.host, self.settings.port)
-        environment = self._start_servers()
+        environment = self.environment = self._start_servers()
         self._tell("migrating the database")
         database = Database(environment["BUILDARENA_DATABASE_URL"])
         database.migrate()

@@ -14,6 +14,7 @@ from typing import Any
 
 import structlog
 from celery.signals import worker_process_init, worker_process_shutdown, worker_ready
+from sqlalchemy.exc import OperationalError
 
 from buildarena_pipeline.context import Context, open_context
 from buildarena_pipeline.errors import StartupError
@@ -158,4 +159,6 @@ def _checked_context(settings: Settings) -> Context:
         context.database.require_schema()
     except (ValueError, SchemaVersionError) as error:
         raise StartupError(str(error)) from error
+    except OperationalError as error:
+        raise StartupError(f"the database can't be reached: {error.orig}") from error
     return context

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 
 import uvicorn
+from sqlalchemy.exc import OperationalError
 
 from buildarena_api.access import check_binding
 from buildarena_api.app import create_app
@@ -31,6 +32,8 @@ def main() -> None:
         context.database.require_schema()
     except (StartupError, SchemaVersionError, ValueError) as error:
         sys.exit(f"api: {error}")
+    except OperationalError as error:
+        sys.exit(f"api: the database can't be reached: {error.orig}")
     try:
         uvicorn.run(
             create_app(context, registry),

@@ -1,0 +1,79 @@
+"""What the database must say after a fire, in queries: each returns what is wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import datetime
+
+from fire import WORKERS, Strike
+from sqlalchemy import text
+
+from buildarena_store import Database
+
+WRONG = {
+    "jobs that have not ended": "SELECT id FROM jobs WHERE state <> 'done'",
+    "jobs that ended without a score": (
+        "SELECT id FROM jobs WHERE outcome IN ('errored', 'cancelled') OR success IS NULL"
+    ),
+    "jobs that ended more than once": (
+        "SELECT job_id FROM events WHERE kind = 'done' GROUP BY job_id HAVING count(*) > 1"
+    ),
+    "jobs that entered the leaderboard more than once, or changed there": (
+        "SELECT job_id FROM board_changes GROUP BY job_id "
+        "HAVING count(*) > 1 OR min(kind) <> 'entered'"
+    ),
+    "journal entries written without a hold": (
+        "SELECT j.job_id FROM journal j LEFT JOIN attempts a USING (job_id, token) "
+        "WHERE a.job_id IS NULL OR j.created_at < a.started_at "
+        "OR j.created_at > COALESCE(a.ended_at, 'infinity')"
+    ),
+    "holds of one job at the same time": (
+        "SELECT a.job_id FROM attempts a JOIN attempts b USING (job_id) "
+        "WHERE a.token < b.token AND COALESCE(a.ended_at, 'infinity') > b.started_at"
+    ),
+    "journals with a gap or a double entry": (
+        "SELECT job_id FROM journal GROUP BY job_id "
+        "HAVING count(*) <> max(sequence) + 1 OR count(*) <> count(DISTINCT sequence)"
+    ),
+    "jobs whose account is not their journal's": (
+        "SELECT id FROM jobs WHERE requests <> "
+        "(SELECT count(*) FROM journal WHERE journal.job_id = jobs.id)"
+    ),
+    "finished rollouts that are not those asked for": (
+        "SELECT job_id FROM rollouts WHERE finished_at IS NULL OR success IS NULL"
+    ),
+    "reservations left over": "SELECT job_id FROM reservations",
+}
+
+
+def wrongs(database: Database) -> dict[str, list[str]]:
+    """Jobs with which something is wrong, by what is."""
+    found = {}
+    with database.transaction() as connection:
+        for name, query in WRONG.items():
+            ids = [str(id_) for id_ in connection.execute(text(query)).scalars()]
+            if ids:
+                found[name] = ids[:10]
+    return found
+
+
+def pick_up_times(database: Database, strikes: Sequence[Strike]) -> list[float]:
+    """Seconds from the death of a worker to the next hold on each job that it held."""
+    # A prefork worker's jobs are held by its children, which die with it.
+    query = text(
+        "SELECT a.job_id, (SELECT min(b.started_at) FROM attempts b "
+        "WHERE b.job_id = a.job_id AND b.token > a.token) AS next, a.started_at, a.ended_at "
+        "FROM attempts a WHERE a.result = 'lost'"
+    )
+    times = []
+    deaths = [strike.at for strike in strikes if strike.name in WORKERS]
+    with database.transaction() as connection:
+        for row in connection.execute(query):
+            before = [at for at in deaths if row.started_at <= at <= row.ended_at]
+            if before and row.next is not None:
+                times.append(_seconds(max(before), row.next))
+    return sorted(times)
+
+
+def _seconds(start: datetime, end: datetime) -> float:
+    return (end - start).total_seconds()

@@ -1,0 +1,14 @@
+"""Runs a worker whose clock is wrong: ``python skewed.py HOURS MODULE [ARGUMENT ...]``."""
+
+from __future__ import annotations
+
+import runpy
+import sys
+from datetime import UTC, datetime, timedelta
+
+import time_machine
+
+hours, module = float(sys.argv[1]), sys.argv[2]
+sys.argv = sys.argv[2:]
+time_machine.travel(datetime.now(UTC) + timedelta(hours=hours), tick=True).start()
+runpy.run_module(module, run_name="__main__")

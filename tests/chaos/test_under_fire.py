@@ -1,0 +1,158 @@
+"""A sweep while everything around it is killed again and again: nothing is lost or done twice."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import httpx
+import pytest
+from accounts import pick_up_times, wrongs
+from fire import Fire
+from running import running_stack, wait_until
+from sqlalchemy.exc import OperationalError
+
+from buildarena_benchmark import builtin_tasks, score
+from buildarena_simulation import simulate
+from buildarena_store import Database
+
+HERE = Path(__file__).parent
+JOBS = int(os.environ.get("CHAOS_JOBS", "80"))
+EVERY_S = float(os.environ.get("CHAOS_EVERY_S", "2.5"))
+LEASE_S = float(os.environ.get("CHAOS_LEASE_S", "3"))
+SEED = os.environ.get("CHAOS_SEED", "1")
+TASK, ENGINE = "lift-1", "mujoco"
+PICKED_UP_WITHIN_S = 30.0
+SKEW_HOURS = "3"
+
+
+@contextmanager
+def skewed_worker(environment: dict[str, str], log: Path, *words: str) -> Iterator[None]:
+    """A further worker, whose clock is hours ahead."""
+    with log.open("ab") as stream:
+        process = subprocess.Popen(
+            [sys.executable, str(HERE / "skewed.py"), SKEW_HOURS, *words],
+            env=environment,
+            stdout=stream,
+            stderr=stream,
+        )
+        try:
+            yield
+        finally:
+            process.terminate()
+            process.wait(timeout=30)
+
+
+@pytest.fixture
+def folder() -> Iterator[Path]:
+    """A folder that Postgres can reach again when it is restarted, as another user.
+
+    Any pytest that starts takes the rights of others from the folder of all tmp_paths.
+    """
+    with tempfile.TemporaryDirectory(prefix="buildarena-chaos-") as name:
+        yield Path(name)
+
+
+def submitted(client: httpx.Client, wish: dict[str, object], key: str) -> str:
+    """The sweep's id; submitted again with its key until an answer comes."""
+
+    def submit() -> str | None:
+        try:
+            answer = client.post("/v1/sweeps", json=wish, headers={"Idempotency-Key": key})
+        except httpx.TransportError:
+            return None
+        return answer.json()["id"] if answer.status_code == 202 else None
+
+    return str(wait_until(submit, 60, f"sweep {key} is accepted"))
+
+
+def ended(client: httpx.Client, sweep_id: str) -> bool:
+    try:
+        answer = client.get(f"/v1/sweeps/{sweep_id}")
+    except httpx.TransportError:
+        return False
+    time.sleep(0.5)
+    return answer.status_code == 200 and answer.json()["state"] == "done"
+
+
+def reachable(database: Database) -> bool:
+    try:
+        database.require_schema()
+    except OperationalError:
+        return False
+    return True
+
+
+@pytest.mark.timeout(3600)
+def test_nothing_is_lost_or_done_twice(folder, play) -> None:
+    rng = random.Random(SEED)
+    cheap, dear = JOBS - JOBS // 4, JOBS // 4
+    with running_stack(folder, lease_s=LEASE_S) as stack:
+        environment, logs = stack.environment, stack.logs
+        database = Database(environment["BUILDARENA_DATABASE_URL"])
+        with (
+            httpx.Client(base_url=stack.url, timeout=30) as client,
+            skewed_worker(environment, logs / "skewed.log", "buildarena_worker"),
+            skewed_worker(
+                environment, logs / "skewed.log", "buildarena_simworker", "--engine", ENGINE
+            ),
+            Fire(stack=stack, rng=rng, every_s=EVERY_S) as fire,
+        ):
+            started = time.monotonic()
+            common = {"tasks": [TASK], "simulator": ENGINE}
+            sweeps = [
+                submitted(
+                    client, {**common, "models": ["builtin/random"], "samples": cheap}, "cheap"
+                ),
+                submitted(
+                    client, {**common, "models": ["builtin/expert"], "samples": dear}, "dear"
+                ),
+            ]
+            for sweep_id in sweeps:
+                wait_until(lambda: ended(client, sweep_id), 3000, f"{sweep_id} ended")  # noqa: B023
+            fire.stop()
+            seconds = time.monotonic() - started
+        wait_until(lambda: reachable(database), 60, "the last strike is over")
+        assert wrongs(database) == {}
+        times = pick_up_times(database, fire.strikes)
+        with database.transaction() as connection:
+            query = "SELECT seed, model, requests, indicator FROM jobs ORDER BY model, seed"
+            rows = connection.exec_driver_sql(query).all()
+        database.close()
+    figures = {
+        "jobs": len(rows),
+        "seconds": round(seconds, 1),
+        "strikes": {
+            name: sum(strike.name == name for strike in fire.strikes)
+            for name in sorted({strike.name for strike in fire.strikes})
+        },
+        "messages_duplicated": fire.duplicates,
+        "jobs_of_dead_workers": len(times),
+        "longest_pick_up_s": round(times[-1], 1) if times else None,
+    }
+    sys.stdout.write(json.dumps(figures) + "\n")
+    assert len(rows) == JOBS
+    assert not times or times[-1] <= PICKED_UP_WITHIN_S
+    _compare_with_undisturbed(rng.sample(rows, 6), play)
+
+
+def _compare_with_undisturbed(rows, play) -> None:
+    """Same requests and same indicator as in a session that nobody disturbed."""
+    task = builtin_tasks()[TASK]
+    for row in rows:
+        played = play(row.model, task=TASK, seed=row.seed)
+        assert row.requests == len(played.entries)
+        if played.suspended is not None:
+            suspended = played.suspended
+            trajectory = simulate(
+                suspended.machine, task.scenario, engine=ENGINE, controls=suspended.controls
+            )
+            assert row.indicator == score(task, suspended.machine, trajectory).indicator
