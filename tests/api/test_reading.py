@@ -4,6 +4,8 @@ import json
 import re
 from pathlib import Path
 
+import pytest
+
 from buildarena_store import JobScore
 
 GOLDEN = Path(__file__).parent.parent / "data" / "openapi.json"
@@ -91,3 +93,28 @@ def test_the_docs_page_is_there(api) -> None:
     for source in sources:
         assert source.startswith("/"), "the page must not need another server"
         assert api.get(source).status_code == 200
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["..%2f..%2fetc%2fpasswd", "....//etc/passwd", "machine%00", "%2e%2e%2fmachine", "machine/.."],
+)
+def test_names_that_leave_the_store_lead_nowhere(api, name) -> None:
+    job_id = api.post("/v1/jobs", json={"task": "lift-1", "model": "builtin/idle"}).json()["id"]
+    answer = api.get(f"/v1/jobs/{job_id}/{name}")
+    assert answer.status_code in {404, 422} or answer.json()["id"] == job_id
+    assert "root:" not in answer.text
+
+
+@pytest.mark.parametrize(
+    "lure", ["'; DROP TABLE jobs; --", '" OR 1=1 --', "%' OR '1'='1", "builtin/idle'/*"]
+)
+def test_sql_in_texts_is_text(api, lure) -> None:
+    api.post("/v1/jobs", json={"task": "lift-1", "model": "builtin/idle"})
+    for name in ("task", "model", "outcome", "sweep"):
+        answer = api.get("/v1/jobs", params={name: lure})
+        assert answer.status_code in {200, 404, 422}
+        assert answer.json().get("jobs", []) == []
+    assert api.post("/v1/jobs", json={"task": lure, "model": lure}).status_code == 422
+    assert api.get("/v1/leaderboard", params={"task": lure, "model": lure}).status_code < 500
+    assert len(api.get("/v1/jobs").json()["jobs"]) == 1

@@ -6,11 +6,13 @@ announces waiting jobs again; so nothing rests on the broker's redelivery.
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Sequence
 
 import structlog
 from celery import Celery
 from kombu.exceptions import OperationalError
+from redis import Redis
 from redis.exceptions import RedisError
 
 LOOK = "buildarena.look"
@@ -67,6 +69,11 @@ class Queues:
 
     def __init__(self, broker_url: str) -> None:
         self.app = celery_app(broker_url)
+        self._sender = celery_app(broker_url)
+        self._broker_url = broker_url
+        self._guard = threading.Lock()
+        # Celery's queues are lists of the same name.
+        self._redis = Redis.from_url(broker_url, socket_connect_timeout=2, socket_timeout=10)
 
     def announce(self, queue: str, job_ids: Sequence[str]) -> bool:
         """Tells a queue's workers of jobs, as well as it can.
@@ -74,15 +81,16 @@ class Queues:
         Returns:
             False when the broker could not be reached; the sweeper will try again.
         """
+        sender = self._sender
         try:
-            with self.app.producer_pool.acquire(block=True) as producer:
+            with sender.producer_pool.acquire(block=True) as producer:
                 for job_id in job_ids:
-                    self.app.send_task(
+                    sender.send_task(
                         LOOK, args=(queue, job_id), queue=queue, producer=producer, retry=False
                     )
         except (OperationalError, RedisError, OSError) as error:
             log.warning("broker_unreachable", queue=queue, error=str(error))
-            self.app.pool.force_close_all()
+            self._renew_sender(sender)
             return False
         return True
 
@@ -99,13 +107,19 @@ class Queues:
     def waiting(self, queue: str) -> int | None:
         """Messages that no worker has taken, or None when the broker can't be reached."""
         try:
-            with self.app.pool.acquire(block=True) as connection:
-                channel = connection.default_channel
-                return int(channel.client.llen(queue))
-        except (OperationalError, RedisError, OSError) as error:
+            return int(self._redis.llen(queue))
+        except (RedisError, OSError) as error:
             log.warning("broker_unreachable", queue=queue, error=str(error))
             return None
 
+    def _renew_sender(self, failed: Celery) -> None:
+        """Takes a fresh sender: a pool's connections to a server that is gone stay in its way."""
+        with self._guard:
+            if self._sender is failed:
+                self._sender = celery_app(self._broker_url)
+
     def close(self) -> None:
         """Closes the connections to the broker."""
+        self._redis.close()
+        self._sender.close()
         self.app.close()

@@ -15,7 +15,7 @@ from typing import Any, Protocol
 from buildarena_geometry import KeyPress, Machine
 from buildarena_pipeline.tracing import span
 from buildarena_simulation import Trajectory
-from buildarena_store import JournalEntry, RolloutRecord, Usage
+from buildarena_store import JournalEntry, RolloutRecord, Usage, clean
 from buildarena_worker.errors import JournalMismatchError, LeaseLostError, LimitReachedError
 from buildarena_worker.messages import Reply, Request
 
@@ -170,7 +170,7 @@ class SessionIO:
             stage=stage,
             role=role,
             request_hash=request.hash,
-            reply=answer.reply.to_json(),
+            reply=clean(answer.reply.to_json()),
             usage=answer.usage,
             latency_s=answer.latency_s,
             tries=answer.tries,

@@ -18,6 +18,7 @@ from httpx2 import Request, Response
 from openai import APIConnectionError, AsyncOpenAI, NotGiven, Omit
 from openai.resources.chat.completions import AsyncCompletions
 from openai.types.chat import ChatCompletion
+from pydantic import ValidationError
 from pydantic_ai.models import ModelRequestParameters
 from pydantic_ai.models.openai import OpenAIChatModel
 
@@ -96,9 +97,12 @@ class DirectClient(AsyncOpenAI):
             raise self._make_status_error_from_response(
                 Response(answer.status, headers=kept, content=text, request=sent)
             )
-        parsed = json.loads(text)
-        # pydantic-ai says what is wrong with an answer that is no completion.
-        return ChatCompletion.construct(**parsed) if isinstance(parsed, dict) else parsed
+        try:
+            return ChatCompletion.model_validate_json(text)
+        except ValidationError:
+            # The SDK lets everything pass; pydantic-ai mends it or says what is wrong.
+            parsed = json.loads(text)
+            return ChatCompletion.construct(**parsed) if isinstance(parsed, dict) else parsed
 
     async def close(self) -> None:
         """Closes the connections."""

@@ -21,7 +21,6 @@ from pydantic_ai.messages import (
 from pydantic_ai.models import ModelRequestParameters
 from pydantic_ai.tools import ToolDefinition
 
-from buildarena_store import clean
 from buildarena_worker.messages import Message, Reply, Tool, ToolCall
 
 FINISH = {"tool_call": "stop", None: "stop"}
@@ -89,19 +88,15 @@ def request_parameters(tools: Sequence[Tool]) -> ModelRequestParameters:
 
 
 def from_wire(response: ModelResponse) -> Reply:
-    """A reply in our form, its texts such as everything can hold."""
+    """A reply in our form."""
     text = "".join(part.content for part in response.parts if isinstance(part, TextPart))
     calls = tuple(
-        ToolCall(
-            id=clean(part.tool_call_id),
-            name=clean(part.tool_name),
-            arguments=clean(_arguments(part.args)),
-        )
+        ToolCall(id=part.tool_call_id, name=part.tool_name, arguments=_arguments(part.args))
         for part in response.parts
         if isinstance(part, ToolCallPart)
     )
     finish = response.finish_reason
-    return Reply(text=clean(text), calls=calls, finish=FINISH.get(finish, finish or "stop"))
+    return Reply(text=text, calls=calls, finish=FINISH.get(finish, finish or "stop"))
 
 
 def _arguments(raw: Any) -> Any:
