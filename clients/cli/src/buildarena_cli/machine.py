@@ -70,8 +70,8 @@ def simulate_command(  # noqa: PLR0917 - the command line passes options by name
     as_json: Annotated[bool, typer.Option("--json", help="Print the score as JSON.")] = False,
 ) -> None:
     """Put a machine through a task's trial and score it."""
-    with _told_errors():
-        chosen, machine = _task(task), read_machine(file)
+    with told_errors():
+        chosen, machine = chosen_task(task), read_machine(file)
         rollout = _simulated(machine, chosen, engine, seed)
         if rollout is None:
             result = failed_score(chosen, machine)
@@ -80,7 +80,7 @@ def simulate_command(  # noqa: PLR0917 - the command line passes options by name
             if trajectory is not None:
                 trajectory.write_bytes(rollout.to_parquet())
             if video is not None:
-                _film(machine, chosen, rollout, video)
+                film(machine, chosen, rollout, video)
         if as_json:
             print_json(_report(chosen, result, rollout))
         else:
@@ -95,13 +95,13 @@ def render_command(
     video: Annotated[Path, typer.Option(help="The film (.mp4, .gif) or pictures (.png) to write.")],
 ) -> None:
     """Draw a trial that was simulated before."""
-    with _told_errors():
-        chosen, machine = _task(task), read_machine(file)
+    with told_errors():
+        chosen, machine = chosen_task(task), read_machine(file)
         rollout = Trajectory.from_parquet(trajectory.read_bytes())
         missing = [block for block in rollout.block_ids if block not in machine.blocks]
         if missing:
             raise CommandError(f"{trajectory}: block {missing[0]} is not in {file}")
-        _film(machine, chosen, rollout, video)
+        film(machine, chosen, rollout, video)
 
 
 def read_machine(file: Path) -> Machine:
@@ -146,7 +146,13 @@ def _built(actions: Any, available: dict[str, Machine], where: str) -> Machine:
     return machine
 
 
-def _task(name: str) -> Task:
+def chosen_task(name: str) -> Task:
+    """A built-in task, or the one in a file.
+
+    Raises:
+        CommandError: There is neither.
+        TaskError: The file is wrong.
+    """
     known = builtin_tasks()
     if name in known:
         return known[name]
@@ -171,7 +177,8 @@ def _simulated(machine: Machine, task: Task, engine: str, seed: int | None) -> T
             return None
 
 
-def _film(machine: Machine, task: Task, rollout: Trajectory, video: Path) -> None:
+def film(machine: Machine, task: Task, rollout: Trajectory, video: Path) -> None:
+    """Draws a trial into a film or pictures."""
     from buildarena_simulation.render.film import write_film
 
     with _progress() as bar:
@@ -230,7 +237,7 @@ def _table(task: Task, result: Score, rollout: Trajectory | None) -> Table:
 
 
 @contextlib.contextmanager
-def _told_errors() -> Iterator[None]:
+def told_errors() -> Iterator[None]:
     """Turns the rooms' errors into one message and an exit code."""
     try:
         yield

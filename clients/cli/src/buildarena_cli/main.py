@@ -7,7 +7,18 @@ from typing import Annotated
 
 import typer
 
-from buildarena_cli import board, catalogue, jobs, keys, machine, report, service, sweeps, tasks
+from buildarena_cli import (
+    board,
+    catalogue,
+    jobs,
+    keys,
+    machine,
+    machine_files,
+    report,
+    service,
+    sweeps,
+    tasks,
+)
 from buildarena_cli.client import Client
 from buildarena_cli.doctor import examine
 from buildarena_cli.errors import FAILED, CommandError
@@ -30,6 +41,12 @@ app.add_typer(machine.app, name="machine")
 app.command()(service.up)
 app.command()(service.demo)
 app.command()(service.migrate)
+workers = typer.Typer(help="Run workers by themselves.", no_args_is_help=True)
+workers.command("start")(service.start_worker)
+app.add_typer(workers, name="worker")
+machine.app.command("check")(machine_files.check)
+machine.app.command("export")(machine_files.export)
+jobs.app.command("replay")(machine_files.replay)
 for command in (board.leaderboard, board.compare, board.export, board.audit, report.report):
     app.command()(command)
 

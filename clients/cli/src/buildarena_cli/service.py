@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import signal
+import sys
 import threading
 from pathlib import Path
 from typing import Annotated, Any
@@ -16,7 +18,9 @@ from buildarena_cli.errors import CommandError
 from buildarena_cli.output import console, leaderboard_tables
 from buildarena_cli.progress import exit_code, watch_sweep
 from buildarena_cli.stack import Stack
+from buildarena_pipeline.queues import CONSTRUCT, simulate_queue
 from buildarena_pipeline.settings import Settings
+from buildarena_pipeline.tracks import SIMULATORS
 from buildarena_store import Database
 
 DEMO_SWEEP = {
@@ -79,6 +83,25 @@ def demo(data: DataOption = None, port: PortOption = None) -> None:
         f"API docs are then at {stack.url}/docs."
     )
     raise typer.Exit(exit_code(sweep))
+
+
+def start_worker(
+    queue: Annotated[
+        str, typer.Argument(help="construct, or simulate.ENGINE, such as simulate.mujoco.")
+    ],
+) -> None:
+    """Serve a queue from this process, with the servers that BUILDARENA_* name, until Ctrl-C."""
+    programs = {
+        CONSTRUCT: ["buildarena_worker"],
+        **{
+            simulate_queue(engine): ["buildarena_simworker", "--engine", engine]
+            for engine in SIMULATORS
+        },
+    }
+    if queue not in programs:
+        raise CommandError(f"there is no queue {queue!r}; choose from {', '.join(programs)}")
+    # The worker takes this process' place, so that signals reach it.
+    os.execv(sys.executable, [sys.executable, "-m", *programs[queue]])  # noqa: S606 - no shell
 
 
 def migrate() -> None:

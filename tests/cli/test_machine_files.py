@@ -1,0 +1,88 @@
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+from live_api import live_api
+from typer.testing import CliRunner
+
+from buildarena_cli.errors import CommandError
+from buildarena_cli.main import app
+from buildarena_pipeline.documents import machine_bytes
+from buildarena_pipeline.models import load_registry
+from buildarena_pipeline.specs import JobSpec
+from buildarena_pipeline.stages import LeaseKeeper, StageRunner
+from buildarena_simworker.simulate import SimulateHandler
+from buildarena_worker.construct import ConstructHandler
+
+SUSPENSION_BRIDGE = Path(__file__).parents[2] / "examples" / "tasks" / "suspension-bridge.yaml"
+
+
+@pytest.fixture
+def machine_file(play, tmp_path) -> Path:
+    file = tmp_path / "machine.json"
+    file.write_bytes(machine_bytes(play("builtin/expert", task="support-1").suspended.machine))
+    return file
+
+
+def run(*words: str):
+    return CliRunner().invoke(app, words)
+
+
+def test_a_sound_machine_is_called_sound(machine_file) -> None:
+    done = run("machine", "check", str(machine_file), "--task", "support-1", "--json")
+    found = json.loads(done.stdout)
+    assert (done.exit_code, found["problems"]) == (0, [])
+    assert found["parts"] > 5
+    assert "The machine is sound." in run("machine", "check", str(machine_file)).stdout
+
+
+def test_a_broken_constraint_is_told(machine_file) -> None:
+    done = run("machine", "check", str(machine_file), "--task", str(SUSPENSION_BRIDGE))
+    assert done.exit_code == 1
+    assert "Winch" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("ending", "begins"), [(".glb", b"glTF"), (".svg", b"<svg"), (".json", b"{")]
+)
+def test_a_machine_is_written_in_each_format(machine_file, tmp_path, ending, begins) -> None:
+    out = tmp_path / f"out{ending}"
+    assert run("machine", "export", str(machine_file), "--out", str(out)).exit_code == 0
+    assert out.read_bytes().startswith(begins)
+
+
+def test_an_unknown_format_is_refused_with_the_known_ones(machine_file, tmp_path) -> None:
+    done = run("machine", "export", str(machine_file), "--out", str(tmp_path / "x.stl"))
+    assert (done.exit_code, ".glb, .svg, .json" in done.stderr) == (1, True)
+
+
+def test_a_jobs_trial_is_drawn(context, submissions, tmp_path) -> None:
+    job, _ = submissions.submit_job(
+        JobSpec(task="lift-1", model="builtin/expert", simulator="mujoco")
+    )
+    registry, keeper = load_registry(), LeaseKeeper(context, lambda: None)
+    for handler in (ConstructHandler(context, registry), SimulateHandler(context)):
+        StageRunner(context, handler, keeper, "w").look(context.jobs.get(job.id).queue, job.id)
+    out = tmp_path / "trial.png"
+    with live_api(context) as url:
+        done = run("job", "replay", job.id, "--out", str(out), "--url", url)
+    assert done.exit_code == 0, (done.stdout, done.stderr)
+    assert out.read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_worker_takes_the_commands_place(monkeypatch) -> None:
+    started = []
+    monkeypatch.setattr("os.execv", lambda *words: started.append(words))
+    assert run("worker", "start", "simulate.mujoco").exit_code == 0
+    assert started == [
+        (
+            sys.executable,
+            [sys.executable, "-m", "buildarena_simworker", "--engine", "mujoco"],
+        )
+    ]
+    refused = run("worker", "start", "paint")
+    assert isinstance(refused.exception, CommandError)
+    assert "choose from construct, simulate.pybullet, simulate.mujoco" in str(refused.exception)
