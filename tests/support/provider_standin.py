@@ -95,7 +95,11 @@ class _Handler(BaseHTTPRequestHandler):
             self.close_connection = True
             return
         if fault in {"429", "429 gzip", "500", "503", "401", "404"}:
-            error = {"error": {"message": "stand-in says no", "type": "error", "status": "X"}}
+            # Some providers repeat the key that they refuse.
+            names = ("authorization", "x-api-key", "x-goog-api-key")
+            keys = [self.headers[name] for name in names if self.headers[name]]
+            message = f"stand-in says no to {keys}"
+            error = {"error": {"message": message, "type": "error", "status": "X"}}
             headers = {"retry-after": "0"} if "429" in fault else {}
             if "gzip" in fault:
                 headers["content-encoding"] = "gzip"

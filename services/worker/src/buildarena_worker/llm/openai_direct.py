@@ -69,7 +69,7 @@ class DirectClient(AsyncOpenAI):
         vars(self.chat)["completions"] = _DirectCompletions(self)
 
     async def complete(self, body: dict[str, Any], headers: dict[str, Any]) -> ChatCompletion:
-        """Sends a body and gives the answer in the SDK's type; what does not fit it passes unchecked.
+        """Sends a body and gives the answer as the SDK's type, unchecked where it does not fit.
 
         Raises:
             APIStatusError: The provider says no.

@@ -75,8 +75,9 @@ class ProviderClient:
         self._entry = entry
         self._policy = policy or RetryPolicy()
         self._wire = provider.wire
+        self._key = _key_of(entry, provider)
         pools = 1 if provider.wire == "openai" else POOLS
-        shards = [_make_model(entry, provider) for _ in range(pools)]
+        shards = [_make_model(entry, provider, self._key) for _ in range(pools)]
         self._models = cycle([model for model, _ in shards])
         self._closers = [close for _, close in shards]
         self._rng = random.Random()  # noqa: S311 - spreads retries, guards nothing
@@ -110,11 +111,11 @@ class ProviderClient:
             except ContentFilterError as error:
                 return _own_failure("content_filter", str(error), started, tries)
             except Exception as error:
-                _raise_if_permanent(error, self._entry)
+                _raise_if_permanent(error, self._entry, self._key)
                 if tries == self._policy.tries:
                     raise PassingFaultError(
                         f"{self._entry.name}: {tries} tries failed, the last with "
-                        f"{type(error).__name__}: {_first_line(error)}",
+                        f"{type(error).__name__}: {_first_line(error, self._key)}",
                         reason="provider_outage",
                         delay_s=OUTAGE_DELAY_S,
                     ) from error
@@ -183,16 +184,21 @@ class ProviderClient:
         )
 
 
-def _make_model(
-    entry: ModelEntry, provider: ProviderEntry
-) -> tuple[Model, Callable[[], Coroutine[Any, Any, None]]]:
-    """The provider's model in pydantic-ai, and how to close its connections."""
+def _key_of(entry: ModelEntry, provider: ProviderEntry) -> str:
+    """The provider's API key, from the environment; a provider may need none."""
     key = "none" if provider.key is None else os.environ.get(provider.key, "")
     if not key:
         raise PermanentFaultError(
             f"{entry.name} needs the API key in {provider.key}, which is not set on the worker",
             reason="missing_key",
         )
+    return key
+
+
+def _make_model(
+    entry: ModelEntry, provider: ProviderEntry, key: str
+) -> tuple[Model, Callable[[], Coroutine[Any, Any, None]]]:
+    """The provider's model in pydantic-ai, and how to close its connections."""
     if provider.wire == "openai":
         from pydantic_ai.providers.openai import OpenAIProvider
 
@@ -227,7 +233,7 @@ def _own_failure(finish: str, detail: str, started: float, tries: int) -> Answer
     )
 
 
-def _raise_if_permanent(error: Exception, entry: ModelEntry) -> None:
+def _raise_if_permanent(error: Exception, entry: ModelEntry, key: str) -> None:
     reasons: tuple[tuple[type[Exception], str], ...] = (
         (ModelAuthenticationError, "bad_credentials"),
         (ModelNotFoundError, "model_not_found"),
@@ -236,11 +242,11 @@ def _raise_if_permanent(error: Exception, entry: ModelEntry) -> None:
     for kind, reason in reasons:
         if isinstance(error, kind):
             raise PermanentFaultError(
-                f"{entry.name}: {_first_line(error)}", reason=reason
+                f"{entry.name}: {_first_line(error, key)}", reason=reason
             ) from error
     if isinstance(error, ModelHTTPError) and error.status_code not in RETRIED_STATUS:
         raise PermanentFaultError(
-            f"{entry.name}: HTTP {error.status_code}: {_first_line(error)}",
+            f"{entry.name}: HTTP {error.status_code}: {_first_line(error, key)}",
             reason="request_refused",
         ) from error
 
@@ -249,5 +255,7 @@ def _headers(error: Exception) -> Mapping[str, str] | None:
     return error.headers if isinstance(error, ModelHTTPError) else None
 
 
-def _first_line(error: Exception) -> str:
-    return (str(error).splitlines() or [type(error).__name__])[0][:500]
+def _first_line(error: Exception, key: str) -> str:
+    """What an error says, without the API key, which some providers repeat."""
+    line = (str(error).splitlines() or [type(error).__name__])[0]
+    return line.replace(key, "***")[:500]
