@@ -59,19 +59,22 @@ def wrongs(database: Database) -> dict[str, list[str]]:
 
 def pick_up_times(database: Database, strikes: Sequence[Strike]) -> list[float]:
     """Seconds from the death of a worker to the next hold on each job that it held."""
-    # A prefork worker's jobs are held by its children, which die with it.
+    # A worker's id ends with its process'; a prefork worker's jobs are held by its children.
     query = text(
-        "SELECT a.job_id, (SELECT min(b.started_at) FROM attempts b "
-        "WHERE b.job_id = a.job_id AND b.token > a.token) AS next, a.started_at, a.ended_at "
+        "SELECT a.worker, a.started_at, (SELECT min(b.started_at) FROM attempts b "
+        "WHERE b.job_id = a.job_id AND b.token > a.token) AS next "
         "FROM attempts a WHERE a.result = 'lost'"
     )
+    deaths = [
+        (pid, strike.at) for strike in strikes if strike.name in WORKERS for pid in strike.pids
+    ]
     times = []
-    deaths = [strike.at for strike in strikes if strike.name in WORKERS]
     with database.transaction() as connection:
         for row in connection.execute(query):
-            before = [at for at in deaths if row.started_at <= at <= row.ended_at]
-            if before and row.next is not None:
-                times.append(_seconds(max(before), row.next))
+            pid = int(row.worker.rsplit(":", 1)[1])
+            died = [at for dead, at in deaths if dead == pid and at >= row.started_at]
+            if died and row.next is not None:
+                times.append(_seconds(min(died), row.next))
     return sorted(times)
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import Self
 
+import psutil
 import structlog
 from redis import Redis
 from redis.exceptions import RedisError
@@ -27,10 +28,10 @@ log = structlog.get_logger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class Strike:
-    """A process that was ended, and when."""
+    """A process that was ended with its children, and when."""
 
     name: str
-    pid: int
+    pids: frozenset[int]
     at: datetime
 
 
@@ -84,9 +85,11 @@ class Fire:
         # SIGTERM makes Postgres wait until all who are connected have left.
         gently = signal.SIGINT if name == "postgres" else signal.SIGTERM
         how = signal.SIGKILL if self.rng.random() < 0.75 else gently
-        with contextlib.suppress(ProcessLookupError):
+        with contextlib.suppress(ProcessLookupError, psutil.NoSuchProcess):
+            children = psutil.Process(victim.pid).children(recursive=True)
+            pids = frozenset({victim.pid, *(child.pid for child in children)})
             os.kill(victim.pid, how)
-            self.strikes.append(Strike(name, victim.pid, datetime.now(UTC)))
+            self.strikes.append(Strike(name, pids, datetime.now(UTC)))
             log.info("struck", name=name, how=how.name)
 
     def _duplicate(self) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import random
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -136,6 +137,7 @@ def test_nothing_is_lost_or_done_twice(folder, play) -> None:
         },
         "messages_duplicated": fire.duplicates,
         "jobs_of_dead_workers": len(times),
+        "median_pick_up_s": round(statistics.median(times), 1) if times else None,
         "longest_pick_up_s": round(times[-1], 1) if times else None,
     }
     sys.stdout.write(json.dumps(figures) + "\n")

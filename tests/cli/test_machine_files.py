@@ -7,15 +7,12 @@ from pathlib import Path
 import pytest
 from live_api import live_api
 from typer.testing import CliRunner
+from working import work
 
 from buildarena_cli.errors import CommandError
 from buildarena_cli.main import app
 from buildarena_pipeline.documents import machine_bytes
-from buildarena_pipeline.models import load_registry
 from buildarena_pipeline.specs import JobSpec
-from buildarena_pipeline.stages import LeaseKeeper, StageRunner
-from buildarena_simworker.simulate import SimulateHandler
-from buildarena_worker.construct import ConstructHandler
 
 SUSPENSION_BRIDGE = Path(__file__).parents[2] / "examples" / "tasks" / "suspension-bridge.yaml"
 
@@ -63,9 +60,7 @@ def test_a_jobs_trial_is_drawn(context, submissions, tmp_path) -> None:
     job, _ = submissions.submit_job(
         JobSpec(task="lift-1", model="builtin/expert", simulator="mujoco")
     )
-    registry, keeper = load_registry(), LeaseKeeper(context, lambda: None)
-    for handler in (ConstructHandler(context, registry), SimulateHandler(context)):
-        StageRunner(context, handler, keeper, "w").look(context.jobs.get(job.id).queue, job.id)
+    work(context)
     out = tmp_path / "trial.png"
     with live_api(context) as url:
         done = run("job", "replay", job.id, "--out", str(out), "--url", url)

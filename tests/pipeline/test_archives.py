@@ -10,42 +10,19 @@ from pathlib import Path
 
 import pytest
 from sqlalchemy import text
+from working import work
 
 from buildarena_pipeline import archives
 from buildarena_pipeline.archives import ArchiveError, read_archive, write_archive
 from buildarena_pipeline.context import Context
-from buildarena_pipeline.models import load_registry
 from buildarena_pipeline.specs import SweepSpec
-from buildarena_pipeline.stages import LeaseKeeper, StageRunner
-from buildarena_simworker.simulate import SimulateHandler
 from buildarena_store import ArtifactStore, UnknownIdError
 from buildarena_store.tables import metadata
-from buildarena_worker.construct import ConstructHandler
 from buildarena_worker.verify import Verifier
 
 SPEC = SweepSpec(
     tasks=["lift-1"], models=["builtin/expert"], seeds=[0, 1], simulator="mujoco", name="moved"
 )
-
-
-@pytest.fixture
-def work(context) -> Callable[..., None]:
-    """Does what waits, at most so many steps."""
-
-    def do(context: Context = context, steps: int = 100) -> None:
-        keeper = LeaseKeeper(context, lambda: None)
-        handlers = {
-            "construct": ConstructHandler(context, load_registry()),
-            "simulate": SimulateHandler(context),
-        }
-        for _ in range(steps):
-            waiting = context.jobs.page(limit=1, state="queued")
-            if not waiting:
-                return
-            job = waiting[0]
-            StageRunner(context, handlers[job.stage], keeper, "w").look(job.queue, job.id)
-
-    return do
 
 
 @pytest.fixture
@@ -62,10 +39,10 @@ def elsewhere(context, tmp_path) -> Callable[[], Context]:
 
 
 @pytest.fixture
-def archive(context, submissions, work, tmp_path) -> tuple[str, Path]:
+def archive(context, submissions, tmp_path) -> tuple[str, Path]:
     """An archive of a finished sweep."""
     sweep_id = submissions.submit_sweep(SPEC).sweep.id
-    work()
+    work(context)
     target = tmp_path / "sweep.zip"
     write_archive(context, sweep_id, target)
     return sweep_id, target
@@ -95,10 +72,10 @@ def test_taking_in_twice_changes_nothing(context, archive) -> None:
 
 
 def test_an_unfinished_sweep_goes_on_elsewhere_from_its_journals(
-    context, submissions, work, elsewhere, tmp_path
+    context, submissions, elsewhere, tmp_path
 ) -> None:
     sweep_id = submissions.submit_sweep(SPEC).sweep.id
-    work(steps=1)
+    work(context, steps=1)
     asked = {job.id: job.requests for job in context.jobs.page(limit=10)}
     assert sum(asked.values()) > 0
     write_archive(context, sweep_id, tmp_path / "half.zip")

@@ -2,44 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from working import work
 
-import pytest
-
-from buildarena_pipeline.models import load_registry
 from buildarena_pipeline.specs import Budget, SweepSpec
-from buildarena_pipeline.stages import LeaseKeeper, StageRunner
-from buildarena_simworker.simulate import SimulateHandler
-from buildarena_worker.construct import ConstructHandler
 
 WISH = {"tasks": ["lift-1"], "models": ["builtin/expert"], "simulator": "mujoco"}
 
 
-@pytest.fixture
-def work(context) -> Callable[[], None]:
-    """Does whatever waits, with four workers at once, until nothing does."""
-
-    def work_all() -> None:
-        registry = load_registry()
-        keeper = LeaseKeeper(context, lambda: None)
-        keeper.start()
-        runners = {
-            "construct": StageRunner(context, ConstructHandler(context, registry), keeper, "c"),
-            "simulate.mujoco": StageRunner(context, SimulateHandler(context), keeper, "s"),
-        }
-        with ThreadPoolExecutor(4) as threads:
-            while waiting := context.jobs.page(limit=100, state="queued"):
-                list(threads.map(lambda job: runners[job.queue].look(job.queue, job.id), waiting))
-        keeper.stop()
-
-    return work_all
-
-
-def test_a_sweep_stops_at_its_budget_and_goes_on_with_more(context, submissions, work) -> None:
+def test_a_sweep_stops_at_its_budget_and_goes_on_with_more(context, submissions) -> None:
     spec = SweepSpec(**WISH, seeds=[0, 1, 2, 3, 4, 5], budget=Budget(max_requests=20))
     sweep_id = submissions.submit_sweep(spec).sweep.id
-    work()
+    work(context, threads=4)
     assert context.sweeps.get(sweep_id).state == "limit"
     budget = context.budgets.get(sweep_id)
     assert budget.spent_requests == 20
@@ -51,7 +24,7 @@ def test_a_sweep_stops_at_its_budget_and_goes_on_with_more(context, submissions,
         spec.model_copy(update={"budget": Budget(max_requests=10_000)}), take_up=True
     )
     assert (again.sweep.id, again.taken_up) == (sweep_id, True)
-    work()
+    work(context, threads=4)
     assert context.sweeps.progress(sweep_id).outcomes == {"success": 6}
     jobs = context.jobs.page(limit=10)
     # No reply was paid for twice: the budget knows of no request that the journals lack.
@@ -60,10 +33,10 @@ def test_a_sweep_stops_at_its_budget_and_goes_on_with_more(context, submissions,
     assert journaled == sum(job.requests for job in jobs)
 
 
-def test_a_small_token_budget_stops_before_the_first_request(context, submissions, work) -> None:
+def test_a_small_token_budget_stops_before_the_first_request(context, submissions) -> None:
     spec = SweepSpec(**WISH, seeds=[0], budget=Budget(max_tokens=1000))
     sweep_id = submissions.submit_sweep(spec).sweep.id
-    work()
+    work(context, threads=4)
     assert context.sweeps.get(sweep_id).state == "limit"
     assert context.budgets.get(sweep_id).spent_requests == 0
     (job,) = context.jobs.page(limit=2)
@@ -71,10 +44,10 @@ def test_a_small_token_budget_stops_before_the_first_request(context, submission
     assert "max_tokens is 1,000, 0 is spent" in job.detail
 
 
-def test_taking_up_a_finished_sweep_does_nothing_twice(submissions, work) -> None:
+def test_taking_up_a_finished_sweep_does_nothing_twice(context, submissions) -> None:
     spec = SweepSpec(**WISH, seeds=[0])
     first = submissions.submit_sweep(spec)
-    work()
+    work(context, threads=4)
     second = submissions.submit_sweep(spec, take_up=True)
     assert (second.sweep.id, second.added) == (first.sweep.id, 0)
     other = submissions.submit_sweep(SweepSpec(**WISH, seeds=[0, 1]), take_up=True)

@@ -5,43 +5,29 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pytest
+from working import work
 
 from buildarena_pipeline.models import load_registry
 from buildarena_pipeline.specs import JobSpec
-from buildarena_pipeline.stages import LeaseKeeper, StageRunner
 from buildarena_pipeline.submission import Submissions
-from buildarena_simworker.simulate import SimulateHandler
 from buildarena_store import Job
-from buildarena_worker.construct import ConstructHandler
 from buildarena_worker.verify import Verifier
 
 
 @pytest.fixture
-def run(context) -> Callable[..., Job]:
+def run(context, submissions) -> Callable[..., Job]:
     """Submits a job and works on it until it has ended."""
-    registry = load_registry()
 
-    def work(**spec: object) -> Job:
-        job, _ = Submissions(context, registry).submit_job(
+    def submit_and_work(**spec: object) -> Job:
+        job, _ = submissions.submit_job(
             JobSpec.model_validate(
                 {"task": "support-1", "model": "builtin/expert", "simulator": "mujoco", **spec}
             )
         )
-        keeper = LeaseKeeper(context, lambda: None)
-        keeper.start()
-        handlers = {
-            "construct": ConstructHandler(context, registry),
-            "simulate": SimulateHandler(context),
-        }
-        for _ in range(20):
-            job = context.jobs.get(job.id)
-            if job.state == "done":
-                break
-            StageRunner(context, handlers[job.stage], keeper, "w").look(job.queue, job.id)
-        keeper.stop()
-        return job
+        work(context)
+        return context.jobs.get(job.id)
 
-    return work
+    return submit_and_work
 
 
 def test_a_bridge_is_built_simulated_scored_and_verified(context, run) -> None:

@@ -9,15 +9,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from working import work
 
-from buildarena_pipeline.models import load_registry
 from buildarena_pipeline.specs import JobSpec
-from buildarena_pipeline.stages import LeaseKeeper, StageRunner
-from buildarena_pipeline.submission import Submissions
-from buildarena_simworker.simulate import SimulateHandler
 from buildarena_worker import builtin
 from buildarena_worker.builtin import expert
-from buildarena_worker.construct import ConstructHandler
 from buildarena_worker.messages import Reply, Request, ToolCall
 
 LURES = (
@@ -106,20 +102,14 @@ def test_lures_reach_nothing(play, monkeypatch, workflow, task) -> None:
     assert type(played.failure).__name__ == "ConstructionFailedError"
 
 
-def test_lures_in_a_good_machine_go_the_whole_road_as_text(context, monkeypatch, tmp_path) -> None:
+def test_lures_in_a_good_machine_go_the_whole_road_as_text(
+    context, submissions, monkeypatch, tmp_path
+) -> None:
     monkeypatch.setitem(builtin.MODELS, "expert", spiced_expert())
-    registry = load_registry()
-    job, _ = Submissions(context, registry).submit_job(
+    job, _ = submissions.submit_job(
         JobSpec(task="lift-1", model="builtin/expert", simulator="mujoco")
     )
-    keeper = LeaseKeeper(context, lambda: None)
-    handlers = {
-        "construct": ConstructHandler(context, registry),
-        "simulate": SimulateHandler(context),
-    }
-    for _ in range(2):
-        job = context.jobs.get(job.id)
-        StageRunner(context, handlers[job.stage], keeper, "w").look(job.queue, job.id)
+    work(context)
     job = context.jobs.get(job.id)
     assert job.outcome == "success", job.detail
     transcript = context.artifacts.get(context.jobs.artifacts(job.id)["transcript"]).decode()

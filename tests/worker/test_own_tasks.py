@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 import yaml
 from suspension_bridge import suspension_bridge
+from working import work
 
 from buildarena_api.tasks import EXAMPLE
 from buildarena_benchmark import builtin_tasks, parse_own_task
@@ -16,12 +17,9 @@ from buildarena_pipeline.external import ExternalSessions
 from buildarena_pipeline.models import load_registry
 from buildarena_pipeline.prompt_packs import PromptPacks
 from buildarena_pipeline.specs import JobSpec
-from buildarena_pipeline.stages import LeaseKeeper, StageRunner
 from buildarena_pipeline.submission import Submissions
-from buildarena_simworker.simulate import SimulateHandler
 from buildarena_store import Job
 from buildarena_worker.builtin.designs import DESIGNS
-from buildarena_worker.construct import ConstructHandler
 from buildarena_worker.session import Session
 from buildarena_worker.session_io import SessionIO
 from buildarena_worker.verify import Verifier
@@ -34,39 +32,28 @@ OTHER = EXAMPLE.replace("final_mass: 200", "final_mass: 300")
 def finish(context) -> Callable[[str], Job]:
     """Works on a job until it has ended."""
 
-    def work(job_id: str) -> Job:
-        keeper = LeaseKeeper(context, lambda: None)
-        keeper.start()
-        handlers = {
-            "construct": ConstructHandler(context, load_registry()),
-            "simulate": SimulateHandler(context),
-        }
-        for _ in range(20):
-            job = context.jobs.get(job_id)
-            if job.state == "done":
-                break
-            StageRunner(context, handlers[job.stage], keeper, "w").look(job.queue, job.id)
-        keeper.stop()
-        return job
+    def finish_job(job_id: str) -> Job:
+        work(context)
+        return context.jobs.get(job_id)
 
-    return work
+    return finish_job
 
 
 @pytest.fixture
 def submit(context) -> Callable[..., Job]:
-    def work(**spec: object) -> Job:
+    def submit_job(**spec: object) -> Job:
         given = {"model": "builtin/random", "simulator": "mujoco", **spec}
         job, _ = Submissions(context, load_registry()).submit_job(JobSpec.model_validate(given))
         return job
 
-    return work
+    return submit_job
 
 
 @pytest.fixture
 def play(context) -> Callable[..., Job]:
     """Builds the expert's bridge of another task, as an outside agent, and submits it."""
 
-    def work(task: str, design: str = "support-1", seed: int = 0) -> Job:
+    def play_task(task: str, design: str = "support-1", seed: int = 0) -> Job:
         sessions = ExternalSessions(context)
         job = sessions.open(task=task, agent="me", seed=seed, simulator="mujoco")
         for tool, arguments in next(iter(DESIGNS[design](0).parts.values())).actions:
@@ -74,7 +61,7 @@ def play(context) -> Callable[..., Job]:
             assert done.ok, done.feedback
         return sessions.submit(job.id)
 
-    return work
+    return play_task
 
 
 def add(context, text: str) -> str:

@@ -1,0 +1,34 @@
+"""Does what waits, with the real stage handlers, in the test's process."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+
+from buildarena_pipeline.context import Context
+from buildarena_pipeline.models import load_registry
+from buildarena_pipeline.stages import LeaseKeeper, StageRunner
+from buildarena_simworker.simulate import SimulateHandler
+from buildarena_worker.construct import ConstructHandler
+
+
+def work(context: Context, *, steps: int = 1000, threads: int = 1) -> None:
+    """Works until nothing waits.
+
+    Args:
+        context: Where the jobs are.
+        steps: Stages at the most.
+        threads: Stages at once.
+    """
+    keeper = LeaseKeeper(context, lambda: None)
+    keeper.start()
+    handlers = {
+        "construct": ConstructHandler(context, load_registry()),
+        "simulate": SimulateHandler(context),
+    }
+    runners = {stage: StageRunner(context, made, keeper, "w") for stage, made in handlers.items()}
+    with ThreadPoolExecutor(threads) as pool:
+        while steps > 0 and (waiting := context.jobs.page(limit=100, state="queued")):
+            waiting = waiting[:steps]
+            steps -= len(waiting)
+            list(pool.map(lambda job: runners[job.stage].look(job.queue, job.id), waiting))
+    keeper.stop()
