@@ -192,12 +192,7 @@ def _show(sweep: dict[str, Any], *, as_json: bool) -> None:
     console.print(f"{progress['requests']:,} model requests, ${progress['cost_usd']:.2f}")
     if sweep["budget"] is not None:
         console.print(f"budget: {spent(sweep['budget'])}")
-    if sweep["state"] == "limit":
-        console.print(
-            f"The budget is used up: `buildarena sweep resume {sweep['id']} --max-cost-usd …` "
-            "gives it more.",
-            soft_wrap=True,
-        )
+    _tell_of_limit(sweep)
 
 
 def _show_estimate(estimate: dict[str, Any], *, as_json: bool) -> None:
@@ -225,9 +220,20 @@ def _show_estimate(estimate: dict[str, Any], *, as_json: bool) -> None:
     console.print(table)
 
 
+def _tell_of_limit(sweep: dict[str, Any]) -> None:
+    if sweep["state"] == "limit":
+        console.print(
+            f"The budget is used up: `buildarena sweep resume {sweep['id']} --max-cost-usd …` "
+            "gives it more.",
+            soft_wrap=True,
+        )
+
+
 def _watch(client: Client, sweep_id: str, *, as_json: bool) -> dict[str, Any]:
     if not as_json:
-        return watch_sweep(client, sweep_id)
+        watched = watch_sweep(client, sweep_id)
+        _tell_of_limit(watched)
+        return watched
     while True:
         sweep: dict[str, Any] = client.get_patiently(f"/v1/sweeps/{sweep_id}")
         if ended(sweep):
