@@ -61,7 +61,7 @@ def pick_up_times(database: Database, strikes: Sequence[Strike]) -> list[float]:
     """Seconds from the death of a worker to the next hold on each job that it held."""
     # A worker's id ends with its process'; a prefork worker's jobs are held by its children.
     query = text(
-        "SELECT a.worker, a.started_at, (SELECT min(b.started_at) FROM attempts b "
+        "SELECT a.worker, a.started_at, a.ended_at, (SELECT min(b.started_at) FROM attempts b "
         "WHERE b.job_id = a.job_id AND b.token > a.token) AS next "
         "FROM attempts a WHERE a.result = 'lost'"
     )
@@ -72,7 +72,9 @@ def pick_up_times(database: Database, strikes: Sequence[Strike]) -> list[float]:
     with database.transaction() as connection:
         for row in connection.execute(query):
             pid = int(row.worker.rsplit(":", 1)[1])
-            died = [at for dead, at in deaths if dead == pid and at >= row.started_at]
+            died = [
+                at for dead, at in deaths if dead == pid and row.started_at <= at <= row.ended_at
+            ]
             if died and row.next is not None:
                 times.append(_seconds(min(died), row.next))
     return sorted(times)

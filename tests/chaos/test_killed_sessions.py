@@ -68,7 +68,7 @@ def test_a_session_that_is_killed_again_and_again_builds_the_same_machine(
             "BUILDARENA_BROKER_URL": settings.required_broker_url(),
             "BUILDARENA_DATA": str(settings.data),
             "BUILDARENA_MODELS_FILE": str(file),
-            "BUILDARENA_LEASE_S": "1.5",
+            "BUILDARENA_LEASE_S": "4",
             "BUILDARENA_SESSIONS_PER_WORKER": "1",
             "BUILDARENA_MAX_FAULTS": "1000",
         }
@@ -76,7 +76,7 @@ def test_a_session_that_is_killed_again_and_again_builds_the_same_machine(
         while kills < KILLS:
             with worker(environment) as process:
                 seen = standin.counts.requests
-                wait_until(lambda seen=seen: standin.counts.requests > seen, 60, "a request")
+                wait_until(lambda seen=seen: standin.counts.requests > seen, 120, "a request")
                 time.sleep(rng.uniform(0, 12 * LATENCY_S))
                 if context.jobs.get(job.id).stage != "construct":
                     break
