@@ -7,8 +7,8 @@ import pytest
 
 from buildarena_pipeline.errors import PassingFaultError, PermanentFaultError
 from buildarena_pipeline.specs import JobSpec
-from buildarena_pipeline.stages import LeaseKeeper, StageRunner
-from buildarena_store import JobScore, Lease
+from buildarena_pipeline.stages import Hold, LeaseKeeper, StageRunner
+from buildarena_store import JobScore
 
 SCORE = JobScore(outcome="unsuccessful", success=False, indicator=1.0)
 
@@ -29,9 +29,9 @@ def run(context, submissions):
 
 
 def finisher(context) -> Callable[..., None]:
-    def finish(lease: Lease, _: object) -> None:
+    def finish(hold: Hold) -> None:
         with context.database.transaction() as connection:
-            context.results.finish(lease, SCORE, connection=connection)
+            context.results.finish(hold.lease, SCORE, connection=connection)
 
     return finish
 
@@ -41,11 +41,11 @@ def test_a_handler_ends_the_job(context, run) -> None:
 
 
 def test_a_lease_lives_as_long_as_its_handler(context, run) -> None:
-    def slow(lease: Lease, still_held: Callable[[], bool]) -> None:
+    def slow(hold: Hold) -> None:
         time.sleep(context.settings.lease_s * 1.5)
         context.leases.recover()
-        assert still_held()
-        finisher(context)(lease, still_held)
+        assert not hold.over
+        finisher(context)(hold)
 
     assert run(slow).outcome == "unsuccessful"
 
@@ -53,16 +53,16 @@ def test_a_lease_lives_as_long_as_its_handler(context, run) -> None:
 def test_a_handler_hears_that_its_job_was_cancelled(context, run) -> None:
     heard: list[bool] = []
 
-    def cancelled(lease: Lease, still_held: Callable[[], bool]) -> None:
+    def cancelled(hold: Hold) -> None:
         with context.database.transaction() as connection:
-            context.jobs.cancel([lease.job.id], connection=connection)
+            context.jobs.cancel([hold.lease.job.id], connection=connection)
         deadline = time.monotonic() + 5
-        while still_held() and time.monotonic() < deadline:
+        while not hold.over and time.monotonic() < deadline:
             time.sleep(0.05)
-        heard.append(still_held())
+        heard.append(hold.over)
 
     assert run(cancelled).outcome == "cancelled"
-    assert heard == [False]
+    assert heard == [True]
 
 
 @pytest.mark.parametrize(
@@ -88,8 +88,8 @@ def test_what_is_held_at_shutdown_is_handed_back(context, submissions) -> None:
     keeper = LeaseKeeper(context, lambda: None)
     keeper.start()
     lease = context.leases.claim("construct", owner="w")
-    with keeper.keeping(lease) as still_held:
+    with keeper.keeping(lease) as hold:
         keeper.stop()
-        assert not still_held()
+        assert hold.over
     assert context.jobs.get(job.id).state == "queued"
     assert [a.result for a in context.jobs.attempts(job.id)] == ["handed_back"]

@@ -101,7 +101,7 @@ def test_heartbeats_keep_a_lease_and_tell_of_lost_ones(context: Context, add) ->
     kept, lost = claim(context), claim(context)
     with context.database.transaction() as connection:
         context.jobs.cancel([lost.job.id], connection=connection)
-    assert context.leases.heartbeat([kept, lost]) == {kept.job.id}
+    assert context.leases.heartbeat([kept, lost]) == {kept.job.id: False}
     context.leases.duration = timedelta(seconds=0.05)
     context.leases.heartbeat([kept])
     time.sleep(0.1)

@@ -6,6 +6,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import structlog
@@ -19,15 +20,32 @@ from buildarena_store import Lease, StaleLeaseError
 log = structlog.get_logger(__name__)
 
 
+@dataclass(slots=True, eq=False)
+class Hold:
+    """A lease that is worked under, as the last heartbeat found it.
+
+    Attributes:
+        lease: The lease.
+        over: Whether it ended: by its time, or because the job was cancelled.
+        budgeted: Whether a budget pays for the job.
+    """
+
+    lease: Lease
+    over: bool = False
+    budgeted: bool = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.budgeted = self.lease.budgeted
+
+
 class StageHandler(Protocol):
     """Does a job's stage. It may run twice for one job, so it must be idempotent."""
 
-    def __call__(self, lease: Lease, still_held: Callable[[], bool]) -> None:
+    def __call__(self, hold: Hold) -> None:
         """Works on the leased job and moves it on.
 
         Args:
-            lease: The right to work on the job.
-            still_held: Tells whether the lease goes on; when not, stop without writing.
+            hold: The right to work on the job; when it is over, stop without writing.
 
         Raises:
             StaleLeaseError: The lease is over.
@@ -47,7 +65,7 @@ class LeaseKeeper:
     def __init__(self, context: Context, on_beat: Callable[[], None]) -> None:
         self._context = context
         self._on_beat = on_beat
-        self._held: dict[str, Lease] = {}
+        self._held: dict[str, Hold] = {}
         self._guard = threading.Lock()
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="leases", daemon=True)
@@ -62,23 +80,23 @@ class LeaseKeeper:
         self._thread.join(timeout=10)
         with self._guard:
             held, self._held = list(self._held.values()), {}
-        for lease in held:
+        for hold in held:
+            hold.over = True
             try:
-                self._context.leases.hand_back(lease)
+                self._context.leases.hand_back(hold.lease)
             except (StaleLeaseError, OperationalError):
-                log.info("not_handed_back", job=lease.job.id)
+                log.info("not_handed_back", job=hold.lease.job.id)
 
     @contextmanager
-    def keeping(self, lease: Lease) -> Iterator[Callable[[], bool]]:
-        """Keeps a lease alive inside the block; yields whether it is still held."""
+    def keeping(self, lease: Lease) -> Iterator[Hold]:
+        """Keeps a lease alive inside the block."""
+        hold = Hold(lease)
         with self._guard:
-            self._held[lease.job.id] = lease
+            self._held[lease.job.id] = hold
         try:
-            yield lambda: self._held.get(lease.job.id) is lease
+            yield hold
         finally:
-            with self._guard:
-                if self._held.get(lease.job.id) is lease:
-                    del self._held[lease.job.id]
+            self._forget(hold)
 
     def _run(self) -> None:
         period_s = self._context.settings.lease_s / 4
@@ -92,13 +110,21 @@ class LeaseKeeper:
         self._on_beat()
         with self._guard:
             held = list(self._held.values())
-        kept = self._context.leases.heartbeat(held)
-        for lease in held:
-            if lease.job.id not in kept:
-                log.warning("lease_lost", job=lease.job.id, token=lease.token)
-                with self._guard:
-                    if self._held.get(lease.job.id) is lease:
-                        del self._held[lease.job.id]
+        kept = self._context.leases.heartbeat([hold.lease for hold in held])
+        for hold in held:
+            job_id = hold.lease.job.id
+            if job_id in kept:
+                hold.budgeted = kept[job_id]
+            else:
+                log.warning("lease_lost", job=job_id, token=hold.lease.token)
+                self._forget(hold)
+
+    def _forget(self, hold: Hold) -> None:
+        hold.over = True
+        job_id = hold.lease.job.id
+        with self._guard:
+            if self._held.get(job_id) is hold:
+                del self._held[job_id]
 
 
 class StageRunner:
@@ -132,11 +158,11 @@ class StageRunner:
         bound = log.bind(stage=lease.job.stage, token=lease.token)
         with (
             structlog.contextvars.bound_contextvars(job=lease.job.id),
-            self._keeper.keeping(lease) as still_held,
+            self._keeper.keeping(lease) as hold,
         ):
             try:
                 with span(lease.job.stage, job=lease.job.id, token=lease.token):
-                    self._handler(lease, still_held)
+                    self._handler(hold)
             except StaleLeaseError:
                 bound.warning("lease_over")
             except PassingFaultError as fault:

@@ -120,12 +120,6 @@ class Budgets:
             row = connection.execute(select(budgets).where(budgets.c.id == budget_id)).first()
         return None if row is None else _budget(row)
 
-    def of_job(self, job_id: str) -> list[str]:
-        """Ids of the budgets that pay for a job."""
-        query = select(budgets.c.id).join(jobs, _PAYS).where(jobs.c.id == job_id)
-        with self._database.statement() as connection:
-            return [row.id for row in connection.execute(query)]
-
     def reserve(self, lease: Lease, need: Need) -> Shortage | None:
         """Puts aside what the job's next request may cost, in all its budgets or in none.
 

@@ -31,7 +31,7 @@ from buildarena_store.database import Database
 from buildarena_store.errors import StaleLeaseError
 from buildarena_store.jobs import JOB_COLUMNS, Job, job_from_row
 from buildarena_store.reservations import release
-from buildarena_store.tables import attempts, jobs
+from buildarena_store.tables import attempts, budgets, jobs
 
 RENUDGE_AFTER = timedelta(seconds=10)
 """A queued job whose message may have been lost is announced again after this time."""
@@ -134,23 +134,25 @@ class Leases:
         job = job_from_row(row)
         return Lease(job=job, owner=owner, token=job.lease_token, budgeted=row.budgeted)
 
-    def heartbeat(self, leases: Sequence[Lease]) -> set[str]:
+    def heartbeat(self, leases: Sequence[Lease]) -> dict[str, bool]:
         """Renews leases.
 
         Returns:
-            Ids of the jobs whose lease is still ours; work on the others must stop.
+            Ids of the jobs whose lease is still ours, each with whether a budget pays for the
+            job now; work on the others must stop.
         """
         if not leases:
-            return set()
+            return {}
         pairs = [(lease.job.id, lease.token) for lease in leases]
-        with self._database.transaction() as connection:
+        paying = select(budgets).where(budgets.c.id.in_([jobs.c.payer, jobs.c.owner]))
+        with self._database.statement() as connection:
             rows = connection.execute(
                 update(jobs)
                 .where(jobs.c.state == "running", tuple_(jobs.c.id, jobs.c.lease_token).in_(pairs))
                 .values(lease_expires_at=events.now + self.duration)
-                .returning(jobs.c.id)
+                .returning(jobs.c.id, paying.exists().label("budgeted"))
             )
-            return {row.id for row in rows}
+            return {row.id: row.budgeted for row in rows}
 
     def advance(
         self,

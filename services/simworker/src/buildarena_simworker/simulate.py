@@ -14,6 +14,7 @@ from buildarena_pipeline.context import Context
 from buildarena_pipeline.errors import PassingFaultError, PermanentFaultError
 from buildarena_pipeline.queues import CONSTRUCT
 from buildarena_pipeline.scoring import best_rollout, rollout_score, task_of
+from buildarena_pipeline.stages import Hold
 from buildarena_simulation import (
     SIMULATION_VERSION,
     MachineNotSimulable,
@@ -25,7 +26,6 @@ from buildarena_simulation import (
 from buildarena_store import (
     ArtifactInfo,
     ArtifactMissingError,
-    Lease,
     RolloutRecord,
     StaleLeaseError,
 )
@@ -53,9 +53,10 @@ class SimulateHandler:
     def __init__(self, context: Context) -> None:
         self._context = context
 
-    def __call__(self, lease: Lease, still_held: Callable[[], bool]) -> None:
+    def __call__(self, hold: Hold) -> None:
         """Simulates the job's waiting rollout; the job ends, or goes back to its session."""
-        context, job = self._context, lease.job
+        context, lease = self._context, hold.lease
+        job = lease.job
         records = context.rollouts.read(job.id)
         waiting = [record for record in records if record.finished_at is None]
         if not waiting:
@@ -67,7 +68,7 @@ class SimulateHandler:
             trajectory = None
         else:
             task = task_of(job, context.catalogue)
-            done = self._simulate(task, request, lambda: _require(lease, still_held))
+            done = self._simulate(task, request, lambda: _require(hold))
             values, trajectory = _values(request, done), done.trajectory
         with context.database.transaction() as connection:
             if trajectory is not None:
@@ -168,9 +169,9 @@ def _controls(presses: Sequence[Any] | None) -> tuple[KeyPress, ...] | None:
     return None if presses is None else tuple(KeyPress(**press) for press in presses)
 
 
-def _require(lease: Lease, still_held: Callable[[], bool]) -> None:
-    if not still_held():
-        raise StaleLeaseError(lease.job.id, lease.token)
+def _require(hold: Hold) -> None:
+    if hold.over:
+        raise StaleLeaseError(hold.lease.job.id, hold.lease.token)
 
 
 def _trace(trajectory: Trajectory) -> list[list[float]]:

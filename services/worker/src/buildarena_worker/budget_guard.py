@@ -6,12 +6,11 @@ import time
 from collections.abc import Callable
 from decimal import Decimal
 
-from buildarena_store import Budgets, Lease, Need, Shortage
+from buildarena_pipeline.stages import Hold
+from buildarena_store import Budgets, Need, Shortage
 from buildarena_worker.errors import LeaseLostError, WorkerError
 from buildarena_worker.messages import Request
 
-LOOK_AGAIN_S = 5.0
-"""A budget that is given to a sweep while its jobs go on takes effect within this time."""
 WAIT_S = 0.2
 CHARACTERS_PER_TOKEN = 3
 """English has about four; fewer puts aside a little too much rather than too little."""
@@ -39,20 +38,15 @@ class BudgetGuard:
 
     Args:
         budgets: Where budgets are.
-        lease: The hold on the job.
+        hold: The hold on the job. A budget that its sweep is given meanwhile takes effect with the
+            next heartbeat.
         price: What tokens of the job's model cost.
-        still_held: Tells whether the hold goes on.
     """
 
-    def __init__(
-        self, budgets: Budgets, lease: Lease, price: Price, still_held: Callable[[], bool]
-    ) -> None:
+    def __init__(self, budgets: Budgets, hold: Hold, price: Price) -> None:
         self._budgets = budgets
-        self._lease = lease
+        self._hold = hold
         self._price = price
-        self._still_held = still_held
-        self._has_any = lease.budgeted
-        self._looked_at = time.monotonic()
 
     def __call__(self, request: Request) -> None:
         """Puts aside what a request may cost; waits while open requests may give back enough.
@@ -61,22 +55,15 @@ class BudgetGuard:
             BudgetUsedUpError: No budget is left for it.
             LeaseLostError: The hold ended while it waited.
         """
-        if not self._any_budget():
+        if not self._hold.budgeted:
             return
         need = self._need(request)
-        while (shortage := self._budgets.reserve(self._lease, need)) is not None:
+        while (shortage := self._budgets.reserve(self._hold.lease, need)) is not None:
             if not shortage.passing:
                 raise BudgetUsedUpError(shortage)
-            if not self._still_held():
+            if self._hold.over:
                 raise LeaseLostError("the lease ended while the job waited for its budget")
             time.sleep(WAIT_S)
-
-    def _any_budget(self) -> bool:
-        now = time.monotonic()
-        if now - self._looked_at > LOOK_AGAIN_S:
-            self._has_any = bool(self._budgets.of_job(self._lease.job.id))
-            self._looked_at = now
-        return self._has_any
 
     def _need(self, request: Request) -> Need:
         given = request.model_config["decoding"].get("max_tokens")

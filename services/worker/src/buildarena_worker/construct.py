@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from decimal import Decimal
 
 from buildarena_pipeline.context import Context
@@ -13,6 +12,7 @@ from buildarena_pipeline.prices import price_usd
 from buildarena_pipeline.prompt_packs import PromptPack, PromptPacks
 from buildarena_pipeline.queues import simulate_queue
 from buildarena_pipeline.scoring import failure_score, rollout_score, task_of
+from buildarena_pipeline.stages import Hold
 from buildarena_simulation import Trajectory
 from buildarena_store import (
     Job,
@@ -33,6 +33,7 @@ from buildarena_worker.llm import ModelClients
 from buildarena_worker.rounds import Loop, run_session
 from buildarena_worker.session import Session
 from buildarena_worker.session_io import SessionIO, SuspendedError
+from buildarena_worker.turnstile import Turnstile
 from buildarena_worker.workflow import SessionEnd, Workflows
 
 JSON = "application/json"
@@ -52,11 +53,12 @@ class ConstructHandler:
         self._clients = ModelClients(registry, context.settings.broker_url)
         self._packs = PromptPacks(context.settings.prompt_packs)
         self._workflows = Workflows(context.settings.workflows)
+        self._turnstile = Turnstile()
 
-    def __call__(self, lease: Lease, still_held: Callable[[], bool]) -> None:
+    def __call__(self, hold: Hold) -> None:
         """Runs the job's session as far as it gets: to a simulation, or to its end."""
-        job = lease.job
-        guard = BudgetGuard(self._context.budgets, lease, self._price_of(job), still_held)
+        lease, job = hold.lease, hold.lease.job
+        guard = BudgetGuard(self._context.budgets, hold, self._price_of(job))
         task = task_of(job, self._context.catalogue)
         pack = pack_of(job, self._packs)
         io = SessionIO(
@@ -64,17 +66,19 @@ class ConstructHandler:
             entries=self._context.journal.read(job.id),
             rollouts=self._context.rollouts.read(job.id),
             append=lambda entry: self._append(lease, entry),
-            still_held=still_held,
+            still_held=lambda: not hold.over,
             limits=job.limits,
             load_trajectory=lambda digest: Trajectory.from_parquet(
                 self._context.artifacts.get(digest)
             ),
             reserve=guard,
+            waiting=self._turnstile.outside,
         )
         session = Session(task=task, seed=job.seed, model_config=job.model_config, pack=pack, io=io)
         try:
             workflow = self._workflows.find(str(job.track_config["workflow"]))
-            end = run_session(session, workflow, loop_of(job))
+            with self._turnstile.inside():
+                end = run_session(session, workflow, loop_of(job))
         except SuspendedError as suspended:
             self._suspend(lease, session, suspended)
         except BudgetUsedUpError as used_up:

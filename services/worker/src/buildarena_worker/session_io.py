@@ -8,6 +8,7 @@ again: it gets the kept answers first.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from decimal import Decimal
 from typing import Any, Protocol
@@ -102,6 +103,7 @@ class SessionIO:
         limits: The job's limits.
         load_trajectory: Reads a kept trajectory by its hash.
         reserve: Puts aside what a new request may cost, before it is sent.
+        waiting: What surrounds the wait for a new reply.
     """
 
     def __init__(
@@ -115,7 +117,9 @@ class SessionIO:
         limits: Mapping[str, Any],
         load_trajectory: Callable[[str], Trajectory],
         reserve: Callable[[Request], None] = lambda _: None,
+        waiting: Callable[[], AbstractContextManager[None]] = nullcontext,
     ) -> None:
+        self._waiting = waiting
         self._reserve = reserve
         self._load_trajectory = load_trajectory
         self._client = client
@@ -162,8 +166,11 @@ class SessionIO:
             raise JournalMismatchError(f"the journal ends at entry {self.sequence}")
         if not self._still_held():
             raise LeaseLostError("the lease is over")
-        self._reserve(request)
-        with span("model request", stage=stage, role=role, sequence=self.sequence):
+        with (
+            span("model request", stage=stage, role=role, sequence=self.sequence),
+            self._waiting(),
+        ):
+            self._reserve(request)
             answer = self._client.complete(request)
         entry = JournalEntry(
             sequence=self.sequence,

@@ -10,12 +10,10 @@ import asyncio
 import os
 import random
 import time
-from collections.abc import Callable, Coroutine, Mapping
-from itertools import cycle
+from collections.abc import Mapping
 from typing import Any
 
 import structlog
-from pydantic_ai.direct import model_request
 from pydantic_ai.exceptions import (
     ContentFilterError,
     ModelAuthenticationError,
@@ -26,8 +24,6 @@ from pydantic_ai.exceptions import (
     ModelQuotaExceededError,
     ModelRateLimitError,
 )
-from pydantic_ai.messages import ModelResponse
-from pydantic_ai.models import Model
 from pydantic_ai.settings import ModelSettings
 
 from buildarena_pipeline.errors import PassingFaultError, PermanentFaultError
@@ -36,16 +32,14 @@ from buildarena_pipeline.prices import price_usd
 from buildarena_store import Usage
 from buildarena_worker.llm.request_loop import RequestLoop
 from buildarena_worker.llm.retries import RetryPolicy
+from buildarena_worker.llm.senders import sender_for
 from buildarena_worker.llm.throttle import Throttle
-from buildarena_worker.llm.wire import from_wire, request_parameters, to_wire
+from buildarena_worker.llm.wire import Answered
 from buildarena_worker.messages import Reply, Request
 from buildarena_worker.session_io import Answer
 
 log = structlog.get_logger(__name__)
 
-POOLS = 16
-"""Connection pools per model over httpx: it looks at all connections of a pool for each request,
-so that many small pools carry hundreds of open requests at less cost than one large one."""
 OUTAGE_DELAY_S = 30.0
 """How long a job waits after its provider failed through all retries."""
 RETRIED_STATUS = frozenset({408, 409, 425, 429, 500, 502, 503, 504, 520, 522, 524, 529})
@@ -76,10 +70,7 @@ class ProviderClient:
         self._policy = policy or RetryPolicy()
         self._wire = provider.wire
         self._key = _key_of(entry, provider)
-        pools = 1 if provider.wire == "openai" else POOLS
-        shards = [_make_model(entry, provider, self._key) for _ in range(pools)]
-        self._models = cycle([model for model, _ in shards])
-        self._closers = [close for _, close in shards]
+        self._sender = sender_for(entry, provider, self._key)
         self._rng = random.Random()  # noqa: S311 - spreads retries, guards nothing
 
     def complete(self, request: Request) -> Answer:
@@ -95,8 +86,7 @@ class ProviderClient:
         """Closes the connections to the provider."""
 
         async def close() -> None:
-            for close_pool in self._closers:
-                await close_pool()
+            await self._sender.close()
             await self._throttle.close()
 
         REQUESTS.run(close())
@@ -105,7 +95,7 @@ class ProviderClient:
         started = time.monotonic()
         for tries in range(1, self._policy.tries + 1):
             try:
-                response = await self._send(request)
+                answered = await self._send(request)
             except ModelContextWindowExceededError as error:
                 return _own_failure("context_overflow", str(error), started, tries)
             except ContentFilterError as error:
@@ -123,27 +113,22 @@ class ProviderClient:
                 log.info("model_retry", model=self._entry.name, tries=tries, wait_s=wait_s)
                 await asyncio.sleep(wait_s)
             else:
-                return self._answer(response, time.monotonic() - started, tries)
+                return self._answer(answered, time.monotonic() - started, tries)
         raise AssertionError("the last try returns or raises")
 
-    async def _send(self, request: Request) -> ModelResponse:
+    async def _send(self, request: Request) -> Answered:
         """Sends a request once, when the provider's shared limit lets it."""
         async with self._throttle.slot() as slot:
             try:
-                response = await asyncio.wait_for(
-                    model_request(
-                        next(self._models),
-                        to_wire(request.messages),
-                        model_settings=self._settings(request),
-                        model_request_parameters=request_parameters(request.tools),
-                    ),
-                    timeout=self._policy.timeout_s,
-                )
+                async with asyncio.timeout(self._policy.timeout_s):
+                    answered = await self._sender.send(
+                        request.messages, request.tools, self._settings(request)
+                    )
             except (ModelRateLimitError, ModelOverloadedError):
                 slot.was_too_much()
                 raise
             slot.went_well()
-            return response
+            return answered
 
     def _settings(self, request: Request) -> ModelSettings:
         decoding: Mapping[str, Any] = request.model_config["decoding"]
@@ -158,8 +143,8 @@ class ProviderClient:
             settings["parallel_tool_calls"] = False
         return settings
 
-    def _answer(self, response: ModelResponse, latency_s: float, tries: int) -> Answer:
-        used = response.usage
+    def _answer(self, answered: Answered, latency_s: float, tries: int) -> Answer:
+        used = answered.usage
         reasoning = int(used.details.get("reasoning_tokens", 0)) if used.details else 0
         cost = price_usd(
             self._entry,
@@ -176,11 +161,11 @@ class ProviderClient:
             cost_usd=cost,
         )
         return Answer(
-            reply=from_wire(response),
+            reply=answered.reply,
             usage=usage,
             latency_s=latency_s,
             tries=tries,
-            provider_request_id=response.provider_response_id,
+            provider_request_id=answered.response_id,
         )
 
 
@@ -193,36 +178,6 @@ def _key_of(entry: ModelEntry, provider: ProviderEntry) -> str:
             reason="missing_key",
         )
     return key
-
-
-def _make_model(
-    entry: ModelEntry, provider: ProviderEntry, key: str
-) -> tuple[Model, Callable[[], Coroutine[Any, Any, None]]]:
-    """The provider's model in pydantic-ai, and how to close its connections."""
-    if provider.wire == "openai":
-        from pydantic_ai.providers.openai import OpenAIProvider
-
-        from buildarena_worker.llm.openai_direct import DirectClient, RememberingChatModel
-
-        client = DirectClient(base_url=provider.base_url, api_key=key)
-        model = RememberingChatModel(entry.model, provider=OpenAIProvider(openai_client=client))
-        return model, client.close
-    if provider.wire == "anthropic":
-        from anthropic import AsyncAnthropic
-        from pydantic_ai.models.anthropic import AnthropicModel
-        from pydantic_ai.providers.anthropic import AnthropicProvider
-
-        anthropic = AsyncAnthropic(base_url=provider.base_url, api_key=key, max_retries=0)
-        return AnthropicModel(
-            entry.model, provider=AnthropicProvider(anthropic_client=anthropic)
-        ), anthropic.close
-    from httpx2 import AsyncClient
-    from pydantic_ai.models.google import GoogleModel
-    from pydantic_ai.providers.google import GoogleProvider
-
-    http = AsyncClient(timeout=None)  # the retry policy's own timeout rules
-    google = GoogleProvider(api_key=key, base_url=provider.base_url, http_client=http)
-    return GoogleModel(entry.model, provider=google), http.aclose
 
 
 def _own_failure(finish: str, detail: str, started: float, tries: int) -> Answer:

@@ -23,7 +23,7 @@ from redis.asyncio import Redis
 
 log = structlog.get_logger(__name__)
 
-START, LEAST, MOST = 32.0, 1.0, 2048.0
+START, LEAST, MOST = 64.0, 1.0, 2048.0
 HOLD_S = 900
 """A slot whose holder died is free again after this time; no request may take longer."""
 CALM_S = 2

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from pydantic_ai.messages import (
@@ -20,10 +21,26 @@ from pydantic_ai.messages import (
 )
 from pydantic_ai.models import ModelRequestParameters
 from pydantic_ai.tools import ToolDefinition
+from pydantic_ai.usage import RequestUsage
 
 from buildarena_worker.messages import Message, Reply, Tool, ToolCall
 
 FINISH = {"tool_call": "stop", None: "stop"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Answered:
+    """An answer of a provider.
+
+    Attributes:
+        reply: What the model said.
+        usage: What it used, as the provider counts.
+        response_id: The provider's own id of the answer, if it gave one.
+    """
+
+    reply: Reply
+    usage: RequestUsage
+    response_id: str | None
 
 
 def to_wire(messages: Sequence[Message]) -> list[ModelMessage]:
@@ -59,16 +76,10 @@ def _response_parts(message: Message) -> list[ModelResponsePart]:
     parts: list[ModelResponsePart] = []
     if message.text:
         parts.append(TextPart(content=message.text))
-    for call in message.calls:
-        # A provider accepts only an object here, even when the model gave something else.
-        arguments = call.arguments if isinstance(call.arguments, dict) else {"text": call.arguments}
-        parts.append(
-            ToolCallPart(
-                tool_name=call.name,
-                args=json.dumps(arguments, ensure_ascii=False),
-                tool_call_id=call.id,
-            )
-        )
+    parts += [
+        ToolCallPart(tool_name=call.name, args=arguments_text(call), tool_call_id=call.id)
+        for call in message.calls
+    ]
     return parts
 
 
@@ -87,19 +98,33 @@ def request_parameters(tools: Sequence[Tool]) -> ModelRequestParameters:
     )
 
 
-def from_wire(response: ModelResponse) -> Reply:
-    """A reply in our form."""
+def from_wire(response: ModelResponse) -> Answered:
+    """An answer in our form."""
     text = "".join(part.content for part in response.parts if isinstance(part, TextPart))
     calls = tuple(
-        ToolCall(id=part.tool_call_id, name=part.tool_name, arguments=_arguments(part.args))
+        ToolCall(id=part.tool_call_id, name=part.tool_name, arguments=arguments_of(part.args))
         for part in response.parts
         if isinstance(part, ToolCallPart)
     )
     finish = response.finish_reason
-    return Reply(text=text, calls=calls, finish=FINISH.get(finish, finish or "stop"))
+    return Answered(
+        reply=Reply(text=text, calls=calls, finish=FINISH.get(finish, finish or "stop")),
+        usage=response.usage,
+        response_id=response.provider_response_id,
+    )
 
 
-def _arguments(raw: Any) -> Any:
+def arguments_text(call: ToolCall) -> str:
+    """A call's arguments as JSON: an object, even when the model gave something else.
+
+    Providers accept nothing else in a conversation.
+    """
+    arguments = call.arguments if isinstance(call.arguments, dict) else {"text": call.arguments}
+    return json.dumps(arguments, ensure_ascii=False)
+
+
+def arguments_of(raw: Any) -> Any:
+    """What a model gave as a call's arguments: an object, or text that is no JSON."""
     if not isinstance(raw, str):
         return {} if raw is None else raw
     try:
