@@ -1,8 +1,13 @@
 from __future__ import annotations
 
 import asyncio
+import subprocess
+import sys
 import time
 
+from redis import Redis
+
+from buildarena_worker.llm import throttle as throttle_module
 from buildarena_worker.llm.throttle import Throttle
 
 
@@ -67,6 +72,88 @@ def test_the_limit_halves_on_complaints_and_grows_with_answers(context, broker_u
     start, halved, grown = asyncio.run(main())
     assert (start, halved) == (8, 4)
     assert 4.9 < grown < 5
+    del context
+
+
+HOLDER = """
+import asyncio, sys
+from buildarena_worker.llm import throttle
+throttle.HOLD_S = 1
+
+async def hold():
+    async with throttle.Throttle(sys.argv[1], "p", start=1).slot():
+        print("held", flush=True)
+        await asyncio.sleep(60)
+
+asyncio.run(hold())
+"""
+
+
+def open_slots(broker_url: str) -> int:
+    with Redis.from_url(broker_url) as store:
+        return store.zcard("buildarena:throttle:p:open")
+
+
+def test_a_free_slot_waits_for_the_next_request_and_then_goes_back(context, broker_url) -> None:
+    async def main() -> tuple[list[int], int]:
+        throttle, seen = Throttle(broker_url, "p"), []
+        for _ in range(5):
+            async with throttle.slot():
+                seen.append(open_slots(broker_url))
+            await asyncio.sleep(throttle_module.SPARE_S / 5)
+        await asyncio.sleep(throttle_module.SPARE_S * 2)
+        left = open_slots(broker_url)
+        await throttle.close()
+        return seen, left
+
+    assert asyncio.run(main()) == ([1, 1, 1, 1, 1], 0)
+    del context
+
+
+def test_a_busy_worker_leaves_slots_to_others(context, broker_url) -> None:
+    async def main() -> bool:
+        busy, other = (Throttle(broker_url, "p", start=1) for _ in range(2))
+        served = asyncio.Event()
+
+        async def keep_busy() -> None:
+            while not served.is_set():
+                async with busy.slot() as slot:
+                    await asyncio.sleep(0.01)
+                    slot.verdict = "keep"
+
+        working = asyncio.create_task(keep_busy())
+        await asyncio.sleep(0.1)
+        async with asyncio.timeout(10), other.slot():
+            served.set()
+        await working
+        for throttle in (busy, other):
+            await throttle.close()
+        return served.is_set()
+
+    assert asyncio.run(main())
+    del context
+
+
+def test_slots_of_a_dead_worker_are_free_again_soon(context, broker_url, monkeypatch) -> None:
+    monkeypatch.setattr(throttle_module, "HOLD_S", 1)
+
+    async def come_after() -> int:
+        throttle = Throttle(broker_url, "p", start=1)
+        async with asyncio.timeout(10), throttle.slot():
+            await asyncio.sleep(2)  # renewed meanwhile
+            held = open_slots(broker_url)
+        await throttle.close()
+        return held
+
+    with subprocess.Popen(
+        [sys.executable, "-c", HOLDER, broker_url], stdout=subprocess.PIPE
+    ) as holder:
+        assert holder.stdout is not None
+        holder.stdout.readline()
+        holder.kill()
+    assert open_slots(broker_url) == 1
+    assert asyncio.run(come_after()) == 1
+    assert open_slots(broker_url) == 0
     del context
 
 

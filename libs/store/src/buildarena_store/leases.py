@@ -53,6 +53,11 @@ class Lease:
     token: int
     budgeted: bool = False
 
+    @property
+    def first(self) -> bool:
+        """Whether nobody held the job before, so that it has neither journal nor rollouts."""
+        return self.token == 1
+
 
 # One statement each, because every stage of every job waits for them.
 _WAITS = "state = 'queued' AND queue = :queue AND available_at <= clock_timestamp()"

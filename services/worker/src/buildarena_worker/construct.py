@@ -63,8 +63,8 @@ class ConstructHandler:
         pack = pack_of(job, self._packs)
         io = SessionIO(
             client=self._clients.for_config(job.model_config),
-            entries=self._context.journal.read(job.id),
-            rollouts=self._context.rollouts.read(job.id),
+            entries=[] if lease.first else self._context.journal.read(job.id),
+            rollouts=[] if lease.first else self._context.rollouts.read(job.id),
             append=lambda entry: self._append(lease, entry),
             still_held=lambda: not hold.over,
             limits=job.limits,

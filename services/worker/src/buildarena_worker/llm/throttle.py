@@ -5,8 +5,9 @@ for each limit's worth of answers (additive increase, multiplicative decrease; C
 1989). Until the provider's limit was met once, it grows by one with each answer (slow start).
 It lives in the broker's key-value store; without it, each process goes on by itself.
 
-A process gathers what its requests want for a few milliseconds and asks the store for all of it
-in one message over one connection, because a message costs more than what it asks for.
+A slot that came free stays with its process for a moment, so that a session's next request finds
+it there, unless another request was refused lately. A process renews the slots it has; those of a
+process that died are free again soon.
 """
 
 from __future__ import annotations
@@ -14,44 +15,58 @@ from __future__ import annotations
 import asyncio
 import random
 import uuid
+from collections import deque
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from typing import Any
 
-import structlog
-from redis.asyncio import Redis
-
-log = structlog.get_logger(__name__)
+from buildarena_worker.llm.gathered import GatheredStore
 
 START, LEAST, MOST = 64.0, 1.0, 2048.0
-HOLD_S = 900
-"""A slot whose holder died is free again after this time; no request may take longer."""
+HOLD_S = 30
+"""A slot that was not renewed for so long is free again: its process died."""
 CALM_S = 2
 """Several complaints within this time count as one: they speak of the same crowd."""
-GATHER_S = 0.005
-"""How long what is to be asked gathers before it is sent: little beside a model's seconds."""
+SPARE_S = 0.25
+"""How long a free slot stays with its process: longer than a session takes for its next request."""
+ASK_AGAIN_S = 0.02, 0.1
+"""A refused request asks again after a random time between these."""
+REFUSED_MS = 150
+"""While one waits, which shows for this time, a new request waits its turn like it."""
+LIMIT_KEPT_S = 86400
 
-_TAKE = """
+_PARTS = ("open", "limit", "calm", "met", "refused")
+_TAKE = f"""
 local now = tonumber(redis.call('TIME')[1])
 redis.call('ZREMRANGEBYSCORE', KEYS[1], '-inf', now)
 local limit = tonumber(redis.call('GET', KEYS[2]) or ARGV[3])
-if redis.call('ZCARD', KEYS[1]) >= math.floor(limit) then return 0 end
-redis.call('ZADD', KEYS[1], now + tonumber(ARGV[2]), ARGV[1])
-redis.call('EXPIRE', KEYS[1], tonumber(ARGV[2]) * 2)
+if redis.call('ZCARD', KEYS[1]) >= math.floor(limit) then
+  redis.call('SET', KEYS[5], 1, 'PX', {REFUSED_MS})
+  return 0
+end
+if ARGV[4] == 'new' and redis.call('EXISTS', KEYS[5]) == 1 then return 0 end
+redis.call('ZADD', KEYS[1], now + ARGV[2], ARGV[1])
 return 1
 """
-_GIVE = """
-redis.call('ZREM', KEYS[1], ARGV[1])
+_GIVE = f"""
 local limit = tonumber(redis.call('GET', KEYS[2]) or ARGV[3])
 if ARGV[2] == 'grow' then
   local step = redis.call('EXISTS', KEYS[4]) == 1 and 1 / limit or 1
-  limit = math.min(tonumber(ARGV[5]), limit + step)
-elseif ARGV[2] == 'shrink' and redis.call('SET', KEYS[3], 1, 'NX', 'EX', ARGV[6]) then
-  limit = math.max(tonumber(ARGV[4]), limit / 2)
-  redis.call('SET', KEYS[4], 1, 'EX', 86400)
+  limit = math.min({MOST}, limit + step)
+elseif ARGV[2] == 'shrink' and redis.call('SET', KEYS[3], 1, 'NX', 'EX', {CALM_S}) then
+  limit = math.max({LEAST}, limit / 2)
+  redis.call('SET', KEYS[4], 1, 'EX', {LIMIT_KEPT_S})
 end
-redis.call('SET', KEYS[2], tostring(limit), 'EX', 86400)
-return tostring(limit)
+redis.call('SET', KEYS[2], tostring(limit), 'EX', {LIMIT_KEPT_S})
+if redis.call('EXISTS', KEYS[5]) == 0 and redis.call('ZCARD', KEYS[1]) <= math.floor(limit) then
+  return 1
+end
+redis.call('ZREM', KEYS[1], ARGV[1])
+return 0
+"""
+_RENEW = """
+local now = tonumber(redis.call('TIME')[1])
+for place = 2, #ARGV do redis.call('ZADD', KEYS[1], 'XX', now + ARGV[1], ARGV[place]) end
 """
 
 
@@ -65,92 +80,96 @@ class Throttle:
     """
 
     def __init__(self, url: str | None, provider: str, *, start: float = START) -> None:
-        self._redis: Any = None if url is None else Redis.from_url(url, socket_timeout=5)
-        self._keys = [
-            f"buildarena:throttle:{provider}:{part}" for part in ("open", "limit", "calm", "met")
-        ]
+        self._store = None if url is None else GatheredStore(url)
+        self._keys = [f"buildarena:throttle:{provider}:{part}" for part in _PARTS]
         self._start = start
-        self._asked: list[tuple[tuple[Any, ...], asyncio.Future[Any]]] = []
-        self._sender: asyncio.Task[None] | None = None
+        self._held: set[str] = set()
+        self._spare: deque[tuple[str, float]] = deque()
+        self._renewing: asyncio.Task[None] | None = None
 
     @asynccontextmanager
     async def slot(self) -> AsyncIterator[Slot]:
         """Waits for a free slot and holds it inside the block; say there how it went."""
         slot = Slot()
-        taken = await self._take(slot.id)
+        held = None if self._store is None else await self._take(self._store)
         try:
             yield slot
         finally:
-            if taken:
-                self._give(slot)
+            if held is not None and self._store is not None:
+                self._give(self._store, held, slot.verdict)
 
     async def limit(self) -> float:
         """The limit now."""
-        raw = None if self._redis is None else await self._ask("GET", self._keys[1])
+        raw = None if self._store is None else await self._store.ask("GET", self._keys[1])
         return self._start if raw is None else float(raw)
 
     async def close(self) -> None:
-        """Closes the connections, after what is still to be said."""
-        if self._sender is not None:
-            await self._sender
-        if self._redis is not None:
-            await self._redis.aclose()
+        """Gives all slots back and closes the connection."""
+        if self._store is None:
+            return
+        if self._renewing is not None:
+            self._renewing.cancel()
+            with suppress(asyncio.CancelledError):
+                await self._renewing
+        if self._held:
+            self._store.tell("ZREM", self._keys[0], *self._held)
+        await self._store.close()
 
-    async def _take(self, slot_id: str) -> bool:
-        while self._redis is not None:
+    async def _take(self, store: GatheredStore) -> str | None:
+        """The id of a slot; None when the store fails, without which requests go on."""
+        slot_id, standing = uuid.uuid4().hex, "new"
+        while not self._spare:
             try:
-                arguments = [slot_id, HOLD_S, self._start]
-                if await self._ask("EVAL", _TAKE, 2, *self._keys[:2], *arguments):
-                    return True
-            except Exception:  # noqa: BLE001 - logged; requests go on without the limit
-                return False
-            await asyncio.sleep(random.uniform(0.02, 0.1))  # noqa: S311 - spreads waits
-        return False
+                if await self._eval(store, _TAKE, slot_id, HOLD_S, self._start, standing):
+                    self._hold(store, slot_id)
+                    return slot_id
+            except Exception:  # noqa: BLE001 - the store has logged it
+                return None
+            standing = "waiting"
+            await asyncio.sleep(random.uniform(*ASK_AGAIN_S))  # noqa: S311 - spreads waits
+        return self._spare.pop()[0]
 
-    def _give(self, slot: Slot) -> None:
-        """Frees a slot soon; the request that held it does not wait for that."""
-        arguments = [slot.id, slot.verdict, self._start, LEAST, MOST, CALM_S]
-        told = self._ask("EVAL", _GIVE, 4, *self._keys, *arguments)
-        told.add_done_callback(asyncio.Future.exception)  # logged; the slot expires by itself
+    def _give(self, store: GatheredStore, slot_id: str, verdict: str) -> None:
+        """Frees a slot soon; the request that had it does not wait for that."""
 
-    def _ask(self, *command: Any) -> asyncio.Future[Any]:
-        """The store's answer to a command, in order with all others."""
-        answer: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
-        self._asked.append((command, answer))
-        if self._sender is None:
-            self._sender = asyncio.create_task(self._send())
-        return answer
+        def heard(answer: asyncio.Future[Any]) -> None:
+            if answer.cancelled() or answer.exception() is not None or not answer.result():
+                self._held.discard(slot_id)
+                return
+            loop = asyncio.get_running_loop()
+            self._spare.append((slot_id, loop.time()))
+            loop.call_later(SPARE_S, self._return_spares, store)
 
-    async def _send(self) -> None:
-        while self._asked:
-            await asyncio.sleep(GATHER_S)
-            asked, self._asked = self._asked, []
-            pipeline = self._redis.pipeline(transaction=False)
-            for command, _ in asked:
-                pipeline.execute_command(*command)
-            answers: list[Any]
-            try:
-                answers = await pipeline.execute(raise_on_error=False)
-            except Exception as error:  # noqa: BLE001 - whatever it is, nobody may wait forever
-                answers = [error] * len(asked)
-            errors = [answer for answer in answers if isinstance(answer, Exception)]
-            if errors:
-                log.warning("throttle_failed", requests=len(errors), error=str(errors[0]))
-            for (_, waiting), answer in zip(asked, answers, strict=True):
-                if waiting.done():  # who asked was cancelled
-                    continue
-                if isinstance(answer, Exception):
-                    waiting.set_exception(answer)
-                else:
-                    waiting.set_result(answer)
-        self._sender = None
+        told = self._eval(store, _GIVE, slot_id, verdict, self._start)
+        told.add_done_callback(heard)
+
+    def _return_spares(self, store: GatheredStore) -> None:
+        """Gives back the slots that nobody has wanted for a while."""
+        oldest = asyncio.get_running_loop().time() - SPARE_S
+        while self._spare and self._spare[0][1] <= oldest:
+            slot_id, _ = self._spare.popleft()
+            self._held.discard(slot_id)
+            store.tell("ZREM", self._keys[0], slot_id)
+
+    def _hold(self, store: GatheredStore, slot_id: str) -> None:
+        self._held.add(slot_id)
+        if self._renewing is None or self._renewing.done():
+            self._renewing = asyncio.create_task(self._renew(store))
+
+    async def _renew(self, store: GatheredStore) -> None:
+        while self._held:
+            await asyncio.sleep(HOLD_S / 3)
+            with suppress(Exception):  # the store has logged it; the next time may do
+                await self._eval(store, _RENEW, HOLD_S, *self._held)
+
+    def _eval(self, store: GatheredStore, script: str, *arguments: Any) -> asyncio.Future[Any]:
+        return store.ask("EVAL", script, len(self._keys), *self._keys, *arguments)
 
 
 class Slot:
     """One open request."""
 
     def __init__(self) -> None:
-        self.id = uuid.uuid4().hex
         self.verdict = "keep"
 
     def went_well(self) -> None:
