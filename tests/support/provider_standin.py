@@ -44,6 +44,7 @@ class ProviderStandIn:
         fault: What goes wrong with each request.
         latency_s: Time each answer takes.
         respond: Answers in the built-in model's place.
+        raw: The body of every answer, in the place of one that is made.
     """
 
     def __init__(
@@ -53,7 +54,9 @@ class ProviderStandIn:
         fault: Fault = lambda _: None,
         latency_s: float = 0.0,
         respond: Callable[[Request], Reply] | None = None,
+        raw: Any = None,
     ) -> None:
+        self.raw = raw
         self.counts = Counts()
         self.guard = threading.Lock()
         self.respond = respond or MODELS[model]
@@ -114,6 +117,9 @@ class _Handler(BaseHTTPRequestHandler):
             self._send(200, {"nothing": "here"}, {})
             return
         time.sleep(5.0 if fault == "slow" else self.standin.latency_s)
+        if self.standin.raw is not None:
+            self._send(200, self.standin.raw, {})
+            return
         wire = _WIRES[_wire_of(self.path)]
         reply = self.standin.respond(wire.read(body))
         used = _used(body, reply)

@@ -120,7 +120,7 @@ def arguments_text(call: ToolCall) -> str:
     Providers accept nothing else in a conversation.
     """
     arguments = call.arguments if isinstance(call.arguments, dict) else {"text": call.arguments}
-    return json.dumps(arguments, ensure_ascii=False)
+    return json.dumps(arguments, ensure_ascii=False, separators=(",", ":"))
 
 
 def arguments_of(raw: Any) -> Any:

@@ -1,0 +1,73 @@
+from __future__ import annotations
+
+import threading
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+
+from buildarena_worker.turnstile import Turnstile
+
+
+class Crowd:
+    """Counts how many are inside at once."""
+
+    def __init__(self) -> None:
+        self.now = self.most = 0
+        self._guard = threading.Lock()
+
+    def come(self, change: int = 1) -> None:
+        with self._guard:
+            self.now += change
+            self.most = max(self.most, self.now)
+
+
+def test_few_are_inside_at_once_and_all_get_their_turn() -> None:
+    turnstile, crowd = Turnstile(places=3, patience_s=60), Crowd()
+
+    def session(_: int) -> None:
+        with turnstile.inside():
+            for _ in range(20):
+                crowd.come()
+                threading.Event().wait(0.0005)
+                crowd.come(-1)
+                with turnstile.outside():
+                    threading.Event().wait(0.0005)
+
+    with ThreadPoolExecutor(16) as threads:
+        list(threads.map(session, range(16)))
+    assert crowd.most == 3
+    assert crowd.now == 0
+
+
+def test_who_waits_outside_leaves_its_place_to_others() -> None:
+    turnstile, inside = Turnstile(places=1, patience_s=60), threading.Event()
+
+    def other() -> None:
+        with turnstile.inside():
+            inside.set()
+
+    with turnstile.inside(), ThreadPoolExecutor(1) as threads:
+        came = threads.submit(other)
+        with turnstile.outside():
+            assert inside.wait(30)
+        came.result()
+
+
+def test_a_session_that_is_stuck_inside_does_not_stop_the_others() -> None:
+    turnstile = Turnstile(places=1, patience_s=0.01)
+
+    def other() -> str:
+        with turnstile.inside(), turnstile.outside():
+            return "done"
+
+    with turnstile.inside(), ThreadPoolExecutor(4) as threads:
+        assert list(threads.map(lambda _: other(), range(4))) == ["done"] * 4
+
+
+def test_an_error_gives_the_place_back() -> None:
+    turnstile = Turnstile(places=1, patience_s=60)
+    for _ in range(3):
+        with pytest.raises(ZeroDivisionError), turnstile.inside(), turnstile.outside():
+            raise ZeroDivisionError
+    with turnstile.inside(), ThreadPoolExecutor(1) as threads:
+        assert not threads.submit(turnstile._places.acquire, blocking=False).result()
