@@ -17,15 +17,9 @@ from buildarena_pipeline.worker_process import WorkerSpec, run_worker
 from buildarena_worker.construct import ConstructHandler
 from buildarena_worker.verify import VerificationRunner
 
-SWITCH_INTERVAL_S = 0.05
-"""How long a thread may compute before another one that waits may interrupt it. Python's own 5 ms
-make hundreds of session threads wake up, only to wait again: a third of the processor's time. A
-turn computes for 5 ms between its waits, so that threads still take turns often enough."""
-
 
 def main() -> None:
     """Serves the construct queue until it is told to stop."""
-    sys.setswitchinterval(SWITCH_INTERVAL_S)
     settings = Settings()
     try:
         registry = load_registry(settings.models_file)
