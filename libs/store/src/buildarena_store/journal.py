@@ -9,7 +9,7 @@ from datetime import datetime
 from decimal import Decimal
 from typing import Any
 
-from sqlalchemy import select, text
+from sqlalchemy import bindparam, select, text
 
 from buildarena_store.database import Database
 from buildarena_store.errors import StaleLeaseError
@@ -116,6 +116,11 @@ _APPEND = text(
 )
 
 
+_OF_JOB = (
+    select(journal).where(journal.c.job_id == bindparam("job_id")).order_by(journal.c.sequence)
+)
+
+
 class Journal:
     """Appends to and reads the journals of jobs."""
 
@@ -158,7 +163,6 @@ class Journal:
 
     def read(self, job_id: str) -> list[JournalEntry]:
         """All entries of a job in their order."""
-        query = select(journal).where(journal.c.job_id == job_id).order_by(journal.c.sequence)
         with self._database.statement() as connection:
             return [
                 JournalEntry(
@@ -180,5 +184,5 @@ class Journal:
                     provider_request_id=row.provider_request_id,
                     created_at=row.created_at,
                 )
-                for row in connection.execute(query)
+                for row in connection.execute(_OF_JOB, {"job_id": job_id})
             ]

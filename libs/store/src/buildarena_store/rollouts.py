@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import nullcontext
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import Connection, insert, select, update
+from sqlalchemy import Connection, Row, bindparam, insert, select, update
 
 from buildarena_store import events
 from buildarena_store.database import Database
@@ -60,6 +59,19 @@ class RolloutRecord:
     finished_at: datetime | None
 
 
+# Made once, because making them takes longer than running them.
+_OF_JOB = (
+    select(rollouts).where(rollouts.c.job_id == bindparam("job_id")).order_by(rollouts.c.number)
+)
+_REQUEST = insert(rollouts)
+_COMPLETE = (
+    update(rollouts)
+    .where(rollouts.c.job_id == bindparam("of_job"), rollouts.c.number == bindparam("of_number"))
+    .values(finished_at=events.now)
+    .returning(rollouts)
+)
+
+
 class Rollouts:
     """Keeps rollouts. Writes take the transaction that also moves the job."""
 
@@ -70,36 +82,31 @@ class Rollouts:
         """Adds a rollout that is to be simulated."""
         controls = None if request.controls is None else [dict(press) for press in request.controls]
         connection.execute(
-            insert(rollouts).values(
-                job_id=job_id,
-                number=request.number,
-                final=request.final,
-                engine=request.engine,
-                machine_hash=request.machine_hash,
-                controls=controls,
-            )
+            _REQUEST,
+            {
+                "job_id": job_id,
+                "number": request.number,
+                "final": request.final,
+                "engine": request.engine,
+                "machine_hash": request.machine_hash,
+                "controls": controls,
+            },
         )
 
-    def complete(self, job_id: str, number: int, *, connection: Connection, **values: Any) -> None:
-        """Writes a rollout's score and trajectory."""
-        connection.execute(
-            update(rollouts)
-            .where(rollouts.c.job_id == job_id, rollouts.c.number == number)
-            .values(finished_at=events.now, **values)
-        )
+    def complete(
+        self, job_id: str, number: int, *, connection: Connection, **values: Any
+    ) -> RolloutRecord:
+        """Writes a rollout's score and trajectory; returns the rollout as it is now."""
+        given = {"of_job": job_id, "of_number": number, **values}
+        return _record(connection.execute(_COMPLETE, given).one())
 
-    def read(self, job_id: str, *, connection: Connection | None = None) -> list[RolloutRecord]:
-        """All rollouts of a job in their order.
+    def read(self, job_id: str) -> list[RolloutRecord]:
+        """All rollouts of a job in their order."""
+        with self._database.statement() as connection:
+            return [_record(row) for row in connection.execute(_OF_JOB, {"job_id": job_id})]
 
-        Args:
-            job_id: The job.
-            connection: A transaction whose own writes are to be seen.
-        """
-        query = select(rollouts).where(rollouts.c.job_id == job_id).order_by(rollouts.c.number)
-        with nullcontext(connection) if connection else self._database.statement() as reader:
-            return [
-                RolloutRecord(
-                    **{name: getattr(row, name) for name in RolloutRecord.__dataclass_fields__}
-                )
-                for row in reader.execute(query)
-            ]
+
+def _record(row: Row[Any]) -> RolloutRecord:
+    return RolloutRecord(
+        **{name: getattr(row, name) for name in RolloutRecord.__dataclass_fields__}
+    )

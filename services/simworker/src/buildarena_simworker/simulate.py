@@ -74,10 +74,11 @@ class SimulateHandler:
             if trajectory is not None:
                 made = {f"trajectory-{request.number}": trajectory}
                 context.results.attach(job.id, made, connection=connection)
-            context.rollouts.complete(job.id, request.number, connection=connection, **values)
+            completed = context.rollouts.complete(
+                job.id, request.number, connection=connection, **values
+            )
             if request.final:
-                records = context.rollouts.read(job.id, connection=connection)
-                final = rollout_score(job, best_rollout(records))
+                final = rollout_score(job, best_rollout([*records, completed]))
                 context.results.finish(lease, final, connection=connection)
             else:
                 context.leases.queue_again(
