@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from datetime import datetime
+from dataclasses import dataclass
 
 from fire import WORKERS, Strike
 from sqlalchemy import text
@@ -57,18 +57,35 @@ def wrongs(database: Database) -> dict[str, list[str]]:
     return found
 
 
-def pick_up_times(database: Database, strikes: Sequence[Strike]) -> list[float]:
-    """Seconds from the death of a worker to the next hold on each job that it held."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PickUp:
+    """How a dead worker's job was taken up again.
+
+    Attributes:
+        seconds: From the death to the next hold.
+        waited_s: The part of them from when the hold was found to be over.
+        stage: The job's stage.
+        meanwhile: What else was struck in these seconds.
+    """
+
+    seconds: float
+    waited_s: float
+    stage: str
+    meanwhile: Sequence[str]
+
+
+def pick_ups(database: Database, strikes: Sequence[Strike]) -> list[PickUp]:
+    """How the jobs that dead workers held were taken up, the slowest last."""
     # A worker's id ends with its process'; a prefork worker's jobs are held by its children.
     query = text(
-        "SELECT a.worker, a.started_at, a.ended_at, (SELECT min(b.started_at) FROM attempts b "
-        "WHERE b.job_id = a.job_id AND b.token > a.token) AS next "
+        "SELECT a.worker, a.stage, a.started_at, a.ended_at, (SELECT min(b.started_at) "
+        "FROM attempts b WHERE b.job_id = a.job_id AND b.token > a.token) AS next "
         "FROM attempts a WHERE a.result = 'lost'"
     )
     deaths = [
         (pid, strike.at) for strike in strikes if strike.name in WORKERS for pid in strike.pids
     ]
-    times = []
+    found = []
     with database.transaction() as connection:
         for row in connection.execute(query):
             pid = int(row.worker.rsplit(":", 1)[1])
@@ -76,9 +93,13 @@ def pick_up_times(database: Database, strikes: Sequence[Strike]) -> list[float]:
                 at for dead, at in deaths if dead == pid and row.started_at <= at <= row.ended_at
             ]
             if died and row.next is not None:
-                times.append(_seconds(min(died), row.next))
-    return sorted(times)
-
-
-def _seconds(start: datetime, end: datetime) -> float:
-    return (end - start).total_seconds()
+                death = min(died)
+                found.append(
+                    PickUp(
+                        seconds=(row.next - death).total_seconds(),
+                        waited_s=(row.next - row.ended_at).total_seconds(),
+                        stage=row.stage,
+                        meanwhile=[s.name for s in strikes if death < s.at < row.next],
+                    )
+                )
+    return sorted(found, key=lambda pick_up: pick_up.seconds)
