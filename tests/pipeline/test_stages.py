@@ -6,9 +6,9 @@ from collections.abc import Callable
 import pytest
 
 from buildarena_pipeline.errors import PassingFaultError, PermanentFaultError
-from buildarena_pipeline.specs import JobSpec
+from buildarena_pipeline.specs import JobSpec, SweepSpec
 from buildarena_pipeline.stages import Hold, LeaseKeeper, StageRunner
-from buildarena_store import JobScore
+from buildarena_store import BudgetLimits, JobScore
 
 SCORE = JobScore(outcome="unsuccessful", success=False, indicator=1.0)
 
@@ -63,6 +63,28 @@ def test_a_handler_hears_that_its_job_was_cancelled(context, run) -> None:
 
     assert run(cancelled).outcome == "cancelled"
     assert heard == [True]
+
+
+def test_a_handler_hears_of_a_budget_that_was_given_meanwhile(context, submissions) -> None:
+    spec = SweepSpec(tasks=["support-1"], models=["builtin/idle"], seeds=[0])
+    sweep_id = submissions.submit_sweep(spec).sweep.id
+    heard: list[bool] = []
+
+    def paid_for_later(hold: Hold) -> None:
+        heard.append(hold.budgeted)
+        with context.database.transaction() as connection:
+            context.budgets.set(sweep_id, BudgetLimits(max_requests=5), connection=connection)
+        deadline = time.monotonic() + 20
+        while not hold.budgeted and time.monotonic() < deadline:
+            time.sleep(0.05)
+        heard.append(hold.budgeted)
+        finisher(context)(hold)
+
+    keeper = LeaseKeeper(context, lambda: None)
+    keeper.start()
+    StageRunner(context, paid_for_later, keeper, "worker").look("construct", "any")
+    keeper.stop()
+    assert heard == [False, True]
 
 
 @pytest.mark.parametrize(

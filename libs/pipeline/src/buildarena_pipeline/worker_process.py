@@ -18,6 +18,7 @@ from sqlalchemy.exc import OperationalError
 
 from buildarena_pipeline.context import Context, open_context
 from buildarena_pipeline.errors import StartupError
+from buildarena_pipeline.hearing import Hearing
 from buildarena_pipeline.logs import set_up_logs
 from buildarena_pipeline.processes import die_with_parent
 from buildarena_pipeline.queues import LOOK
@@ -127,7 +128,13 @@ def run_worker(spec: WorkerSpec, settings: Settings) -> None:
     app = context.queues.app
     app.task(name=LOOK)(look)
     sweeper = Sweeper(context)
-    worker_ready.connect(lambda **_: sweeper.start(), weak=False)
+    hearing = Hearing(context.queues, spec.queues)
+
+    def begin(sender: Any, **_: Any) -> None:
+        sweeper.start()
+        hearing.start(sender)
+
+    worker_ready.connect(begin, weak=False)
     if forks:
         worker_process_init.connect(start_runtime, weak=False)
         worker_process_shutdown.connect(stop_runtime, weak=False)
@@ -146,6 +153,7 @@ def run_worker(spec: WorkerSpec, settings: Settings) -> None:
     try:
         worker.start()
     finally:
+        hearing.stop()
         sweeper.stop()
         if not forks:
             stop_runtime()

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 PLACES = 4
-"""More than one, because a session inside also waits for the database. With 2 or 8 a process of 200
-sessions does less."""
+"""More than one, because a session inside also waits for the database. With 2 a process of 200
+sessions does less, with 6 no more."""
 PATIENCE_S = 1.0
 """Whoever waited so long goes in all the same: nothing that happens inside can stop the others."""
 
