@@ -7,7 +7,6 @@ idle for seconds while messages wait for it therefore takes a new connection.
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
@@ -15,6 +14,7 @@ import structlog
 from celery.signals import task_received
 from celery.worker import state
 
+from buildarena_pipeline.periodic import Periodic
 from buildarena_pipeline.queues import Queues
 
 log = structlog.get_logger(__name__)
@@ -53,41 +53,36 @@ class Hearing:
         self._names = names
         self._period_s = period_s
         self._deaf_after_s = deaf_after_s
-        self._received = 0
-        self._stop = threading.Event()
-        self._thread: threading.Thread | None = None
+        self._consumer: Consumer | None = None
+        self._received = False
+        self._deaf_s = 0.0
+        self._thread = Periodic(self._look, name="hearing", period_s=period_s)
 
     def start(self, consumer: Consumer) -> None:
         """Starts to watch."""
-        task_received.connect(self._count, weak=False)
-        self._thread = threading.Thread(
-            target=self._watch, args=(consumer,), name="hearing", daemon=True
-        )
+        self._consumer = consumer
+        task_received.connect(self._hear, weak=False)
         self._thread.start()
 
     def stop(self) -> None:
         """Stops to watch."""
-        self._stop.set()
-        task_received.disconnect(self._count)
-        if self._thread is not None:
-            self._thread.join(timeout=10)
+        task_received.disconnect(self._hear)
+        self._thread.stop()
 
-    def _count(self, **_: Any) -> None:
-        self._received += 1
+    def _hear(self, **_: Any) -> None:
+        self._received = True
 
-    def _watch(self, consumer: Consumer) -> None:
-        deaf_s, received = 0.0, self._received
-        while not self._stop.wait(self._period_s):
-            quiet = received == self._received and not state.reserved_requests
-            received = self._received
-            if not quiet or not any(self._queues.waiting(name) for name in self._names):
-                deaf_s = 0.0
-                continue
-            deaf_s += self._period_s
-            if deaf_s >= self._deaf_after_s:
-                log.warning("deaf_to_messages", queues=list(self._names))
-                consumer.call_soon(reconnect)
-                deaf_s = 0.0
+    def _look(self) -> None:
+        quiet = not self._received and not state.reserved_requests
+        self._received = False
+        if not quiet or not any(self._queues.waiting(name) for name in self._names):
+            self._deaf_s = 0.0
+            return
+        self._deaf_s += self._period_s
+        if self._deaf_s >= self._deaf_after_s and self._consumer is not None:
+            log.warning("deaf_to_messages", queues=list(self._names))
+            self._consumer.call_soon(reconnect)
+            self._deaf_s = 0.0
 
 
 def reconnect() -> None:

@@ -6,7 +6,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Protocol
 
 import structlog
@@ -14,6 +14,7 @@ from sqlalchemy.exc import OperationalError
 
 from buildarena_pipeline.context import Context
 from buildarena_pipeline.errors import PassingFaultError, PermanentFaultError
+from buildarena_pipeline.periodic import Periodic
 from buildarena_pipeline.tracing import span
 from buildarena_store import Lease, StaleLeaseError
 
@@ -26,16 +27,13 @@ class Hold:
 
     Attributes:
         lease: The lease.
-        over: Whether it ended: by its time, or because the job was cancelled.
         budgeted: Whether a budget pays for the job.
+        over: Whether it ended: by its time, or because the job was cancelled.
     """
 
     lease: Lease
+    budgeted: bool
     over: bool = False
-    budgeted: bool = field(init=False)
-
-    def __post_init__(self) -> None:
-        self.budgeted = self.lease.budgeted
 
 
 class StageHandler(Protocol):
@@ -67,8 +65,8 @@ class LeaseKeeper:
         self._on_beat = on_beat
         self._held: dict[str, Hold] = {}
         self._guard = threading.Lock()
-        self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="leases", daemon=True)
+        period_s = context.settings.lease_s / 4
+        self._thread = Periodic(self._beat_safely, name="leases", period_s=period_s)
 
     def start(self) -> None:
         """Starts the thread."""
@@ -76,8 +74,7 @@ class LeaseKeeper:
 
     def stop(self) -> None:
         """Stops the thread and hands back every lease that is still held."""
-        self._stop.set()
-        self._thread.join(timeout=10)
+        self._thread.stop()
         with self._guard:
             held, self._held = list(self._held.values()), {}
         for hold in held:
@@ -90,7 +87,7 @@ class LeaseKeeper:
     @contextmanager
     def keeping(self, lease: Lease) -> Iterator[Hold]:
         """Keeps a lease alive inside the block."""
-        hold = Hold(lease)
+        hold = Hold(lease, lease.budgeted)
         with self._guard:
             self._held[lease.job.id] = hold
         try:
@@ -98,13 +95,11 @@ class LeaseKeeper:
         finally:
             self._forget(hold)
 
-    def _run(self) -> None:
-        period_s = self._context.settings.lease_s / 4
-        while not self._stop.wait(period_s):
-            try:
-                self._beat()
-            except OperationalError as error:
-                log.warning("heartbeat_failed", error=str(error).splitlines()[0])
+    def _beat_safely(self) -> None:
+        try:
+            self._beat()
+        except OperationalError as error:
+            log.warning("heartbeat_failed", error=str(error).splitlines()[0])
 
     def _beat(self) -> None:
         self._on_beat()

@@ -6,13 +6,12 @@ do the work, so that no process is needed for it and none can be missing.
 
 from __future__ import annotations
 
-import threading
-
 import structlog
 from sqlalchemy import text
 from sqlalchemy.exc import SQLAlchemyError
 
 from buildarena_pipeline.context import Context
+from buildarena_pipeline.periodic import Periodic
 from buildarena_pipeline.queues import BATCH, VERIFY
 from buildarena_store.tables import jobs as jobs_table
 
@@ -32,9 +31,7 @@ class Sweeper:
 
     def __init__(self, context: Context, *, period_s: float = PERIOD_S) -> None:
         self._context = context
-        self._period_s = period_s
-        self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="sweeper", daemon=True)
+        self._thread = Periodic(self._sweep_safely, name="sweeper", period_s=period_s)
 
     def start(self) -> None:
         """Starts the thread."""
@@ -42,18 +39,16 @@ class Sweeper:
 
     def stop(self) -> None:
         """Stops the thread and waits for it."""
-        self._stop.set()
-        self._thread.join(timeout=10)
+        self._thread.stop()
 
-    def _run(self) -> None:
-        while not self._stop.wait(self._period_s):
-            try:
-                self.sweep()
-            except SQLAlchemyError as error:
-                log.warning("sweep_failed", error=str(error).splitlines()[0])
-            except Exception:
-                # Without a sweeper, lost messages stay lost: it must outlive what nobody foresaw.
-                log.exception("sweep_failed")
+    def _sweep_safely(self) -> None:
+        try:
+            self.sweep()
+        except SQLAlchemyError as error:
+            log.warning("sweep_failed", error=str(error).splitlines()[0])
+        except Exception:
+            # Without a sweeper, lost messages stay lost: it must outlive what nobody foresaw.
+            log.exception("sweep_failed")
 
     def sweep(self) -> None:
         """Sweeps once, unless another process is at it."""

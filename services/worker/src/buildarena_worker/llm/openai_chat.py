@@ -24,7 +24,6 @@ from openai.types.chat import ChatCompletion
 from pydantic import ValidationError
 from pydantic_ai.direct import model_request
 from pydantic_ai.messages import ModelMessage, ModelRequest, SystemPromptPart, UserPromptPart
-from pydantic_ai.models import ModelRequestParameters
 from pydantic_ai.models.openai import OpenAIChatModel
 from pydantic_ai.providers.openai import OpenAIProvider
 from pydantic_ai.settings import ModelSettings
@@ -96,7 +95,7 @@ class OpenAIChat:
         except (aiohttp.ClientError, OSError) as error:
             broken = APIConnectionError(request=Request("POST", self._endpoint))
             broken.__cause__ = error
-            return await self._interpret(lambda: _raise(broken), tools, settings)
+            return await self._ask_library(lambda **_: _raise(broken), tools, settings)
         if answer.status == HTTPStatus.OK:
             answered = read_answer(text, provider_url=str(self._sdk.base_url))
             if answered is not None:
@@ -105,7 +104,7 @@ class OpenAIChat:
         kept = [(k, v) for k, v in answer.headers.items() if k.lower() != "content-encoding"]
         sent = Request("POST", self._endpoint)
         response = Response(answer.status, headers=kept, content=text, request=sent)
-        return await self._interpret(lambda: self._as_sdk_gives_it(response), tools, settings)
+        return await self._ask_library(lambda **_: self._as_sdk_gives_it(response), tools, settings)
 
     async def close(self) -> None:
         """Closes the connections."""
@@ -154,25 +153,21 @@ class OpenAIChat:
             )
         raise AssertionError("the library sends what it is given")
 
-    async def _interpret(
-        self, given: Callable[[], Any], tools: Sequence[Tool], settings: ModelSettings
-    ) -> Answered:
-        """What pydantic-ai makes of an answer that is here already."""
-        return await self._ask_library(lambda **_: given(), tools, settings)
-
     async def _ask_library(
         self, create: Callable[..., Any], tools: Sequence[Tool], settings: ModelSettings
     ) -> Answered:
+        """What pydantic-ai makes of what ``create`` gives or raises in the SDK's place."""
         client = self._sdk.copy()
         # `completions` is a cached property of the SDK: what stands in its place is used.
         vars(client.chat)["completions"] = _Completions(client, create)
         model = OpenAIChatModel(self._model, provider=OpenAIProvider(openai_client=client))
-        parameters: ModelRequestParameters = request_parameters(tools)
-        return from_wire(
-            await model_request(
-                model, SAMPLE, model_settings=settings, model_request_parameters=parameters
-            )
+        response = await model_request(
+            model,
+            SAMPLE,
+            model_settings=settings,
+            model_request_parameters=request_parameters(tools),
         )
+        return from_wire(response)
 
     def _as_sdk_gives_it(self, response: Response) -> Any:
         """The SDK's type, unchecked where the answer does not fit; the SDK's error for a no."""

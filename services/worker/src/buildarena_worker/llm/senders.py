@@ -18,6 +18,9 @@ POOLS = 16
 """Connection pools per model over httpx: it looks at all connections of a pool for each request,
 so that many small pools carry hundreds of open requests at less cost than one large one."""
 
+Connected = tuple[Model, Callable[[], Awaitable[Any]]]
+"""A model with connections of its own, and how to close them."""
+
 
 class Sender(Protocol):
     """Sends requests to one model, each once."""
@@ -49,10 +52,10 @@ class LibrarySender:
     """Sends through pydantic-ai and the provider's SDK.
 
     Args:
-        models: One model several times, each with connections of its own, and how to close them.
+        models: One model several times.
     """
 
-    def __init__(self, models: Sequence[tuple[Model, Callable[[], Awaitable[Any]]]]) -> None:
+    def __init__(self, models: Sequence[Connected]) -> None:
         self._models = cycle([model for model, _ in models])
         self._closers = [close for _, close in models]
 
@@ -74,9 +77,7 @@ class LibrarySender:
             await close()
 
 
-def _anthropic(
-    entry: ModelEntry, provider: ProviderEntry, key: str
-) -> tuple[Model, Callable[[], Awaitable[Any]]]:
+def _anthropic(entry: ModelEntry, provider: ProviderEntry, key: str) -> Connected:
     from anthropic import AsyncAnthropic
     from pydantic_ai.models.anthropic import AnthropicModel
     from pydantic_ai.providers.anthropic import AnthropicProvider
@@ -86,9 +87,7 @@ def _anthropic(
     return model, client.close
 
 
-def _google(
-    entry: ModelEntry, provider: ProviderEntry, key: str
-) -> tuple[Model, Callable[[], Awaitable[Any]]]:
+def _google(entry: ModelEntry, provider: ProviderEntry, key: str) -> Connected:
     from httpx2 import AsyncClient
     from pydantic_ai.models.google import GoogleModel
     from pydantic_ai.providers.google import GoogleProvider

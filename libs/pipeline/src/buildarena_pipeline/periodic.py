@@ -1,0 +1,38 @@
+"""Work that a thread of its own does again and again."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+
+LONGEST_JOIN_S = 10.0
+
+
+class Periodic:
+    """Calls something every so often, from its start until it is stopped.
+
+    Args:
+        work: What is called; it handles its own errors, as one that leaves it ends the thread.
+        name: The thread's name.
+        period_s: Seconds before each call.
+    """
+
+    def __init__(self, work: Callable[[], None], *, name: str, period_s: float) -> None:
+        self._work = work
+        self._period_s = period_s
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+
+    def start(self) -> None:
+        """Starts the thread."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Stops the thread, if it was started, and waits for it."""
+        self._stop.set()
+        if self._thread.ident is not None:
+            self._thread.join(timeout=LONGEST_JOIN_S)
+
+    def _run(self) -> None:
+        while not self._stop.wait(self._period_s):
+            self._work()
