@@ -14,11 +14,11 @@ from player import Player
 from redis import Redis
 from sqlalchemy import create_engine, text
 
-from buildarena_pipeline.context import Context, open_context
-from buildarena_pipeline.embedded import EmbeddedPostgres, EmbeddedValkey
-from buildarena_pipeline.models import load_registry
-from buildarena_pipeline.settings import Settings
-from buildarena_pipeline.submission import Submissions
+from buildarena_cli.local import EmbeddedPostgres, EmbeddedValkey
+from buildarena_pipeline.catalog.models import load_registry
+from buildarena_pipeline.runtime.context import Context, open_context
+from buildarena_pipeline.runtime.settings import Settings
+from buildarena_pipeline.submission.submission import Submissions
 from buildarena_store import Database
 from buildarena_store.tables import metadata
 

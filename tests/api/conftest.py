@@ -6,8 +6,8 @@ import pytest
 from starlette.testclient import TestClient
 
 from buildarena_api.app import create_app
-from buildarena_pipeline.context import Context
-from buildarena_pipeline.models import load_registry
+from buildarena_pipeline.catalog.models import load_registry
+from buildarena_pipeline.runtime.context import Context
 
 
 @pytest.fixture

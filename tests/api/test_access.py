@@ -8,11 +8,11 @@ import pytest
 from pydantic import SecretStr
 from starlette.testclient import TestClient
 
-from buildarena_api.access import check_binding
 from buildarena_api.app import create_app
-from buildarena_pipeline.context import Context, open_context
-from buildarena_pipeline.models import load_registry
-from buildarena_pipeline.settings import Settings
+from buildarena_api.http.access import check_binding
+from buildarena_pipeline.catalog.models import load_registry
+from buildarena_pipeline.runtime.context import Context, open_context
+from buildarena_pipeline.runtime.settings import Settings
 
 ADMIN = "operator-secret-that-is-long-enough"
 CHANGES = [

@@ -20,7 +20,7 @@ from schemathesis.specs.openapi.checks import (
     status_code_conformance,
 )
 
-from buildarena_pipeline.specs import SweepSpec
+from buildarena_pipeline.catalog.specs import SweepSpec
 
 ADMIN = "operator-secret-that-is-long-enough"
 CONTRACT = Path(__file__).parents[1] / "data" / "openapi.json"

@@ -8,7 +8,7 @@ from sqlalchemy import delete, text, update
 from starlette.testclient import TestClient
 
 from buildarena_api.app import create_app
-from buildarena_pipeline.models import load_registry
+from buildarena_pipeline.catalog.models import load_registry
 from buildarena_store import JobScore
 from buildarena_store.tables import jobs
 

@@ -82,8 +82,8 @@ def test_each_request_is_a_line_in_the_log(api) -> None:
 
 
 def test_what_people_write_can_not_forge_lines_of_the_log(api, capfd, monkeypatch) -> None:
-    from buildarena_api import request_log
-    from buildarena_pipeline.logs import set_up_logs
+    from buildarena_api.http import log as request_log
+    from buildarena_pipeline.runtime.logs import set_up_logs
 
     # A logger keeps the stream of its first line, and this one is closed with the test.
     monkeypatch.setattr(request_log, "log", structlog.get_logger())

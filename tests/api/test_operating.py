@@ -126,7 +126,7 @@ def read_events(url: str, count: int, **headers: str) -> list[tuple[int, str, di
 
 
 def test_events_come_as_they_happen_and_from_where_one_left_off(context, submissions) -> None:
-    from buildarena_pipeline.specs import SweepSpec
+    from buildarena_pipeline.catalog.specs import SweepSpec
 
     done = submissions.submit_sweep(
         SweepSpec(tasks=["support-1"], models=["builtin/idle"], seeds=[0, 1])

@@ -10,9 +10,9 @@ from pydantic import SecretStr
 from starlette.testclient import TestClient
 
 from buildarena_api.app import create_app
-from buildarena_api.tasks import EXAMPLE
-from buildarena_pipeline.context import open_context
-from buildarena_pipeline.models import load_registry
+from buildarena_api.routes.tasks import EXAMPLE
+from buildarena_pipeline.catalog.models import load_registry
+from buildarena_pipeline.runtime.context import open_context
 from buildarena_store import JobScore
 
 YAML = {"Content-Type": "application/yaml"}

@@ -42,7 +42,7 @@ def test_an_agent_builds_and_submits(api, context, session) -> None:
 
 
 def test_calls_survive_a_restart_of_the_api(api, context, session) -> None:
-    from buildarena_pipeline.external import ExternalSessions
+    from buildarena_pipeline.agents.sessions import ExternalSessions
 
     act(api, session, "start", START)
     other = ExternalSessions(context)

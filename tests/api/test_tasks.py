@@ -7,7 +7,7 @@ import json
 import pytest
 import yaml
 
-from buildarena_api.tasks import EXAMPLE
+from buildarena_api.routes.tasks import EXAMPLE
 
 YAML = {"Content-Type": "application/yaml"}
 OTHER = EXAMPLE.replace("final_mass: 200", "final_mass: 300")

@@ -17,7 +17,7 @@ import structlog
 from redis import Redis
 from redis.exceptions import RedisError
 
-from buildarena_cli.stack import Stack
+from buildarena_cli.local.stack import Stack
 
 VICTIMS = ("construct worker", "mujoco worker", "api", "valkey", "postgres")
 WORKERS = ("construct worker", "mujoco worker")

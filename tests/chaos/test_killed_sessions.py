@@ -15,11 +15,11 @@ from pathlib import Path
 from provider_standin import ProviderStandIn
 from running import wait_until
 
-from buildarena_pipeline.documents import machine_bytes
-from buildarena_pipeline.models import load_registry
-from buildarena_pipeline.specs import JobSpec
-from buildarena_pipeline.submission import Submissions
-from buildarena_pipeline.sweeper import Sweeper
+from buildarena_pipeline.catalog.models import load_registry
+from buildarena_pipeline.catalog.specs import JobSpec
+from buildarena_pipeline.runtime.machine_documents import machine_bytes
+from buildarena_pipeline.runtime.reaper import Sweeper
+from buildarena_pipeline.submission.submission import Submissions
 
 KILLS = int(os.environ.get("CHAOS_KILLS", "4"))
 LATENCY_S = 0.02

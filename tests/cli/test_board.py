@@ -15,9 +15,9 @@ from live_api import live_api
 from sqlalchemy import insert, select, update
 
 from buildarena_benchmark.leaderboard import published_rows
-from buildarena_cli.report import variant
-from buildarena_pipeline.models import load_registry
-from buildarena_pipeline.specs import SweepSpec
+from buildarena_cli.commands.report import variant
+from buildarena_pipeline.catalog.models import load_registry
+from buildarena_pipeline.catalog.specs import SweepSpec
 from buildarena_store.tables import jobs, rollouts
 
 TASKS = ["transport-1", "support-1", "support-2", "lift-1", "lift-2"]

@@ -9,9 +9,9 @@ import yaml
 
 from buildarena_benchmark import parse_own_task
 from buildarena_benchmark.leaderboard import published_rows
-from buildarena_cli.report import variant
-from buildarena_pipeline.models import load_registry
-from buildarena_pipeline.specs import SweepSpec
+from buildarena_cli.commands.report import variant
+from buildarena_pipeline.catalog.models import load_registry
+from buildarena_pipeline.catalog.specs import SweepSpec
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 FILES = sorted((EXAMPLES / "sweeps").glob("*.yaml"))

@@ -13,7 +13,7 @@ from typer.testing import CliRunner, Result
 
 from buildarena_cli.errors import CommandError
 from buildarena_cli.main import app
-from buildarena_pipeline.context import open_context
+from buildarena_pipeline.runtime.context import open_context
 
 ADMIN = "operator-secret-that-is-long-enough"
 Call = Callable[..., Result]

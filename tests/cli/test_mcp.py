@@ -15,8 +15,8 @@ from mcp import ClientSession, StdioServerParameters, stdio_client
 from mcp.client.streamable_http import streamable_http_client
 from running import wait_until
 
-from buildarena_pipeline.embedded import free_port
-from buildarena_pipeline.stages import LeaseKeeper, StageRunner
+from buildarena_cli.local import free_port
+from buildarena_pipeline.runtime.job_runner import LeaseKeeper, StageRunner
 from buildarena_simworker.simulate import SimulateHandler
 from buildarena_worker.builtin.designs import DESIGNS
 from buildarena_worker.verify import Verifier

@@ -9,7 +9,7 @@ import pytest
 from commands import printed, run, run_cli
 from live_api import live_api
 
-from buildarena_api.tasks import EXAMPLE
+from buildarena_api.routes.tasks import EXAMPLE
 from buildarena_store import JobScore
 
 OTHER = EXAMPLE.replace("final_mass: 200", "final_mass: 300")

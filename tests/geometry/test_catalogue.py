@@ -12,7 +12,7 @@ import yaml
 
 from buildarena_geometry import CatalogueError, Machine, RefusalClass, load_catalogue
 
-FILES = resources.files("buildarena_geometry")
+FILES = resources.files("buildarena_geometry.modules")
 BASIC = json.loads(FILES.joinpath("modules.yaml").read_text())
 SCHEMA = json.loads(FILES.joinpath("modules.schema.json").read_text())
 CRATE = {

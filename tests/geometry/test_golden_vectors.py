@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from buildarena_geometry.sequences import run_sequences
+from buildarena_geometry.vectors.sequences import run_sequences
 
 DATA = Path(__file__).parents[1] / "data" / "geometry"
 POSITION_TOLERANCE = 1.5e-6  # units: what the paper measured against Besiege

@@ -13,9 +13,9 @@ from pathlib import Path
 
 import httpx
 
-from buildarena_pipeline.embedded import free_port
-from buildarena_pipeline.models import ModelEntry, ProviderEntry
-from buildarena_worker.llm.provider import ProviderClient
+from buildarena_cli.local import free_port
+from buildarena_pipeline.catalog.models import ModelEntry, ProviderEntry
+from buildarena_worker.providers.provider import ProviderClient
 
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE.parent / "support"))

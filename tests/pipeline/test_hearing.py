@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from celery.signals import task_received
 
-from buildarena_pipeline.hearing import Hearing, reconnect
+from buildarena_pipeline.broker.watchdog import Hearing, reconnect
 
 SOON_S = 10
 

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
-from buildarena_pipeline.embedded import EmbeddedValkey
-from buildarena_pipeline.queues import PLENTY, Queues
+from buildarena_cli.local import EmbeddedValkey
+from buildarena_pipeline.broker.queues import PLENTY, Queues
 
 
 def test_messages_are_sent_again_when_the_broker_is_back(tmp_path) -> None:

@@ -4,12 +4,12 @@ from pathlib import Path
 
 import pytest
 
+from buildarena_pipeline.catalog.models import load_registry
+from buildarena_pipeline.catalog.prompt_packs import PromptPacks, read_pack
+from buildarena_pipeline.catalog.specs import ClosedLoop
+from buildarena_pipeline.catalog.tracks import make_track
+from buildarena_pipeline.catalog.workflows import workflow_sources
 from buildarena_pipeline.errors import StartupError
-from buildarena_pipeline.extensions import workflow_sources
-from buildarena_pipeline.models import load_registry
-from buildarena_pipeline.prompt_packs import PromptPacks, read_pack
-from buildarena_pipeline.specs import ClosedLoop
-from buildarena_pipeline.tracks import make_track
 
 PAPER = {
     "grok4-0709",
@@ -67,7 +67,7 @@ def test_a_missing_file_is_named(tmp_path: Path) -> None:
 def test_a_changed_sentence_changes_the_packs_hash_and_the_track(tmp_path: Path) -> None:
     import shutil
 
-    from buildarena_pipeline.prompt_packs import builtin_folder
+    from buildarena_pipeline.catalog.prompt_packs import builtin_folder
 
     copy = tmp_path / "pack"
     shutil.copytree(builtin_folder() / "default", copy)

@@ -5,9 +5,9 @@ from collections.abc import Callable
 
 import pytest
 
+from buildarena_pipeline.catalog.specs import JobSpec, SweepSpec
 from buildarena_pipeline.errors import PassingFaultError, PermanentFaultError
-from buildarena_pipeline.specs import JobSpec, SweepSpec
-from buildarena_pipeline.stages import Hold, LeaseKeeper, StageRunner
+from buildarena_pipeline.runtime.job_runner import Hold, LeaseKeeper, StageRunner
 from buildarena_store import BudgetLimits, JobScore
 
 SCORE = JobScore(outcome="unsuccessful", success=False, indicator=1.0)

@@ -2,8 +2,8 @@ from __future__ import annotations
 
 import pytest
 
+from buildarena_pipeline.catalog.specs import JobSpec, SweepSpec
 from buildarena_pipeline.errors import SubmissionError
-from buildarena_pipeline.specs import JobSpec, SweepSpec
 
 MODELS = ["builtin/expert", "builtin/idle"]
 
@@ -78,9 +78,9 @@ def test_the_papers_samples_are_the_default() -> None:
 
 
 def test_work_goes_on_when_the_broker_is_gone(context, submissions, settings) -> None:
-    from buildarena_pipeline.context import open_context
-    from buildarena_pipeline.models import load_registry
-    from buildarena_pipeline.submission import Submissions
+    from buildarena_pipeline.catalog.models import load_registry
+    from buildarena_pipeline.runtime.context import open_context
+    from buildarena_pipeline.submission.submission import Submissions
 
     lonely = open_context(settings.model_copy(update={"broker_url": "redis://127.0.0.1:1/0"}))
     try:

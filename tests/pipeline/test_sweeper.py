@@ -1,7 +1,7 @@
 from __future__ import annotations
 
-from buildarena_pipeline.specs import SweepSpec
-from buildarena_pipeline.sweeper import Sweeper
+from buildarena_pipeline.catalog.specs import SweepSpec
+from buildarena_pipeline.runtime.reaper import Sweeper
 
 
 def submit(submissions, samples: int) -> None:

@@ -5,13 +5,13 @@ from __future__ import annotations
 import pytest
 from sqlalchemy import event
 
-from buildarena_api.tasks import EXAMPLE
+from buildarena_api.routes.tasks import EXAMPLE
 from buildarena_benchmark import TaskError, builtin_tasks, parse_own_task
 from buildarena_benchmark.tasks import task as task_module
+from buildarena_pipeline.catalog.specs import JobSpec, SweepSpec
+from buildarena_pipeline.catalog.tasks import TaskCatalogue, TaskChangedError
 from buildarena_pipeline.errors import PermanentFaultError, SubmissionError
-from buildarena_pipeline.scoring import task_of
-from buildarena_pipeline.specs import JobSpec, SweepSpec
-from buildarena_pipeline.task_catalogue import TaskCatalogue, TaskChangedError
+from buildarena_pipeline.runtime.scoring import task_of
 from buildarena_store import UnknownIdError
 
 OTHER = EXAMPLE.replace("final_mass: 200", "final_mass: 300")

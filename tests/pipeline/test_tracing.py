@@ -11,7 +11,7 @@ from opentelemetry.proto.collector.trace.v1.trace_service_pb2 import ExportTrace
 
 PROGRAM = """
 import sys
-from buildarena_pipeline.tracing import Tracing, span
+from buildarena_pipeline.runtime.tracing import Tracing, span
 
 tracing = Tracing("test", sys.argv[1])
 for stage in ("construct", "simulate"):

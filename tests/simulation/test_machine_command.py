@@ -10,7 +10,7 @@ from tests.simulation.reference_designs import beam, replayed
 from tests.simulation.references import DATA
 from typer.testing import CliRunner
 
-from buildarena_cli.machine import app
+from buildarena_cli.commands.machine import app
 from buildarena_simulation import Trajectory
 
 SHORT_TASK = """\

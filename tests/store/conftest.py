@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import pytest
 
-from buildarena_pipeline.context import Context
+from buildarena_pipeline.runtime.context import Context
 from buildarena_store import JobKey, NewJob
 
 

@@ -7,7 +7,7 @@ from decimal import Decimal
 
 import pytest
 
-from buildarena_pipeline.context import Context
+from buildarena_pipeline.runtime.context import Context
 from buildarena_store import (
     BudgetLimits,
     JournalEntry,

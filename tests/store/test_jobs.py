@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from buildarena_pipeline.context import Context
+from buildarena_pipeline.runtime.context import Context
 from buildarena_store import UnknownIdError
 
 

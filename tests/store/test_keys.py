@@ -5,7 +5,7 @@ from datetime import timedelta
 import pytest
 from sqlalchemy import text
 
-from buildarena_pipeline.context import Context
+from buildarena_pipeline.runtime.context import Context
 from buildarena_store import UnknownIdError
 
 

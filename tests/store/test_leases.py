@@ -6,9 +6,9 @@ from datetime import timedelta
 
 import pytest
 
-from buildarena_pipeline.context import Context
+from buildarena_pipeline.runtime.context import Context
 from buildarena_store import JobScore, JournalEntry, Leases, StaleLeaseError, Usage
-from buildarena_store.leases import Lease
+from buildarena_store.jobs.leases import Lease
 
 SCORE = JobScore(outcome="success", success=True, indicator=7.5)
 

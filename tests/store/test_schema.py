@@ -4,7 +4,7 @@ import pytest
 from alembic import command
 from sqlalchemy.exc import OperationalError
 
-from buildarena_pipeline.context import Context
+from buildarena_pipeline.runtime.context import Context
 from buildarena_store import Database, SchemaVersionError
 from buildarena_store import database as database_module
 from buildarena_store.database import alembic_config, expected_schema

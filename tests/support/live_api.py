@@ -12,9 +12,9 @@ import structlog
 import uvicorn
 
 from buildarena_api.app import create_app
-from buildarena_pipeline.context import Context
-from buildarena_pipeline.embedded import free_port
-from buildarena_pipeline.models import load_registry
+from buildarena_cli.local import free_port
+from buildarena_pipeline.catalog.models import load_registry
+from buildarena_pipeline.runtime.context import Context
 
 
 @contextmanager

@@ -8,16 +8,16 @@ from types import MappingProxyType
 from typing import Any
 
 from buildarena_benchmark import Task, builtin_tasks
-from buildarena_pipeline.models import load_registry
-from buildarena_pipeline.prompt_packs import PromptPack, PromptPacks
-from buildarena_pipeline.specs import Decoding
-from buildarena_pipeline.submission import model_config
+from buildarena_pipeline.catalog.models import load_registry
+from buildarena_pipeline.catalog.prompt_packs import PromptPack, PromptPacks
+from buildarena_pipeline.catalog.specs import Decoding
+from buildarena_pipeline.submission.submission import model_config
 from buildarena_store import JournalEntry, RolloutRecord
-from buildarena_worker.llm import ModelClients
-from buildarena_worker.rounds import Loop, run_session
-from buildarena_worker.session import Session
-from buildarena_worker.session_io import ModelClient, SessionIO, SuspendedError
+from buildarena_worker.providers import ModelClients
+from buildarena_worker.session.host import ModelClient, SessionIO, SuspendedError
+from buildarena_worker.session.session import Session
 from buildarena_worker.workflow import Workflows
+from buildarena_worker.workflow.rounds import Loop, run_session
 
 
 @dataclass

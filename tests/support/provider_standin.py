@@ -18,7 +18,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any, Self
 
 from buildarena_worker.builtin import MODELS
-from buildarena_worker.messages import Message, Reply, Request, Tool, ToolCall
+from buildarena_worker.session.messages import Message, Reply, Request, Tool, ToolCall
 
 Fault = Callable[[int], str | None]
 """From the number of a request to what goes wrong: '429', '500', 'drop', 'slow', …."""

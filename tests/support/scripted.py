@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from buildarena_store import Usage
-from buildarena_worker.messages import Reply, Request, ToolCall
-from buildarena_worker.session_io import Answer
+from buildarena_worker.session.host import Answer
+from buildarena_worker.session.messages import Reply, Request, ToolCall
 
 
 class Scripted:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 
-from buildarena_pipeline.context import Context
-from buildarena_pipeline.models import load_registry
-from buildarena_pipeline.stages import LeaseKeeper, StageRunner
+from buildarena_pipeline.catalog.models import load_registry
+from buildarena_pipeline.runtime.context import Context
+from buildarena_pipeline.runtime.job_runner import LeaseKeeper, StageRunner
 from buildarena_simworker.simulate import SimulateHandler
 from buildarena_worker.construct import ConstructHandler
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from working import work
 
-from buildarena_pipeline.specs import Budget, SweepSpec
+from buildarena_pipeline.catalog.specs import Budget, SweepSpec
 
 WISH = {"tasks": ["lift-1"], "models": ["builtin/expert"], "simulator": "mujoco"}
 

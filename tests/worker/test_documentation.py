@@ -7,7 +7,7 @@ from scripted import Scripted, call
 
 from buildarena_benchmark import parse_own_task
 from buildarena_worker.builtin.designs import DESIGNS
-from buildarena_worker.messages import Reply
+from buildarena_worker.session.messages import Reply
 
 DOCS = Path(__file__).parents[2] / "docs"
 START = call("start", init_shift=[0, 0, 0], init_rotation=[0, 0, 0], note="")

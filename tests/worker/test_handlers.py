@@ -7,9 +7,9 @@ from collections.abc import Callable
 import pytest
 from working import work
 
-from buildarena_pipeline.models import load_registry
-from buildarena_pipeline.specs import JobSpec
-from buildarena_pipeline.submission import Submissions
+from buildarena_pipeline.catalog.models import load_registry
+from buildarena_pipeline.catalog.specs import JobSpec
+from buildarena_pipeline.submission.submission import Submissions
 from buildarena_store import Job
 from buildarena_worker.verify import Verifier
 

@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 from working import work
 
-from buildarena_pipeline.specs import JobSpec
+from buildarena_pipeline.catalog.specs import JobSpec
 from buildarena_worker import builtin
 from buildarena_worker.builtin import expert
-from buildarena_worker.messages import Reply, Request, ToolCall
+from buildarena_worker.session.messages import Reply, Request, ToolCall
 
 LURES = (
     "../../../../etc/passwd",

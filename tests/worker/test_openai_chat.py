@@ -16,11 +16,11 @@ from pydantic_ai.models.openai import OpenAIChatModel
 from pydantic_ai.providers.openai import OpenAIProvider
 from pydantic_ai.settings import ModelSettings
 
-from buildarena_worker.llm.openai_chat import OpenAIChat
-from buildarena_worker.llm.openai_wire import read_answer
-from buildarena_worker.llm.wire import Answered, from_wire, request_parameters, to_wire
-from buildarena_worker.machine_tools import BUILD, tools_named
-from buildarena_worker.messages import Message, Tool, ToolCall
+from buildarena_worker.providers.openai_chat import OpenAIChat
+from buildarena_worker.providers.openai_wire import read_answer
+from buildarena_worker.providers.wire import Answered, from_wire, request_parameters, to_wire
+from buildarena_worker.session.messages import Message, Tool, ToolCall
+from buildarena_worker.workflow.machine_tools import BUILD, tools_named
 
 URL = "http://provider.test/v1/"
 SYSTEM = Message(role="system", text="Build.")

@@ -11,17 +11,17 @@ import yaml
 from suspension_bridge import suspension_bridge
 from working import work
 
-from buildarena_api.tasks import EXAMPLE
+from buildarena_api.routes.tasks import EXAMPLE
 from buildarena_benchmark import builtin_tasks, parse_own_task
-from buildarena_pipeline.external import ExternalSessions
-from buildarena_pipeline.models import load_registry
-from buildarena_pipeline.prompt_packs import PromptPacks
-from buildarena_pipeline.specs import JobSpec
-from buildarena_pipeline.submission import Submissions
+from buildarena_pipeline.agents.sessions import ExternalSessions
+from buildarena_pipeline.catalog.models import load_registry
+from buildarena_pipeline.catalog.prompt_packs import PromptPacks
+from buildarena_pipeline.catalog.specs import JobSpec
+from buildarena_pipeline.submission.submission import Submissions
 from buildarena_store import Job
 from buildarena_worker.builtin.designs import DESIGNS
-from buildarena_worker.session import Session
-from buildarena_worker.session_io import SessionIO
+from buildarena_worker.session.host import SessionIO
+from buildarena_worker.session.session import Session
 from buildarena_worker.verify import Verifier
 
 BRIDGE = Path(__file__).parents[2] / "examples" / "tasks" / "suspension-bridge.yaml"

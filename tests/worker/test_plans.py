@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from buildarena_worker.plan import PlanError, read_plan
+from buildarena_worker.workflow.plan import PlanError, read_plan
 
 GOOD = """<building_plan><overall_structure>all</overall_structure><sub_structures>
 <sub_structure><name>deck</name><description>flat & long</description></sub_structure>

@@ -8,13 +8,13 @@ from dataclasses import replace
 import pytest
 from provider_standin import ProviderStandIn
 
+from buildarena_pipeline.catalog.models import ModelEntry, Price, ProviderEntry
 from buildarena_pipeline.errors import PassingFaultError, PermanentFaultError
-from buildarena_pipeline.models import ModelEntry, Price, ProviderEntry
 from buildarena_store import Usage
 from buildarena_worker.errors import ConstructionFailedError
-from buildarena_worker.llm.provider import ProviderClient
-from buildarena_worker.llm.retries import RetryPolicy
-from buildarena_worker.messages import Message, Reply, Request, Tool, ToolCall
+from buildarena_worker.providers.provider import ProviderClient
+from buildarena_worker.providers.retries import RetryPolicy
+from buildarena_worker.session.messages import Message, Reply, Request, Tool, ToolCall
 
 QUICK = RetryPolicy(tries=5, first_wait_s=0.01, longest_wait_s=0.05, timeout_s=2.0)
 PRICE = Price(input=2.0, output=8.0, cached=0.5)

@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from buildarena_worker.llm.request_loop import RequestLoop
+from buildarena_worker.providers.request_loop import RequestLoop
 
 THREADS = 16
 

@@ -9,7 +9,7 @@ from buildarena_worker.errors import (
     LeaseLostError,
     LimitReachedError,
 )
-from buildarena_worker.messages import Message, Reply, ToolCall
+from buildarena_worker.session.messages import Message, Reply, ToolCall
 
 START = call("start", init_shift=[0, 0, 0], init_rotation=[0, 0, 0], note="")
 PLAN = Reply(

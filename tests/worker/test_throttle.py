@@ -7,8 +7,8 @@ import time
 
 from redis import Redis
 
-from buildarena_worker.llm import throttle as throttle_module
-from buildarena_worker.llm.throttle import Throttle
+from buildarena_worker.providers import throttle as throttle_module
+from buildarena_worker.providers.throttle import Throttle
 
 
 def test_no_more_than_the_limit_is_open_at_once_over_all_workers(context, broker_url) -> None:
@@ -77,7 +77,7 @@ def test_the_limit_halves_on_complaints_and_grows_with_answers(context, broker_u
 
 HOLDER = """
 import asyncio, sys
-from buildarena_worker.llm import throttle
+from buildarena_worker.providers import throttle
 throttle.HOLD_S = 1
 
 async def hold():

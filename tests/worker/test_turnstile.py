@@ -5,7 +5,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from buildarena_worker.turnstile import Turnstile
+from buildarena_worker.concurrency_gate import Turnstile
 
 
 class Crowd:

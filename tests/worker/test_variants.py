@@ -7,15 +7,15 @@ from scripted import Scripted, call
 
 from buildarena_benchmark import builtin_tasks
 from buildarena_geometry import Machine
+from buildarena_pipeline.catalog.prompt_packs import PromptPack, PromptPacks
 from buildarena_pipeline.errors import PermanentFaultError, StartupError
-from buildarena_pipeline.prompt_packs import PromptPack, PromptPacks
 from buildarena_simulation import simulate
 from buildarena_worker.builtin.expert import reply as expert
 from buildarena_worker.builtin.reading import read_situation
 from buildarena_worker.errors import ConstructionFailedError
-from buildarena_worker.messages import Reply, Request
-from buildarena_worker.rounds import Loop
+from buildarena_worker.session.messages import Reply, Request
 from buildarena_worker.workflow import Workflows
+from buildarena_worker.workflow.rounds import Loop
 
 START = call("start", init_shift=[0, 0, 0], init_rotation=[0, 0, 0], note="")
 BLOCK = call("attach_block_to", base_block="1", face="A", new_block="Small Wooden Block", note="")
@@ -168,7 +168,7 @@ def test_a_workflow_that_cannot_be_loaded_is_named(tmp_path: Path) -> None:
 
 
 def test_the_expert_ends_work_on_tasks_it_does_not_know() -> None:
-    from buildarena_worker.messages import Message
+    from buildarena_worker.session.messages import Message
 
     request = Request(
         model_config={},

@@ -28,7 +28,7 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "support"))
 from overhead import measure_overhead
 from running import wait_until
 
-from buildarena_pipeline.embedded import EmbeddedPostgres, EmbeddedValkey, free_port
+from buildarena_cli.local import EmbeddedPostgres, EmbeddedValkey, free_port
 from buildarena_store import Database
 
 MEBIBYTE = 1024 * 1024

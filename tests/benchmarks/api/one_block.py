@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from buildarena_geometry import Machine
-from buildarena_worker.dialogue import Dialogue, Role
-from buildarena_worker.session import Session
+from buildarena_worker.session.dialogue import Dialogue, Role
+from buildarena_worker.session.session import Session
 
 
 class OneBlock:

@@ -26,11 +26,11 @@ from starlette.testclient import TestClient
 
 from buildarena_api.app import create_app
 from buildarena_benchmark import builtin_tasks
-from buildarena_pipeline.context import Context, open_context
-from buildarena_pipeline.embedded import EmbeddedPostgres
-from buildarena_pipeline.logs import set_up_logs
-from buildarena_pipeline.models import load_registry
-from buildarena_pipeline.settings import Settings
+from buildarena_cli.local import EmbeddedPostgres
+from buildarena_pipeline.catalog.models import load_registry
+from buildarena_pipeline.runtime.context import Context, open_context
+from buildarena_pipeline.runtime.logs import set_up_logs
+from buildarena_pipeline.runtime.settings import Settings
 from buildarena_store import Database
 from buildarena_store.tables import jobs
 

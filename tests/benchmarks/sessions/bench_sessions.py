@@ -19,12 +19,12 @@ from pathlib import Path
 
 import psutil
 
-from buildarena_pipeline.context import Context, open_context
-from buildarena_pipeline.embedded import EmbeddedPostgres, EmbeddedValkey
-from buildarena_pipeline.models import load_registry
-from buildarena_pipeline.settings import Settings
-from buildarena_pipeline.specs import SweepSpec
-from buildarena_pipeline.submission import Submissions
+from buildarena_cli.local import EmbeddedPostgres, EmbeddedValkey
+from buildarena_pipeline.catalog.models import load_registry
+from buildarena_pipeline.catalog.specs import SweepSpec
+from buildarena_pipeline.runtime.context import Context, open_context
+from buildarena_pipeline.runtime.settings import Settings
+from buildarena_pipeline.submission.submission import Submissions
 
 STANDIN = Path(__file__).with_name("standin.py")
 MEBIBYTE = 1024 * 1024

@@ -7,20 +7,20 @@ from typing import Annotated
 
 import typer
 
-from buildarena_cli import (
-    board,
-    catalogue,
+from buildarena_cli.client import Client
+from buildarena_cli.commands import (
     jobs,
     keys,
+    leaderboard,
     machine,
     machine_files,
+    models,
     report,
     service,
     sweeps,
     tasks,
 )
-from buildarena_cli.client import Client
-from buildarena_cli.doctor import examine
+from buildarena_cli.commands.doctor import examine
 from buildarena_cli.errors import FAILED, CommandError
 from buildarena_cli.options import DEFAULT_URL, JsonOption, UrlOption
 from buildarena_cli.output import error_console
@@ -35,7 +35,7 @@ app.add_typer(sweeps.app, name="sweep")
 app.add_typer(jobs.app, name="job")
 app.add_typer(keys.app, name="key")
 app.add_typer(tasks.app, name="task")
-app.add_typer(catalogue.models, name="model")
+app.add_typer(models.models, name="model")
 app.add_typer(machine.app, name="machine")
 
 app.command()(service.up)
@@ -47,7 +47,13 @@ app.add_typer(workers, name="worker")
 machine.app.command("check")(machine_files.check)
 machine.app.command("export")(machine_files.export)
 jobs.app.command("replay")(machine_files.replay)
-for command in (board.leaderboard, board.compare, board.export, board.audit, report.report):
+for command in (
+    leaderboard.leaderboard,
+    leaderboard.compare,
+    leaderboard.export,
+    leaderboard.audit,
+    report.report,
+):
     app.command()(command)
 
 

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
-from buildarena_pipeline.settings import DEFAULT_PORT
+from buildarena_pipeline.runtime.settings import DEFAULT_PORT
 
 DEFAULT_URL = f"http://127.0.0.1:{DEFAULT_PORT}"
 

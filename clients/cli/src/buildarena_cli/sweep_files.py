@@ -13,7 +13,7 @@ from buildarena_benchmark import Fault, SourceError
 from buildarena_benchmark.tasks.sources import Source, path_of, read_source
 from buildarena_cli.client import RefusedError
 from buildarena_cli.errors import CommandError
-from buildarena_pipeline.specs import SweepSpec
+from buildarena_pipeline.catalog.specs import SweepSpec
 
 MOST_BYTES: Final = 2 * 1024 * 1024
 """Largest file: room for the 100,000 seeds that a sweep can name."""

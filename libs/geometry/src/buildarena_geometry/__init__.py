@@ -1,17 +1,17 @@
 """Build machines block by block; every step is checked."""
 
-from .blocks import Block, Connector, Joint, KeyPress
-from .catalogue import load_catalogue
-from .documents import DOCUMENT_VERSION
-from .errors import CatalogueError, DocumentError, GeometryError, SequenceError
-from .feedback import FEEDBACK_VERSION
-from .keys import KEYS
-from .log import ActionLog, ActionRecord
-from .machine import Machine, replay
-from .modules import Box, Catalogue, Cylinder, Face, Landmark, Module
-from .outcomes import Accepted, Cause, Outcome, RefusalClass, Refused
-from .poses import Pose
-from .tools import GROUPS, ToolDefinition, tool_definitions
+from buildarena_geometry.blocks import Block, Connector, Joint, KeyPress
+from buildarena_geometry.documents.log import ActionLog, ActionRecord
+from buildarena_geometry.documents.write import DOCUMENT_VERSION
+from buildarena_geometry.errors import CatalogueError, DocumentError, GeometryError, SequenceError
+from buildarena_geometry.feedback import FEEDBACK_VERSION
+from buildarena_geometry.keys import KEYS
+from buildarena_geometry.machine import Machine, replay
+from buildarena_geometry.modules.catalogue import load_catalogue
+from buildarena_geometry.modules.module import Box, Catalogue, Cylinder, Face, Landmark, Module
+from buildarena_geometry.outcomes import Accepted, Cause, Outcome, RefusalClass, Refused
+from buildarena_geometry.poses import Pose
+from buildarena_geometry.tools import GROUPS, ToolDefinition, tool_definitions
 
 __version__ = "0.1.0"
 

@@ -8,8 +8,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .errors import GeometryError
-from .sequences import parse, run_sequences
+from buildarena_geometry.errors import GeometryError
+from buildarena_geometry.vectors.sequences import parse, run_sequences
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

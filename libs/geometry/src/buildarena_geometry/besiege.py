@@ -10,10 +10,10 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from .rotations import Quaternion, Vector, multiply, positive
+from buildarena_geometry.rotations import Quaternion, Vector, multiply, positive
 
 if TYPE_CHECKING:
-    from .blocks import Block, Connector
+    from buildarena_geometry.blocks import Block, Connector
 
 # Our block axes in swapped components: x mirrored and the last two swapped is this half turn.
 _BLOCK_FROM_SWAPPED: Quaternion = (0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5))

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .modules import Module
-from .poses import Pose
-from .rotations import Vector, add, scaled
+from buildarena_geometry.modules.module import Module
+from buildarena_geometry.poses import Pose
+from buildarena_geometry.rotations import Vector, add, scaled
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

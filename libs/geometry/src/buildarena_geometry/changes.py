@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from .state import MachineState
+    from buildarena_geometry.state import MachineState
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 import fcl
 import numpy as np
 
-from .modules import Box, Solid
-from .poses import Pose
+from buildarena_geometry.modules.module import Box, Solid
+from buildarena_geometry.poses import Pose
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from .blocks import Block
+    from buildarena_geometry.blocks import Block
 
 TOUCHING = 1e-6  # units; solids that reach into each other less than this touch, which is allowed
 _ALL_CONTACTS = 1_000_000  # FCL's broadphase stops at so many contacts: more than any machine has

@@ -5,18 +5,18 @@ from __future__ import annotations
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Self
 
-from .catalogue import load_catalogue
-from .changes import Change
-from .collision import CollisionWorld
-from .documents import machine_document
-from .feedback.words import listing
-from .json_values import json_value
-from .log import ActionLog, ActionRecord
-from .measures import bounds, center_of_mass
-from .outcomes import Accepted, Cause, Outcome, Refused
-from .parameters import LARGEST_NUMBER, RefusalError, shown
-from .state import MachineState
-from .tools import ACTIONS
+from buildarena_geometry.changes import Change
+from buildarena_geometry.collision import CollisionWorld
+from buildarena_geometry.documents.json_values import json_value
+from buildarena_geometry.documents.log import ActionLog, ActionRecord
+from buildarena_geometry.documents.write import machine_document
+from buildarena_geometry.feedback.words import listing
+from buildarena_geometry.measures import bounds, center_of_mass
+from buildarena_geometry.modules.catalogue import load_catalogue
+from buildarena_geometry.modules.parameters import LARGEST_NUMBER, RefusalError, shown
+from buildarena_geometry.outcomes import Accepted, Cause, Outcome, Refused
+from buildarena_geometry.state import MachineState
+from buildarena_geometry.tools import ACTIONS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -24,9 +24,9 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from .blocks import Block, Connector, Joint, KeyPress
-    from .modules import Catalogue
-    from .state import SubStructure
+    from buildarena_geometry.blocks import Block, Connector, Joint, KeyPress
+    from buildarena_geometry.modules.module import Catalogue
+    from buildarena_geometry.state import SubStructure
 
 
 class Machine:
@@ -234,7 +234,7 @@ class Machine:
         Raises:
             DocumentError: it is not a machine; the message names the entry.
         """
-        from .document_reading import read_machine
+        from buildarena_geometry.documents.read import read_machine
 
         return read_machine(document, catalogue=catalogue)
 

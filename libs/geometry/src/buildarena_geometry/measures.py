@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .modules import Box, Solid
+from buildarena_geometry.modules.module import Box, Solid
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from .blocks import Block
-    from .state import MachineState
+    from buildarena_geometry.blocks import Block
+    from buildarena_geometry.state import MachineState
 
 
 def center_of_mass(state: MachineState) -> NDArray[np.float64]:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .rotations import (
+from buildarena_geometry.rotations import (
     NO_ROTATION,
     ORIGIN,
     SHORTEST_QUATERNION,

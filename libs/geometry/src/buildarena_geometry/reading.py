@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, NoReturn
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator
 
-    from .errors import GeometryError
-    from .rotations import Vector
+    from buildarena_geometry.errors import GeometryError
+    from buildarena_geometry.rotations import Vector
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -10,16 +10,16 @@ import math
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from .blocks import Block, Connector, FaceRef, Joint, KeyPress
-from .rotations import distance, subtract
+from buildarena_geometry.blocks import Block, Connector, FaceRef, Joint, KeyPress
+from buildarena_geometry.rotations import distance, subtract
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
     from collections.abc import Set as AbstractSet
 
-    from .modules import Catalogue
-    from .poses import Pose
-    from .rotations import Vector
+    from buildarena_geometry.modules.module import Catalogue
+    from buildarena_geometry.poses import Pose
+    from buildarena_geometry.rotations import Vector
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

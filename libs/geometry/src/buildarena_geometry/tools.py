@@ -11,11 +11,11 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
-from .actions import assemble, build, control, query, refine, remove
-from .changes import Change
-from .feedback.words import listing
-from .outcomes import Cause
-from .parameters import JsonSchema, Parameter, RefusalError, shown
+from buildarena_geometry.actions import assemble, build, control, query, refine, remove
+from buildarena_geometry.changes import Change
+from buildarena_geometry.feedback.words import listing
+from buildarena_geometry.modules.parameters import JsonSchema, Parameter, RefusalError, shown
+from buildarena_geometry.outcomes import Cause
 
 GROUPS = ("build", "refine", "assemble", "control", "query")
 
@@ -132,7 +132,9 @@ def _action(propose: Callable[..., Change], group: str) -> Action:
 
 def _parameter(hint: object) -> Parameter:
     if get_origin(hint) is not Annotated:
-        raise TypeError(f"{hint} is not one of the annotations in buildarena_geometry.parameters")
+        raise TypeError(
+            f"{hint} is not one of the annotations in buildarena_geometry.modules.parameters"
+        )
     parameter = get_args(hint)[1]
     assert isinstance(parameter, Parameter)  # noqa: S101  guards the developer who adds an action
     return parameter

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from buildarena_geometry.modules import Cylinder
+from buildarena_geometry.modules.module import Cylinder
 from buildarena_simulation.constants import MAX_PARTS, JointKind
 from buildarena_simulation.control import Bindings
 from buildarena_simulation.errors import MachineNotSimulable
@@ -20,7 +20,7 @@ from buildarena_simulation.structure.model import (
 
 if TYPE_CHECKING:
     from buildarena_geometry import Block, Joint, Machine
-    from buildarena_geometry.modules import Solid
+    from buildarena_geometry.modules.module import Solid
 
 _SMALL_WOODEN_BLOCK = 15
 """Besiege's id of the one module whose far end grabs what it touches."""

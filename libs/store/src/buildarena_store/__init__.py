@@ -4,9 +4,10 @@ Postgres is the truth about jobs; the artifact store keeps the large results by 
 Rows leave this room as frozen dataclasses, never as database objects.
 """
 
+from buildarena_store.accounts.budgets import Budget, BudgetLimits, Budgets, Need, Shortage
+from buildarena_store.accounts.keys import ApiKey, ApiKeys, KeyCheck
 from buildarena_store.artifacts import ArtifactInfo, ArtifactStore
 from buildarena_store.boards import BoardChange, BoardFeed, Boards, Round
-from buildarena_store.budgets import Budget, BudgetLimits, Budgets, Need, Shortage
 from buildarena_store.database import Database
 from buildarena_store.errors import (
     ArtifactMissingError,
@@ -16,18 +17,17 @@ from buildarena_store.errors import (
     UnknownIdError,
 )
 from buildarena_store.events import Event, Events
-from buildarena_store.external import ExternalCall, ExternalCalls
 from buildarena_store.figures import STAGE_SECONDS, Figures, ServiceFigures
-from buildarena_store.jobs import Job, JobKey, Jobs, NewJob
-from buildarena_store.journal import Journal, JournalEntry, Usage
-from buildarena_store.keys import ApiKey, ApiKeys, KeyCheck
-from buildarena_store.leases import Lease, Leases
-from buildarena_store.results import JobScore, Results
-from buildarena_store.rollouts import RolloutRecord, RolloutRequest, Rollouts
-from buildarena_store.sweeps import NewSweep, Sweep, SweepProgress, Sweeps
+from buildarena_store.jobs.external_calls import ExternalCall, ExternalCalls
+from buildarena_store.jobs.jobs import Job, JobKey, Jobs, NewJob
+from buildarena_store.jobs.journal import Journal, JournalEntry, Usage
+from buildarena_store.jobs.leases import Lease, Leases
+from buildarena_store.jobs.results import JobScore, Results
+from buildarena_store.jobs.rollouts import RolloutRecord, RolloutRequest, Rollouts
+from buildarena_store.jobs.verifications import Verification, Verifications
+from buildarena_store.sweeps.sweeps import NewSweep, Sweep, SweepProgress, Sweeps
 from buildarena_store.tasks import StoredTask, Tasks
 from buildarena_store.text import clean
-from buildarena_store.verifications import Verification, Verifications
 from buildarena_store.workers import WorkerInfo, Workers
 
 __all__ = [

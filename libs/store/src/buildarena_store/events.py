@@ -10,8 +10,8 @@ from typing import Any
 from sqlalchemy import Connection, cast, func, insert, literal, or_, select
 from sqlalchemy.dialects.postgresql import JSONB
 
-from buildarena_store.bulk import bound_texts
 from buildarena_store.database import Database
+from buildarena_store.rows import bound_texts
 from buildarena_store.tables import events, sweep_jobs
 
 now = func.clock_timestamp()

@@ -7,14 +7,14 @@ import sys
 import uvicorn
 from sqlalchemy.exc import OperationalError
 
-from buildarena_api.access import check_binding
 from buildarena_api.app import create_app
-from buildarena_pipeline.context import open_context
+from buildarena_api.http.access import check_binding
+from buildarena_pipeline.catalog.models import load_registry
 from buildarena_pipeline.errors import StartupError
-from buildarena_pipeline.logs import set_up_logs
-from buildarena_pipeline.models import load_registry
-from buildarena_pipeline.settings import Settings
-from buildarena_pipeline.tracing import Tracing
+from buildarena_pipeline.runtime.context import open_context
+from buildarena_pipeline.runtime.logs import set_up_logs
+from buildarena_pipeline.runtime.settings import Settings
+from buildarena_pipeline.runtime.tracing import Tracing
 from buildarena_store import SchemaVersionError
 
 POOL_SIZE = 10

@@ -8,34 +8,34 @@ from contextlib import asynccontextmanager
 from fastapi import Depends, FastAPI
 from fastapi_offline import FastAPIOffline
 
-from buildarena_api import (
+from buildarena_api.events.hub import EventHub
+from buildarena_api.http.access import caller_of
+from buildarena_api.http.limits import Guards
+from buildarena_api.http.log import RequestLog
+from buildarena_api.http.problems import add_problem_handlers, problem_responses
+from buildarena_api.http.rate_limits import RateLimits
+from buildarena_api.leaderboard.cache import BoardCache
+from buildarena_api.routes import (
     archives,
     catalogue,
+    events,
     health,
     jobs,
     keys,
     leaderboard,
     metrics,
     sessions,
-    streams,
     sweeps,
     tasks,
     verifications,
 )
-from buildarena_api.access import caller_of
-from buildarena_api.board_cache import BoardCache
-from buildarena_api.event_hub import EventHub
-from buildarena_api.guards import Guards
-from buildarena_api.metrics import ServiceMetrics
-from buildarena_api.problems import add_problem_handlers, problem_responses
-from buildarena_api.rate_limits import RateLimits
-from buildarena_api.request_log import RequestLog
+from buildarena_api.routes.metrics import ServiceMetrics
 from buildarena_pipeline import __version__
-from buildarena_pipeline.context import Context
-from buildarena_pipeline.external import ExternalSessions
-from buildarena_pipeline.models import ModelRegistry
-from buildarena_pipeline.submission import Submissions
-from buildarena_pipeline.sweeper import Sweeper
+from buildarena_pipeline.agents.sessions import ExternalSessions
+from buildarena_pipeline.catalog.models import ModelRegistry
+from buildarena_pipeline.runtime.context import Context
+from buildarena_pipeline.runtime.reaper import Sweeper
+from buildarena_pipeline.submission.submission import Submissions
 
 DESCRIPTION = """Find out whether language models can engineer: submit task x model x seed jobs,
 watch machines being built and simulated, and read the leaderboard. Errors are RFC 9457 problem
@@ -86,7 +86,7 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
     for room in (
         verifications,
         sessions,
-        streams,
+        events,
         jobs,
         sweeps,
         leaderboard,

@@ -7,9 +7,9 @@ import sys
 from typing import Any
 
 from buildarena_api.app import create_app
-from buildarena_pipeline.context import open_context
-from buildarena_pipeline.models import load_registry
-from buildarena_pipeline.settings import Settings
+from buildarena_pipeline.catalog.models import load_registry
+from buildarena_pipeline.runtime.context import open_context
+from buildarena_pipeline.runtime.settings import Settings
 
 
 def contract() -> dict[str, Any]:

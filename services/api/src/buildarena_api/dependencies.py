@@ -6,10 +6,10 @@ from typing import Annotated
 
 from fastapi import Depends, Request
 
-from buildarena_pipeline.context import Context
-from buildarena_pipeline.external import ExternalSessions
-from buildarena_pipeline.models import ModelRegistry
-from buildarena_pipeline.submission import Submissions
+from buildarena_pipeline.agents.sessions import ExternalSessions
+from buildarena_pipeline.catalog.models import ModelRegistry
+from buildarena_pipeline.runtime.context import Context
+from buildarena_pipeline.submission.submission import Submissions
 
 
 def _context(request: Request) -> Context:

@@ -6,10 +6,10 @@ import argparse
 import sys
 
 from buildarena_geometry import __version__ as geometry_version
+from buildarena_pipeline.broker.queues import simulate_queue
 from buildarena_pipeline.errors import StartupError
-from buildarena_pipeline.queues import simulate_queue
-from buildarena_pipeline.settings import Settings
-from buildarena_pipeline.worker_process import WorkerSpec, run_worker
+from buildarena_pipeline.runtime.settings import Settings
+from buildarena_pipeline.runtime.worker_process import WorkerSpec, run_worker
 from buildarena_simulation import ENGINES, SIMULATION_VERSION
 from buildarena_simworker.simulate import SimulateHandler
 

@@ -10,11 +10,11 @@ from typing import Any
 
 from buildarena_benchmark import Score, Task, failed_score, score
 from buildarena_geometry import KeyPress, Machine
-from buildarena_pipeline.context import Context
+from buildarena_pipeline.broker.queues import CONSTRUCT
 from buildarena_pipeline.errors import PassingFaultError, PermanentFaultError
-from buildarena_pipeline.queues import CONSTRUCT
-from buildarena_pipeline.scoring import best_rollout, rollout_score, task_of
-from buildarena_pipeline.stages import Hold
+from buildarena_pipeline.runtime.context import Context
+from buildarena_pipeline.runtime.job_runner import Hold
+from buildarena_pipeline.runtime.scoring import best_rollout, rollout_score, task_of
 from buildarena_simulation import (
     SIMULATION_VERSION,
     MachineNotSimulable,

@@ -7,13 +7,13 @@ from collections.abc import Callable, Mapping
 
 from buildarena_geometry import FEEDBACK_VERSION
 from buildarena_geometry import __version__ as geometry_version
-from buildarena_pipeline.context import Context
+from buildarena_pipeline.broker.queues import CONSTRUCT, VERIFY
+from buildarena_pipeline.catalog.models import load_registry
 from buildarena_pipeline.errors import StartupError
-from buildarena_pipeline.models import load_registry
-from buildarena_pipeline.queues import CONSTRUCT, VERIFY
-from buildarena_pipeline.settings import Settings
-from buildarena_pipeline.stages import StageHandler
-from buildarena_pipeline.worker_process import WorkerSpec, run_worker
+from buildarena_pipeline.runtime.context import Context
+from buildarena_pipeline.runtime.job_runner import StageHandler
+from buildarena_pipeline.runtime.settings import Settings
+from buildarena_pipeline.runtime.worker_process import WorkerSpec, run_worker
 from buildarena_worker.construct import ConstructHandler
 from buildarena_worker.verify import VerificationRunner
 

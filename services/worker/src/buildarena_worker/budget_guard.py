@@ -6,10 +6,10 @@ import time
 from collections.abc import Callable
 from decimal import Decimal
 
-from buildarena_pipeline.stages import Hold
+from buildarena_pipeline.runtime.job_runner import Hold
 from buildarena_store import Budgets, Need, Shortage
 from buildarena_worker.errors import LeaseLostError, WorkerError
-from buildarena_worker.messages import Request
+from buildarena_worker.session.messages import Request
 
 WAIT_S = 0.2
 CHARACTERS_PER_TOKEN = 3

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from decimal import Decimal
 
-from buildarena_pipeline.context import Context
-from buildarena_pipeline.documents import machine_bytes
+from buildarena_pipeline.broker.queues import simulate_queue
+from buildarena_pipeline.catalog.models import ModelRegistry
+from buildarena_pipeline.catalog.prices import price_usd
+from buildarena_pipeline.catalog.prompt_packs import PromptPack, PromptPacks
 from buildarena_pipeline.errors import PermanentFaultError, StartupError
-from buildarena_pipeline.models import ModelRegistry
-from buildarena_pipeline.prices import price_usd
-from buildarena_pipeline.prompt_packs import PromptPack, PromptPacks
-from buildarena_pipeline.queues import simulate_queue
-from buildarena_pipeline.scoring import failure_score, rollout_score, task_of
-from buildarena_pipeline.stages import Hold
+from buildarena_pipeline.runtime.context import Context
+from buildarena_pipeline.runtime.job_runner import Hold
+from buildarena_pipeline.runtime.machine_documents import machine_bytes
+from buildarena_pipeline.runtime.scoring import failure_score, rollout_score, task_of
 from buildarena_simulation import Trajectory
 from buildarena_store import (
     Job,
@@ -23,18 +23,18 @@ from buildarena_store import (
     StaleLeaseError,
 )
 from buildarena_worker.budget_guard import BudgetGuard, BudgetUsedUpError, Price
+from buildarena_worker.concurrency_gate import Turnstile
 from buildarena_worker.errors import (
     ConstructionFailedError,
     JournalMismatchError,
     LeaseLostError,
     LimitReachedError,
 )
-from buildarena_worker.llm import ModelClients
-from buildarena_worker.rounds import Loop, run_session
-from buildarena_worker.session import Session
-from buildarena_worker.session_io import SessionIO, SuspendedError
-from buildarena_worker.turnstile import Turnstile
+from buildarena_worker.providers import ModelClients
+from buildarena_worker.session.host import SessionIO, SuspendedError
+from buildarena_worker.session.session import Session
 from buildarena_worker.workflow import SessionEnd, Workflows
+from buildarena_worker.workflow.rounds import Loop, run_session
 
 JSON = "application/json"
 

@@ -16,13 +16,13 @@ import structlog
 
 from buildarena_benchmark import failed_score, score
 from buildarena_geometry import KeyPress, Machine
-from buildarena_pipeline.context import Context
-from buildarena_pipeline.documents import machine_bytes
+from buildarena_pipeline.agents.workbench import Workbench
+from buildarena_pipeline.broker.queues import EXTERNAL
+from buildarena_pipeline.catalog.prompt_packs import PromptPacks
 from buildarena_pipeline.errors import PermanentFaultError
-from buildarena_pipeline.prompt_packs import PromptPacks
-from buildarena_pipeline.queues import EXTERNAL
-from buildarena_pipeline.scoring import best_rollout, task_of
-from buildarena_pipeline.workbench import Workbench
+from buildarena_pipeline.runtime.context import Context
+from buildarena_pipeline.runtime.machine_documents import machine_bytes
+from buildarena_pipeline.runtime.scoring import best_rollout, task_of
 from buildarena_simulation import SIMULATION_VERSION, MachineNotSimulable, Trajectory, simulate
 from buildarena_store import ExternalCall, Job, RolloutRecord, Usage
 from buildarena_worker.construct import loop_of, pack_of
@@ -31,10 +31,10 @@ from buildarena_worker.errors import (
     JournalMismatchError,
     LimitReachedError,
 )
-from buildarena_worker.rounds import run_session
-from buildarena_worker.session import Session
-from buildarena_worker.session_io import SessionIO, SuspendedError
+from buildarena_worker.session.host import SessionIO, SuspendedError
+from buildarena_worker.session.session import Session
 from buildarena_worker.workflow import Workflows
+from buildarena_worker.workflow.rounds import run_session
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

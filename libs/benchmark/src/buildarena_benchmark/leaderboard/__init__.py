@@ -2,7 +2,7 @@
 
 from buildarena_benchmark.leaderboard.board import Board, BoardQuery, TaskBoard, TrackBoard
 from buildarena_benchmark.leaderboard.cells import Cell, summarise
-from buildarena_benchmark.leaderboard.duels import Duel, TaskDuel, duel
+from buildarena_benchmark.leaderboard.comparisons import Duel, TaskDuel, duel
 from buildarena_benchmark.leaderboard.latex import cost_table, performance_table, plain_table
 from buildarena_benchmark.leaderboard.overall import OverallRow
 from buildarena_benchmark.leaderboard.published import (

@@ -2,19 +2,18 @@
 
 from dataclasses import replace
 
+from buildarena_geometry.actions.lookups import named, structure
+from buildarena_geometry.actions.motions import turn_about, turned
+from buildarena_geometry.actions.remove import told_removal, without
 from buildarena_geometry.blocks import Block, Connector, FaceRef
 from buildarena_geometry.changes import Change
 from buildarena_geometry.feedback import state as words
 from buildarena_geometry.feedback.words import point
+from buildarena_geometry.modules.parameters import Name, RefusalError, Triple, shown
 from buildarena_geometry.outcomes import Cause
-from buildarena_geometry.parameters import Name, RefusalError, Triple, shown
 from buildarena_geometry.poses import Pose
 from buildarena_geometry.rotations import ORIGIN
 from buildarena_geometry.state import MachineState, SubStructure, follow, moved_connector
-
-from .lookups import named, structure
-from .motions import turn_about, turned
-from .remove import told_removal, without
 
 
 def add_machine(

@@ -3,18 +3,22 @@
 from dataclasses import replace
 from math import dist
 
+from buildarena_geometry.actions.lookups import (
+    attachable_module,
+    connector_module,
+    part,
+    require_started,
+)
+from buildarena_geometry.actions.motions import turned
 from buildarena_geometry.blocks import Block, Connector
 from buildarena_geometry.changes import Change
 from buildarena_geometry.feedback import state as words
 from buildarena_geometry.feedback.words import listing
+from buildarena_geometry.modules.parameters import BlockId, Name, Note, RefusalError, Triple, shown
 from buildarena_geometry.outcomes import Cause
-from buildarena_geometry.parameters import BlockId, Name, Note, RefusalError, Triple, shown
 from buildarena_geometry.poses import Pose
 from buildarena_geometry.rotations import ORIGIN
 from buildarena_geometry.state import MachineState, span_in
-
-from .lookups import attachable_module, connector_module, part, require_started
-from .motions import turned
 
 CLOSEST_FACES = 0.01  # units; a connector between faces nearer than this has no direction
 

@@ -2,16 +2,23 @@
 
 from dataclasses import replace
 
+from buildarena_geometry.actions.lookups import part, powered, require_started
 from buildarena_geometry.blocks import KeyPress
 from buildarena_geometry.changes import Change
 from buildarena_geometry.feedback import state as words
 from buildarena_geometry.feedback.words import listing
 from buildarena_geometry.keys import KEYS, KEYS_IN_WORDS
+from buildarena_geometry.modules.parameters import (
+    BlockId,
+    Index,
+    Key,
+    Name,
+    Number,
+    RefusalError,
+    shown,
+)
 from buildarena_geometry.outcomes import Cause
-from buildarena_geometry.parameters import BlockId, Index, Key, Name, Number, RefusalError, shown
 from buildarena_geometry.state import MachineState
-
-from .lookups import part, powered, require_started
 
 
 def change_control_key(

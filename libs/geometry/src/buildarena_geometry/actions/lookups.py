@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING
 
 from buildarena_geometry.feedback.state import heading
 from buildarena_geometry.feedback.words import listing
+from buildarena_geometry.modules.parameters import RefusalError, shown
 from buildarena_geometry.outcomes import Cause
-from buildarena_geometry.parameters import RefusalError, shown
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from buildarena_geometry.blocks import Block, Connector
-    from buildarena_geometry.modules import Module
+    from buildarena_geometry.modules.module import Module
     from buildarena_geometry.state import MachineState, SubStructure
 
 _MOST_NAMED = 12  # a refusal names so many choices and counts the rest

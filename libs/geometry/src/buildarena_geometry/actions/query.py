@@ -2,13 +2,12 @@
 
 from collections.abc import Callable
 
+from buildarena_geometry.actions.lookups import part
 from buildarena_geometry.blocks import Block
 from buildarena_geometry.changes import Change
 from buildarena_geometry.feedback import state as words
-from buildarena_geometry.parameters import BlockId
+from buildarena_geometry.modules.parameters import BlockId
 from buildarena_geometry.state import MachineState
-
-from .lookups import part
 
 
 def get_machine_summary(state: MachineState) -> Change:

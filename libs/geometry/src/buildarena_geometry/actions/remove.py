@@ -2,15 +2,14 @@
 
 from dataclasses import replace
 
+from buildarena_geometry.actions.lookups import part
 from buildarena_geometry.blocks import Block, Connector
 from buildarena_geometry.changes import Change
 from buildarena_geometry.feedback import state as words
 from buildarena_geometry.feedback.words import listing
+from buildarena_geometry.modules.parameters import BlockId, RefusalError
 from buildarena_geometry.outcomes import Cause
-from buildarena_geometry.parameters import BlockId, RefusalError
 from buildarena_geometry.state import MachineState
-
-from .lookups import part
 
 
 def remove_block(state: MachineState, block_id: BlockId) -> Change:

@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from buildarena_geometry.modules import Cylinder
+from buildarena_geometry.export.meshes import COLOURS, CONNECTOR_RADIUS, normal, polygons
+from buildarena_geometry.modules.module import Cylinder
 from buildarena_geometry.poses import Pose
-
-from .meshes import COLOURS, CONNECTOR_RADIUS, normal, polygons
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -23,7 +22,7 @@ if TYPE_CHECKING:
 
     from buildarena_geometry.blocks import Connector
     from buildarena_geometry.machine import Machine
-    from buildarena_geometry.modules import Module, Solid
+    from buildarena_geometry.modules.module import Module, Solid
 
 _MAGIC, _VERSION = 0x46546C67, 2
 _JSON_CHUNK, _BINARY_CHUNK = 0x4E4F534A, 0x004E4942

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from buildarena_geometry.modules import Box, Solid
+from buildarena_geometry.modules.module import Box, Solid
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -9,9 +9,8 @@ from xml.sax.saxutils import escape
 
 import numpy as np
 
-from buildarena_geometry.modules import Box
-
-from .meshes import COLOURS, CYLINDER_SIDES, normal, polygons
+from buildarena_geometry.export.meshes import COLOURS, CYLINDER_SIDES, normal, polygons
+from buildarena_geometry.modules.module import Box
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -4,7 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from .words import caption, counted, listing, number, plain, point, rolling
+from buildarena_geometry.feedback.words import (
+    caption,
+    counted,
+    listing,
+    number,
+    plain,
+    point,
+    rolling,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from buildarena_simulation.engines.nearest import ShapeTable
+from buildarena_simulation.engines.closest_points import ShapeTable
 from buildarena_simulation.structure.contacts import ContactForces
 from buildarena_simulation.structure.model import FloatArray
 from buildarena_simulation.structure.motion import Motion

@@ -9,7 +9,7 @@ import numpy as np
 from buildarena_simulation.constants import MAX_SPIN, WHEEL_TORQUE
 from buildarena_simulation.engines.base import CargoPose, World, principal_frames
 from buildarena_simulation.engines.hinges import hinge_rate
-from buildarena_simulation.engines.jolts import JoltWatch
+from buildarena_simulation.engines.impacts import JoltWatch
 from buildarena_simulation.engines.mjcf import MjcfSettings, MjcfState, mjcf_of
 from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.contacts import ContactForces

@@ -32,13 +32,13 @@ from buildarena_simulation.engines.base import (
     rotation_of,
 )
 from buildarena_simulation.engines.bullet_contacts import WORLD, read_contacts
+from buildarena_simulation.engines.closest_points import shape_table
+from buildarena_simulation.engines.external_forces import Force, drag_forces, thrust_forces
 from buildarena_simulation.engines.hinges import hinge_frames, hinge_rate
-from buildarena_simulation.engines.jolts import JoltWatch
+from buildarena_simulation.engines.impacts import JoltWatch
 from buildarena_simulation.engines.near_contacts import NearContacts
-from buildarena_simulation.engines.nearest import shape_table
-from buildarena_simulation.engines.pushes import Force, drag_forces, thrust_forces
+from buildarena_simulation.engines.quiet_output import silence
 from buildarena_simulation.engines.ropes import rope_forces
-from buildarena_simulation.engines.silence import silence
 from buildarena_simulation.engines.urdf import urdf_of
 from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.contacts import ContactForces

@@ -11,8 +11,8 @@ from decimal import Decimal
 from buildarena_pipeline.errors import PermanentFaultError
 from buildarena_store import Usage
 from buildarena_worker.builtin import expert, idle, random_builder
-from buildarena_worker.messages import Reply, Request
-from buildarena_worker.session_io import Answer
+from buildarena_worker.session.host import Answer
+from buildarena_worker.session.messages import Reply, Request
 
 MODELS = {"expert": expert.reply, "random": random_builder.reply, "idle": idle.reply}
 CHARACTERS_PER_TOKEN = 4

@@ -14,7 +14,7 @@ from buildarena_worker.builtin.designs import DESIGNS
 from buildarena_worker.builtin.designs.design import Design
 from buildarena_worker.builtin.designs.drafting import Action
 from buildarena_worker.builtin.reading import Situation, read_situation
-from buildarena_worker.messages import Reply, Request, ToolCall
+from buildarena_worker.session.messages import Reply, Request, ToolCall
 
 DONE = "TERMINATE"
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from buildarena_worker.messages import Reply, Request
+from buildarena_worker.session.messages import Reply, Request
 
 
 def reply(request: Request) -> Reply:

@@ -10,7 +10,7 @@ import random
 from typing import Any
 
 from buildarena_worker.builtin.reading import Situation, read_situation
-from buildarena_worker.messages import Reply, Request, Tool, ToolCall
+from buildarena_worker.session.messages import Reply, Request, Tool, ToolCall
 
 BLOCKS = ("Small Wooden Block", "Powered Wheel", "Water Cannon", "Torch", "Steel Beam")
 CONNECTORS = ("Brace", "Winch", "Torch")

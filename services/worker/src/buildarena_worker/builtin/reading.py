@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from buildarena_worker.messages import Request
+from buildarena_worker.session.messages import Request
 
 _ROLE = re.compile(r"^# Role: (\S+)", re.MULTILINE)
 _TASK = re.compile(r"^# Task: (\S+)", re.MULTILINE)

@@ -8,7 +8,7 @@ from typing import Protocol
 from buildarena_geometry import Machine
 from buildarena_store import RolloutRecord
 from buildarena_worker.errors import ConstructionFailedError
-from buildarena_worker.session import Session
+from buildarena_worker.session.session import Session
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

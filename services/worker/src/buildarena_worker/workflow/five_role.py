@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from buildarena_geometry import Machine
-from buildarena_worker.session import Session
+from buildarena_worker.session.session import Session
 from buildarena_worker.workflow.base import require_started
 from buildarena_worker.workflow.stages import (
     assemble_stage,

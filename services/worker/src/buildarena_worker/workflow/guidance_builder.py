@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from buildarena_geometry import Machine
-from buildarena_worker.machine_tools import modules_text
-from buildarena_worker.plan import SubStructure
-from buildarena_worker.session import Session
+from buildarena_worker.session.session import Session
 from buildarena_worker.workflow.base import require_started
+from buildarena_worker.workflow.machine_tools import modules_text
+from buildarena_worker.workflow.plan import SubStructure
 from buildarena_worker.workflow.stages import build_stage, refine_stage
 
 

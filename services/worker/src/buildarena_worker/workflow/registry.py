@@ -8,8 +8,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import ModuleType
 
+from buildarena_pipeline.catalog.workflows import WorkflowSource, workflow_sources
 from buildarena_pipeline.errors import PermanentFaultError, StartupError
-from buildarena_pipeline.extensions import WorkflowSource, workflow_sources
 from buildarena_worker.workflow.base import Workflow
 from buildarena_worker.workflow.builder import Builder
 from buildarena_worker.workflow.five_role import FiveRole

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from buildarena_geometry import Machine
-from buildarena_worker.dialogue import OBJECTION, TERMINATE, Dialogue, Role
 from buildarena_worker.errors import ConstructionFailedError
-from buildarena_worker.machine_tools import (
+from buildarena_worker.session.dialogue import OBJECTION, TERMINATE, Dialogue, Role
+from buildarena_worker.session.session import Session
+from buildarena_worker.workflow.machine_tools import (
     ASSEMBLE,
     BUILD,
     REFINE,
@@ -15,8 +16,7 @@ from buildarena_worker.machine_tools import (
     modules_text,
     tools_named,
 )
-from buildarena_worker.plan import Plan, PlanError, SubStructure, read_plan
-from buildarena_worker.session import Session
+from buildarena_worker.workflow.plan import Plan, PlanError, SubStructure, read_plan
 
 DRAFT_TURNS = 50
 BUILD_TURNS = 300

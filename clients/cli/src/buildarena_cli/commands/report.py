@@ -1,0 +1,122 @@
+"""The command ``buildarena report``: a sweep's results as tables and plots."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import closing
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+import typer
+
+from buildarena_benchmark.leaderboard import Trial
+from buildarena_cli.client import Client
+from buildarena_cli.errors import CommandError
+from buildarena_cli.options import DEFAULT_URL, UrlOption
+from buildarena_cli.output import console
+
+ENDINGS = (".html", ".md", ".pdf")
+PLAIN: Final[Mapping[str, Any]] = {
+    "workflow": "five-role",
+    "simulator": "pybullet",
+    "prompts": "default",
+    "one_shot": False,
+    "closed_loop": None,
+}
+PLAIN_DECODING: Final[Mapping[str, Any]] = {"temperature": 0.5, "top_p": 0.7}
+"""The paper's main experiment; what differs from it names a variant."""
+
+
+def report(
+    sweeps: Annotated[
+        list[str], typer.Argument(help="Ids of sweeps; several are set side by side.")
+    ],
+    out: Annotated[Path, typer.Option("--out", help="File: .html, .md or .pdf.")],
+    url: UrlOption = DEFAULT_URL,
+) -> None:
+    """Write a report of sweeps: tables and plots that stand beside the paper's."""
+    if out.suffix not in ENDINGS:
+        raise CommandError(f"{out}: the name must end in {', '.join(ENDINGS)}")
+    from buildarena_cli.report.document import write_report
+    from buildarena_cli.report.sections import sections
+
+    with closing(Client(url)) as client:
+        material = collect(client, sweeps)
+    try:
+        write_report(sections(material), out)
+    except OSError as error:
+        raise CommandError(f"{out} can't be written: {error.strerror}") from error
+    console.print(f"{out}: {len(material.trials):,} jobs", soft_wrap=True)
+
+
+def collect(client: Client, ids: Sequence[str]) -> Any:
+    """Reads what a report of these sweeps is made of.
+
+    Sweeps of different workflows, prompts or decodings are set side by side: each becomes a row
+    of its own, named by what differs from the paper's main experiment.
+    """
+    from buildarena_cli.report.custom_tasks import read_tasks
+    from buildarena_cli.report.material import Material
+
+    found = [client.get(f"/v1/sweeps/{id_}") for id_ in dict.fromkeys(ids)]
+    variants = {sweep["id"]: variant(sweep["spec"]) for sweep in found}
+    several = len(set(variants.values())) > 1
+    registry = {entry["name"]: entry["model"] for entry in client.get("/v1/models")}
+    trials: dict[str, Trial] = {}
+    rounds: dict[str, list[tuple[bool, float]]] = {}
+    snapshots: dict[str, str] = {}
+    verdicts: dict[tuple[str, str], dict[str, tuple[bool, float]]] = {}
+    for sweep in found:
+        named = variants[sweep["id"]] or "main"
+        for result in client.get(f"/v1/sweeps/{sweep['id']}/results"):
+            row = f"{result['model']} ({named})" if several else result["model"]
+            # The paper's main table is of the main experiment alone.
+            if not variants[sweep["id"]]:
+                snapshots[row] = registry.get(result["model"], "")
+            rounds[result["job_id"]] = [(r["success"], r["indicator"]) for r in result["rounds"]]
+            for made in result["rounds"]:
+                tried = verdicts.setdefault((result["task"], made["machine"]), {})
+                tried[sweep["spec"]["simulator"]] = (made["success"], made["indicator"])
+            trials[result["job_id"]] = _trial(result, row)
+    progress = [sweep["progress"] for sweep in found]
+    return Material(
+        title=", ".join(dict.fromkeys(sweep["name"] for sweep in found)),
+        tasks=read_tasks(client, list(trials.values())),
+        trials=list(trials.values()),
+        rounds=rounds,
+        snapshots=snapshots,
+        verdicts=verdicts,
+        unfinished=sum(p["total"] - p["done"] for p in progress),
+    )
+
+
+def variant(spec: Mapping[str, Any]) -> str:
+    """What of a sweep differs from the paper's main experiment; "" for nothing."""
+    given = {name: spec.get(name, plain) for name, plain in PLAIN.items()}
+    loop = given["closed_loop"]
+    parts = [
+        given[name] for name in ("workflow", "simulator", "prompts") if given[name] != PLAIN[name]
+    ]
+    if given["one_shot"]:
+        parts.append("one-shot")
+    if loop:
+        parts.append(f"{loop['rounds']} rounds" + (" + analyst" if loop["analyst"] else ""))
+    decoding = {
+        key: value
+        for key, value in spec.get("decoding", PLAIN_DECODING).items()
+        if value is not None
+    }
+    parts += [
+        f"{key.replace('_', ' ')} {decoding.get(key, 'default')}"
+        for key in sorted({*decoding, *PLAIN_DECODING})
+        if decoding.get(key) != PLAIN_DECODING.get(key)
+    ]
+    return ", ".join(parts)
+
+
+def _trial(result: Mapping[str, Any], row: str) -> Trial:
+    values = {name: result[name] for name in Trial.__dataclass_fields__ if name in result}
+    values |= {"model": row, "flags": tuple(result["flags"])}
+    if row != result["model"]:
+        values["configuration"] = f"{row} {result['configuration']}"
+    return Trial(**values)

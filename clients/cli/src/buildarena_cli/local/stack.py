@@ -1,0 +1,269 @@
+"""The whole service on one machine: servers, API and workers as children of this process."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import json
+import os
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import IO, Any, Self
+
+import httpx
+
+from buildarena_cli.errors import CommandError
+from buildarena_cli.local import (
+    EmbeddedPostgres,
+    EmbeddedServer,
+    EmbeddedValkey,
+    ManagedProcess,
+    Supervisor,
+)
+from buildarena_pipeline.catalog.tracks import SIMULATORS
+from buildarena_pipeline.errors import StartupError
+from buildarena_pipeline.runtime.processes import die_with_parent, tree_memory_bytes
+from buildarena_pipeline.runtime.settings import Settings
+from buildarena_store import Database
+from buildarena_store.accounts.keys import new_secret
+
+READY_WITHIN_S = 60.0
+MEMORY_EVERY_S = 0.5
+
+
+class Stack:
+    """Everything that `buildarena up` runs. Use as a context manager; leaving it stops all.
+
+    Args:
+        settings: Where data lies and which port the API takes.
+        tell: Gets one line for each thing that was started.
+        simulators: Engines to start workers for.
+
+    Attributes:
+        environment: The variables that its programs were started with; further workers need them.
+    """
+
+    def __init__(
+        self,
+        settings: Settings,
+        *,
+        tell: Callable[[str], None] = lambda _: None,
+        simulators: tuple[str, ...] = SIMULATORS,
+    ) -> None:
+        self.settings = settings
+        self.admin_key: str | None = None
+        self.environment: dict[str, str] = {}
+        self.url = f"http://{settings.host}:{settings.port}"
+        self.supervisor = Supervisor()
+        self.peak_memory_bytes = 0
+        self._tell = tell
+        self._simulators = simulators
+        self._lock: IO[str] | None = None
+        self._stopped = threading.Event()
+
+    def __enter__(self) -> Self:
+        try:
+            self._start()
+        except (StartupError, OSError, subprocess.SubprocessError) as error:
+            self.stop()
+            raise CommandError(str(error)) from error
+        except BaseException:
+            self.stop()
+            raise
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
+
+    @property
+    def logs(self) -> Path:
+        """Where the processes write their logs."""
+        return self.settings.data.absolute() / "logs"
+
+    def stop(self) -> None:
+        """Stops everything that was started."""
+        self._stopped.set()
+        self.supervisor.stop()
+        if self._lock is not None:
+            self._write_run()
+            self._lock.close()
+            self._lock = None
+
+    def require_running(self) -> None:
+        """Checks that no process was given up.
+
+        Raises:
+            CommandError: One was; the message names it.
+        """
+        if self.supervisor.failed is not None:
+            raise CommandError(f"{self.supervisor.failed} (see {self.logs})")
+
+    def _start(self) -> None:
+        self._take_folder()
+        _require_free_port(self.settings.host, self.settings.port)
+        environment = self.environment = self._start_servers()
+        self._tell("migrating the database")
+        database = Database(environment["BUILDARENA_DATABASE_URL"])
+        database.migrate()
+        database.close()
+        programs = {
+            "api": ["buildarena_api"],
+            "construct worker": ["buildarena_worker"],
+            **{
+                f"{engine} worker": ["buildarena_simworker", "--engine", engine]
+                for engine in self._simulators
+            },
+        }
+        for name, module in programs.items():
+            self._tell(f"starting the {name}")
+            self._launch_program(name, module, environment)
+        self.supervisor.watch()
+        threading.Thread(target=self._watch_memory, name="memory", daemon=True).start()
+        self._wait_until_healthy()
+
+    def _take_folder(self) -> None:
+        data = self.settings.data.absolute()
+        try:
+            self.logs.mkdir(parents=True, exist_ok=True)
+            lock = (data / "lock").open("w")
+        except OSError as error:
+            raise CommandError(
+                f"the data folder {data} can't be written ({error.strerror}): "
+                "choose another with --data or BUILDARENA_DATA"
+            ) from error
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            lock.close()
+            raise CommandError(
+                f"another BuildArena runs on the data folder {data}: stop it, "
+                "or choose another folder with --data or BUILDARENA_DATA"
+            ) from error
+        self._lock = lock
+
+    def _start_servers(self) -> dict[str, str]:
+        settings, data = self.settings, self.settings.data.absolute()
+        database_url, broker_url = settings.database_url, settings.broker_url
+        if database_url is None:
+            postgres = EmbeddedPostgres(data / "postgres", self.logs / "postgres.log")
+            self._launch_server(postgres)
+            database_url = postgres.url
+        if broker_url is None:
+            valkey = EmbeddedValkey(data / "valkey", self.logs / "valkey.log")
+            self._launch_server(valkey)
+            broker_url = valkey.url
+        return {
+            **os.environ,
+            **{
+                f"BUILDARENA_{name.upper()}": (
+                    json.dumps(value) if isinstance(value, dict) else str(value)
+                )
+                for name, value in settings.model_dump(
+                    mode="json", exclude_none=True, exclude={"admin_key"}
+                ).items()
+            },
+            **self._key_environment(data),
+            "BUILDARENA_DATA": str(data),
+            "BUILDARENA_DATABASE_URL": database_url,
+            "BUILDARENA_BROKER_URL": broker_url,
+            "PYTHONUNBUFFERED": "1",
+        }
+
+    def _key_environment(self, data: Path) -> dict[str, str]:
+        """The operator's own key: the one that was set, or one that is kept in the folder."""
+        if not self.settings.require_keys:
+            return {}
+        if self.settings.admin_key is not None:
+            self.admin_key = self.settings.admin_key.get_secret_value()
+        else:
+            file = data / "admin.key"
+            if not file.exists():
+                file.touch(mode=0o600)
+                file.write_text(new_secret() + "\n")
+            self.admin_key = file.read_text().strip()
+            self._tell(f"the operator's key is in {file}")
+        return {"BUILDARENA_ADMIN_KEY": self.admin_key}
+
+    def _launch_server(self, server: EmbeddedServer) -> None:
+        self._tell(f"starting {server.name}")
+        self.supervisor.launch(
+            ManagedProcess(name=server.name, start=server.start, stop=server.stop)
+        )
+
+    def _launch_program(self, name: str, module: list[str], environment: dict[str, str]) -> None:
+        log_file = self.logs / f"{name.replace(' ', '-')}.log"
+
+        def start() -> subprocess.Popen[bytes]:
+            with log_file.open("ab") as log:
+                return subprocess.Popen(
+                    [sys.executable, "-m", *module],
+                    env=environment,
+                    stdin=subprocess.DEVNULL,
+                    stdout=log,
+                    stderr=subprocess.STDOUT,
+                    start_new_session=True,
+                    preexec_fn=die_with_parent,  # noqa: PLW1509 - one system call
+                )
+
+        self.supervisor.launch(ManagedProcess(name=name, start=start))
+
+    def _wait_until_healthy(self) -> None:
+        self._tell("waiting until everything answers")
+        deadline = time.monotonic() + READY_WITHIN_S
+        missing = "the API"
+        while time.monotonic() < deadline:
+            self.require_running()
+            with contextlib.suppress(httpx.TransportError, ValueError):
+                health = httpx.get(f"{self.url}/v1/health", timeout=5).json()
+                served = {f"simulate.{engine}" for engine in self._simulators}
+                bad = [
+                    check["name"]
+                    for check in health["checks"]
+                    if not check["ok"] and _concerns(check["name"], served)
+                ]
+                if not bad:
+                    return
+                missing = ", ".join(bad)
+            time.sleep(0.1)
+        raise CommandError(
+            f"not ready within {READY_WITHIN_S:.0f} s, missing: {missing} (see {self.logs})"
+        )
+
+    def _watch_memory(self) -> None:
+        while not self._stopped.wait(MEMORY_EVERY_S):
+            self.peak_memory_bytes = max(self.peak_memory_bytes, tree_memory_bytes())
+            self._write_run()
+
+    def _write_run(self) -> None:
+        run: dict[str, Any] = {
+            "url": self.url,
+            "pid": os.getpid(),
+            "peak_memory_bytes": self.peak_memory_bytes,
+        }
+        target = self.settings.data.absolute() / "run.json"
+        partial = target.with_suffix(".partial")
+        partial.write_text(json.dumps(run))
+        partial.replace(target)
+
+
+def _concerns(check: str, served: set[str]) -> bool:
+    """Disk space is worth a warning only, and so are simulators that were not asked for."""
+    queue = check.removeprefix("workers of ")
+    return check != "disk" and (not queue.startswith("simulate.") or queue in served)
+
+
+def _require_free_port(host: str, port: int) -> None:
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((host, port))
+        except OSError as error:
+            raise CommandError(
+                f"{host}:{port} can't be used for the API ({error.strerror}): "
+                "choose another port with --port or BUILDARENA_PORT"
+            ) from error

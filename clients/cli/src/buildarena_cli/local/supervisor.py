@@ -1,0 +1,130 @@
+"""The supervisor: starts processes in order, starts again those that die, stops all in the end."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Self
+
+import structlog
+
+from buildarena_cli.local.server import stop_process
+from buildarena_pipeline.errors import StartupError
+
+log = structlog.get_logger(__name__)
+
+DEATHS_ALLOWED = 5
+"""A process that dies more often than this within DEATHS_WITHIN_S is not started again."""
+DEATHS_WITHIN_S = 30.0
+LOOK_EVERY_S = 0.2
+
+
+def _terminate(process: subprocess.Popen[bytes]) -> None:
+    stop_process(process, signal.SIGTERM, within_s=15)
+
+
+@dataclass(slots=True, kw_only=True)
+class ManagedProcess:
+    """A process that should run.
+
+    Attributes:
+        name: For logs and messages.
+        start: Starts it and waits until it is of use.
+        stop: Ends it.
+        process: The running process, if any.
+        deaths: When it died without being asked to.
+    """
+
+    name: str
+    start: Callable[[], subprocess.Popen[bytes]]
+    stop: Callable[[subprocess.Popen[bytes]], None] = _terminate
+    process: subprocess.Popen[bytes] | None = None
+    deaths: deque[float] = field(default_factory=deque)
+
+
+class Supervisor:
+    """Keeps processes running. Use as a context manager: leaving it stops them all."""
+
+    def __init__(self) -> None:
+        self.managed: list[ManagedProcess] = []
+        self.failed: str | None = None
+        self._stop = threading.Event()
+        self._stopped = threading.Event()
+        self._thread: threading.Thread | None = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
+
+    def launch(self, managed: ManagedProcess) -> None:
+        """Starts a process and puts it under supervision.
+
+        Raises:
+            StartupError: It did not start.
+        """
+        managed.process = managed.start()
+        self.managed.append(managed)
+
+    def watch(self) -> None:
+        """Starts watching from a thread of its own, which is also the parent of restarts."""
+        self._thread = threading.Thread(target=self._watch, name="supervisor", daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Stops watching, then stops the processes, the last started first."""
+        self._stop.set()
+        running = [
+            (managed, managed.process)
+            for managed in reversed(self.managed)
+            if managed.process is not None
+        ]
+        programs = [pair for pair in running if pair[0].stop is _terminate]
+        threads = [threading.Thread(target=m.stop, args=(p,)) for m, p in programs]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        for managed, process in running:
+            if managed.stop is not _terminate:
+                managed.stop(process)
+        self.managed.clear()
+        self._stopped.set()
+        if self._thread is not None:
+            self._thread.join()
+            self._thread = None
+
+    def _watch(self) -> None:
+        while not self._stop.wait(LOOK_EVERY_S):
+            for managed in self.managed:
+                if managed.process is not None and managed.process.poll() is not None:
+                    self._restart(managed, managed.process.returncode)
+        # Children it started again are told when this thread ends: stay until they are stopped.
+        self._stopped.wait()
+
+    def _restart(self, managed: ManagedProcess, code: int) -> None:
+        now = time.monotonic()
+        managed.deaths.append(now)
+        while managed.deaths and managed.deaths[0] < now - DEATHS_WITHIN_S:
+            managed.deaths.popleft()
+        log.warning("process_died", name=managed.name, code=code)
+        if len(managed.deaths) > DEATHS_ALLOWED:
+            managed.process = None
+            self.failed = (
+                f"{managed.name} died {len(managed.deaths)} times within "
+                f"{DEATHS_WITHIN_S:.0f} s, last with exit code {code}"
+            )
+            return
+        # The first restart is immediate; a process that goes on dying is given more and more time.
+        if self._stop.wait(LOOK_EVERY_S * (2 ** (len(managed.deaths) - 1) - 1)):
+            return
+        try:
+            managed.process = managed.start()
+        except (StartupError, OSError) as error:
+            log.warning("restart_failed", name=managed.name, error=str(error))

@@ -1,0 +1,176 @@
+"""A report's sections on effort: cost, closed loops, and what the samples can show."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import combinations
+
+import numpy as np
+
+from buildarena_benchmark.leaderboard import Cell
+from buildarena_benchmark.statistics import agreement, detectable_difference, token_bins
+from buildarena_cli.output import number
+from buildarena_cli.report.document import Block, Grid, Heading, Paragraph, Plot
+from buildarena_cli.report.material import Material, paper_rows, percent
+from buildarena_cli.report.plots import cost_plot, rounds_plot
+
+SAMPLES = 64
+"""The paper's samples of each model on each task."""
+
+
+def cost(material: Material, cells: Mapping[str, Sequence[Cell]]) -> list[Block]:
+    """Tokens, requests and dollars, and whether more of them brought more."""
+    paper = paper_rows(cells, material.snapshots)
+    rows = []
+    for task, row in cells.items():
+        for cell in row:
+            reference = paper[task].get(cell.model)
+            rows.append(
+                (
+                    task,
+                    cell.model,
+                    number(cell.input_tokens_mean, 0),
+                    number(reference.input_tokens_mean, 0) if reference else "-",
+                    number(cell.output_tokens_mean, 0),
+                    number(reference.output_tokens_mean, 0) if reference else "-",
+                    number(cell.requests_mean),
+                    number(reference.requests_mean) if reference else "-",
+                    number(cell.cost_usd_mean, 4),
+                    number(cell.cost_per_success_usd, 4),
+                )
+            )
+    columns = (
+        *("task", "model", "input tokens", "paper", "output tokens", "paper", "requests"),
+        *("paper", "USD", "USD a success"),
+    )
+    blocks: list[Block] = [
+        Heading(text="Cost"),
+        Grid(caption="Means of scored jobs", columns=columns, rows=rows, text_columns=2),
+    ]
+    by_category = _normalised(material)
+    if by_category:
+        blocks.append(
+            Plot(
+                name="cost",
+                text="Performance, normalised to the best job, by output tokens",
+                figure=cost_plot(
+                    {
+                        category: token_bins(tokens, performance)
+                        for category, (tokens, performance) in by_category.items()
+                    }
+                ),
+            )
+        )
+    return blocks
+
+
+def rounds(material: Material) -> list[Block]:
+    """Closed loops: curves of every model and task that had a second round."""
+    runs: dict[str, dict[str, list[Sequence[tuple[bool, float]]]]] = {}
+    for trial in material.trials:
+        if trial.scored:
+            models = runs.setdefault(trial.task, {})
+            models.setdefault(trial.model, []).append(material.rounds[trial.job_id])
+    blocks: list[Block] = []
+    for task, models in runs.items():
+        looped = {model: found for model, found in models.items() if max(map(len, found)) > 1}
+        if not looped:
+            continue
+        longest = max(len(run) for found in looped.values() for run in found)
+        curves = {
+            model: [_after(found, number_) for number_ in range(1, longest + 1)]
+            for model, found in looped.items()
+        }
+        known = material.tasks.get(task)
+        indicator = known.indicator if known else "indicator"
+        blocks += [
+            Grid(
+                caption=f"{task}: succeeded after so many simulated rounds, and best indicator "
+                "so far",
+                columns=("model", *(f"round {i}" for i in range(1, longest + 1))),
+                rows=[
+                    (model, *(f"{percent(rate)} / {value:.1f}" for rate, value in curve))
+                    for model, curve in curves.items()
+                ],
+            ),
+            Plot(
+                name=f"rounds-{task}",
+                text=f"{task}: success and indicator by round",
+                figure=rounds_plot(curves, indicator),
+            ),
+        ]
+    return [Heading(text="Closed loop"), *blocks] if blocks else []
+
+
+def simulators(material: Material) -> list[Block]:
+    """How far two simulators agree on the same machines."""
+    names = sorted({name for tried in material.verdicts.values() for name in tried})
+    rows = []
+    for first, second in combinations(names, 2):
+        for task in dict.fromkeys(task for task, _ in material.verdicts):
+            both = [
+                tried
+                for (name, _), tried in material.verdicts.items()
+                if name == task and first in tried and second in tried
+            ]
+            found = agreement([t[first] for t in both], [t[second] for t in both])
+            if found is not None:
+                kappa, rho = number(found.kappa, 2), number(found.rank_correlation, 2)
+                same = percent(found.same_verdict)
+                rows.append((task, f"{first}, {second}", str(found.trials), same, kappa, rho))
+    if not rows:
+        return []
+    columns = "task", "simulators", "machines", "same verdict", "kappa", "rank correlation"
+    caption = "The same machines in two simulators: success (Cohen's kappa), indicator (Spearman)"
+    return [
+        Heading(text="Agreement of simulators"),
+        Grid(caption=caption, columns=columns, rows=rows, text_columns=2),
+    ]
+
+
+def power(cells: Mapping[str, Sequence[Cell]]) -> list[Block]:
+    """Which differences these numbers of samples can show."""
+    counts = sorted({cell.trials for row in cells.values() for cell in row if cell.trials})
+    shown = sorted({counts[0], counts[-1], SAMPLES})
+    rows = []
+    for rate in (0.05, 0.2, 0.5, 0.8):
+        rises = [detectable_difference(rate, trials) for trials in shown]
+        rows.append((percent(rate), *("-" if r is None else f"+{100 * r:.0f} %" for r in rises)))
+    return [
+        Heading(text="What these samples can show"),
+        Paragraph(
+            text="The smallest rise above a success rate that is found in four of five such "
+            "experiments, at an error of 5 %. Smaller differences may be real and stay unseen."
+        ),
+        Grid(
+            caption="By samples of each model on a task",
+            columns=("success rate", *(f"{trials} samples" for trials in shown)),
+            rows=rows,
+        ),
+    ]
+
+
+def _after(runs: Sequence[Sequence[tuple[bool, float]]], rounds: int) -> tuple[float, float]:
+    """Of all runs: the share that has succeeded by then, and the mean of their best so far."""
+    succeeded = [any(success for success, _ in run[:rounds]) for run in runs]
+    best = [max((value for _, value in run[:rounds]), default=0.0) for run in runs]
+    return sum(succeeded) / len(runs), sum(best) / len(runs)
+
+
+def _normalised(material: Material) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Output tokens and performance, relative to the best job of the task, by category."""
+    tasks = material.tasks
+    best: dict[str, float] = {}
+    for trial in material.trials:
+        best[trial.task] = max(best.get(trial.task, 0.0), trial.indicator)
+    found: dict[str, list[tuple[float, float]]] = {}
+    for trial in material.trials:
+        if trial.scored and trial.output_tokens:
+            category = tasks[trial.task].category if trial.task in tasks else trial.task
+            top = best[trial.task]
+            relative = trial.indicator / top if top > 0 else 0.0
+            found.setdefault(category, []).append((float(trial.output_tokens), relative))
+    return {
+        category: (np.array([t for t, _ in pairs]), np.array([p for _, p in pairs]))
+        for category, pairs in found.items()
+    }

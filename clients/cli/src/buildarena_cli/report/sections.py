@@ -1,0 +1,210 @@
+"""What a report says: from a sweep's ended jobs to tables and plots beside the paper's."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+
+from buildarena_benchmark.leaderboard import Board, BoardQuery, Cell, TrackBoard
+from buildarena_cli.output import in_words, number
+from buildarena_cli.report.custom_tasks import own_tasks
+from buildarena_cli.report.document import Block, Grid, Heading, Paragraph, Plot
+from buildarena_cli.report.effort import cost, power, rounds, simulators
+from buildarena_cli.report.material import Material, between, paper_rows, percent
+from buildarena_cli.report.plots import indicator_plot, radar_plot, shares_plot, success_plot
+
+
+def sections(material: Material) -> list[Block]:
+    """The whole report."""
+    blocks: list[Block] = [Heading(text=material.title, level=1), _opening(material)]
+    if not any(trial.scored for trial in material.trials):
+        return [*blocks, *_failures(material, {}), Paragraph(text="No job was scored.")]
+    tasks = material.tasks.values()
+    kept = TrackBoard(
+        {task.name: task.version for task in tasks},
+        {task.name: task.difficulty for task in tasks if task.difficulty},
+    )
+    for trial in material.trials:
+        kept.put(trial)
+    board = kept.board(BoardQuery())
+    cells = {task.task: [row.cell for row in task.rows] for task in board.tasks}
+    return [
+        *blocks,
+        *own_tasks(material, board),
+        *_overall(board),
+        *_performance(board, cells, material),
+        *_dimensions(board),
+        *_failures(material, cells),
+        *cost(material, cells),
+        *rounds(material),
+        *simulators(material),
+        *power(cells),
+    ]
+
+
+def _opening(material: Material) -> Paragraph:
+    outcomes = Counter(trial.outcome for trial in material.trials)
+    text = f"{len(material.trials):,} jobs have ended"
+    if outcomes:
+        text += f": {', '.join(f'{n:,} {name}' for name, n in sorted(outcomes.items()))}"
+    if material.unfinished:
+        text += f". {material.unfinished:,} have not ended yet, and are not in this report"
+    return Paragraph(
+        text=f"{text}. Averages are over scored jobs; errored and cancelled jobs and flagged "
+        "successes are left out and counted beside. The paper's figures were measured in the "
+        "game itself: they are a reference and are never ranked with ours."
+    )
+
+
+def _overall(board: Board) -> list[Block]:
+    rows = [
+        (
+            row.model,
+            "-" if row.rank is None else str(row.rank),
+            "-" if row.rank is None else f"{row.rank_low}-{row.rank_high}",
+            number(row.mean_rank, 2),
+            percent(row.success_rate_mean),
+            number(row.cost_usd_mean, 2),
+            "yes" if row.pareto else "",
+            ", ".join(row.missing),
+        )
+        for row in board.overall
+    ]
+    columns = "model", "rank", "95 % of place", "mean rank", "success", "USD", "cost front", "lacks"
+    return [
+        Heading(text="Ranking"),
+        Grid(
+            caption="By mean rank over tasks, of success rate and indicator. Models that can't "
+            "be told apart share a rank",
+            columns=columns,
+            rows=rows,
+        ),
+    ]
+
+
+def _performance(
+    board: Board, cells: Mapping[str, Sequence[Cell]], material: Material
+) -> list[Block]:
+    paper = paper_rows(cells, material.snapshots)
+    rows = []
+    for task in board.tasks:
+        for ranked in task.rows:
+            cell = ranked.cell
+            reference = paper[task.task].get(cell.model)
+            rows.append(
+                (
+                    task.task,
+                    cell.model,
+                    "-" if ranked.rank is None else str(ranked.rank),
+                    f"{cell.successes}/{cell.trials}",
+                    f"{cell.successes}/{cell.ended}",
+                    percent(cell.success_rate),
+                    between(cell.success_low, cell.success_high, 100),
+                    percent(reference.success_rate) if reference else "-",
+                    number(cell.indicator_mean),
+                    between(cell.indicator_low, cell.indicator_high),
+                    number(reference.indicator_mean) if reference else "-",
+                    number(cell.parts_mean),
+                    number(reference.parts_mean) if reference else "-",
+                    str(cell.flagged),
+                )
+            )
+    columns = (
+        *("task", "model", "rank", "of scored", "of ended", "success", "95 %", "paper"),
+        *("indicator", "95 %", "paper", "parts", "paper", "flagged"),
+    )
+    labels = {
+        name: in_words(material.tasks[name].indicator, material.tasks[name].unit)
+        for name in cells
+        if name in material.tasks
+    }
+    return [
+        Heading(text="Performance"),
+        Grid(
+            caption="Success rate with Wilson interval, indicator with bootstrap interval",
+            columns=columns,
+            rows=rows,
+            text_columns=2,
+        ),
+        Plot(
+            name="success",
+            text="Success rates with 95 % intervals",
+            figure=success_plot(cells, paper),
+        ),
+        Plot(
+            name="indicator",
+            text="Mean indicators with 95 % intervals",
+            figure=indicator_plot(cells, paper, labels),
+        ),
+    ]
+
+
+def _dimensions(board: Board) -> list[Block]:
+    ranked = [row for row in board.overall if row.dimensions]
+    if not ranked:
+        return []
+    names = list(ranked[0].dimensions)
+    return [
+        Heading(text="Difficulty dimensions"),
+        Grid(
+            caption="Score from 0 (last on every task) to 1 (first), weighted by what the tasks "
+            "ask for",
+            columns=("model", *names),
+            rows=[(r.model, *(f"{r.dimensions[name]:.2f}" for name in names)) for r in ranked],
+        ),
+        Plot(name="dimensions", text="Scores by difficulty dimension", figure=radar_plot(ranked)),
+    ]
+
+
+def _failures(material: Material, cells: Mapping[str, Sequence[Cell]]) -> list[Block]:
+    outcomes: dict[str, Counter[str]] = {}
+    refusals: dict[str, Counter[str]] = {}
+    actions: dict[str, list[int]] = {}
+    for trial in material.trials:
+        row = outcomes.setdefault(trial.model, Counter())
+        named = trial.outcome if not trial.reason else f"{trial.outcome}: {trial.reason}"
+        row[named] += 1
+        refusals.setdefault(trial.model, Counter()).update(trial.refusals)
+        made = actions.setdefault(trial.model, [0, 0])
+        made[0] += trial.actions
+        made[1] += trial.refused_actions
+    if not outcomes:
+        return []
+    blocks: list[Block] = [
+        Heading(text="Failures"),
+        Plot(
+            name="outcomes",
+            text="Shares of outcomes",
+            figure=shares_plot(outcomes, "share of ended jobs"),
+        ),
+    ]
+    if any(sum(counts.values()) for counts in refusals.values()):
+        rows = [
+            (task, cell.model, name.replace("_", " "), str(count), percent(count / total))
+            for task, row_ in cells.items()
+            for cell in row_
+            if (total := sum(cell.refusals.values()))
+            for name, count in sorted(cell.refusals.items(), key=lambda item: -item[1])
+        ]
+        blocks += [
+            Grid(
+                caption="Refused actions of all actions",
+                columns=("model", "actions", "refused", "invalid-action rate"),
+                rows=[
+                    (model, f"{n:,}", f"{bad:,}", percent(bad / n if n else None))
+                    for model, (n, bad) in actions.items()
+                ],
+            ),
+            Plot(
+                name="refusals",
+                text="Shares of reasons for refused actions",
+                figure=shares_plot(refusals, "share of refused actions"),
+            ),
+            Grid(
+                caption="Reasons for refused actions",
+                columns=("task", "model", "reason", "actions", "share"),
+                rows=rows,
+                text_columns=3,
+            ),
+        ]
+    return blocks

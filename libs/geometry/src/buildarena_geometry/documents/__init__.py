@@ -1,0 +1,1 @@
+"""Machine documents: machines as JSON, written, read and logged."""

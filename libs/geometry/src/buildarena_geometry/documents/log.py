@@ -1,0 +1,62 @@
+"""What was done to a machine, action by action."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, overload
+
+from buildarena_geometry.outcomes import RefusalClass
+
+if TYPE_CHECKING:
+    from buildarena_geometry.machine import Machine
+    from buildarena_geometry.modules.module import Catalogue
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ActionRecord:
+    """One action as it arrived.
+
+    Attributes:
+        name: the action's name.
+        arguments: JSON values. What could not be written down as JSON stands there as an object
+            {"unreadable": what it was}, which every action refuses just as it refused the original.
+        reason: why it was refused; None if it was accepted.
+    """
+
+    name: str
+    arguments: object
+    reason: RefusalClass | None = None
+
+    @property
+    def ok(self) -> bool:
+        """Whether it was accepted."""
+        return self.reason is None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ActionLog(Sequence[ActionRecord]):
+    """The actions of one machine in order, with all it takes to do them again.
+
+    Attributes:
+        records: accepted and refused actions.
+        catalogue: the modules the machine was made of.
+        available: the machines an assembly was made of.
+    """
+
+    records: tuple[ActionRecord, ...]
+    catalogue: Catalogue = field(repr=False)
+    available: Mapping[str, Machine] = field(repr=False, default_factory=dict)
+
+    @overload
+    def __getitem__(self, index: int) -> ActionRecord: ...
+    @overload
+    def __getitem__(self, index: slice) -> tuple[ActionRecord, ...]: ...
+    def __getitem__(self, index: int | slice) -> ActionRecord | tuple[ActionRecord, ...]:
+        return self.records[index]
+
+    def __len__(self) -> int:
+        return len(self.records)
+
+    def __iter__(self) -> Iterator[ActionRecord]:
+        return iter(self.records)

@@ -1,0 +1,1 @@
+"""Module types: what blocks and connectors are made from, read from one file."""

@@ -1,0 +1,224 @@
+"""What machines are made of: modules, their faces and their shapes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Literal, get_args
+
+from buildarena_geometry.poses import Pose
+from buildarena_geometry.rotations import ORIGIN, Vector, distance, from_axes
+
+Kind = Literal["start", "block", "wheel", "cannon", "torch", "connector", "cargo"]
+KINDS: tuple[str, ...] = get_args(Kind)
+ATTACHABLE_KINDS = ("block", "wheel", "cannon", "torch")
+FLUSH_TOLERANCE = 1e-6  # units; faces nearer than this are the same place
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Face:
+    """A place of a module where others attach.
+
+    Attributes:
+        label: the letter models name it by.
+        block_from_face: its frame in the block's: the origin is the face's centre, +z its outward
+            normal; a block attached to it takes over this frame as its own.
+    """
+
+    label: str
+    block_from_face: Pose
+
+    @property
+    def center(self) -> Vector:
+        """(3,) the face's centre, block frame, units."""
+        return self.block_from_face.xyz
+
+    @property
+    def normal(self) -> Vector:
+        """(3,) the outward normal, block frame, unit length."""
+        return self.block_from_face.direction((0.0, 0.0, 1.0))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Box:
+    """A box with its edges along the block's axes.
+
+    Attributes:
+        lowest: (3,) its corner with the smallest coordinates, block frame, units.
+        highest: (3,) the corner opposite.
+    """
+
+    lowest: Vector
+    highest: Vector
+
+    @property
+    def center(self) -> Vector:
+        """(3,) its middle, block frame, units."""
+        return _middle(self.lowest, self.highest)
+
+    @property
+    def size(self) -> Vector:
+        """(3,) its edges along x, y and z, units."""
+        (a, b, c), (x, y, z) = self.lowest, self.highest
+        return (x - a, y - b, z - c)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cylinder:
+    """A right circular cylinder.
+
+    Attributes:
+        radius: units.
+        base: (3,) centre of the one end, block frame, units.
+        top: (3,) centre of the other.
+    """
+
+    radius: float
+    base: Vector
+    top: Vector
+
+    @property
+    def length(self) -> float:
+        """Distance between its ends, units."""
+        return distance(self.base, self.top)
+
+    @property
+    def block_from_axis(self) -> Pose:
+        """The frame of its middle in the block's, +z along its axis."""
+        scale = 1 / self.length
+        x, y, z = (scale * (end - start) for start, end in zip(self.base, self.top, strict=True))
+        # Any x axis will do: a cylinder looks the same all round.
+        across = (0.0, -z, y) if abs(x) < max(abs(y), abs(z)) else (-y, x, 0.0)
+        norm = distance(across, ORIGIN)
+        x_axis = (across[0] / norm, across[1] / norm, across[2] / norm)
+        turn = from_axes(x_axis, (x, y, z))
+        return Pose(position=_middle(self.base, self.top), quaternion=turn)
+
+
+Solid = Box | Cylinder
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Landmark:
+    """A point of a module that matters to its use, such as a cannon's outlet or a torch's flame.
+
+    Attributes:
+        name: what it is.
+        along: how far it lies from the block's centre in the pointing direction, units.
+        radius: of the sphere it stands for, units; None for a mere point.
+    """
+
+    name: str
+    along: float
+    radius: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Module:
+    """A kind of part, as the catalogue describes it.
+
+    Shapes are in the block's frame: its origin is the root point, where the block touches the face
+    it sits on, and +z points away from that face. A starting block's root is its centre, and its
+    axes are the world's when it is not turned.
+
+    Attributes:
+        name: what models call it.
+        besiege_id: its number in Besiege's machine files.
+        kind: what it does; see `KINDS`.
+        mass: mass units; a cargo's until its task sets another.
+        cost: Besiege's price.
+        size: (3,) its extent along x, y and z, units; None for connectors.
+        center: (3,) the point shown to models as its position.
+        faces: the places where others attach, in the order of their labels.
+        colliders: the convex solids that may not overlap another block's; smaller than the body, so
+            that neighbours on a lattice stay clear of each other.
+        body: the solids people see.
+        pointing: (3,) the way a cannon or torch points; None for the others.
+        landmarks: further points along the pointing direction.
+        actions: what its keys can make it do.
+        description: what models are told about it.
+        besiege_data: further entries of its block in Besiege's machine files: type, key, value.
+    """
+
+    name: str
+    besiege_id: int
+    kind: Kind
+    mass: float
+    cost: int
+    size: Vector | None
+    center: Vector = ORIGIN
+    faces: tuple[Face, ...] = ()
+    colliders: tuple[Solid, ...] = ()
+    body: tuple[Solid, ...] = ()
+    pointing: Vector | None = None
+    landmarks: tuple[Landmark, ...] = ()
+    actions: tuple[str, ...] = ()
+    description: str = ""
+    besiege_data: tuple[tuple[str, str, str | int | float | bool], ...] = ()
+    face_of_label: Mapping[str, Face] = field(init=False, repr=False, compare=False)
+    root_face: str | None = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        """Derives the lookups of faces: by label, and the one the block sits on."""
+        object.__setattr__(self, "face_of_label", {face.label: face for face in self.faces})
+        at_root = [face.label for face in self.faces if _is_root(face)]
+        root_face = at_root[0] if at_root and self.kind != "start" else None
+        object.__setattr__(self, "root_face", root_face)
+
+    @property
+    def attachable(self) -> bool:
+        """Whether it can be attached to a face."""
+        return self.kind in ATTACHABLE_KINDS
+
+    @property
+    def spins(self) -> bool:
+        """Whether it has a spin that can be flipped."""
+        return self.kind == "wheel"
+
+
+class Catalogue(Mapping[str, Module]):
+    """The modules a machine may be made of, by name, in the order of their files."""
+
+    __slots__ = ("_modules", "start")
+
+    def __init__(self, modules: tuple[Module, ...]) -> None:
+        """Takes modules with distinct names, exactly one of them a starting block.
+
+        Raises:
+            ValueError: two modules of one name, or not exactly one starting block.
+        """
+        self._modules = {module.name: module for module in modules}
+        starts = [module for module in modules if module.kind == "start"]
+        if len(self._modules) != len(modules) or len(starts) != 1:
+            raise ValueError("a catalogue holds distinct names and exactly one starting block")
+        self.start = starts[0]
+
+    def __getitem__(self, name: str) -> Module:
+        return self._modules[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._modules)
+
+    def __len__(self) -> int:
+        return len(self._modules)
+
+    def __repr__(self) -> str:
+        return f"Catalogue({', '.join(self._modules)})"
+
+    @property
+    def attachable(self) -> tuple[str, ...]:
+        """The names `attach_block_to` takes."""
+        return tuple(module.name for module in self._modules.values() if module.attachable)
+
+    @property
+    def connectors(self) -> tuple[str, ...]:
+        """The names `connect_blocks` takes."""
+        return tuple(name for name, module in self._modules.items() if module.kind == "connector")
+
+
+def _is_root(face: Face) -> bool:
+    return distance(face.center, ORIGIN) < FLUSH_TOLERANCE and face.normal[2] < FLUSH_TOLERANCE - 1
+
+
+def _middle(left: Vector, right: Vector) -> Vector:
+    return ((left[0] + right[0]) / 2, (left[1] + right[1]) / 2, (left[2] + right[2]) / 2)

@@ -1,0 +1,132 @@
+"""The kinds of arguments actions take: how models are told of them and how they are read.
+
+An action's signature is annotated with these, and both its tool definition and the check of what
+arrives are made from that one place.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Annotated, Any, TypeGuard
+
+from buildarena_geometry.documents.json_values import LARGEST_INTEGER, is_storable
+from buildarena_geometry.keys import KEYS
+from buildarena_geometry.outcomes import Cause
+from buildarena_geometry.rotations import Vector
+
+LARGEST_NUMBER = (
+    1e6  # units, degrees or seconds; far beyond any machine, well within a float's digits
+)
+LONGEST_TEXT = 500  # characters of a note or a name
+_LONGEST_QUOTE = 40  # characters of what a message quotes
+JsonSchema = dict[str, Any]
+
+
+class RefusalError(Exception):
+    """Stops an action from inside; the dispatcher turns it into a `Refused`."""
+
+    def __init__(self, cause: Cause, text: str, overlaps: tuple[tuple[str, str], ...] = ()) -> None:
+        """Takes what was wrong and what a model shall read about it."""
+        super().__init__(text)
+        self.cause = cause
+        self.text = text
+        self.overlaps = overlaps
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """A kind of argument.
+
+    Attributes:
+        schema: its JSON schema, without the description.
+        read: makes the value an action takes from the JSON value that arrived; raises RefusalError.
+    """
+
+    schema: JsonSchema
+    read: Callable[[str, object], Any]
+
+
+def shown(value: object) -> str:
+    """A value as a message quotes it: short whatever it is, and never an error itself."""
+    if isinstance(value, str):
+        printable = "".join(char if char.isprintable() else "?" for char in value[:_LONGEST_QUOTE])
+        return f'"{printable}…"' if len(value) > _LONGEST_QUOTE else f'"{printable}"'
+    if value is None or isinstance(value, bool):
+        return json.dumps(value)
+    if isinstance(value, int):
+        return str(value) if abs(value) <= LARGEST_INTEGER else "a huge number"
+    if isinstance(value, float):
+        return f"{value:g}"
+    if isinstance(value, list | tuple):
+        return f"a list of {len(value)}"
+    return "an object"
+
+
+def _malformed(name: str, expected: str, value: object) -> RefusalError:
+    text = f"{name} must be {expected}, not {shown(value)}."
+    return RefusalError(Cause.MALFORMED_ARGUMENTS, text)
+
+
+def _is_integer(value: object) -> TypeGuard[int]:
+    """Whether it is a whole number that JSON readers everywhere can take."""
+    return isinstance(value, int) and not isinstance(value, bool) and abs(value) <= LARGEST_INTEGER
+
+
+def _read_id(name: str, value: object) -> str:
+    return str(value) if _is_integer(value) else _read_text(name, value)
+
+
+def _read_text(name: str, value: object) -> str:
+    if not isinstance(value, str) or not is_storable(value):
+        raise _malformed(name, "a text without NUL characters and lone surrogates", value)
+    if len(value) > LONGEST_TEXT:
+        raise _malformed(name, f"a text of at most {LONGEST_TEXT} characters", value)
+    return value
+
+
+def _read_note(name: str, value: object) -> str:
+    return "" if value is None else _read_text(name, value)
+
+
+def _read_number(name: str, value: object) -> float:
+    if not _is_integer(value) and not (isinstance(value, float) and math.isfinite(value)):
+        raise _malformed(name, "a finite number", value)
+    if abs(value) > LARGEST_NUMBER:
+        text = f"{name} must lie within ±{LARGEST_NUMBER:.0f}, not {shown(value)}."
+        raise RefusalError(Cause.OUT_OF_RANGE, text)
+    return float(value)
+
+
+def _read_index(name: str, value: object) -> int:
+    if isinstance(value, float) and value.is_integer() and abs(value) <= LARGEST_NUMBER:
+        return int(value)
+    if not _is_integer(value):
+        raise _malformed(name, "a whole number", value)
+    return value
+
+
+def _read_vector(name: str, value: object) -> Vector:
+    if not isinstance(value, list | tuple) or len(value) != 3:  # noqa: PLR2004  three components
+        raise _malformed(name, "a list of three numbers", value)
+    x, y, z = (_read_number(f"{name}[{index}]", entry) for index, entry in enumerate(value))
+    return (x, y, z)
+
+
+_VECTOR_SCHEMA: JsonSchema = {
+    "type": "array",
+    "items": {"type": "number"},
+    "minItems": 3,
+    "maxItems": 3,
+}
+
+# Whole numbers are read too; the schema says text because not every provider takes two types.
+BlockId = Annotated[str, Parameter({"type": "string"}, _read_id)]
+Name = Annotated[str, Parameter({"type": "string"}, _read_text)]
+Key = Annotated[str, Parameter({"type": "string", "enum": list(KEYS)}, _read_text)]
+Note = Annotated[str, Parameter({"type": "string", "maxLength": LONGEST_TEXT}, _read_note)]
+Number = Annotated[float, Parameter({"type": "number"}, _read_number)]
+Index = Annotated[int, Parameter({"type": "integer"}, _read_index)]
+Triple = Annotated[Vector, Parameter(_VECTOR_SCHEMA, _read_vector)]

@@ -1,0 +1,1 @@
+"""Replay of golden action sequences, for tests and the `replay` command."""

@@ -1,0 +1,142 @@
+"""Runs action sequences in the golden vectors' format."""
+
+from __future__ import annotations
+
+import gzip
+import json
+import zlib
+from typing import TYPE_CHECKING, Any
+
+from buildarena_geometry.errors import SequenceError
+from buildarena_geometry.machine import Machine
+from buildarena_geometry.outcomes import Cause, Refused
+from buildarena_geometry.reading import Reader
+from buildarena_geometry.vectors.state import kind_of, state_entry
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from buildarena_geometry.modules.module import Catalogue
+    from buildarena_geometry.outcomes import Outcome
+
+_GZIP_MAGIC = b"\x1f\x8b"
+
+
+def run_sequences(
+    content: object, *, every_state: bool = True, catalogue: Catalogue | None = None
+) -> Iterator[dict[str, Any]]:
+    """Builds the machines of some sequences.
+
+    Args:
+        content: JSON values: a list of sequences, one sequence, or a bare list of {op, params}.
+        every_state: whether each step tells the state after it, or the last step only.
+        catalogue: the modules to build with; the basic ones if left out.
+
+    Yields:
+        {"seed", "steps": [{"ok", "kind", "state"}]} for each sequence.
+
+    Raises:
+        SequenceError: the content has another form.
+    """
+    for sequence in _sequences(Reader(value=content, where="input", error=SequenceError)):
+        run, steps = _prepare(sequence, catalogue)
+        told: list[dict[str, Any]] = []
+        for step in steps:
+            outcome = run.act(step)
+            told.append({"ok": outcome.ok, "kind": kind_of(outcome)})
+            if every_state:
+                told[-1]["state"] = run.told_state()
+        if told and not every_state:
+            told[-1]["state"] = run.told_state()
+        seed = sequence.value.get("seed") if isinstance(sequence.value, dict) else None
+        yield {"seed": seed, "steps": told}
+
+
+def parse(data: bytes) -> object:
+    """The JSON values of a sequence file, plain or compressed by gzip.
+
+    Raises:
+        SequenceError: it is not JSON, or damaged.
+    """
+    try:
+        plain = gzip.decompress(data) if data.startswith(_GZIP_MAGIC) else data
+        content: object = json.loads(plain)
+    except (OSError, EOFError, zlib.error) as error:
+        raise SequenceError(f"input: not gzip: {error}") from error
+    except (ValueError, RecursionError) as error:
+        raise SequenceError(f"input: not JSON: {error}") from error
+    return content
+
+
+class _Run:
+    """A machine on its way through a sequence, with the order the vectors list its parts in.
+
+    That is the order of creation, but for parts that a twist or shift was tried on: the published
+    library takes them out and puts them in again at the end.
+    """
+
+    def __init__(self, catalogue: Catalogue | None, sources: Mapping[str, _Run]) -> None:
+        available = {name: source.machine for name, source in sources.items()}
+        self.machine: Machine = Machine(catalogue=catalogue, available=available)
+        self._sources = sources
+        self.order: list[str] = []
+
+    def act(self, step: Reader) -> Outcome:
+        if not isinstance(step.value, dict) or "op" not in step.value:
+            step.fail("an object with op and params")
+        name, arguments = step.value["op"], step.value.get("params")
+        outcome = self.machine.act(name, arguments)
+        self._put_in_order(name, arguments, outcome)
+        return outcome
+
+    def told_state(self) -> dict[str, Any]:
+        return state_entry(self.machine.state, self.order)
+
+    def _put_in_order(self, name: object, arguments: object, outcome: Outcome) -> None:
+        parts = [part.id for part in self.machine.state.parts]
+        there, known = set(parts), set(self.order)
+        self.order = [part for part in self.order if part in there]
+        new = [part for part in parts if part not in known]
+        if new and name == "add_machine":
+            letter = list(self.machine.sub_structures)[-1]
+            source = self._sources[self.machine.sub_structures[letter].source]
+            new = [f"{letter}_{part}" for part in source.order]
+        self.order += new
+        tried = outcome.ok or (isinstance(outcome, Refused) and outcome.cause is Cause.OVERLAP)
+        if tried and name in ("twist_block", "shift_block") and isinstance(arguments, dict):
+            moved = str(arguments["block_id"])
+            self.order.remove(moved)
+            self.order.append(moved)
+
+
+def _sequences(root: Reader) -> Iterator[Reader]:
+    if isinstance(root.value, dict):
+        yield root
+        return
+    entries = list(root.items())
+    whole = [isinstance(entry.value, dict) and "steps" in entry.value for entry in entries]
+    if entries and all(whole):
+        yield from entries
+    else:
+        yield root
+
+
+def _prepare(sequence: Reader, catalogue: Catalogue | None) -> tuple[_Run, list[Reader]]:
+    values = sequence.value
+    if not isinstance(values, dict):
+        return _Run(catalogue, {}), list(sequence.items())
+    if "steps" not in values:
+        raise SequenceError(f"{sequence.where}: steps are missing")
+    sources: dict[str, _Run] = {}
+    subs, steps = (
+        Reader(value=value, where=f"{sequence.where}.{name}", error=SequenceError)
+        for name, value in (
+            ("sub_machines", values.get("sub_machines", {})),
+            ("steps", values["steps"]),
+        )
+    )
+    for name, actions in subs.entries():
+        sources[name] = _Run(catalogue, {})
+        for action in actions.items():
+            sources[name].act(action)
+    return _Run(catalogue, sources), list(steps.items())

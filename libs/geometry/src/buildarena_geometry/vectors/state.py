@@ -1,0 +1,123 @@
+"""Verdicts and states in the golden vectors' words."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from buildarena_geometry.besiege import besiege_point, besiege_rotation, besiege_span
+from buildarena_geometry.outcomes import Cause, Refused
+from buildarena_geometry.rotations import scaled
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from buildarena_geometry.blocks import Block, Connector, FaceRef
+    from buildarena_geometry.outcomes import Outcome
+    from buildarena_geometry.state import MachineState
+
+# The vectors know no name of their own for these.
+_KIND_OF_CAUSE = {
+    Cause.EXCESS_CONNECTION: "too_close",
+    Cause.UNKNOWN_ACTION: "bad_action",
+}
+
+
+def kind_of(outcome: Outcome) -> str:
+    """What the vectors call an outcome."""
+    if isinstance(outcome, Refused):
+        return _KIND_OF_CAUSE.get(outcome.cause, outcome.cause.value)
+    return "ok"
+
+
+def state_entry(state: MachineState, order: Iterable[str]) -> dict[str, Any]:
+    """A state in the vectors' field names; positions are east, north, up.
+
+    Args:
+        state: what to tell.
+        order: the ids of all its parts in the order to tell them in.
+    """
+    return {
+        "blocks": [
+            _block_entry(state, state.blocks[part])
+            if part in state.blocks
+            else _connector_entry(state.connectors[part])
+            for part in order
+        ],
+        "n": len(state.blocks) + len(state.connectors),
+        "cost": state.cost,
+        "mass": state.mass,
+        "next_id": state.next_id,
+        "control_sequence": [
+            {"time": press.time_s, "key": press.key, "hold_for": press.hold_for_s}
+            for press in state.control_sequence
+        ],
+    }
+
+
+def _block_entry(state: MachineState, block: Block) -> dict[str, Any]:
+    center = list(block.center_xyz)
+    entry: dict[str, Any] = {
+        "id": block.id,
+        "name": block.module.name,
+        "pos": list(block.world_from_block.xyz),
+        "virtual": list(besiege_point(block.world_from_block.xyz)),
+        "center": center,
+        "center_follow": center,
+        "quat": list(besiege_rotation(block)),
+        "flipped": block.flipped,
+    }
+    if block.module.faces:
+        entry["faces"] = {
+            face.label: {
+                "c": list(block.face_center(face.label)),
+                "n": list(block.face_normal(face.label)),
+                "att": not state.is_occupied(block, face.label),
+            }
+            for face in block.module.faces
+        }
+    if block.mount is not None:
+        entry["root_face"] = _seat(block, block.mount)
+    elif block.lost_mount is not None:
+        entry["root_face"] = [None, block.lost_mount[1], block.lost_mount[0]]
+    if block.pointing_xyz is not None:
+        entry["pointing"] = list(block.pointing_xyz)
+    if block.module.spins:
+        # Seen in Besiege's left-handed components the spin's sense is the other way round.
+        entry["spin"] = list(scaled(block.axis_xyz, -1.0 if block.flipped else 1.0))
+    if block.module.actions:
+        entry["keys"] = {action: list(keys) for action, keys in block.bindings.items()}
+    return entry
+
+
+def _connector_entry(link: Connector) -> dict[str, Any]:
+    root = list(link.world_from_connector.xyz)
+    return {
+        "id": link.id,
+        "name": link.module.name,
+        "pos": root,
+        "virtual": list(besiege_point(link.world_from_connector.xyz)),
+        "center": root,
+        "center_follow": root,
+        "quat": list(besiege_rotation(link)),
+        "flipped": False,
+        "connector": {
+            "start": _seat(link, link.start),
+            "end": _seat(link, link.end),
+            "start_point": list(link.start_xyz),
+            "end_point": list(link.end_xyz),
+            "projection_virtual": list(besiege_span(link)),
+        },
+    }
+
+
+def _seat(part: Block | Connector, face: FaceRef) -> list[str | None]:
+    """A face by its block and label.
+
+    The vectors look faces up by the ids of the machine a sub-structure was copied from, which are
+    unknown in the assembly: there the block's place is empty, and the id comes last.
+    """
+    block, label = face
+    prefix = f"{part.structure}_"
+    if part.structure and part.id.startswith(prefix):
+        return [None, label, block.removeprefix(prefix)]
+    return [block, label]

@@ -1,0 +1,1 @@
+"""Sessions of external agents over the tools API."""

@@ -1,0 +1,223 @@
+"""Sessions of outside agents: opened, played through tool calls, submitted, and then simulated."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections import Counter, OrderedDict
+from collections.abc import Mapping, Sequence
+from threading import Lock
+from typing import Any
+
+from buildarena_benchmark import Task, broken_constraint
+from buildarena_pipeline.agents.workbench import Workbench, rebuild
+from buildarena_pipeline.broker.queues import simulate_queue
+from buildarena_pipeline.catalog.tracks import SIMULATORS, external_track
+from buildarena_pipeline.errors import FieldError, PipelineError, SubmissionError
+from buildarena_pipeline.runtime.context import Context
+from buildarena_pipeline.runtime.machine_documents import machine_bytes
+from buildarena_pipeline.runtime.scoring import failure_score, task_of
+from buildarena_store import (
+    ExternalCall,
+    Job,
+    JobKey,
+    Lease,
+    NewJob,
+    RolloutRequest,
+    UnknownIdError,
+)
+from buildarena_store.ids import content_hash
+
+AGENT_NAME = re.compile(r"^[A-Za-z0-9_.-]{1,80}$")
+MOST_CALLS = 2000
+CACHED_BENCHES = 256
+JSON = "application/json"
+
+
+class SessionClosedError(PipelineError):
+    """The session is not open: it was submitted, cancelled, or never there."""
+
+
+class NothingToSubmitError(PipelineError):
+    """There is no machine, or several and no assembly."""
+
+
+class ExternalSessions:
+    """Lets outside agents build through tool calls.
+
+    Args:
+        context: The process' connections.
+    """
+
+    def __init__(self, context: Context) -> None:
+        self._context = context
+        self._benches: OrderedDict[tuple[str, int], Workbench] = OrderedDict()
+        self._guard = Lock()
+
+    def open(
+        self, *, task: str, agent: str, seed: int, simulator: str, owner: str | None = None
+    ) -> Job:
+        """Opens a session for one task, which belongs to the key that opened it.
+
+        Raises:
+            SubmissionError: Something is unknown, or this agent played this seed already.
+        """
+        chosen = self._check(task, agent, simulator)
+        track = external_track(simulator)
+        config = {"name": f"agent/{agent}", "provider": "external", "model": agent}
+        key = JobKey(
+            task=task,
+            task_version=chosen.version,
+            model_hash=content_hash(config),
+            track=track.id,
+            seed=seed,
+        )
+        new = NewJob(
+            key=key,
+            model=f"agent/{agent}",
+            model_config=config,
+            track_config=track.as_config(),
+            owner=owner,
+        )
+        with self._context.database.transaction() as connection:
+            self._context.jobs.add([new], connection=connection)
+            opened = self._context.external.open(key.job_id, connection=connection)
+        if not opened:
+            message = f"agent {agent!r} has played seed {seed} of {task}: take another seed"
+            raise SubmissionError([FieldError(field="seed", message=message)])
+        return self._context.jobs.get(key.job_id)
+
+    def call(self, job_id: str, *, machine: str, tool: str, arguments: Any) -> ExternalCall:
+        """Carries out one tool call and keeps it.
+
+        Raises:
+            SessionClosedError: The session is not open, or it made too many calls.
+        """
+        with self._context.database.transaction() as connection:
+            lease = self._lease(job_id, connection)
+            count = lease.job.actions
+            if count >= MOST_CALLS:
+                raise SessionClosedError(
+                    f"session {job_id} has made {MOST_CALLS} calls, which is all it may: submit it"
+                )
+            bench = self._bench(job_id, count, connection)
+            done = bench.call(machine, tool, arguments)
+            self._context.external.append(lease, count, done, connection=connection)
+        self._keep_bench(job_id, count + 1, bench)
+        return done
+
+    def submit(self, job_id: str) -> Job:
+        """Ends the building: the machine is checked and goes to the simulator.
+
+        Raises:
+            SessionClosedError: The session is not open.
+            NothingToSubmitError: There is no machine, or several and no assembly.
+        """
+        context = self._context
+        engine = None
+        with context.database.transaction() as connection:
+            lease = self._lease(job_id, connection)
+            job = lease.job
+            calls = context.external.read(job_id, connection=connection)
+            chosen = rebuild(calls).result()
+            if chosen is None:
+                raise NothingToSubmitError(
+                    "there is no machine to simulate: build one, or join several in 'assembly'"
+                )
+            _, machine = chosen
+            transcript = context.artifacts.put(_transcript(calls), JSON)
+            kept = context.artifacts.put(machine_bytes(machine), JSON)
+            made = {"machine": kept, "transcript": transcript}
+            context.results.attach(job_id, made, connection=connection)
+            refusals = dict(Counter(c.reason or "refused" for c in calls if not c.ok))
+            task = task_of(job, context.catalogue)
+            broken = broken_constraint(task, machine)
+            if broken is not None:
+                reason, detail = broken
+                score = failure_score(
+                    job, task, machine, outcome="construction_failed", reason=reason, detail=detail
+                )
+                context.results.finish(lease, score, connection=connection, refusals=refusals)
+            else:
+                engine = str(job.track_config["simulator"])
+                request = RolloutRequest(
+                    number=0, final=True, engine=engine, machine_hash=kept.hash
+                )
+                context.rollouts.request(job_id, request, connection=connection)
+                context.leases.queue_again(
+                    lease,
+                    stage="simulate",
+                    queue=simulate_queue(engine),
+                    connection=connection,
+                    refusals=refusals,
+                )
+        if engine is not None:
+            context.queues.announce(simulate_queue(engine), [job_id])
+        return context.jobs.get(job_id)
+
+    def _check(self, task: str, agent: str, simulator: str) -> Task:
+        """The newest version of the task, if all that was named is there."""
+        errors = []
+        found = self._context.catalogue.named([task]).get(task)
+        if found is None:
+            errors.append(_unknown("task", task, sorted(self._context.catalogue.newest())))
+        if simulator not in SIMULATORS:
+            errors.append(_unknown("simulator", simulator, SIMULATORS))
+        if not AGENT_NAME.match(agent):
+            message = "1 to 80 letters, digits, dots, dashes and underscores"
+            errors.append(FieldError(field="agent", message=message))
+        if errors or found is None:
+            raise SubmissionError(errors)
+        return found
+
+    def _lease(self, job_id: str, connection: Any) -> Lease:
+        lease = self._context.external.lease(job_id, connection=connection)
+        if lease is None:
+            try:
+                job = self._context.jobs.get(job_id)
+            except UnknownIdError as error:
+                raise UnknownIdError("session", job_id) from error
+            state = job.outcome or f"{job.stage} {job.state}"
+            raise SessionClosedError(f"session {job_id} is not open: it is {state}")
+        return lease
+
+    def _bench(self, job_id: str, count: int, connection: Any) -> Workbench:
+        """The workbench after so many calls: kept from the last call, or built again."""
+        with self._guard:
+            bench = self._benches.pop((job_id, count), None)
+        if bench is not None:
+            return bench
+        return rebuild(self._context.external.read(job_id, connection=connection))
+
+    def _keep_bench(self, job_id: str, count: int, bench: Workbench) -> None:
+        with self._guard:
+            self._benches[job_id, count] = bench
+            while len(self._benches) > CACHED_BENCHES:
+                self._benches.popitem(last=False)
+
+
+def _unknown(field: str, value: str, choices: Sequence[str]) -> FieldError:
+    return FieldError(field=field, message=f"there is no {field} {value!r}", choices=choices)
+
+
+def _transcript(calls: Sequence[ExternalCall]) -> bytes:
+    turns: list[Mapping[str, Any]] = [
+        {
+            "index": index,
+            "stage": "external",
+            "sub_structure": call.machine,
+            "role": "agent",
+            "text": "",
+            "actions": [
+                {
+                    "name": call.tool,
+                    "arguments": call.arguments,
+                    "ok": call.ok,
+                    "reason": call.reason,
+                    "feedback": call.feedback,
+                }
+            ],
+        }
+        for index, call in enumerate(calls)
+    ]
+    return json.dumps({"version": "1", "turns": turns}, ensure_ascii=False).encode()

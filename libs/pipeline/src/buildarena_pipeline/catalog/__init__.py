@@ -1,0 +1,1 @@
+"""What a submission can name: models, prompts, workflows, tracks, tasks."""

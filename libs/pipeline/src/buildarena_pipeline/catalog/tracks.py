@@ -1,0 +1,100 @@
+"""Tracks: workflow x simulator x prompt version. Only results of one track share a ranking."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from buildarena_geometry import FEEDBACK_VERSION
+from buildarena_pipeline.broker.queues import EXTERNAL
+from buildarena_pipeline.catalog.prompt_packs import PromptPack
+from buildarena_pipeline.catalog.specs import ClosedLoop
+from buildarena_pipeline.catalog.workflows import WorkflowSource
+from buildarena_simulation import ENGINES, SIMULATION_VERSION
+
+SIMULATORS = tuple(ENGINES)
+"""Simulators that jobs can name; each has a queue of its own."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Track:
+    """What results must share to be compared.
+
+    Attributes:
+        workflow: Workflow name.
+        simulator: Simulator name.
+        simulation_version: Version of the physics.
+        prompts: Prompt pack name.
+        prompts_digest: Hash of the pack.
+        feedback_version: Version of the words in which geometry answers a model.
+        workflow_digest: Hash of an operator's own workflow; "" for built-in ones.
+        one_shot: Whether an example construction is shown.
+        rounds: Rounds of the closed loop; 1 without one.
+        analyst: Whether an analyst advises between rounds.
+    """
+
+    workflow: str
+    simulator: str
+    simulation_version: str
+    prompts: str
+    prompts_digest: str
+    feedback_version: str
+    workflow_digest: str = ""
+    one_shot: bool = False
+    rounds: int = 1
+    analyst: bool = False
+
+    @property
+    def id(self) -> str:
+        """A short spelling that holds everything."""
+        workflow = self.workflow
+        if self.workflow_digest:
+            workflow += f"-{self.workflow_digest[:8]}"
+        if self.one_shot:
+            workflow += "+one-shot"
+        if self.rounds > 1:
+            workflow += f"+{self.rounds}-rounds" + ("-analyst" if self.analyst else "")
+        return (
+            f"{workflow}/{self.simulator}-{self.simulation_version}/"
+            f"{self.prompts}-{self.prompts_digest[:8]}-{self.feedback_version}"
+        )
+
+    def as_config(self) -> Mapping[str, Any]:
+        """The parts as a JSON object."""
+        return {name: getattr(self, name) for name in self.__dataclass_fields__}
+
+
+def external_track(simulator: str) -> Track:
+    """The track of outside agents, which bring their own prompts."""
+    return Track(
+        workflow=EXTERNAL,
+        simulator=simulator,
+        simulation_version=SIMULATION_VERSION,
+        prompts="own",
+        prompts_digest="",
+        feedback_version=FEEDBACK_VERSION,
+    )
+
+
+def make_track(
+    workflow: WorkflowSource,
+    simulator: str,
+    pack: PromptPack,
+    *,
+    one_shot: bool = False,
+    closed_loop: ClosedLoop | None = None,
+) -> Track:
+    """The track of a submission, with the versions that are installed now."""
+    return Track(
+        workflow=workflow.name,
+        simulator=simulator,
+        simulation_version=SIMULATION_VERSION,
+        prompts=pack.name,
+        prompts_digest=pack.digest,
+        feedback_version=FEEDBACK_VERSION,
+        workflow_digest=workflow.digest,
+        one_shot=one_shot,
+        rounds=1 if closed_loop is None else closed_loop.rounds,
+        analyst=closed_loop is not None and closed_loop.analyst,
+    )

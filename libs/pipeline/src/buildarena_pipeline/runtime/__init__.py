@@ -1,0 +1,1 @@
+"""What every process runs on: settings, context, stages, leases, the reaper."""

@@ -1,0 +1,93 @@
+"""From rollouts to a job's score, and the manifest that lets anybody check it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from buildarena_benchmark import Task, failed_score
+from buildarena_geometry import DOCUMENT_VERSION, Machine
+from buildarena_geometry import __version__ as geometry_version
+from buildarena_pipeline import __version__
+from buildarena_pipeline.catalog.tasks import TaskCatalogue
+from buildarena_pipeline.errors import PermanentFaultError
+from buildarena_store import Job, JobScore, RolloutRecord
+
+
+def task_of(job: Job, catalogue: TaskCatalogue) -> Task:
+    """The job's task, in the version that the job was submitted for.
+
+    Raises:
+        PermanentFaultError: It is gone, or is no longer scored as it was.
+    """
+    task = catalogue.exact(job.task, job.task_version)
+    if task is None:
+        raise PermanentFaultError(
+            f"task {job.task} is no longer at version {job.task_version[:12]}: submit it again",
+            reason="task_changed",
+        )
+    return task
+
+
+def best_rollout(records: Sequence[RolloutRecord]) -> RolloutRecord:
+    """The rollout that counts: a success before none, then the larger indicator, then the first."""
+    done = [record for record in records if record.finished_at is not None]
+    return max(done, key=lambda r: (bool(r.success), r.indicator or 0.0, -r.number))
+
+
+def rollout_score(job: Job, record: RolloutRecord) -> JobScore:
+    """The score of a job whose best rollout this is."""
+    success = bool(record.success)
+    return JobScore(
+        outcome="success" if success else "unsuccessful",
+        success=success,
+        indicator=float(record.indicator or 0.0),
+        metrics=record.metrics or {},
+        flags=record.flags or (),
+        manifest=job_manifest(job, record),
+    )
+
+
+def failure_score(
+    job: Job, task: Task, machine: Machine | None, *, outcome: str, reason: str, detail: str
+) -> JobScore:
+    """The score of a job that ended without a rollout.
+
+    Args:
+        job: The job.
+        task: Its task.
+        machine: What was built, if anything: its parts are counted.
+        outcome: ``construction_failed`` or ``limit``.
+        reason: Class of the failure.
+        detail: A sentence for people.
+    """
+    failed = failed_score(task, machine)
+    return JobScore(
+        outcome=outcome,
+        success=failed.success,
+        indicator=failed.indicator,
+        metrics=failed.metrics,
+        flags=failed.flags,
+        reason=reason,
+        detail=detail,
+        manifest=job_manifest(job, None),
+    )
+
+
+def job_manifest(job: Job, record: RolloutRecord | None) -> Mapping[str, Any]:
+    """Versions of everything that can change the score, and hashes of what it was made from."""
+    manifest: dict[str, Any] = {
+        "buildarena": __version__,
+        "geometry": geometry_version,
+        "document": DOCUMENT_VERSION,
+        "task": {"name": job.task, "version": job.task_version},
+        "model": dict(job.model_config),
+        "track": dict(job.track_config),
+        "seed": job.seed,
+    }
+    if record is not None:
+        manifest["simulator"] = dict(record.versions or {})
+        manifest["machine"] = record.machine_hash
+        manifest["trajectory"] = record.trajectory_hash
+        manifest["rollout"] = record.number
+    return manifest

@@ -1,0 +1,172 @@
+"""A worker process: a Celery worker whose messages run a stage handler."""
+
+from __future__ import annotations
+
+import os
+import resource
+import signal
+import socket
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Any
+
+import structlog
+from celery.signals import worker_process_init, worker_process_shutdown, worker_ready
+from sqlalchemy.exc import OperationalError
+
+from buildarena_pipeline.broker.queues import LOOK
+from buildarena_pipeline.broker.watchdog import Hearing
+from buildarena_pipeline.errors import StartupError
+from buildarena_pipeline.runtime.context import Context, open_context
+from buildarena_pipeline.runtime.job_runner import LeaseKeeper, StageHandler, StageRunner
+from buildarena_pipeline.runtime.logs import set_up_logs
+from buildarena_pipeline.runtime.processes import die_with_parent
+from buildarena_pipeline.runtime.reaper import Sweeper
+from buildarena_pipeline.runtime.settings import Settings
+from buildarena_pipeline.runtime.tracing import Tracing
+from buildarena_store import SchemaVersionError
+
+log = structlog.get_logger(__name__)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WorkerSpec:
+    """What a worker does.
+
+    Attributes:
+        kind: ``construct`` or ``simulate``.
+        queues: Queues it serves.
+        pool: Celery pool: ``threads``, ``prefork`` or ``solo``.
+        concurrency: Jobs at once.
+        make_handler: Makes the stage handler from a process' connections.
+        make_others: Makes what else it does: functions of an id, by queue.
+        versions: Versions of what it runs.
+    """
+
+    kind: str
+    queues: Sequence[str]
+    pool: str
+    concurrency: int
+    make_handler: Callable[[Context], StageHandler]
+    make_others: Callable[[Context], Mapping[str, Callable[[str], None]]] = lambda _: {}
+    versions: Mapping[str, Any]
+
+
+class _Runtime:
+    """The connections, threads and handler of one process that does stages."""
+
+    def __init__(self, spec: WorkerSpec, settings: Settings) -> None:
+        pool_size = 5 if spec.pool != "threads" else 8
+        self.context = open_context(settings, pool_size=pool_size)
+        self.tracing = Tracing(f"{spec.kind}-worker", settings.otlp_endpoint)
+        self.id = f"{spec.kind}@{socket.gethostname()}:{os.getpid()}"
+        self._spec = spec
+        self.keeper = LeaseKeeper(self.context, self.report)
+        self.others = spec.make_others(self.context)
+        self.runner = StageRunner(
+            self.context, spec.make_handler(self.context), self.keeper, self.id
+        )
+
+    def report(self) -> None:
+        """Tells the register that this process lives."""
+        peak_kib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        self.context.workers.report(
+            worker_id=self.id,
+            kind=self._spec.kind,
+            queues=self._spec.queues,
+            host=socket.gethostname(),
+            pid=os.getpid(),
+            versions=self._spec.versions,
+            peak_memory_bytes=peak_kib * 1024,
+            own_time=datetime.now(UTC),
+        )
+
+    def start(self) -> None:
+        """Starts the heartbeat thread and reports."""
+        self.report()
+        self.keeper.start()
+
+    def stop(self) -> None:
+        """Hands leases back, leaves the register and closes the connections."""
+        self.keeper.stop()
+        self.context.workers.leave(self.id)
+        self.context.close()
+        self.tracing.close()
+
+
+def run_worker(spec: WorkerSpec, settings: Settings) -> None:
+    """Serves queues until the process is told to stop.
+
+    Raises:
+        StartupError: The database has another schema, or the settings are incomplete.
+    """
+    set_up_logs(settings.log_level)
+    context = _checked_context(settings)
+    runtimes: dict[int, _Runtime] = {}
+    forks = spec.pool == "prefork"
+
+    def start_runtime(**_: Any) -> None:
+        if forks:
+            die_with_parent(signal.SIGKILL)
+        runtimes[os.getpid()] = runtime = _Runtime(spec, settings)
+        runtime.start()
+
+    def stop_runtime(**_: Any) -> None:
+        runtime = runtimes.pop(os.getpid(), None)
+        if runtime is not None:
+            runtime.stop()
+
+    def look(queue: str, job_id: str) -> None:
+        runtime = runtimes[os.getpid()]
+        if queue in runtime.others:
+            runtime.others[queue](job_id)
+        else:
+            runtime.runner.look(queue, job_id)
+
+    app = context.queues.app
+    app.task(name=LOOK)(look)
+    sweeper = Sweeper(context)
+    hearing = Hearing(context.queues, spec.queues)
+
+    def begin(sender: Any, **_: Any) -> None:
+        sweeper.start()
+        hearing.start(sender)
+
+    worker_ready.connect(begin, weak=False)
+    if forks:
+        worker_process_init.connect(start_runtime, weak=False)
+        worker_process_shutdown.connect(stop_runtime, weak=False)
+    else:
+        start_runtime()
+    worker = app.Worker(
+        queues=list(spec.queues),
+        pool=spec.pool,
+        concurrency=spec.concurrency,
+        without_gossip=True,
+        without_mingle=True,
+        without_heartbeat=True,
+        loglevel="WARNING",
+        quiet=True,
+    )
+    try:
+        worker.start()
+    finally:
+        hearing.stop()
+        sweeper.stop()
+        if not forks:
+            stop_runtime()
+        context.close()
+    sys.exit(worker.exitcode or 0)
+
+
+def _checked_context(settings: Settings) -> Context:
+    try:
+        context = open_context(settings)
+        context.database.require_schema()
+    except (ValueError, SchemaVersionError) as error:
+        raise StartupError(str(error)) from error
+    except OperationalError as error:
+        raise StartupError(f"the database can't be reached: {error.orig}") from error
+    return context

@@ -1,0 +1,1 @@
+"""From specs to jobs in the database, and what they will cost."""

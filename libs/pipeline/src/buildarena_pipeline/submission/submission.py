@@ -1,0 +1,249 @@
+"""Submissions: from what people ask for to jobs in the database, all of them or none."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from buildarena_benchmark import Task
+from buildarena_pipeline.broker.queues import CONSTRUCT
+from buildarena_pipeline.catalog.models import ModelRegistry
+from buildarena_pipeline.catalog.prompt_packs import PromptPacks
+from buildarena_pipeline.catalog.specs import Budget, Decoding, JobSpec, SweepSpec
+from buildarena_pipeline.catalog.tracks import SIMULATORS, make_track
+from buildarena_pipeline.catalog.workflows import workflow_sources
+from buildarena_pipeline.errors import FieldError, SubmissionError
+from buildarena_pipeline.runtime.context import Context
+from buildarena_pipeline.runtime.reaper import announce_waiting
+from buildarena_pipeline.submission.estimates import SweepEstimate, estimate
+from buildarena_store import Job, JobKey, NewJob, NewSweep, Sweep
+from buildarena_store.ids import content_hash, new_id
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Submitted:
+    """A sweep that was accepted.
+
+    Attributes:
+        sweep: The sweep.
+        jobs: How many jobs it has.
+        added: How many of them are new; the others were there before.
+        taken_up: Whether an earlier submission of the same jobs goes on.
+    """
+
+    sweep: Sweep
+    jobs: int
+    added: int
+    taken_up: bool = False
+
+
+class Submissions:
+    """Checks and stores submissions.
+
+    Args:
+        context: The process' connections.
+        registry: The models that can be named.
+    """
+
+    def __init__(self, context: Context, registry: ModelRegistry) -> None:
+        self._context = context
+        self._registry = registry
+        self._packs = PromptPacks(context.settings.prompt_packs)
+        self._workflows = workflow_sources(context.settings.workflows)
+
+    def submit_job(self, spec: JobSpec, *, owner: str | None = None) -> tuple[Job, bool]:
+        """Stores a job and announces it.
+
+        Args:
+            spec: The job.
+            owner: Id of the API key that submits it, if any.
+
+        Returns:
+            The job, and whether it is new: an equal job is never done twice.
+
+        Raises:
+            SubmissionError: Something of it is unknown; nothing was stored.
+        """
+        new = self.plan(
+            SweepSpec(
+                tasks=[spec.task],
+                models=[spec.model],
+                seeds=[spec.seed],
+                **spec.model_dump(exclude={"task", "model", "seed"}),
+            ),
+            fields={"tasks[0]": "task", "models[0]": "model"},
+        )
+        own = [replace(job, owner=owner) for job in new]
+        with self._context.database.transaction() as connection:
+            added = self._context.jobs.add(own, connection=connection)
+        announce_waiting(self._context, CONSTRUCT)
+        return self._context.jobs.get(new[0].key.job_id), added > 0
+
+    def submit_sweep(
+        self,
+        spec: SweepSpec,
+        *,
+        owner: str | None = None,
+        request_key: str | None = None,
+        take_up: bool = False,
+    ) -> Submitted:
+        """Stores a sweep with its jobs and announces them.
+
+        Args:
+            spec: The sweep.
+            owner: Id of the API key that submits it, if any.
+            request_key: Idempotency key, if any.
+            take_up: Whether the owner's earlier sweep of just these jobs, if there is one, goes
+                on with this one's budget, instead of a further sweep being stored.
+
+        Raises:
+            SubmissionError: Something of it is unknown; nothing was stored.
+        """
+        new = self.plan(spec)
+        job_ids = [job.key.job_id for job in new]
+        jobs_hash = content_hash(sorted(job_ids))
+        if take_up:
+            before = self._context.sweeps.with_jobs(jobs_hash, owner=owner)
+            if before is not None:
+                self.resume(before, spec.budget)
+                found = self._context.sweeps.get(before.id)
+                return Submitted(sweep=found, jobs=len(new), added=0, taken_up=True)
+        sweep = NewSweep(
+            id=new_id("sweep"),
+            name=spec.name,
+            spec=spec.model_dump(mode="json", exclude_none=True),
+            owner=owner,
+            request_key=request_key,
+            request_hash=spec_hash(spec),
+            jobs_hash=jobs_hash,
+        )
+        own = [replace(job, owner=owner, payer=sweep.id) for job in new]
+        with self._context.database.transaction() as connection:
+            if spec.budget is not None:
+                self._context.budgets.set(sweep.id, spec.budget.as_limits(), connection=connection)
+            added = self._context.jobs.add(own, connection=connection)
+            self._context.sweeps.add(sweep, job_ids, connection=connection)
+        announce_waiting(self._context, CONSTRUCT)
+        return Submitted(sweep=self._context.sweeps.get(sweep.id), jobs=len(new), added=added)
+
+    def resume(self, sweep: Sweep, budget: Budget | None) -> None:
+        """Lets a sweep go on, with another budget if one is given."""
+        with self._context.database.transaction() as connection:
+            if budget is not None:
+                self._context.budgets.set(sweep.id, budget.as_limits(), connection=connection)
+            if sweep.state != "active":
+                self._context.sweeps.resume(sweep.id, connection=connection)
+        announce_waiting(self._context, CONSTRUCT)
+
+    def estimate(self, spec: SweepSpec) -> SweepEstimate:
+        """What a sweep would use, without storing anything.
+
+        Raises:
+            SubmissionError: Something of it is unknown, or it is too large.
+        """
+        return estimate(self.plan(spec), self._registry)
+
+    def plan(self, spec: SweepSpec, *, fields: dict[str, str] | None = None) -> list[NewJob]:
+        """The jobs that a sweep consists of, without storing anything.
+
+        Args:
+            spec: The sweep.
+            fields: Other names for fields in error messages.
+
+        Raises:
+            SubmissionError: Something of it is unknown, or it is too large.
+        """
+        tasks = self._context.catalogue.named(spec.tasks)
+        self._check(spec, tasks, fields or {})
+        track = make_track(
+            self._workflows[spec.workflow],
+            spec.simulator,
+            self._packs.load(spec.prompts),
+            one_shot=spec.one_shot,
+            closed_loop=spec.closed_loop,
+        )
+        track_config = track.as_config()
+        limits = spec.limits.model_dump(exclude_none=True)
+        seeds = spec.all_seeds()
+        new = []
+        for task_name in dict.fromkeys(spec.tasks):
+            for model_name in dict.fromkeys(spec.models):
+                config = model_config(self._registry, model_name, spec.decoding)
+                config_hash = content_hash(config)
+                new += [
+                    NewJob(
+                        key=JobKey(
+                            task=task_name,
+                            task_version=tasks[task_name].version,
+                            model_hash=config_hash,
+                            track=track.id,
+                            seed=seed,
+                        ),
+                        model=model_name,
+                        model_config=config,
+                        track_config=track_config,
+                        limits=limits,
+                    )
+                    for seed in seeds
+                ]
+        return new
+
+    def _check(self, spec: SweepSpec, tasks: Mapping[str, Task], fields: dict[str, str]) -> None:
+        if any(name not in tasks for name in spec.tasks):
+            # The choices are all there are.
+            tasks = self._context.catalogue.newest()
+        errors = [
+            *_unknown("tasks", "task", spec.tasks, tasks),
+            *_unknown("models", "model", spec.models, self._registry.models),
+            *_unknown("workflow", "workflow", [spec.workflow], self._workflows),
+            *_unknown("simulator", "simulator", [spec.simulator], SIMULATORS),
+            *_unknown("prompts", "prompt pack", [spec.prompts], self._packs.names),
+        ]
+        size = len(set(spec.tasks)) * len(set(spec.models)) * len(spec.all_seeds())
+        largest = self._context.settings.max_sweep_jobs
+        if size > largest:
+            message = f"the sweep has {size:,} jobs; the largest accepted has {largest:,}"
+            errors.append(FieldError(field="seeds", message=message))
+        if errors:
+            raise SubmissionError(
+                [
+                    FieldError(
+                        field=fields.get(error.field, error.field),
+                        message=error.message,
+                        choices=error.choices,
+                    )
+                    for error in errors
+                ]
+            )
+
+
+def spec_hash(spec: SweepSpec) -> str:
+    """The content hash of a submission."""
+    return content_hash(spec.model_dump(mode="json", exclude_none=True))
+
+
+def model_config(registry: ModelRegistry, name: str, decoding: Decoding) -> dict[str, Any]:
+    """Everything about a model that can change what it replies."""
+    entry = registry.models[name]
+    return {
+        "name": entry.name,
+        "provider": entry.provider,
+        "model": entry.model,
+        "decoding": decoding.model_dump(exclude_none=True),
+    }
+
+
+def _unknown(
+    field: str, kind: str, names: Sequence[str], known: Collection[str]
+) -> list[FieldError]:
+    several = field.endswith("s") and field != "prompts"
+    return [
+        FieldError(
+            field=f"{field}[{index}]" if several else field,
+            message=f"there is no {kind} {name!r}",
+            choices=sorted(known),
+        )
+        for index, name in enumerate(names)
+        if name not in known
+    ]

@@ -1,0 +1,294 @@
+"""Budgets of sweeps and keys: what their jobs may spend, reserved before each model request.
+
+A job is paid for by the sweep that wants it and by the key that submitted that sweep. Before a
+request its worker reserves what it may cost; when the reply is journaled, the reservation gives
+way to what it did cost. So a budget is overspent by no more than the open requests cost above
+what was reserved for them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+from typing import Any
+
+from sqlalchemy import Connection, and_, func, literal, or_, select, update
+from sqlalchemy.dialects.postgresql import distinct_on, insert
+
+from buildarena_store import events
+from buildarena_store.database import Database
+from buildarena_store.jobs.journal import Usage
+from buildarena_store.jobs.leases import Lease
+from buildarena_store.tables import budgets, jobs, reservations, sweep_jobs, sweeps
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BudgetLimits:
+    """The most that may be spent; None where there is no limit.
+
+    Attributes:
+        max_cost_usd: US dollars.
+        max_tokens: Input and output tokens together.
+        max_requests: Model requests.
+    """
+
+    max_cost_usd: Decimal | None = None
+    max_tokens: int | None = None
+    max_requests: int | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Budget:
+    """A budget and what was spent of it.
+
+    Attributes:
+        id: Id of the sweep or key whose budget it is.
+        limits: The most that may be spent.
+        spent_cost_usd: US dollars spent.
+        spent_tokens: Input and output tokens used.
+        spent_requests: Model requests answered.
+    """
+
+    id: str
+    limits: BudgetLimits
+    spent_cost_usd: Decimal
+    spent_tokens: int
+    spent_requests: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Need:
+    """What one model request may use."""
+
+    cost_usd: Decimal
+    tokens: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shortage:
+    """Why a request may not be sent.
+
+    Attributes:
+        budget_id: The budget that lacks the means.
+        detail: What is lacking, for people.
+        passing: Whether open requests may give back enough, so that waiting helps.
+    """
+
+    budget_id: str
+    detail: str
+    passing: bool
+
+
+class Budgets:
+    """Sets, reads and reserves budgets."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def set(self, budget_id: str, limits: BudgetLimits, *, connection: Connection) -> None:
+        """Gives a sweep or key a budget; what its jobs spent before counts.
+
+        Args:
+            budget_id: The sweep's or key's id.
+            limits: What may be spent in all, earlier spending included.
+            connection: The transaction it is part of.
+        """
+        own = or_(jobs.c.payer == budget_id, jobs.c.owner == budget_id)
+        cost, tokens, requests = connection.execute(
+            select(
+                func.coalesce(func.sum(jobs.c.cost_usd), 0),
+                func.coalesce(func.sum(jobs.c.input_tokens + jobs.c.output_tokens), 0),
+                func.coalesce(func.sum(jobs.c.requests), 0),
+            ).where(own)
+        ).one()
+        given: dict[str, Any] = {
+            name: getattr(limits, name) for name in BudgetLimits.__dataclass_fields__
+        }
+        statement = insert(budgets).values(
+            id=budget_id,
+            spent_cost_usd=cost,
+            spent_tokens=tokens,
+            spent_requests=requests,
+            **given,
+        )
+        connection.execute(statement.on_conflict_do_update(index_elements=["id"], set_=given))
+
+    def get(self, budget_id: str) -> Budget | None:
+        """The budget of a sweep or key; None when it has none."""
+        with self._database.statement() as connection:
+            row = connection.execute(select(budgets).where(budgets.c.id == budget_id)).first()
+        return None if row is None else _budget(row)
+
+    def reserve(self, lease: Lease, need: Need) -> Shortage | None:
+        """Puts aside what the job's next request may cost, in all its budgets or in none.
+
+        Returns:
+            None when it was put aside, else what is lacking.
+        """
+        job_id = lease.job.id
+        # Locked in the order of their ids, so that two jobs never wait for each other.
+        locked = (
+            select(budgets)
+            .join(jobs, _PAYS)
+            .where(jobs.c.id == job_id)
+            .order_by(budgets.c.id)
+            .with_for_update(of=budgets)
+        )
+        with self._database.transaction() as connection:
+            found = [_budget(row) for row in connection.execute(locked)]
+            for budget in found:
+                shortage = _shortage(budget, _reserved(budget.id, job_id, connection), need)
+                if shortage is not None:
+                    return shortage
+            if found:
+                self._put_aside(found, lease, need, connection)
+        return None
+
+    def _put_aside(
+        self, found: Sequence[Budget], lease: Lease, need: Need, connection: Connection
+    ) -> None:
+        rows = [
+            {
+                "job_id": lease.job.id,
+                "budget_id": budget.id,
+                "token": lease.token,
+                "cost_usd": need.cost_usd,
+                "tokens": need.tokens,
+            }
+            for budget in found
+        ]
+        statement = insert(reservations).values(rows)
+        new = {name: statement.excluded[name] for name in ("token", "cost_usd", "tokens")}
+        connection.execute(
+            statement.on_conflict_do_update(index_elements=["job_id", "budget_id"], set_=new)
+        )
+
+    def charge_lost(self, lease: Lease, usage: Usage) -> None:
+        """Counts a reply that was paid for but came after the lease had ended."""
+        with self._database.transaction() as connection:
+            connection.execute(
+                update(budgets)
+                .where(budgets.c.id.in_([lease.job.payer, lease.job.owner]))
+                .values(
+                    spent_cost_usd=budgets.c.spent_cost_usd + usage.cost_usd,
+                    spent_tokens=budgets.c.spent_tokens + usage.input_tokens + usage.output_tokens,
+                    spent_requests=budgets.c.spent_requests + usage.requests,
+                )
+            )
+
+    def stop(self, budget_id: str, detail: str, *, connection: Connection) -> list[str]:
+        """Brings the sweeps of a used-up budget to the state ``limit``; nothing new starts.
+
+        Waiting jobs that another active sweep with another budget wants go over to that sweep;
+        the others are held.
+
+        Returns:
+            Ids of the sweeps that were stopped.
+        """
+        stopped = [
+            row.id
+            for row in connection.execute(
+                update(sweeps)
+                .where(
+                    or_(sweeps.c.id == budget_id, sweeps.c.owner == budget_id),
+                    sweeps.c.state == "active",
+                )
+                .values(state="limit")
+                .returning(sweeps.c.id)
+            )
+        ]
+        for sweep_id in stopped:
+            events.record_sweep(connection, sweep_id, "limit", {"detail": detail})
+        waiting = and_(
+            or_(jobs.c.payer == budget_id, jobs.c.owner == budget_id),
+            jobs.c.state == "queued",
+            jobs.c.stage == "construct",
+        )
+        self.pass_on(waiting, connection=connection)
+        rows = connection.execute(
+            update(jobs).where(waiting).values(state="held", nudged_at=None).returning(jobs.c.id)
+        )
+        held = [row.id for row in rows]
+        events.record_jobs(connection, held, "held", {"why": detail})
+        return stopped
+
+    def release_single_jobs(self, key_id: str, *, connection: Connection) -> None:
+        """Queues a key's held jobs that belong to no sweep."""
+        rows = connection.execute(
+            update(jobs)
+            .where(jobs.c.owner == key_id, jobs.c.payer.is_(None), jobs.c.state == "held")
+            .values(state="queued")
+            .returning(jobs.c.id)
+        )
+        events.record_jobs(connection, [row.id for row in rows], "queued", {"why": "budget"})
+
+    def pass_on(self, which: Any, *, connection: Connection) -> None:
+        """Makes another active sweep, where one wants a job, the one that pays for it.
+
+        Args:
+            which: Condition on the jobs.
+            connection: The transaction it is part of.
+        """
+        taker = (
+            select(sweeps.c.id, sweeps.c.owner, sweep_jobs.c.job_id)
+            .join(sweep_jobs, sweep_jobs.c.sweep_id == sweeps.c.id)
+            .where(sweeps.c.state == "active")
+            .ext(distinct_on(sweep_jobs.c.job_id))
+            .order_by(sweep_jobs.c.job_id, sweeps.c.created_at)
+            .subquery("taker")
+        )
+        connection.execute(
+            update(jobs)
+            .where(
+                which, taker.c.job_id == jobs.c.id, taker.c.id != func.coalesce(jobs.c.payer, "")
+            )
+            .values(payer=taker.c.id, owner=taker.c.owner)
+        )
+
+
+_PAYS = or_(budgets.c.id == jobs.c.payer, budgets.c.id == jobs.c.owner)
+
+
+def _budget(row: Any) -> Budget:
+    limits = BudgetLimits(
+        max_cost_usd=row.max_cost_usd, max_tokens=row.max_tokens, max_requests=row.max_requests
+    )
+    return Budget(
+        id=row.id,
+        limits=limits,
+        spent_cost_usd=row.spent_cost_usd,
+        spent_tokens=row.spent_tokens,
+        spent_requests=row.spent_requests,
+    )
+
+
+def _reserved(budget_id: str, job_id: str, connection: Connection) -> tuple[Decimal, int, int]:
+    """Dollars, tokens and requests put aside for the budget's other jobs."""
+    row = connection.execute(
+        select(
+            func.coalesce(func.sum(reservations.c.cost_usd), literal(0)),
+            func.coalesce(func.sum(reservations.c.tokens), literal(0)),
+            func.count(),
+        ).where(reservations.c.budget_id == budget_id, reservations.c.job_id != job_id)
+    ).one()
+    return Decimal(row[0]), int(row[1]), int(row[2])
+
+
+def _shortage(budget: Budget, reserved: tuple[Decimal, int, int], need: Need) -> Shortage | None:
+    limits = budget.limits
+    rows: tuple[tuple[str, Any, Any, Any, Any], ...] = (
+        ("max_cost_usd", limits.max_cost_usd, budget.spent_cost_usd, reserved[0], need.cost_usd),
+        ("max_tokens", limits.max_tokens, budget.spent_tokens, reserved[1], need.tokens),
+        ("max_requests", limits.max_requests, budget.spent_requests, reserved[2], 1),
+    )
+    for name, most, spent, aside, wanted in rows:
+        if most is None or spent + aside + wanted <= most:
+            continue
+        passing = spent + wanted <= most
+        detail = (
+            f"budget of {budget.id}: {name} is {most:,}, {spent:,} is spent, and the next "
+            f"request may use {wanted:,}"
+        )
+        return Shortage(budget_id=budget.id, detail=detail, passing=passing)
+    return None

@@ -1,0 +1,1 @@
+"""Jobs with their leases, journals, rollouts, results and attempts."""

@@ -1,0 +1,149 @@
+"""Sessions of outside agents: the tool calls they made, kept in order."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import timedelta
+from typing import Any
+
+from sqlalchemy import Connection, insert, select, update
+
+from buildarena_store import events
+from buildarena_store.database import Database
+from buildarena_store.errors import StaleLeaseError
+from buildarena_store.jobs.jobs import JOB_COLUMNS, Job, job_from_row
+from buildarena_store.jobs.leases import Lease
+from buildarena_store.tables import external_calls, jobs
+
+OWNER = "external"
+IDLE_FOR = timedelta(hours=24)
+"""A session that makes no call for so long is cancelled."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ExternalCall:
+    """One tool call.
+
+    Attributes:
+        machine: Name of the sub-structure it was meant for.
+        tool: The tool.
+        arguments: What the agent gave.
+        ok: Whether the action was accepted.
+        reason: Refusal class, if it was refused.
+        feedback: What the agent was told.
+    """
+
+    machine: str
+    tool: str
+    arguments: Any
+    ok: bool
+    reason: str | None
+    feedback: str
+
+
+class ExternalCalls:
+    """Opens sessions of outside agents and keeps their calls."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def open(self, job_id: str, *, connection: Connection) -> bool:
+        """Takes a job that was just added out of the queue and gives it to its agent.
+
+        Returns:
+            False when the job had been there before.
+        """
+        row = connection.execute(
+            update(jobs)
+            .where(jobs.c.id == job_id, jobs.c.state == "queued", jobs.c.lease_token == 0)
+            .values(
+                state="running",
+                queue=OWNER,
+                lease_owner=OWNER,
+                lease_token=1,
+                started_at=events.now,
+                available_at=events.now,
+            )
+            .returning(jobs.c.id)
+        ).first()
+        return row is not None
+
+    def lease(self, job_id: str, *, connection: Connection) -> Lease | None:
+        """The agent's hold on its open session, locked until the transaction ends."""
+        row = connection.execute(
+            select(*JOB_COLUMNS)
+            .where(jobs.c.id == job_id, jobs.c.state == "running", jobs.c.queue == OWNER)
+            .with_for_update()
+        ).first()
+        if row is None:
+            return None
+        job: Job = job_from_row(row)
+        return Lease(job=job, owner=OWNER, token=job.lease_token)
+
+    def append(
+        self, lease: Lease, sequence: int, call: ExternalCall, *, connection: Connection
+    ) -> None:
+        """Writes a call and its counts.
+
+        Raises:
+            StaleLeaseError: The session is over.
+        """
+        changed = connection.execute(
+            update(jobs)
+            .where(jobs.c.id == lease.job.id, jobs.c.state == "running")
+            .values(
+                actions=jobs.c.actions + 1,
+                refused_actions=jobs.c.refused_actions + (0 if call.ok else 1),
+                available_at=events.now,
+            )
+        )
+        if changed.rowcount != 1:
+            raise StaleLeaseError(lease.job.id, lease.token)
+        connection.execute(
+            insert(external_calls).values(
+                job_id=lease.job.id,
+                sequence=sequence,
+                machine=call.machine,
+                tool=call.tool,
+                arguments=call.arguments,
+                ok=call.ok,
+                reason=call.reason,
+                feedback=call.feedback,
+            )
+        )
+
+    def read(self, job_id: str, *, connection: Connection) -> list[ExternalCall]:
+        """All calls of a session, in order."""
+        query = (
+            select(external_calls)
+            .where(external_calls.c.job_id == job_id)
+            .order_by(external_calls.c.sequence)
+        )
+        names = ExternalCall.__dataclass_fields__
+        return [
+            ExternalCall(**{name: getattr(row, name) for name in names})
+            for row in connection.execute(query)
+        ]
+
+    def abandon_idle(self) -> None:
+        """Cancels sessions that made no call for a day."""
+        with self._database.transaction() as connection:
+            rows = connection.execute(
+                update(jobs)
+                .where(
+                    jobs.c.state == "running",
+                    jobs.c.queue == OWNER,
+                    jobs.c.available_at < events.now - IDLE_FOR,
+                )
+                .values(
+                    state="done",
+                    outcome="cancelled",
+                    reason="abandoned",
+                    lease_owner=None,
+                    finished_at=events.now,
+                )
+                .returning(jobs.c.id)
+            ).all()
+            ended: Mapping[str, str] = {"outcome": "cancelled"}
+            events.record_jobs(connection, [row.id for row in rows], "done", ended)

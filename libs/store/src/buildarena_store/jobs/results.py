@@ -1,0 +1,114 @@
+"""Results: a finished job's score, written once, and the artifacts that belong to it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from sqlalchemy import Connection, text
+
+from buildarena_store import events
+from buildarena_store.artifacts import ArtifactInfo
+from buildarena_store.boards import Boards
+from buildarena_store.database import Database
+from buildarena_store.jobs.leases import Lease, Leases
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JobScore:
+    """How a job ended.
+
+    Attributes:
+        outcome: ``success``, ``unsuccessful``, ``construction_failed`` or ``limit``.
+        success: Whether the task's criterion was met.
+        indicator: The task's performance indicator.
+        metrics: Secondary metrics by name.
+        flags: Remarks that keep a result out of rankings.
+        reason: Class of the failure, if it failed before it was simulated.
+        detail: A sentence for people.
+        manifest: Versions of everything that can change the score.
+    """
+
+    outcome: str
+    success: bool
+    indicator: float
+    metrics: Mapping[str, Any] = field(default_factory=dict)
+    flags: Sequence[str] = ()
+    reason: str | None = None
+    detail: str | None = None
+    manifest: Mapping[str, Any] = field(default_factory=dict)
+
+
+class Results:
+    """Writes scores.
+
+    Attributes:
+        boards: Reads scores in bulk, for leaderboards.
+    """
+
+    def __init__(self, database: Database, leases: Leases) -> None:
+        self.boards = Boards(database)
+        self._leases = leases
+
+    def finish(
+        self, lease: Lease, score: JobScore, *, connection: Connection, **values: Any
+    ) -> None:
+        """Ends a job with its score; nobody can score it again.
+
+        Args:
+            lease: The lease under which it was scored; it ends.
+            score: The score.
+            connection: The transaction that also ties the artifacts to the job.
+            values: Further columns, for example action counts.
+
+        Raises:
+            StaleLeaseError: The lease is over; the transaction must be undone.
+        """
+        self._leases.advance(
+            lease,
+            connection=connection,
+            state="done",
+            outcome=score.outcome,
+            reason=score.reason,
+            detail=score.detail,
+            success=score.success,
+            indicator=score.indicator,
+            metrics=dict(score.metrics),
+            flags=list(score.flags),
+            manifest=dict(score.manifest),
+            finished_at=events.now,
+            **values,
+        )
+
+    def attach(
+        self, job_id: str, made: Mapping[str, ArtifactInfo], *, connection: Connection
+    ) -> None:
+        """Ties artifacts that the artifact store holds to a job, by their names."""
+        infos = list(made.values())
+        given = {
+            "job_id": job_id,
+            "names": list(made),
+            "hashes": [info.hash for info in infos],
+            "types": [info.media_type for info in infos],
+            "sizes": [info.size for info in infos],
+        }
+        connection.execute(_ATTACH, given)
+
+
+_ATTACH = text(
+    """
+    WITH given AS (
+        SELECT * FROM unnest(
+            CAST(:names AS text[]), CAST(:hashes AS text[]),
+            CAST(:types AS text[]), CAST(:sizes AS bigint[])
+        ) AS given (name, hash, media_type, size)
+    ), kept AS (
+        INSERT INTO artifacts (hash, media_type, size)
+        SELECT DISTINCT ON (hash) hash, media_type, size FROM given ORDER BY hash
+        ON CONFLICT DO NOTHING
+    )
+    INSERT INTO job_artifacts (job_id, name, hash) SELECT :job_id, name, hash FROM given
+    ON CONFLICT (job_id, name) DO UPDATE SET hash = excluded.hash
+    """
+)

@@ -1,0 +1,245 @@
+"""Sweeps: submitted matrices of jobs. Jobs are shared: two sweeps that want one job get one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from decimal import Decimal
+from typing import Any
+
+from sqlalchemy import Connection, func, literal, select, update
+from sqlalchemy.dialects.postgresql import insert
+
+from buildarena_store import events
+from buildarena_store.database import Database
+from buildarena_store.errors import UnknownIdError
+from buildarena_store.rows import bound_texts
+from buildarena_store.tables import jobs, sweep_jobs, sweeps
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NewSweep:
+    """A sweep to be stored.
+
+    Attributes:
+        id: Its identifier.
+        name: What its owner calls it.
+        spec: The submitted matrix.
+        owner: Id of the API key that submitted it, if any.
+        request_key: Idempotency key of the submission, if any.
+        request_hash: Content hash of the submission.
+        jobs_hash: Content hash of its jobs' ids.
+    """
+
+    id: str
+    name: str
+    spec: Mapping[str, Any]
+    owner: str | None = None
+    request_key: str | None = None
+    request_hash: str | None = None
+    jobs_hash: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sweep:
+    """A sweep as the database has it."""
+
+    id: str
+    name: str
+    spec: Mapping[str, Any]
+    state: str
+    owner: str | None
+    request_hash: str | None
+    created_at: datetime
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SweepProgress:
+    """How far a sweep is.
+
+    Attributes:
+        total: Jobs in all.
+        stages: Jobs that have not ended, by ``construct queued`` … ``simulate running``.
+        outcomes: Ended jobs by outcome.
+        cost_usd: What its jobs cost so far.
+        requests: Model requests so far.
+        input_tokens: Tokens sent so far.
+        output_tokens: Tokens received so far.
+    """
+
+    total: int
+    stages: Mapping[str, int]
+    outcomes: Mapping[str, int]
+    cost_usd: Decimal
+    requests: int
+    input_tokens: int
+    output_tokens: int
+
+    @property
+    def done(self) -> int:
+        """Jobs that have ended, however."""
+        return sum(self.outcomes.values())
+
+
+class Sweeps:
+    """Adds and finds sweeps."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def add(self, sweep: NewSweep, job_ids: Sequence[str], *, connection: Connection) -> None:
+        """Stores a sweep with its jobs, which exist already."""
+        connection.execute(
+            insert(sweeps).values(
+                id=sweep.id,
+                name=sweep.name,
+                spec=dict(sweep.spec),
+                state="active",
+                owner=sweep.owner,
+                request_key=sweep.request_key,
+                request_hash=sweep.request_hash,
+                jobs_hash=sweep.jobs_hash,
+            )
+        )
+        members = select(literal(sweep.id), func.unnest(bound_texts(job_ids)))
+        connection.execute(insert(sweep_jobs).from_select(["sweep_id", "job_id"], members))
+        events.record_sweep(connection, sweep.id, "submitted", {"jobs": len(job_ids)})
+
+    def get(self, sweep_id: str) -> Sweep:
+        """The sweep with this id.
+
+        Raises:
+            UnknownIdError: Nobody has it.
+        """
+        found = self._find(sweeps.c.id == sweep_id)
+        if found is None:
+            raise UnknownIdError("sweep", sweep_id)
+        return found
+
+    def by_request_key(self, request_key: str) -> Sweep | None:
+        """The sweep that was submitted with this idempotency key, if any."""
+        return self._find(sweeps.c.request_key == request_key)
+
+    def with_jobs(self, jobs_hash: str, *, owner: str | None) -> Sweep | None:
+        """An owner's newest sweep of just these jobs that was not cancelled, if any."""
+        query = (
+            select(sweeps.c.id)
+            .where(
+                sweeps.c.jobs_hash == jobs_hash,
+                sweeps.c.owner.is_not_distinct_from(owner),
+                sweeps.c.state != "cancelled",
+            )
+            .order_by(sweeps.c.created_at.desc())
+            .limit(1)
+        )
+        with self._database.transaction() as connection:
+            found = connection.execute(query).scalar()
+        return None if found is None else self.get(found)
+
+    def _find(self, condition: Any) -> Sweep | None:
+        columns = [sweeps.c[name] for name in Sweep.__dataclass_fields__]
+        with self._database.statement() as connection:
+            row = connection.execute(select(*columns).where(condition)).first()
+        if row is None:
+            return None
+        return Sweep(**{name: getattr(row, name) for name in Sweep.__dataclass_fields__})
+
+    def page(self, *, limit: int, after: tuple[datetime, str] | None = None) -> list[Sweep]:
+        """The newest sweeps first, with keyset paging as for jobs."""
+        columns = [sweeps.c[name] for name in Sweep.__dataclass_fields__]
+        query = select(*columns).order_by(sweeps.c.created_at.desc(), sweeps.c.id).limit(limit)
+        if after is not None:
+            created_at, id_ = after
+            query = query.where(
+                (sweeps.c.created_at < created_at)
+                | ((sweeps.c.created_at == created_at) & (sweeps.c.id > id_))
+            )
+        with self._database.statement() as connection:
+            return [
+                Sweep(**{name: getattr(row, name) for name in Sweep.__dataclass_fields__})
+                for row in connection.execute(query)
+            ]
+
+    def progress(self, sweep_id: str) -> SweepProgress:
+        """Counts a sweep's jobs by where they are, and what they cost."""
+        query = (
+            select(
+                jobs.c.state,
+                jobs.c.stage,
+                jobs.c.outcome,
+                func.count().label("jobs"),
+                func.sum(jobs.c.cost_usd).label("cost_usd"),
+                func.sum(jobs.c.requests).label("requests"),
+                func.sum(jobs.c.input_tokens).label("input_tokens"),
+                func.sum(jobs.c.output_tokens).label("output_tokens"),
+            )
+            .join(sweep_jobs, sweep_jobs.c.job_id == jobs.c.id)
+            .where(sweep_jobs.c.sweep_id == sweep_id)
+            .group_by(jobs.c.state, jobs.c.stage, jobs.c.outcome)
+        )
+        with self._database.transaction() as connection:
+            rows = connection.execute(query).all()
+        stages: dict[str, int] = {}
+        outcomes: dict[str, int] = {}
+        for row in rows:
+            if row.state == "done":
+                outcomes[row.outcome] = outcomes.get(row.outcome, 0) + row.jobs
+            else:
+                name = f"{row.stage} {row.state}"
+                stages[name] = stages.get(name, 0) + row.jobs
+        return SweepProgress(
+            total=sum(row.jobs for row in rows),
+            stages=stages,
+            outcomes=outcomes,
+            cost_usd=sum((row.cost_usd for row in rows), Decimal()),
+            requests=int(sum(row.requests for row in rows)),
+            input_tokens=int(sum(row.input_tokens for row in rows)),
+            output_tokens=int(sum(row.output_tokens for row in rows)),
+        )
+
+    def set_state(self, sweep_id: str, state: str, *, connection: Connection) -> None:
+        """Writes a sweep's state and tells its listeners."""
+        connection.execute(update(sweeps).where(sweeps.c.id == sweep_id).values(state=state))
+        events.record_sweep(connection, sweep_id, state, {})
+
+    def hold(self, sweep_id: str, *, connection: Connection) -> None:
+        """Keeps waiting jobs from being taken, unless another active sweep wants them."""
+        self._move(sweep_id, "queued", "held", connection)
+
+    def resume(self, sweep_id: str, *, connection: Connection) -> None:
+        """Lets a paused or stopped sweep go on, and its held jobs be taken again."""
+        self._move(sweep_id, "held", "queued", connection)
+        self.set_state(sweep_id, "active", connection=connection)
+
+    def _move(self, sweep_id: str, before: str, after: str, connection: Connection) -> None:
+        own = self.own_jobs(sweep_id, connection=connection)
+        rows = connection.execute(
+            update(jobs)
+            .where(jobs.c.id.in_(own), jobs.c.state == before)
+            .values(state=after, nudged_at=None)
+            .returning(jobs.c.id)
+        )
+        events.record_jobs(connection, [row.id for row in rows], after, {})
+
+    def job_ids(self, sweep_id: str) -> list[str]:
+        """Ids of all the sweep's jobs."""
+        query = select(sweep_jobs.c.job_id).where(sweep_jobs.c.sweep_id == sweep_id)
+        with self._database.statement() as connection:
+            return [row.job_id for row in connection.execute(query)]
+
+    def own_jobs(self, sweep_id: str, *, connection: Connection) -> list[str]:
+        """Ids of the jobs that no other active sweep wants."""
+        other = sweep_jobs.alias("other")
+        wanted = (
+            select(literal(1))
+            .select_from(other.join(sweeps, sweeps.c.id == other.c.sweep_id))
+            .where(
+                other.c.job_id == sweep_jobs.c.job_id,
+                other.c.sweep_id != sweep_id,
+                sweeps.c.state == "active",
+            )
+            .exists()
+        )
+        query = select(sweep_jobs.c.job_id).where(sweep_jobs.c.sweep_id == sweep_id, ~wanted)
+        return [row.job_id for row in connection.execute(query)]

@@ -1,0 +1,145 @@
+"""Who asks, and what they may do: API keys, scopes and rate limits.
+
+Reading needs the scope ``read``, everything else ``submit``, the service's own affairs ``admin``;
+each includes those before it. What somebody submitted, only its owner or an admin may change.
+Where the operator asks for no keys, which is allowed on loopback only, whoever asks is admin.
+"""
+
+from __future__ import annotations
+
+import hmac
+from dataclasses import dataclass
+from typing import Annotated
+
+from fastapi import Depends, Request
+from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
+
+from buildarena_api.http.problems import ProblemError
+from buildarena_api.http.rate_limits import RateLimits
+from buildarena_pipeline.runtime.context import Context
+from buildarena_pipeline.runtime.settings import Settings
+
+SCOPES = ("read", "submit", "admin")
+"""From the least to the most; each includes those before it."""
+LOOPBACK = ("127.0.0.1", "::1", "localhost")
+READING = ("GET", "HEAD", "OPTIONS")
+_bearer = HTTPBearer(auto_error=False, description="An API key, as `buildarena key create` made it")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Caller:
+    """Who sent a request.
+
+    Attributes:
+        key_id: The key's id; None for the operator and where no keys are asked for.
+        scope: The greatest scope that was given.
+    """
+
+    key_id: str | None
+    scope: str
+
+    def require(self, scope: str) -> None:
+        """Checks what the caller may do.
+
+        Raises:
+            ProblemError: 403, when it may not.
+        """
+        if SCOPES.index(self.scope) < SCOPES.index(scope):
+            raise ProblemError(403, f"this needs the scope {scope!r}; the key has {self.scope!r}")
+
+    def require_owner(self, owner: str | None, what: str) -> None:
+        """Checks that something is the caller's own.
+
+        Args:
+            owner: The key that submitted it.
+            what: What it is, for the message.
+
+        Raises:
+            ProblemError: 403, when it is somebody else's.
+        """
+        if self.scope != "admin" and owner != self.key_id:
+            raise ProblemError(403, f"{what} was submitted with another key; only an admin may")
+
+
+def check_binding(settings: Settings) -> None:
+    """Checks that an open service can't be reached from other machines.
+
+    Raises:
+        ValueError: It could.
+    """
+    if not settings.require_keys and settings.host not in LOOPBACK:
+        raise ValueError(
+            f"the API is to listen on {settings.host}, where others can reach it: set "
+            "BUILDARENA_REQUIRE_KEYS=true and BUILDARENA_ADMIN_KEY, or listen on 127.0.0.1"
+        )
+    if settings.require_keys and settings.admin_key is None:
+        raise ValueError(
+            "BUILDARENA_REQUIRE_KEYS is set but BUILDARENA_ADMIN_KEY is not: nobody could make "
+            "the first key; set it to a long random text"
+        )
+
+
+def caller_of(
+    request: Request,
+    given: Annotated[HTTPAuthorizationCredentials | None, Depends(_bearer)],
+) -> Caller:
+    """Who sent the request, as long as they may send it now.
+
+    Raises:
+        ProblemError: 401 for no or no good key, 403 for too small a scope, 429 for too many
+            requests.
+    """
+    limits: RateLimits = request.app.state.rate_limits
+    address = "unknown" if request.client is None else request.client.host
+    try:
+        caller = _identify(request.app.state.context, given)
+    except ProblemError:
+        # Guessing keys is limited too.
+        _count(limits, f"refused:{address}")
+        raise
+    _count(limits, caller.key_id or f"address:{address}")
+    request.state.caller = caller
+    caller.require("read" if request.method in READING else "submit")
+    return caller
+
+
+CallerDep = Annotated[Caller, Depends(caller_of)]
+
+
+def admin_only(caller: CallerDep) -> None:
+    """Lets admins pass only."""
+    caller.require("admin")
+
+
+def _count(limits: RateLimits, who: str) -> None:
+    wait_s = limits.hit(who)
+    if wait_s is not None:
+        raise ProblemError(
+            429,
+            f"more than {limits.spelled} requests: wait {wait_s} s",
+            headers={"Retry-After": str(wait_s)},
+        )
+
+
+def _identify(context: Context, given: HTTPAuthorizationCredentials | None) -> Caller:
+    settings = context.settings
+    if given is None:
+        if settings.require_keys:
+            raise _unauthorized("an API key is needed: send `Authorization: Bearer KEY`")
+        return Caller(key_id=None, scope="admin")
+    secret = given.credentials
+    if settings.admin_key is not None and hmac.compare_digest(
+        secret.encode(), settings.admin_key.get_secret_value().encode()
+    ):
+        return Caller(key_id=None, scope="admin")
+    found = context.keys.check(secret)
+    if found is None:
+        raise _unauthorized("this API key is not known here")
+    if found.refusal is not None:
+        raise _unauthorized(f"API key {found.key.id} is {found.refusal}")
+    scopes = [scope for scope in SCOPES if scope in found.key.scopes]
+    return Caller(key_id=found.key.id, scope=scopes[-1])
+
+
+def _unauthorized(detail: str) -> ProblemError:
+    return ProblemError(401, detail, headers={"WWW-Authenticate": "Bearer"})

@@ -1,0 +1,75 @@
+"""The request log: each request has an id, a line in the log, a place in the metrics, a span."""
+
+from __future__ import annotations
+
+import re
+import secrets
+import time
+
+import structlog
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from buildarena_api.routes.metrics import ServiceMetrics
+from buildarena_pipeline.runtime.tracing import span
+
+REQUEST_ID = "X-Request-ID"
+GOOD_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")
+QUIET = ("/v1/health", "/v1/metrics")
+"""Asked for all the time by machines: not worth a line each."""
+
+log = structlog.get_logger(__name__)
+
+
+class RequestLog:
+    """Middleware around the application.
+
+    Args:
+        app: The application.
+        metrics: Where times are counted.
+    """
+
+    def __init__(self, app: ASGIApp, metrics: ServiceMetrics) -> None:
+        self._app = app
+        self._metrics = metrics
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Passes a request on and notes how it went."""
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+        given = Headers(scope=scope).get(REQUEST_ID, "")
+        request_id = given if GOOD_ID.fullmatch(given) else secrets.token_hex(8)
+        status = 500
+        started = time.perf_counter()
+
+        async def noting_send(message: Message) -> None:
+            nonlocal status
+            if message["type"] == "http.response.start":
+                status = message["status"]
+                MutableHeaders(scope=message)[REQUEST_ID] = request_id
+            await send(message)
+
+        method = scope["method"]
+        with (
+            structlog.contextvars.bound_contextvars(request_id=request_id),
+            span("http request", method=method, path=scope["path"], request_id=request_id),
+        ):
+            try:
+                await self._app(scope, receive, noting_send)
+            finally:
+                self._note(scope, status, time.perf_counter() - started)
+
+    def _note(self, scope: Scope, status: int, seconds: float) -> None:
+        route = getattr(scope.get("route"), "path", "none")
+        self._metrics.http_seconds.labels(route, scope["method"], str(status)).observe(seconds)
+        if scope["path"] not in QUIET:
+            caller = scope.get("state", {}).get("caller")
+            log.info(
+                "request",
+                method=scope["method"],
+                path=scope["path"],
+                status=status,
+                seconds=round(seconds, 4),
+                key=None if caller is None else caller.key_id,
+            )

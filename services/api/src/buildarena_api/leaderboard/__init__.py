@@ -1,0 +1,1 @@
+"""The leaderboard in memory: cache, filters, views."""

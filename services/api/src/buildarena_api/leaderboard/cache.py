@@ -1,0 +1,120 @@
+"""The boards of this process: fed with what changed, answered from memory."""
+
+from __future__ import annotations
+
+import threading
+from collections import OrderedDict
+from collections.abc import Callable, Mapping
+from typing import Final
+
+from buildarena_api.http.etags import Answer
+from buildarena_benchmark import Task
+from buildarena_benchmark.leaderboard import Board, BoardQuery, TrackBoard, Trial
+from buildarena_pipeline.catalog.tasks import TaskCatalogue
+from buildarena_store import Boards
+
+KEPT_ANSWERS: Final = 256
+"""Answers in memory at the most; one of a full board is about 200 kB."""
+
+
+class BoardCache:
+    """Keeps every track's board up to date and its answers as long as they are true.
+
+    Each question first asks the database what changed since the last one, which is one indexed
+    look-up; nothing that a question is answered with is older than the question.
+
+    Args:
+        boards: Where ended jobs and their changes are read.
+        catalogue: Where tasks are read, when one was uploaded.
+    """
+
+    def __init__(self, boards: Boards, catalogue: TaskCatalogue) -> None:
+        self._boards = boards
+        self._catalogue = catalogue
+        self._task_versions: int | None = None
+        self._tasks: Mapping[str, Task] = {}
+        self._lock = threading.Lock()
+        self._mark: int | None = None
+        self._tracks: dict[str, TrackBoard] = {}
+        self._track_of: dict[str, str] = {}
+        self._generations: dict[str, int] = {}
+        self._answers: OrderedDict[tuple[str, BoardQuery, str], tuple[int, Answer]] = OrderedDict()
+
+    def tracks(self) -> list[str]:
+        """Tracks with ended jobs."""
+        with self._lock:
+            self._refresh()
+            return sorted(track for track, board in self._tracks.items() if len(board))
+
+    def tasks(self) -> Mapping[str, Task]:
+        """Every task by name in its newest version, as of the last question."""
+        with self._lock:
+            if self._task_versions is None:
+                self._refresh()
+            return self._tasks
+
+    def answer(
+        self, track: str, query: BoardQuery, kind: str, render: Callable[[Board], bytes]
+    ) -> Answer:
+        """The rendered board of a track.
+
+        Args:
+            track: The track.
+            query: What the board is made of.
+            kind: Names the rendering: one kind is always rendered alike.
+            render: Makes the body; called only when there is no true answer in memory.
+        """
+        with self._lock:
+            self._refresh()
+            generation = self._generations.get(track, 0)
+            key = (track, query, kind)
+            kept = self._answers.get(key)
+            if kept is not None and kept[0] == generation:
+                self._answers.move_to_end(key)
+                return kept[1]
+            body = render(self._track(track).board(query))
+            answer = Answer.of(body)
+            self._answers[key] = (generation, answer)
+            self._answers.move_to_end(key)
+            while len(self._answers) > KEPT_ANSWERS:
+                self._answers.popitem(last=False)
+            return answer
+
+    def trials(self, track: str, query: BoardQuery) -> list[Trial]:
+        """The ended jobs that a board is made of."""
+        with self._lock:
+            self._refresh()
+            return list(self._track(track).trials(query))
+
+    def _refresh(self) -> None:
+        feed = self._boards.feed(self._mark)
+        changed: set[str] = set()
+        if feed.task_versions != self._task_versions:
+            self._tasks, self._task_versions = self._catalogue.newest(), feed.task_versions
+            changed.update(self._tracks)
+            for board in self._tracks.values():
+                board.use(*self._known())
+        for trial in feed.put:
+            if self._track(trial.track).put(trial):
+                changed.add(trial.track)
+            self._track_of[trial.job_id] = trial.track
+        for job_id in feed.gone:
+            track = self._track_of.pop(job_id, None)
+            if track is not None and self._track(track).remove(job_id):
+                changed.add(track)
+        for track in changed:
+            self._generations[track] = self._generations.get(track, 0) + 1
+        self._mark = feed.mark
+
+    def _track(self, track: str) -> TrackBoard:
+        if track not in self._tracks:
+            self._tracks[track] = TrackBoard(*self._known())
+        return self._tracks[track]
+
+    def _known(self) -> tuple[dict[str, str], dict[str, Mapping[str, int]]]:
+        """Versions and difficulty weights of the tasks."""
+        tasks = self._tasks.values()
+        return (
+            {task.name: task.version for task in tasks},
+            {task.name: task.difficulty for task in tasks if task.difficulty},
+        )

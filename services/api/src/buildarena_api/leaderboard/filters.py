@@ -1,0 +1,100 @@
+"""Which jobs a board is asked for, and the board's part of the routes' dependencies."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Annotated
+
+from fastapi import Depends, Query, Request
+
+from buildarena_api.http.problems import FieldProblem, ProblemError
+from buildarena_api.leaderboard.cache import BoardCache
+from buildarena_benchmark import builtin_tasks
+from buildarena_benchmark.leaderboard import BoardQuery
+
+
+def _boards(request: Request) -> BoardCache:
+    boards: BoardCache = request.app.state.boards
+    return boards
+
+
+BoardsDep = Annotated[BoardCache, Depends(_boards)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Selection:
+    """A track and what of it; the track is None when no job has ended."""
+
+    track: str | None
+    tracks: list[str]
+    query: BoardQuery
+
+
+def select_board(
+    boards: BoardsDep,
+    *,
+    track: Annotated[str | None, Query(description="Default: the first with ended jobs")] = None,
+    task: Annotated[list[str] | None, Query(description="Only these tasks")] = None,
+    level: Annotated[list[int] | None, Query(description="Only tasks of these levels")] = None,
+    model: Annotated[list[str] | None, Query(description="Only these models")] = None,
+    since: Annotated[datetime | None, Query(description="Only jobs ended then or later")] = None,
+    until: Annotated[datetime | None, Query(description="Only jobs ended before")] = None,
+    flagged: Annotated[bool, Query(description="Count flagged successes too")] = False,
+) -> Selection:
+    """What the parameters ask for.
+
+    Raises:
+        ProblemError: A track, task or level is unknown, or a time has no zone.
+    """
+    tracks = boards.tracks()
+    if track is not None and track not in tracks:
+        raise unknown("track", track, tracks)
+    tasks = boards.tasks()
+    for name in task or ():
+        if name not in tasks:
+            raise unknown("task", name, sorted(tasks))
+    levels = sorted({entry.level for entry in tasks.values()})
+    for number in level or ():
+        if number not in levels:
+            raise unknown("level", str(number), [str(known) for known in levels])
+    for field, time in (("since", since), ("until", until)):
+        if time is not None and time.tzinfo is None:
+            message = f"{time.isoformat()} has no time zone"
+            raise ProblemError(
+                422, f"{field}: {message}", errors=[FieldProblem(field=field, message=message)]
+            )
+    chosen = None
+    if task or level:
+        chosen = frozenset(
+            name
+            for name, entry in tasks.items()
+            if (not task or name in task) and (not level or entry.level in level)
+        )
+    return Selection(
+        track=track or (tracks[0] if tracks else None),
+        tracks=tracks,
+        query=BoardQuery(
+            tasks=chosen,
+            models=frozenset(model) if model else None,
+            since=since,
+            until=until,
+            include_flagged=flagged,
+            # A task of somebody's own does not take from the others that are ranked over all
+            # tasks, unless it is asked for.
+            overall=None if task else frozenset(builtin_tasks()),
+        ),
+    )
+
+
+SelectionDep = Annotated[Selection, Depends(select_board)]
+
+
+def unknown(field: str, value: str, choices: list[str]) -> ProblemError:
+    """The problem of a name that nobody has."""
+    message = f"there is no {field} {value!r}"
+    return ProblemError(
+        422,
+        f"{field}: {message}",
+        errors=[FieldProblem(field=field, message=message, choices=choices)],
+    )

@@ -1,0 +1,246 @@
+"""What the leaderboard answers with."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Any, Literal
+from urllib.parse import urlencode
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from buildarena_benchmark import builtin_tasks
+from buildarena_benchmark.leaderboard import Board as RankedBoard
+from buildarena_benchmark.leaderboard import Cell, published_overall, published_rows
+from buildarena_pipeline.catalog.models import ModelRegistry
+from buildarena_pipeline.catalog.tasks import TaskCatalogue
+
+
+class _View(BaseModel):
+    model_config = ConfigDict(from_attributes=True)
+
+
+class Row(_View):
+    """One model configuration on one task. What does not exist is null."""
+
+    rank: int | None = Field(description="Models that can't be told apart share a rank")
+    rank_low: int | None = Field(description="Lower end of the place's 95 % bootstrap interval")
+    rank_high: int | None
+    model: str
+    configuration: str = Field(description="Hash of model and decoding")
+    decoding: dict[str, Any]
+    baseline: bool = Field(description="A built-in model for comparison")
+    trials: int = Field(description="Counted jobs: the denominator of the averages")
+    ended: int = Field(description="All ended jobs, also errored and cancelled ones")
+    errored: int = Field(description="Jobs that infrastructure faults ended: in no average")
+    cancelled: int
+    flagged: int = Field(description="Successes that a flag keeps out of the averages")
+    simulated: int = Field(description="Counted jobs whose machine was finished and tried")
+    successes: int
+    success_rate: float | None = Field(description="null when nothing was scored")
+    success_low: float | None = Field(description="Lower end of the 95 % Wilson interval")
+    success_high: float | None = Field(description="Upper end of the 95 % Wilson interval")
+    success_rate_of_ended: float | None = Field(description="Successes of all ended jobs")
+    indicator_mean: float | None
+    indicator_low: float | None = Field(description="Lower end of the 95 % bootstrap interval")
+    indicator_high: float | None
+    parts_mean: float | None
+    requests_mean: float | None
+    input_tokens_mean: float | None
+    output_tokens_mean: float | None
+    cost_usd_mean: float | None
+    cost_per_success_usd: float | None
+    invalid_action_rate: float | None
+    pass_at: dict[str, float] = Field(description="Chance that one of k tries succeeds, by k")
+    pass_all: dict[str, float] = Field(description="Chance that all of k tries succeed, by k")
+    outcomes: dict[str, int]
+    reasons: dict[str, int] = Field(description="Counted jobs that failed, by reason")
+    refusals: dict[str, int] = Field(description="Refused actions by class")
+    newest: datetime | None = Field(description="When the last of its jobs ended")
+    jobs: str = Field(description="Path of the list of its jobs")
+    manifest: str = Field(description="Path of the versions behind its score")
+
+
+class PublishedView(_View):
+    """The paper's figures: a reference, never ranked with ours."""
+
+    model: str
+    snapshot: str
+    matches: list[str] = Field(description="Our models with the same snapshot")
+    trials: int
+    successes: int
+    success_rate: float
+    success_low: float
+    success_high: float
+    indicator_mean: float
+    parts_mean: float
+    input_tokens_mean: float | None
+    output_tokens_mean: float | None
+    requests_mean: float | None
+
+
+class TaskBoard(_View):
+    """All models on one task, the best first."""
+
+    task: str
+    version: str
+    custom: bool = Field(description="Whether somebody uploaded the task")
+    outdated: int = Field(description="Ended jobs of other versions, which are left out")
+    indicator: str
+    unit: str
+    rows: list[Row]
+    published: list[PublishedView]
+
+
+class OverallView(_View):
+    """One model configuration over the built-in tasks of the board, or over those asked for."""
+
+    rank: int | None = Field(description="null when a task is missing")
+    rank_low: int | None
+    rank_high: int | None
+    mean_rank: float | None = Field(description="Over tasks, by success rate and by indicator")
+    model: str
+    configuration: str
+    baseline: bool
+    missing: list[str] = Field(description="Tasks of the board without a counted job")
+    trials: int
+    success_rate_mean: float | None
+    cost_usd_mean: float | None
+    output_tokens_mean: float | None
+    pareto: bool = Field(description="No other model is both better and cheaper")
+    dimensions: dict[str, float] = Field(description="Score, 0 to 1, by difficulty dimension")
+
+
+class PublishedOverall(_View):
+    """The paper's models ranked over its nine tasks, among themselves."""
+
+    model: str
+    mean_rank: float
+    rank: int
+    rank_low: int
+    rank_high: int
+
+
+class Board(_View):
+    """The leaderboard of one track."""
+
+    track: str | None = Field(description="null when no job has ended")
+    tracks: list[str] = Field(description="Every track with ended jobs")
+    tasks: list[TaskBoard]
+    overall: list[OverallView] = []
+    published: list[PublishedOverall] = []
+
+
+class ChangeView(_View):
+    """Something that changed on a board."""
+
+    id: int
+    kind: Literal["entered", "left", "rescored", "corrected", "unscored"]
+    job_id: str
+    task: str
+    model: str
+    before: dict[str, Any] | None
+    after: dict[str, Any] | None
+    why: str | None = Field(description="What the one who changed it said, if anything")
+    at: datetime
+
+
+class ChangePage(_View):
+    """Some changes, the newest first."""
+
+    track: str | None
+    changes: list[ChangeView]
+    next_before: int | None = Field(description="Give it as `before` to get the next page")
+
+
+def board_view(
+    board: RankedBoard,
+    *,
+    track: str,
+    tracks: list[str],
+    registry: ModelRegistry,
+    catalogue: TaskCatalogue,
+) -> Board:
+    """A ranked board as it is answered."""
+    newest = catalogue.named({found.task for found in board.tasks})
+    tasks = {
+        found.task: catalogue.exact(found.task, found.version) or newest.get(found.task)
+        for found in board.tasks
+    }
+
+    def is_baseline(model: str) -> bool:
+        return model in registry.models and registry.models[model].baseline
+
+    def row(ranked: Any, task: str) -> Row:
+        cell: Cell = ranked.cell
+        values = {name: getattr(cell, name) for name in Cell.__dataclass_fields__}
+        query = urlencode({"task": task, "model": cell.model})
+        return Row.model_validate(
+            {
+                **values,
+                "rank": ranked.rank,
+                "rank_low": ranked.rank_low,
+                "rank_high": ranked.rank_high,
+                "baseline": is_baseline(cell.model),
+                "jobs": f"/v1/jobs?{query}",
+                "manifest": f"/v1/leaderboard/manifest?{query}&{urlencode({'track': track})}",
+            }
+        )
+
+    return Board(
+        track=track,
+        tracks=tracks,
+        tasks=[
+            TaskBoard(
+                task=found.task,
+                version=found.version,
+                custom=found.task not in builtin_tasks(),
+                outdated=found.outdated,
+                indicator=task.indicator.name if task else "indicator",
+                unit=task.indicator.unit if task else "",
+                rows=[row(ranked, found.task) for ranked in found.rows],
+                published=_published(found.task, registry),
+            )
+            for found, task in ((found, tasks[found.task]) for found in board.tasks)
+        ],
+        overall=[
+            OverallView.model_validate(
+                {
+                    **{name: getattr(place, name) for name in place.__dataclass_fields__},
+                    "baseline": is_baseline(place.model),
+                }
+            )
+            for place in board.overall
+        ],
+        published=published_ranking(),
+    )
+
+
+def published_ranking() -> list[PublishedOverall]:
+    """The paper's models, the best first."""
+    models, ranking = published_overall()
+    rows = [
+        PublishedOverall(
+            model=model,
+            mean_rank=float(ranking.mean_rank[i]),
+            rank=int(ranking.rank[i]),
+            rank_low=int(ranking.low[i]),
+            rank_high=int(ranking.high[i]),
+        )
+        for i, model in enumerate(models)
+    ]
+    return sorted(rows, key=lambda row: row.mean_rank)
+
+
+def _published(task: str, registry: ModelRegistry) -> list[PublishedView]:
+    by_snapshot: dict[str, list[str]] = {}
+    for entry in registry.models.values():
+        by_snapshot.setdefault(entry.model, []).append(entry.name)
+    return [
+        PublishedView.model_validate(
+            {
+                **{name: getattr(row, name) for name in row.__dataclass_fields__},
+                "matches": by_snapshot.get(row.snapshot, []),
+            }
+        )
+        for row in published_rows().get(task, ())
+    ]

@@ -1,0 +1,100 @@
+"""Routes of archives: a whole sweep as one file, out and in."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+from fastapi import APIRouter, Depends, Request, Response
+from fastapi.concurrency import run_in_threadpool
+from fastapi.responses import FileResponse
+from pydantic import BaseModel, ConfigDict, Field
+from starlette.background import BackgroundTask
+
+from buildarena_api.dependencies import ContextDep
+from buildarena_api.http.access import CallerDep, admin_only
+from buildarena_api.http.problems import ProblemError, problem_responses
+from buildarena_store.archives import ArchiveError, read_archive, write_archive
+
+router = APIRouter(prefix="/v1", tags=["archives"])
+
+IMPORT_PATH = "/v1/archives"
+MOST_BYTES = 8 << 30
+"""Largest archive taken in: the paper's whole matrix has about 3 GB of trajectories."""
+ZIP = "application/zip"
+
+
+class ImportedView(BaseModel):
+    """What became of an archive."""
+
+    model_config = ConfigDict(from_attributes=True)
+
+    sweep_id: str
+    jobs: int = Field(description="Jobs it consists of")
+    added: int = Field(description="Jobs that were not there before")
+
+
+@router.get(
+    "/sweeps/{sweep_id}/archive",
+    response_class=FileResponse,
+    responses={200: {"content": {ZIP: {}}}, **problem_responses(404, 503)},
+)
+def export_sweep(sweep_id: str, context: ContextDep) -> FileResponse:
+    """A sweep with its jobs, journals, rollouts and artifacts, as one ZIP file."""
+    target = _scratch()
+    try:
+        write_archive(context.database, context.artifacts, sweep_id, target)
+    except BaseException:
+        target.unlink()
+        raise
+    return FileResponse(
+        target,
+        media_type=ZIP,
+        filename=f"{sweep_id}.zip",
+        background=BackgroundTask(target.unlink),
+    )
+
+
+@router.post(
+    "/archives",
+    status_code=201,
+    dependencies=[Depends(admin_only)],
+    responses=problem_responses(413, 422, 503),
+    openapi_extra={
+        "requestBody": {
+            "required": True,
+            "content": {ZIP: {"schema": {"type": "string", "format": "binary"}}},
+        }
+    },
+)
+async def import_sweep(
+    request: Request, response: Response, context: ContextDep, caller: CallerDep
+) -> ImportedView:
+    """Takes an exported sweep in; jobs that are there already stay as they are. For admins."""
+    source = _scratch()
+    try:
+        await _receive(request, source)
+        done = await run_in_threadpool(
+            read_archive, context.database, context.artifacts, source, owner=caller.key_id
+        )
+    except ArchiveError as error:
+        raise ProblemError(422, str(error)) from error
+    finally:
+        source.unlink()
+    response.headers["Location"] = f"/v1/sweeps/{done.sweep_id}"
+    return ImportedView.model_validate(done)
+
+
+async def _receive(request: Request, target: Path) -> None:
+    received = 0
+    with target.open("wb") as file:
+        async for chunk in request.stream():
+            received += len(chunk)
+            if received > MOST_BYTES:
+                raise ProblemError(413, f"the archive is larger than {MOST_BYTES:,} bytes")
+            file.write(chunk)
+
+
+def _scratch() -> Path:
+    with tempfile.NamedTemporaryFile(prefix="buildarena-", suffix=".zip", delete=False) as file:
+        return Path(file.name)

@@ -1,0 +1,220 @@
+"""Routes of exports: the leaderboard as CSV, Parquet and LaTeX, and a sweep's results."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Callable, Sequence
+from types import UnionType
+from typing import Annotated, Any, Literal, get_args, get_origin
+
+from fastapi import APIRouter, Query, Response
+from pydantic import BaseModel, ConfigDict, Field
+
+from buildarena_api.dependencies import ContextDep, RegistryDep
+from buildarena_api.http.problems import problem_responses
+from buildarena_api.leaderboard.filters import BoardsDep, SelectionDep
+from buildarena_api.leaderboard.views import Board, PublishedView, Row, board_view
+from buildarena_benchmark import builtin_tasks
+from buildarena_benchmark.leaderboard import Board as RankedBoard
+from buildarena_benchmark.leaderboard import (
+    cost_table,
+    performance_table,
+    plain_table,
+    published_rows,
+)
+
+router = APIRouter()
+
+MEDIA_TYPES = {
+    "csv": "text/csv; charset=utf-8",
+    "parquet": "application/vnd.apache.parquet",
+    "latex": "text/x-tex; charset=utf-8",
+}
+PLACES = ("jobs", "manifest")
+"""Fields of a row that are paths of this API: of no use in a file."""
+
+
+class RoundView(BaseModel):
+    """One simulated machine of a job."""
+
+    model_config = ConfigDict(from_attributes=True)
+
+    machine: str = Field(description="Hash of its document")
+    success: bool
+    indicator: float
+    parts: int | None
+
+
+class Result(BaseModel):
+    """One ended job, with all that reports are made of."""
+
+    model_config = ConfigDict(from_attributes=True)
+
+    job_id: str
+    track: str
+    task: str
+    task_version: str
+    model: str
+    configuration: str
+    decoding: dict[str, Any]
+    seed: int
+    outcome: str
+    reason: str | None
+    success: bool
+    indicator: float
+    parts: int | None
+    flags: list[str]
+    refusals: dict[str, int]
+    requests: int
+    input_tokens: int
+    output_tokens: int
+    cost_usd: float
+    actions: int
+    refused_actions: int
+    rounds: list[RoundView] = Field(description="In order; more than one in a closed loop")
+
+
+@router.get(
+    "/leaderboard/export",
+    response_class=Response,
+    responses={
+        200: {"content": {kind.split(";")[0]: {} for kind in MEDIA_TYPES.values()}},
+        **problem_responses(422, 503),
+    },
+)
+def export(
+    boards: BoardsDep,
+    selection: SelectionDep,
+    registry: RegistryDep,
+    context: ContextDep,
+    format: Annotated[Literal["csv", "parquet", "latex"], Query()] = "csv",  # noqa: A002 - its name in the URL
+) -> Response:
+    """The leaderboard as a file; the paper's figures are in it as rows of source `published`."""
+    track, tracks = selection.track, selection.tracks
+
+    def render(board: RankedBoard) -> bytes:
+        return _rendered(
+            format,
+            board,
+            lambda ranked: board_view(
+                ranked,
+                track=track or "",
+                tracks=tracks,
+                registry=registry,
+                catalogue=context.catalogue,
+            ),
+        )
+
+    if track is None:
+        body = render(RankedBoard(tasks=(), overall=()))
+    else:
+        kind = f"{format} {' '.join(tracks)}"
+        body = boards.answer(track, selection.query, kind, render).body
+    name = f"leaderboard.{'tex' if format == 'latex' else format}"
+    headers = {"Content-Disposition": f'attachment; filename="{name}"'}
+    return Response(body, media_type=MEDIA_TYPES[format], headers=headers)
+
+
+@router.get("/sweeps/{sweep_id}/results", responses=problem_responses(404, 503))
+def sweep_results(sweep_id: str, context: ContextDep) -> list[Result]:
+    """All ended jobs of a sweep with their rounds: what a report is made of."""
+    context.sweeps.get(sweep_id)
+    return [
+        Result.model_validate(
+            {
+                **{name: getattr(trial, name) for name in Result.model_fields if name != "rounds"},
+                "flags": list(trial.flags),
+                "rounds": rounds,
+            }
+        )
+        for trial, rounds in context.results.boards.of_sweep(sweep_id)
+    ]
+
+
+def _rendered(kind: str, ranked: RankedBoard, as_view: Callable[[RankedBoard], Board]) -> bytes:
+    if kind == "latex":
+        return _latex(ranked).encode()
+    rows = _flat(as_view(ranked))
+    return _csv(rows) if kind == "csv" else _parquet(rows)
+
+
+def _columns() -> list[str]:
+    names = [name for name in Row.model_fields if name not in PLACES]
+    extra = [name for name in PublishedView.model_fields if name not in Row.model_fields]
+    return ["source", "track", "task", "task_version", "indicator", "unit", *names, *extra]
+
+
+def _flat(board: Board) -> list[dict[str, Any]]:
+    """One record for each row; mappings and lists as JSON texts, so that every format has them."""
+    records = []
+    for task in board.tasks:
+        head = {
+            "track": board.track,
+            "task": task.task,
+            "task_version": task.version,
+            "indicator": task.indicator,
+            "unit": task.unit,
+        }
+        for source, rows in (("measured", task.rows), ("published", task.published)):
+            for row in rows:
+                values = row.model_dump(mode="json", exclude=set(PLACES))
+                if source == "published":
+                    head = {**head, "track": None, "task_version": None}
+                records.append({"source": source, **head, **values})
+    return [{name: _plain(record.get(name)) for name in _columns()} for record in records]
+
+
+def _plain(value: Any) -> Any:
+    return json.dumps(value, sort_keys=True) if isinstance(value, dict | list) else value
+
+
+def _csv(rows: Sequence[dict[str, Any]]) -> bytes:
+    text = io.StringIO(newline="")
+    writer = csv.DictWriter(text, _columns(), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    return text.getvalue().encode()
+
+
+def _parquet(rows: Sequence[dict[str, Any]]) -> bytes:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    types = {int: pa.int64(), float: pa.float64(), bool: pa.bool_()}
+    schema = pa.schema([(name, types.get(_kind(name), pa.string())) for name in _columns()])
+    sink = io.BytesIO()
+    pq.write_table(pa.Table.from_pylist(list(rows), schema=schema), sink, compression="zstd")
+    return sink.getvalue()
+
+
+def _kind(name: str) -> type:
+    """What a column holds, be it optional or not; text for all that is no plain number."""
+    fields = {**PublishedView.model_fields, **Row.model_fields}
+    annotation = fields[name].annotation if name in fields else str
+    choices = get_args(annotation) if get_origin(annotation) is UnionType else (annotation,)
+    return next((choice for choice in choices if choice in (int, float, bool)), str)
+
+
+def _latex(ranked: RankedBoard) -> str:
+    """Our two tables and the paper's two; tasks of users' own in tables of their own."""
+    cells = {board.task: [row.cell for row in board.rows] for board in ranked.tasks}
+    ours = {task: row for task, row in cells.items() if task in builtin_tasks()}
+    own = {task: row for task, row in cells.items() if task not in ours}
+    paper = {task: rows for task, rows in published_rows().items() if task in ours}
+    others = ["% Measured: custom tasks", plain_table(own)] if own else []
+    return "\n".join(
+        [
+            "% Needs the packages booktabs and multirow.",
+            "% Measured: performance",
+            performance_table(ours),
+            "% Measured: cost",
+            cost_table(ours),
+            *others,
+            "% Published in the paper, measured in the game itself: performance",
+            performance_table(paper),
+            "% Published in the paper: cost",
+            cost_table(paper),
+        ]
+    )

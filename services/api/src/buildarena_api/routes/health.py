@@ -1,0 +1,128 @@
+"""Health: what works, what does not, and what to do about it."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+from typing import Literal
+
+from fastapi import APIRouter, Response
+from pydantic import BaseModel, Field
+from sqlalchemy.exc import SQLAlchemyError
+
+from buildarena_api.dependencies import ContextDep
+from buildarena_pipeline.broker.queues import CONSTRUCT, simulate_queue
+from buildarena_pipeline.catalog.tracks import SIMULATORS
+from buildarena_pipeline.runtime.context import Context
+
+router = APIRouter(prefix="/v1", tags=["health"])
+
+LOW_DISK_BYTES = 1_000_000_000
+CLOCK_TOLERANCE_S = 5.0
+
+
+class Check(BaseModel):
+    """One part of the service."""
+
+    name: str = Field(examples=["database"])
+    ok: bool
+    detail: str
+    advice: str = Field(default="", description="What to do when it is not ok")
+
+
+class Health(BaseModel):
+    """The service as a whole."""
+
+    status: Literal["ok", "degraded", "down"]
+    checks: list[Check]
+
+
+@router.get(
+    "/health",
+    responses={503: {"model": Health, "description": "down"}},
+)
+def health(context: ContextDep, response: Response) -> Health:
+    """Checks database, broker, workers and disk. Answers 503 when jobs can't be accepted."""
+    database = _database(context)
+    checks = [database, _broker(context), *_workers(context, database), _disk(context)]
+    if database.ok:
+        checks.append(_clocks(context))
+    if not database.ok:
+        response.status_code = 503
+        return Health(status="down", checks=checks)
+    return Health(status="ok" if all(c.ok for c in checks) else "degraded", checks=checks)
+
+
+def _database(context: Context) -> Check:
+    try:
+        context.database.require_schema()
+    except SQLAlchemyError as error:
+        return Check(
+            name="database",
+            ok=False,
+            detail=str(error).splitlines()[0],
+            advice="start Postgres, or correct BUILDARENA_DATABASE_URL",
+        )
+    except Exception as error:  # noqa: BLE001 - health reports whatever is wrong
+        return Check(
+            name="database", ok=False, detail=str(error), advice="run `buildarena migrate`"
+        )
+    return Check(name="database", ok=True, detail="reachable, schema as expected")
+
+
+def _broker(context: Context) -> Check:
+    waiting = context.queues.waiting(CONSTRUCT)
+    if waiting is None:
+        return Check(
+            name="broker",
+            ok=False,
+            detail="not reachable; jobs are kept and wait",
+            advice="start Valkey or Redis, or correct BUILDARENA_BROKER_URL",
+        )
+    return Check(name="broker", ok=True, detail=f"reachable, {waiting} messages for construct")
+
+
+def _workers(context: Context, database: Check) -> list[Check]:
+    if not database.ok:
+        return []
+    alive = [worker for worker in context.workers.all() if worker.alive]
+    checks = []
+    for queue in [CONSTRUCT, *(simulate_queue(engine) for engine in SIMULATORS)]:
+        serving = [worker for worker in alive if queue in worker.queues]
+        checks.append(
+            Check(
+                name=f"workers of {queue}",
+                ok=bool(serving),
+                detail=f"{len(serving)} alive",
+                advice="" if serving else f"start a worker for the queue {queue}",
+            )
+        )
+    return checks
+
+
+def _clocks(context: Context) -> Check:
+    """Leases go by the database's clock; but limits in seconds and logs go by each process' own."""
+    wrong = [
+        f"{worker.id} is {abs(worker.clock_ahead_s):.0f} s "
+        + ("ahead" if worker.clock_ahead_s > 0 else "behind")
+        for worker in context.workers.all()
+        if worker.alive and worker.clock_ahead_s and abs(worker.clock_ahead_s) > CLOCK_TOLERANCE_S
+    ]
+    return Check(
+        name="clocks",
+        ok=not wrong,
+        detail="; ".join(wrong) or "workers and database agree",
+        advice="set these machines' clocks by NTP" if wrong else "",
+    )
+
+
+def _disk(context: Context) -> Check:
+    folder = context.settings.data.absolute()
+    existing = next(path for path in (folder, *folder.parents) if path.exists())
+    free = shutil.disk_usage(Path(existing)).free
+    return Check(
+        name="disk",
+        ok=free > LOW_DISK_BYTES,
+        detail=f"{free / 1e9:.1f} GB free",
+        advice="" if free > LOW_DISK_BYTES else f"free some space under {existing}",
+    )

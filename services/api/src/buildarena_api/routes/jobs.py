@@ -1,0 +1,138 @@
+"""Routes of jobs."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, Query, Response
+
+from buildarena_api.dependencies import ContextDep, SubmissionsDep
+from buildarena_api.http import cursors
+from buildarena_api.http.access import CallerDep
+from buildarena_api.http.problems import ProblemError, problem_responses
+from buildarena_api.routes.transcripts import as_markdown
+from buildarena_api.schemas import AttemptView, JobDetail, JobPage, JobView
+from buildarena_pipeline.catalog.specs import JobSpec
+from buildarena_pipeline.runtime.reaper import announce_waiting
+
+router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
+
+ARTIFACT_TYPES = {
+    "machine": "application/json",
+    "transcript": "application/json",
+    "trajectory": "application/vnd.apache.parquet",
+}
+
+
+@router.post("", status_code=202, responses=problem_responses(422, 503))
+def submit_job(
+    spec: JobSpec, response: Response, submissions: SubmissionsDep, caller: CallerDep
+) -> JobView:
+    """Submits one job. An equal job that exists already is returned as it is, never redone."""
+    job, _ = submissions.submit_job(spec, owner=caller.key_id)
+    response.headers["Location"] = f"/v1/jobs/{job.id}"
+    return JobView.of(job)
+
+
+@router.get("", responses=problem_responses(404, 422, 503))
+def list_jobs(
+    context: ContextDep,
+    *,
+    sweep: Annotated[str | None, Query(description="Only this sweep's jobs")] = None,
+    task: Annotated[str | None, Query()] = None,
+    model: Annotated[str | None, Query()] = None,
+    state: Annotated[Literal["queued", "held", "running", "done"] | None, Query()] = None,
+    outcome: Annotated[str | None, Query()] = None,
+    cursor: Annotated[str | None, Query(max_length=500)] = None,
+    limit: Annotated[int, Query(ge=1, le=1000)] = 100,
+) -> JobPage:
+    """Lists jobs, newest first."""
+    if sweep is not None:
+        context.sweeps.get(sweep)
+    found = context.jobs.page(
+        limit=limit,
+        after=None if cursor is None else cursors.decode(cursor),
+        sweep_id=sweep,
+        task=task,
+        model=model,
+        state=state,
+        outcome=outcome,
+    )
+    more = len(found) == limit
+    return JobPage(
+        jobs=[JobView.of(job) for job in found],
+        next_cursor=cursors.encode(found[-1].created_at, found[-1].id) if more else None,
+    )
+
+
+@router.get("/{job_id}", responses=problem_responses(404, 503))
+def show_job(job_id: str, context: ContextDep) -> JobDetail:
+    """Shows a job with its manifest, attempts and artifacts."""
+    job = context.jobs.get(job_id)
+    return JobDetail(
+        **JobView.of(job).model_dump(),
+        manifest=None if job.manifest is None else dict(job.manifest),
+        attempts=[AttemptView.model_validate(a) for a in context.jobs.attempts(job_id)],
+        artifacts=context.jobs.artifacts(job_id),
+    )
+
+
+@router.post("/{job_id}/cancel", responses=problem_responses(404, 409, 503))
+def cancel_job(job_id: str, context: ContextDep, caller: CallerDep) -> JobView:
+    """Ends a job that has not ended; its worker stops before its next model request."""
+    caller.require_owner(context.jobs.get(job_id).owner, f"job {job_id}")
+    with context.database.transaction() as connection:
+        cancelled = context.jobs.cancel([job_id], connection=connection)
+    if not cancelled:
+        raise ProblemError(409, f"job {job_id} has ended already")
+    return JobView.of(context.jobs.get(job_id))
+
+
+@router.post("/{job_id}/retry", status_code=202, responses=problem_responses(404, 409, 503))
+def retry_job(job_id: str, context: ContextDep, caller: CallerDep) -> JobView:
+    """Queues an errored job again where it failed. A scored job is never rolled again."""
+    job = context.jobs.get(job_id)
+    caller.require_owner(job.owner, f"job {job_id}")
+    with context.database.transaction() as connection:
+        again = context.jobs.retry([job_id], connection=connection)
+    if not again:
+        state = job.outcome or job.state
+        raise ProblemError(409, f"only errored jobs are retried; job {job_id} is {state}")
+    announce_waiting(context, job.queue)
+    return JobView.of(context.jobs.get(job_id))
+
+
+@router.get(
+    "/{job_id}/{artifact}",
+    responses={
+        200: {
+            "content": {kind: {} for kind in sorted({*ARTIFACT_TYPES.values(), "text/markdown"})}
+        },
+        **problem_responses(404, 422, 503),
+    },
+    response_class=Response,
+)
+def get_artifact(
+    job_id: str,
+    artifact: Literal["machine", "transcript", "trajectory"],
+    context: ContextDep,
+    number: Annotated[int, Query(ge=0, le=1000, description="Which rollout's trajectory")] = 0,
+    style: Annotated[
+        Literal["json", "markdown"], Query(description="markdown: a transcript for people")
+    ] = "json",
+) -> Response:
+    """The machine document, the transcript or a trajectory of a job."""
+    job = context.jobs.get(job_id)
+    name = f"trajectory-{number}" if artifact == "trajectory" else artifact
+    digest = context.jobs.artifacts(job_id).get(name)
+    if digest is None:
+        raise ProblemError(404, f"job {job_id} has no {name} yet")
+    data = context.artifacts.get(digest)
+    if artifact == "transcript" and style == "markdown":
+        title = f"{job.task} by {job.model}, seed {job.seed}"
+        return Response(as_markdown(data, title), media_type="text/markdown; charset=utf-8")
+    return Response(
+        data,
+        media_type=ARTIFACT_TYPES[artifact],
+        headers={"ETag": f'"{digest}"'},
+    )

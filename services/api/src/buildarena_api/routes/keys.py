@@ -1,0 +1,103 @@
+"""Routes of API keys: for admins."""
+
+from __future__ import annotations
+
+from datetime import datetime, timedelta
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, Depends, Response
+from pydantic import BaseModel, ConfigDict, Field
+
+from buildarena_api.dependencies import ContextDep
+from buildarena_api.http.access import admin_only
+from buildarena_api.http.problems import problem_responses
+from buildarena_api.schemas import BudgetView
+from buildarena_pipeline.broker.queues import CONSTRUCT
+from buildarena_pipeline.catalog.specs import Budget, Title
+from buildarena_pipeline.runtime.context import Context
+from buildarena_pipeline.runtime.reaper import announce_waiting
+from buildarena_store import ApiKey
+
+router = APIRouter(prefix="/v1/keys", tags=["keys"], dependencies=[Depends(admin_only)])
+
+
+class NewKey(BaseModel):
+    """A wish for a key."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    name: Annotated[Title, Field(description="Who holds it", examples=["ada"])]
+    scopes: Annotated[
+        list[Literal["read", "submit", "admin"]],
+        Field(min_length=1, max_length=3, description="Each includes those before it"),
+    ]
+    days: Annotated[
+        int | None, Field(ge=1, le=3650, description="How long it is good; null for ever")
+    ] = None
+    budget: Budget | None = None
+
+
+class KeyView(BaseModel):
+    """A key without its secret."""
+
+    model_config = ConfigDict(from_attributes=True)
+
+    id: str = Field(examples=["key_0a1b2c3d4e5f60718293"])
+    name: str
+    scopes: list[str]
+    created_at: datetime
+    expires_at: datetime | None
+    revoked_at: datetime | None
+    used_at: datetime | None = Field(description="When it was last used, to the minute")
+    budget: BudgetView | None = None
+
+
+class KeyCreated(KeyView):
+    """A key that was just made."""
+
+    secret: str = Field(description="What requests carry; it can't be read again")
+
+
+@router.post("", status_code=201, responses=problem_responses(422, 503))
+def create_key(body: NewKey, response: Response, context: ContextDep) -> KeyCreated:
+    """Makes a key. Its secret is in this answer only."""
+    lasts = None if body.days is None else timedelta(days=body.days)
+    key, secret = context.keys.create(name=body.name, scopes=body.scopes, lasts=lasts)
+    if body.budget is not None:
+        with context.database.transaction() as connection:
+            context.budgets.set(key.id, body.budget.as_limits(), connection=connection)
+    response.headers["Location"] = f"/v1/keys/{key.id}"
+    response.headers["Cache-Control"] = "no-store"
+    return KeyCreated(**_view(context, key).model_dump(), secret=secret)
+
+
+@router.get("", responses=problem_responses(503))
+def list_keys(context: ContextDep) -> list[KeyView]:
+    """Lists all keys, oldest first, those that ended included."""
+    return [_view(context, key) for key in context.keys.all()]
+
+
+@router.post("/{key_id}/revoke", responses=problem_responses(404, 503))
+def revoke_key(key_id: str, context: ContextDep) -> KeyView:
+    """Ends a key at once. What was submitted with it goes on."""
+    return _view(context, context.keys.revoke(key_id))
+
+
+@router.put("/{key_id}/budget", responses=problem_responses(404, 422, 503))
+def set_budget(key_id: str, body: Budget, context: ContextDep) -> KeyView:
+    """Sets what all jobs of a key may spend, and lets its single jobs go on that had to stop.
+
+    Sweeps that stopped for want of it go on when they are resumed.
+    """
+    key = context.keys.get(key_id)
+    with context.database.transaction() as connection:
+        context.budgets.set(key_id, body.as_limits(), connection=connection)
+        context.budgets.release_single_jobs(key_id, connection=connection)
+    announce_waiting(context, CONSTRUCT)
+    return _view(context, key)
+
+
+def _view(context: Context, key: ApiKey) -> KeyView:
+    view = KeyView.model_validate(key)
+    view.budget = BudgetView.of(context.budgets.get(key.id))
+    return view

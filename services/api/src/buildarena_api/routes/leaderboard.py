@@ -1,0 +1,220 @@
+"""Routes of the leaderboard."""
+
+from __future__ import annotations
+
+import random
+from typing import Annotated, Any, Literal
+
+from fastapi import APIRouter, Query, Request
+from pydantic import BaseModel, ConfigDict, Field
+
+from buildarena_api.dependencies import ContextDep, RegistryDep
+from buildarena_api.http.etags import conditional
+from buildarena_api.http.problems import problem_responses
+from buildarena_api.leaderboard.filters import BoardsDep, SelectionDep, unknown
+from buildarena_api.leaderboard.views import Board, ChangePage, ChangeView, board_view
+from buildarena_api.routes import exports
+from buildarena_benchmark.leaderboard import SCORED, BoardQuery, TaskDuel, duel
+from buildarena_pipeline.broker.queues import VERIFY
+
+router = APIRouter(prefix="/v1", tags=["leaderboard"])
+MOST_DISTINCT = 20
+"""Values of a manifest that are spelled out; of a name with more, seeds say, only their number."""
+
+
+class TestView(BaseModel):
+    """A paired test on shared seeds."""
+
+    model_config = ConfigDict(from_attributes=True)
+
+    method: Literal["exact McNemar", "Wilcoxon signed-rank"]
+    pairs: int
+    difference: float
+    p_value: float
+
+
+class TaskDuelView(BaseModel):
+    """Two models on one task; tests only where they share seeds."""
+
+    model_config = ConfigDict(from_attributes=True)
+
+    task: str
+    successes: tuple[int, int]
+    trials: tuple[int, int]
+    difference: float = Field(description="Success rate of the first minus that of the second")
+    low: float = Field(description="Lower end of its 95 % interval, unpaired")
+    high: float
+    success: TestView | None
+    indicator: TestView | None
+    success_p: float | None = Field(description="Adjusted over the tasks (Holm)")
+    indicator_p: float | None
+
+
+class Comparison(BaseModel):
+    """Two models on all tasks that both were tried on."""
+
+    track: str | None
+    first: str
+    second: str
+    tasks: list[TaskDuelView]
+
+
+class ManifestEntry(BaseModel):
+    """What the manifests behind an entry say about one thing."""
+
+    name: str
+    distinct: int
+    values: list[dict[str, Any]] = Field(
+        description="value and jobs (how many say so); empty when there are too many"
+    )
+
+
+class VerifyRequest(BaseModel):
+    """Which results to verify."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    track: str | None = None
+    model: str
+    tasks: list[str] | None = None
+    sample: Annotated[int | None, Field(ge=1, le=10_000, description="Default: all")] = None
+    seed: Annotated[int, Field(description="Of the choice of the sample")] = 0
+
+
+class VerifyAccepted(BaseModel):
+    """Verifications that were asked for."""
+
+    scored: int = Field(description="Scored jobs of the model")
+    verifications: list[str] = Field(description="Ids; see /v1/verifications/{id}")
+
+
+@router.get("/leaderboard", response_model=Board, responses=problem_responses(422, 503))
+def leaderboard(
+    boards: BoardsDep,
+    selection: SelectionDep,
+    registry: RegistryDep,
+    context: ContextDep,
+    request: Request,
+) -> Any:
+    """Ranks the models of one track, on each task and overall; tracks are never mixed."""
+    track, tracks = selection.track, selection.tracks
+    if track is None:
+        return Board(track=None, tracks=[], tasks=[])
+    answer = boards.answer(
+        track,
+        selection.query,
+        "json " + " ".join(tracks),
+        lambda board: (
+            board_view(
+                board, track=track, tracks=tracks, registry=registry, catalogue=context.catalogue
+            )
+            .model_dump_json()
+            .encode()
+        ),
+    )
+    return conditional(request, answer, "application/json")
+
+
+@router.get("/leaderboard/compare", responses=problem_responses(422, 503))
+def compare(
+    boards: BoardsDep,
+    selection: SelectionDep,
+    first: Annotated[str, Query(description="A model, or model@configuration")],
+    second: Annotated[str, Query(description="Another")],
+) -> Comparison:
+    """Tells whether one model is better than another, task by task."""
+    tasks: list[TaskDuel] = []
+    if selection.track is not None:
+        every = boards.trials(selection.track, selection.query)
+        sides = []
+        for field, name in (("first", first), ("second", second)):
+            model, _, wanted = name.partition("@")
+            side = [
+                trial
+                for trial in every
+                if trial.model == model and trial.configuration.startswith(wanted)
+            ]
+            if not side:
+                choices = sorted({f"{t.model}@{t.configuration[:8]}" for t in every})
+                raise unknown(field, name, choices)
+            configurations = [trial.configuration for trial in side]
+            usual = max(sorted(set(configurations)), key=configurations.count)
+            sides.append([trial for trial in side if trial.configuration == usual])
+        found = duel(*sides)
+        tasks = list(found.tasks) if found else []
+    return Comparison(
+        track=selection.track,
+        first=first,
+        second=second,
+        tasks=[TaskDuelView.model_validate(task) for task in tasks],
+    )
+
+
+@router.get("/leaderboard/changes", responses=problem_responses(422, 503))
+def changes(
+    context: ContextDep,
+    selection: SelectionDep,
+    *,
+    before: Annotated[int | None, Query(ge=0, description="Only older ones")] = None,
+    limit: Annotated[int, Query(ge=1, le=1000)] = 100,
+    unscored: Annotated[bool, Query(description="Also jobs that ended without a score")] = False,
+) -> ChangePage:
+    """What entered a track's board, left it or was scored anew, and why; the newest first."""
+    if selection.track is None:
+        return ChangePage(track=None, changes=[], next_before=None)
+    found = context.results.boards.changes(
+        selection.track, before=before, limit=limit, scored_only=not unscored
+    )
+    return ChangePage(
+        track=selection.track,
+        changes=[ChangeView.model_validate(change) for change in found],
+        next_before=found[-1].id if len(found) == limit else None,
+    )
+
+
+@router.get("/leaderboard/manifest", responses=problem_responses(422, 503))
+def manifest(
+    context: ContextDep, boards: BoardsDep, selection: SelectionDep
+) -> list[ManifestEntry]:
+    """The versions behind an entry (name task and model): what its jobs' manifests say."""
+    if selection.track is None:
+        return []
+    trials = boards.trials(selection.track, selection.query)
+    entries: dict[str, list[dict[str, Any]]] = {}
+    for task, version, model in sorted({(t.task, t.task_version, t.model) for t in trials}):
+        for name, value, jobs in context.results.boards.manifest_values(
+            selection.track, task, version, model
+        ):
+            entries.setdefault(name, []).append({"value": value, "jobs": jobs})
+    return [
+        ManifestEntry(
+            name=name,
+            distinct=len(values),
+            values=values if len(values) <= MOST_DISTINCT else [],
+        )
+        for name, values in entries.items()
+    ]
+
+
+@router.post("/leaderboard/verify", status_code=202, responses=problem_responses(422, 503))
+def verify(body: VerifyRequest, context: ContextDep, boards: BoardsDep) -> VerifyAccepted:
+    """Has all of a model's results on a board, or a sample, replayed and simulated again."""
+    tracks = boards.tracks()
+    if body.track is not None and body.track not in tracks:
+        raise unknown("track", body.track, tracks)
+    track = body.track or (tracks[0] if tracks else None)
+    query = BoardQuery(tasks=frozenset(body.tasks) if body.tasks else None, include_flagged=True)
+    every = [] if track is None else boards.trials(track, query)
+    scored = sorted(t.job_id for t in every if t.model == body.model and t.outcome in SCORED)
+    if not scored:
+        raise unknown("model", body.model, sorted({trial.model for trial in every}))
+    chosen = scored
+    if body.sample is not None and body.sample < len(scored):
+        # Whoever names the seed gets the same sample again; nothing secret hangs on it.
+        chosen = random.Random(body.seed).sample(scored, body.sample)  # noqa: S311
+    asked = [context.verifications.request(job_id) for job_id in chosen]
+    context.queues.announce(VERIFY, asked)
+    return VerifyAccepted(scored=len(scored), verifications=asked)
+
+
+router.include_router(exports.router)

@@ -1,0 +1,142 @@
+"""Routes of outside agents: open a session, call tools, submit."""
+
+from __future__ import annotations
+
+import contextlib
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Response
+from pydantic import BaseModel, ConfigDict, Field
+
+from buildarena_api.dependencies import ContextDep, ExternalDep
+from buildarena_api.http.access import Caller, CallerDep
+from buildarena_api.http.problems import ProblemError, problem_responses
+from buildarena_api.schemas import JobView
+from buildarena_pipeline.agents.sessions import NothingToSubmitError, SessionClosedError
+from buildarena_pipeline.agents.workbench import ASSEMBLY, MAIN, agent_tools
+from buildarena_pipeline.catalog.specs import Name, Seed
+from buildarena_pipeline.runtime.context import Context
+from buildarena_pipeline.runtime.scoring import task_of
+from buildarena_store import UnknownIdError
+
+router = APIRouter(prefix="/v1/sessions", tags=["sessions"])
+
+MachineName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,40}$")]
+
+
+class OpenSession(BaseModel):
+    """A wish to build."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    task: Name
+    agent: Annotated[str, Field(description="The agent's name on the leaderboard", max_length=80)]
+    seed: Seed = 0
+    simulator: Name = "pybullet"
+
+
+class ToolView(BaseModel):
+    """A tool that the agent may call."""
+
+    name: str
+    description: str
+    parameters: dict[str, Any] = Field(description="JSON schema of its arguments")
+
+
+class SessionOpened(BaseModel):
+    """An open session."""
+
+    id: str = Field(description="Also the id of the job that will hold the score")
+    statement: str = Field(description="What is to be built")
+    tools: list[ToolView]
+
+
+class ToolCall(BaseModel):
+    """One action."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    tool: Annotated[str, Field(max_length=100)]
+    arguments: Any = Field(default={}, description="What the tool's parameters ask for")
+    machine: MachineName = Field(
+        default=MAIN,
+        description=f"Sub-structure it is meant for; {ASSEMBLY!r} is put together from the others",
+    )
+
+
+class ToolOutcome(BaseModel):
+    """What came of an action."""
+
+    model_config = ConfigDict(from_attributes=True)
+
+    ok: bool
+    reason: str | None = Field(description="Refusal class, if it was refused")
+    feedback: str = Field(description="The state in words, or what would have been allowed")
+
+
+@router.post("", status_code=201, responses=problem_responses(422, 503))
+def open_session(
+    body: OpenSession,
+    response: Response,
+    sessions: ExternalDep,
+    context: ContextDep,
+    caller: CallerDep,
+) -> SessionOpened:
+    """Opens a session in which an agent of yours builds for one task."""
+    job = sessions.open(
+        task=body.task,
+        agent=body.agent,
+        seed=body.seed,
+        simulator=body.simulator,
+        owner=caller.key_id,
+    )
+    response.headers["Location"] = f"/v1/jobs/{job.id}"
+    return SessionOpened(
+        id=job.id,
+        statement=task_of(job, context.catalogue).statement,
+        tools=[
+            ToolView(name=tool.name, description=tool.description, parameters=dict(tool.parameters))
+            for tool in agent_tools()
+        ],
+    )
+
+
+@router.post("/{session_id}/calls", responses=problem_responses(404, 409, 422, 503))
+def call_tool(
+    session_id: str, body: ToolCall, sessions: ExternalDep, context: ContextDep, caller: CallerDep
+) -> ToolOutcome:
+    """Carries out one action; a refused one changes nothing."""
+    _require_own(session_id, context, caller)
+    try:
+        done = sessions.call(
+            session_id, machine=body.machine, tool=body.tool, arguments=body.arguments
+        )
+    except SessionClosedError as error:
+        raise ProblemError(409, str(error)) from error
+    return ToolOutcome.model_validate(done)
+
+
+@router.post("/{session_id}/submit", status_code=202, responses=problem_responses(404, 409, 503))
+def submit_session(
+    session_id: str,
+    response: Response,
+    sessions: ExternalDep,
+    context: ContextDep,
+    caller: CallerDep,
+) -> JobView:
+    """Ends the building; the machine is simulated and scored."""
+    _require_own(session_id, context, caller)
+    try:
+        job = sessions.submit(session_id)
+    except (SessionClosedError, NothingToSubmitError) as error:
+        raise ProblemError(409, str(error)) from error
+    response.headers["Location"] = f"/v1/jobs/{job.id}"
+    return JobView.of(job)
+
+
+def _require_own(session_id: str, context: Context, caller: Caller) -> None:
+    """An agent plays its own session only. An unknown one is for the session room to refuse."""
+    if caller.scope == "admin":
+        return
+    with contextlib.suppress(UnknownIdError):
+        caller.require_owner(context.jobs.get(session_id).owner, f"session {session_id}")

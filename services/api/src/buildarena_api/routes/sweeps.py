@@ -1,0 +1,208 @@
+"""Routes of sweeps."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Header, Query, Response
+from pydantic import BaseModel, ConfigDict
+from sqlalchemy.exc import IntegrityError
+
+from buildarena_api.dependencies import ContextDep, SubmissionsDep
+from buildarena_api.http import cursors
+from buildarena_api.http.access import Caller, CallerDep
+from buildarena_api.http.problems import ProblemError, problem_responses
+from buildarena_api.schemas import (
+    BudgetView,
+    ProgressView,
+    SweepAccepted,
+    SweepEstimate,
+    SweepPage,
+    SweepView,
+)
+from buildarena_pipeline.broker.queues import CONSTRUCT
+from buildarena_pipeline.catalog.specs import Budget, SweepSpec
+from buildarena_pipeline.runtime.context import Context
+from buildarena_pipeline.runtime.reaper import announce_waiting
+from buildarena_pipeline.submission.submission import spec_hash
+from buildarena_store import Sweep
+
+router = APIRouter(prefix="/v1/sweeps", tags=["sweeps"])
+
+
+RequestKey = Annotated[
+    str | None,
+    Header(
+        alias="Idempotency-Key",
+        min_length=1,
+        max_length=200,
+        description="The same key with the same sweep returns the first submission's answer",
+    ),
+]
+
+
+TakeUp = Annotated[
+    bool,
+    Query(
+        description="Let the caller's earlier sweep of just these jobs, if there is one, go on "
+        "with this one's budget, instead of storing a further sweep"
+    ),
+]
+
+
+class Resumption(BaseModel):
+    """How a sweep is to go on."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    budget: Budget | None = None
+
+
+@router.post("", status_code=202, responses=problem_responses(409, 422, 503))
+def submit_sweep(
+    spec: SweepSpec,
+    response: Response,
+    *,
+    context: ContextDep,
+    submissions: SubmissionsDep,
+    caller: CallerDep,
+    request_key: RequestKey = None,
+    take_up: TakeUp = False,
+) -> SweepAccepted:
+    """Submits every task with every model and every seed; all of it is stored, or nothing."""
+    if request_key is not None:
+        # One key's idempotency keys are not another's.
+        request_key = f"{caller.key_id or ''}/{request_key}"
+        before = context.sweeps.by_request_key(request_key)
+        if before is not None:
+            return _accepted_before(before, spec, response, context)
+    try:
+        done = submissions.submit_sweep(
+            spec, owner=caller.key_id, request_key=request_key, take_up=take_up
+        )
+    except IntegrityError:
+        # Another request with this key was quicker.
+        before = None if request_key is None else context.sweeps.by_request_key(request_key)
+        if before is None:
+            raise
+        return _accepted_before(before, spec, response, context)
+    response.headers["Location"] = f"/v1/sweeps/{done.sweep.id}"
+    return SweepAccepted(id=done.sweep.id, jobs=done.jobs, added=done.added, taken_up=done.taken_up)
+
+
+def _accepted_before(
+    sweep: Sweep, spec: SweepSpec, response: Response, context: Context
+) -> SweepAccepted:
+    if sweep.request_hash != spec_hash(spec):
+        raise ProblemError(409, "this Idempotency-Key was used for another sweep")
+    response.headers["Location"] = f"/v1/sweeps/{sweep.id}"
+    total = context.sweeps.progress(sweep.id).total
+    return SweepAccepted(id=sweep.id, jobs=total, added=0)
+
+
+@router.post("/estimate", responses=problem_responses(422, 503))
+def estimate_sweep(spec: SweepSpec, submissions: SubmissionsDep) -> SweepEstimate:
+    """Tells what a sweep would consist of and about what it would cost; stores nothing."""
+    return SweepEstimate.model_validate(submissions.estimate(spec))
+
+
+@router.post("/{sweep_id}/pause", responses=problem_responses(404, 409, 503))
+def pause_sweep(sweep_id: str, context: ContextDep, caller: CallerDep) -> SweepView:
+    """Holds the sweep's waiting jobs; jobs that have begun go on to their end."""
+    _changeable(context, caller, sweep_id, "paused")
+    with context.database.transaction() as connection:
+        context.sweeps.hold(sweep_id, connection=connection)
+        context.sweeps.set_state(sweep_id, "paused", connection=connection)
+    return _view(context, context.sweeps.get(sweep_id))
+
+
+@router.post("/{sweep_id}/resume", responses=problem_responses(404, 409, 422, 503))
+def resume_sweep(
+    sweep_id: str,
+    context: ContextDep,
+    caller: CallerDep,
+    submissions: SubmissionsDep,
+    body: Resumption | None = None,
+) -> SweepView:
+    """Lets a sweep go on that was paused or whose budget is used up, with more budget if given."""
+    sweep = _changeable(context, caller, sweep_id, "active")
+    submissions.resume(sweep, None if body is None else body.budget)
+    return _view(context, context.sweeps.get(sweep_id))
+
+
+@router.post("/{sweep_id}/cancel", responses=problem_responses(404, 409, 503))
+def cancel_sweep(sweep_id: str, context: ContextDep, caller: CallerDep) -> SweepView:
+    """Ends the sweep's jobs that have not ended and that no other active sweep wants."""
+    _changeable(context, caller, sweep_id, "cancelled")
+    with context.database.transaction() as connection:
+        own = context.sweeps.own_jobs(sweep_id, connection=connection)
+        context.jobs.cancel(own, connection=connection)
+        context.sweeps.set_state(sweep_id, "cancelled", connection=connection)
+    return _view(context, context.sweeps.get(sweep_id))
+
+
+@router.post("/{sweep_id}/retry", status_code=202, responses=problem_responses(404, 503))
+def retry_sweep(sweep_id: str, context: ContextDep, caller: CallerDep) -> SweepView:
+    """Queues the sweep's errored jobs again where they failed; scored ones are never redone."""
+    sweep = context.sweeps.get(sweep_id)
+    caller.require_owner(sweep.owner, f"sweep {sweep_id}")
+    with context.database.transaction() as connection:
+        context.jobs.retry(context.sweeps.job_ids(sweep_id), connection=connection)
+    announce_waiting(context, CONSTRUCT)
+    return _view(context, sweep)
+
+
+ALLOWED = {
+    "paused": {"active"},
+    "active": {"paused", "limit"},
+    "cancelled": {"active", "paused", "limit"},
+}
+"""From which states a sweep may come into one."""
+
+
+def _changeable(context: Context, caller: Caller, sweep_id: str, state: str) -> Sweep:
+    """The sweep, as long as the caller may bring it into the state now."""
+    sweep = context.sweeps.get(sweep_id)
+    caller.require_owner(sweep.owner, f"sweep {sweep_id}")
+    if sweep.state not in ALLOWED[state]:
+        raise ProblemError(409, f"sweep {sweep_id} is {sweep.state}; it can't become {state}")
+    return sweep
+
+
+@router.get("", responses=problem_responses(422, 503))
+def list_sweeps(
+    context: ContextDep,
+    cursor: Annotated[str | None, Query(max_length=500)] = None,
+    limit: Annotated[int, Query(ge=1, le=100)] = 20,
+) -> SweepPage:
+    """Lists sweeps, newest first."""
+    found = context.sweeps.page(
+        limit=limit, after=None if cursor is None else cursors.decode(cursor)
+    )
+    more = len(found) == limit
+    return SweepPage(
+        sweeps=[_view(context, sweep) for sweep in found],
+        next_cursor=cursors.encode(found[-1].created_at, found[-1].id) if more else None,
+    )
+
+
+@router.get("/{sweep_id}", responses=problem_responses(404, 503))
+def show_sweep(sweep_id: str, context: ContextDep) -> SweepView:
+    """Shows a sweep and how far it is."""
+    return _view(context, context.sweeps.get(sweep_id))
+
+
+def _view(context: Context, sweep: Sweep) -> SweepView:
+    progress = context.sweeps.progress(sweep.id)
+    ended = sweep.state == "active" and progress.done == progress.total
+    state: Any = "done" if ended else sweep.state
+    return SweepView(
+        id=sweep.id,
+        name=sweep.name,
+        state=state,
+        owner=sweep.owner,
+        created_at=sweep.created_at,
+        spec=dict(sweep.spec),
+        budget=BudgetView.of(context.budgets.get(sweep.id)),
+        progress=ProgressView.of(progress),
+    )

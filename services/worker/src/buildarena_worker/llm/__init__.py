@@ -1,5 +1,0 @@
-"""The model layer: one neutral request to any provider, with declared retries and prices."""
-
-from buildarena_worker.llm.clients import ModelClients
-
-__all__ = ["ModelClients"]

@@ -1,0 +1,54 @@
+"""Clients by model: built-in ones play here, all others are reached over HTTP."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Mapping
+from typing import Any
+
+from buildarena_pipeline.catalog.models import ModelRegistry
+from buildarena_pipeline.errors import PermanentFaultError
+from buildarena_worker.builtin import BuiltinClient
+from buildarena_worker.session.host import ModelClient
+
+
+class ModelClients:
+    """Makes and keeps one client per model; safe to use from many threads.
+
+    Args:
+        registry: Models and providers.
+        throttle_url: Where the providers' shared limits live; None for no limits.
+    """
+
+    def __init__(self, registry: ModelRegistry, throttle_url: str | None = None) -> None:
+        self._registry = registry
+        self._throttle_url = throttle_url
+        self._clients: dict[str, ModelClient] = {}
+        self._guard = threading.Lock()
+
+    def for_config(self, model_config: Mapping[str, Any]) -> ModelClient:
+        """The client for a job's model.
+
+        Raises:
+            PermanentFaultError: The operator's registry lacks the model, or its key is not set.
+        """
+        name = str(model_config["name"])
+        with self._guard:
+            if name not in self._clients:
+                self._clients[name] = self._make(name)
+            return self._clients[name]
+
+    def _make(self, name: str) -> ModelClient:
+        entry = self._registry.models.get(name)
+        if entry is None:
+            raise PermanentFaultError(
+                f"this worker's model registry lacks {name!r}", reason="unknown_model"
+            )
+        provider = self._registry.provider_of(entry)
+        if provider.wire == "builtin":
+            return BuiltinClient(entry.model)
+        from buildarena_worker.providers.provider import ProviderClient
+        from buildarena_worker.providers.throttle import Throttle
+
+        throttle = Throttle(self._throttle_url, entry.provider)
+        return ProviderClient(entry, provider, throttle=throttle)

@@ -1,0 +1,1 @@
+"""A construction session: messages, dialogue, host, transcript."""

@@ -1,0 +1,113 @@
+"""A session: one model, playing all roles, builds one machine for one task."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from buildarena_benchmark import Task, broken_constraint
+from buildarena_geometry import Machine
+from buildarena_pipeline.catalog.prompt_packs import PromptPack
+from buildarena_store import JournalEntry
+from buildarena_worker.errors import ConstructionFailedError
+from buildarena_worker.session.host import SessionIO
+from buildarena_worker.session.messages import Message, Reply, Request, Tool
+from buildarena_worker.session.transcript import ActionRecord, Transcript, Turn
+
+
+class Session:
+    """The state that a workflow's steps share.
+
+    Args:
+        task: What is to be built.
+        seed: The job's seed.
+        model_config: The job's model configuration.
+        pack: The sentences to use.
+        io: Where answers come from.
+
+    Attributes:
+        additions: What is said behind the task's statement: an example, results of rounds.
+        machine: What is being built.
+    """
+
+    def __init__(
+        self,
+        *,
+        task: Task,
+        seed: int,
+        model_config: Mapping[str, Any],
+        pack: PromptPack,
+        io: SessionIO,
+    ) -> None:
+        self.task = task
+        self.seed = seed
+        self.pack = pack
+        self.io = io
+        self.transcript = Transcript()
+        self.additions: list[str] = []
+        self.machine: Machine | None = None
+        self._model_config = model_config
+
+    @property
+    def statement(self) -> str:
+        """What the model is told of the task: the pack's or the task's words, and additions."""
+        told = self.pack.statements.get(self.task.name, self.task.statement)
+        return "\n\n".join([told.strip(), *self.additions])
+
+    def ask(
+        self, messages: Sequence[Message], tools: Sequence[Tool], *, stage: str, role: str
+    ) -> tuple[Reply, JournalEntry]:
+        """The model's reply to a conversation.
+
+        Raises:
+            ConstructionFailedError: The conversation outgrew the model's context.
+        """
+        request = Request(
+            model_config=self._model_config, messages=messages, tools=tools, seed=self.seed
+        )
+        entry = self.io.ask(request, stage=stage, role=role)
+        reply = Reply.from_json(entry.reply)
+        if reply.finish == "context_overflow":
+            raise ConstructionFailedError(
+                "context_overflow", f"the {role}'s conversation outgrew the model's context"
+            )
+        return reply, entry
+
+    def record(
+        self,
+        *,
+        stage: str,
+        sub_structure: str | None,
+        role: str,
+        reply: Reply,
+        entry: JournalEntry,
+        actions: Sequence[ActionRecord] = (),
+    ) -> None:
+        """Adds a turn to the transcript."""
+        self.transcript.turns.append(
+            Turn(
+                index=len(self.transcript.turns),
+                stage=stage,
+                sub_structure=sub_structure,
+                role=role,
+                text=reply.text,
+                actions=tuple(actions),
+                finish=reply.finish,
+                input_tokens=entry.usage.input_tokens,
+                output_tokens=entry.usage.output_tokens,
+                cost_usd=f"{entry.usage.cost_usd:.6f}",
+                latency_s=entry.latency_s,
+                tries=entry.tries,
+            )
+        )
+
+    def check_machine(self, machine: Machine) -> None:
+        """Compares a finished machine with the task's constraints.
+
+        Raises:
+            ConstructionFailedError: It breaks one, or there is no machine.
+        """
+        self.machine = machine
+        broken = broken_constraint(self.task, machine)
+        if broken is not None:
+            raise ConstructionFailedError(*broken)

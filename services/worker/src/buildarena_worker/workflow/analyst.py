@@ -1,0 +1,160 @@
+"""The analyst: looks at a failed round with read-only tools and advises the next one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from buildarena_geometry import Machine
+from buildarena_simulation import Trajectory
+from buildarena_store import RolloutRecord
+from buildarena_worker.session.dialogue import Act, Dialogue, Role
+from buildarena_worker.session.messages import Tool, ToolCall
+from buildarena_worker.session.session import Session
+from buildarena_worker.session.transcript import ActionRecord, Turn
+from buildarena_worker.workflow.machine_tools import QUERIES, acting_on, tools_named
+
+ANALYST_TURNS = 20
+ROWS = 60
+"""Rows that one look at transcript or trajectory returns at the most."""
+
+TRANSCRIPT = Tool(
+    name="read_transcript",
+    description=f"Read turns of the session, at most {ROWS} from the given one on.",
+    parameters={
+        "type": "object",
+        "properties": {"first_turn": {"type": "integer", "minimum": 0}},
+        "required": ["first_turn"],
+        "additionalProperties": False,
+    },
+)
+TRAJECTORY = Tool(
+    name="read_trajectory",
+    description=(
+        "Read positions over time (seconds; x east, y north, z up) of a block, or of the cargo "
+        f"with block 'cargo'; at most {ROWS} rows."
+    ),
+    parameters={
+        "type": "object",
+        "properties": {
+            "block": {"type": "string"},
+            "from_s": {"type": "number", "minimum": 0},
+            "to_s": {"type": "number", "minimum": 0},
+        },
+        "required": ["block", "from_s", "to_s"],
+        "additionalProperties": False,
+    },
+)
+BREAKS = Tool(
+    name="read_breaks",
+    description="Read which joints broke in the trial, and when.",
+    parameters={"type": "object", "properties": {}, "additionalProperties": False},
+)
+
+
+def analyse(
+    session: Session, machine: Machine, record: RolloutRecord, *, number: int, result: str
+) -> str:
+    """Lets the analyst look until it advises.
+
+    Args:
+        session: The session.
+        machine: The failed round's machine.
+        record: Its rollout.
+        number: The round.
+        result: The rollout's result in words.
+
+    Returns:
+        The advice, or what it said last when it used up its turns.
+    """
+    opening = session.pack.say(
+        "analyse",
+        task=session.task.name,
+        statement=session.statement,
+        round=str(number),
+        result=result,
+    )
+    dialogue = Dialogue(session, stage="analyse", opening=opening)
+    role = Role(
+        name="analyst",
+        system=session.pack.roles["analyst"],
+        tools=[*tools_named(QUERIES), TRANSCRIPT, TRAJECTORY, BREAKS],
+        act=_reading(session, machine, record),
+    )
+    text = ""
+    for _ in range(ANALYST_TURNS):
+        reply = dialogue.turn(role)
+        text = reply.text or text
+        if not reply.calls:
+            break
+    return text
+
+
+def _reading(session: Session, machine: Machine, record: RolloutRecord) -> Act:
+    trajectory = session.io.trajectory(record)
+    turns = list(session.transcript.turns)
+    on_machine = acting_on(machine)
+    readers: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
+        TRANSCRIPT.name: lambda given: _turns(turns, given),
+        TRAJECTORY.name: lambda given: _positions(trajectory, given),
+        BREAKS.name: lambda _: _breaks(trajectory),
+    }
+
+    def act(call: ToolCall) -> ActionRecord:
+        reader = readers.get(call.name)
+        if reader is None:
+            return on_machine(call)
+        reason = None
+        try:
+            given = call.arguments if isinstance(call.arguments, dict) else {}
+            text = reader(given)
+        except (KeyError, TypeError, ValueError, OverflowError) as error:
+            reason, text = "malformed_arguments", f"That can't be read: {error}."
+        return ActionRecord(
+            name=call.name,
+            arguments=call.arguments,
+            ok=reason is None,
+            reason=reason,
+            feedback=text,
+        )
+
+    return act
+
+
+def _turns(turns: list[Turn], given: Mapping[str, Any]) -> str:
+    first = max(0, int(given["first_turn"]))
+    lines = []
+    for turn in turns[first : first + ROWS]:
+        said = turn.text.replace("\n", " ")[:300]
+        lines.append(f"{turn.index} [{turn.role}] {said}")
+        lines += [f"  {a.name}({a.arguments}): {a.feedback[:300]}" for a in turn.actions]
+    return "\n".join(lines) or f"There are {len(turns)} turns."
+
+
+def _positions(trajectory: Trajectory | None, given: Mapping[str, Any]) -> str:
+    if trajectory is None:
+        return "There is no trajectory: the machine could not be simulated."
+    block, start, end = str(given["block"]), float(given["from_s"]), float(given["to_s"])
+    if block == "cargo" and trajectory.cargo_position is not None:
+        points = trajectory.cargo_position
+    elif block in trajectory.block_ids:
+        points = trajectory.positions[:, trajectory.block_ids.index(block)]
+    else:
+        choices = ", ".join([*trajectory.block_ids[:ROWS], "cargo"])
+        return f"There is no block {block!r}. There are: {choices}."
+    times = np.asarray(trajectory.time_s)
+    chosen = np.flatnonzero((times >= start) & (times <= end))
+    step = max(1, -(-len(chosen) // ROWS))
+    rows = [
+        ", ".join(f"{float(value):.2f}" for value in (times[index], *points[index]))
+        for index in chosen[::step]
+    ]
+    return "\n".join(rows) or f"The trial lasted from 0 to {times[-1]:g} s."
+
+
+def _breaks(trajectory: Trajectory | None) -> str:
+    if trajectory is None or not trajectory.breaks:
+        return "No joint broke."
+    return "\n".join(str(event) for event in trajectory.breaks[:ROWS])

@@ -1,0 +1,79 @@
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import psutil
+import pytest
+from redis import Redis
+
+from buildarena_cli.local import EmbeddedValkey, ManagedProcess, Supervisor
+from buildarena_pipeline.errors import StartupError
+
+
+def wait_until(condition, within_s: float = 10.0) -> None:
+    deadline = time.monotonic() + within_s
+    while not condition():
+        assert time.monotonic() < deadline, "it did not happen in time"
+        time.sleep(0.02)
+
+
+def test_a_killed_broker_is_started_again_with_its_data(tmp_path: Path) -> None:
+    valkey = EmbeddedValkey(tmp_path / "valkey", tmp_path / "log")
+    managed = ManagedProcess(name="valkey", start=valkey.start, stop=valkey.stop)
+    with Supervisor() as supervisor, Redis.from_url(valkey.url, retry=None) as client:
+        supervisor.launch(managed)
+        supervisor.watch()
+        client.set("k", "v")
+        time.sleep(1.2)  # appendfsync everysec
+        first = managed.process
+        first.kill()
+        wait_until(lambda: managed.process is not first)
+        assert client.get("k") == b"v"
+        pid = managed.process.pid
+    assert not psutil.pid_exists(pid)
+
+
+def test_a_process_that_keeps_dying_is_given_up() -> None:
+    def start() -> subprocess.Popen[bytes]:
+        return subprocess.Popen([sys.executable, "-c", "raise SystemExit(3)"])
+
+    with Supervisor() as supervisor:
+        supervisor.launch(ManagedProcess(name="mayfly", start=start))
+        supervisor.watch()
+        wait_until(lambda: supervisor.failed is not None)
+    assert "mayfly died 6 times" in supervisor.failed
+    assert "exit code 3" in supervisor.failed
+
+
+def test_a_server_that_ends_at_once_is_reported(tmp_path: Path) -> None:
+    valkey = EmbeddedValkey(tmp_path / "valkey", tmp_path / "log")
+    process = valkey.start()
+    try:
+        with pytest.raises(StartupError, match="valkey ended at once"):
+            valkey.start()  # its port is taken
+    finally:
+        valkey.stop(process)
+
+
+def test_children_do_not_outlive_a_killed_parent(tmp_path: Path) -> None:
+    program = (
+        "import sys, time, pathlib\n"
+        "from buildarena_cli.local import EmbeddedValkey\n"
+        "folder = pathlib.Path(sys.argv[1])\n"
+        "print(EmbeddedValkey(folder / 'v', folder / 'log').start().pid, flush=True)\n"
+        "time.sleep(60)\n"
+    )
+    parent = subprocess.Popen(
+        [sys.executable, "-c", program, str(tmp_path)], stdout=subprocess.PIPE
+    )
+    assert parent.stdout is not None
+    child = int(parent.stdout.readline())
+    os.kill(parent.pid, signal.SIGKILL)
+    parent.wait()
+    parent.stdout.close()
+    wait_until(lambda: not psutil.pid_exists(child))
