@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
 
+import blas_kernels  # noqa: F401 - before numpy is imported
 import pytest
 from player import Player
 from redis import Redis
