@@ -93,7 +93,7 @@ def context(settings: Settings) -> Iterator[Context]:
     """Connections to an empty database and an empty broker."""
     context = open_context(settings)
     names = ", ".join(table.name for table in metadata.sorted_tables)
-    with context.database.transaction() as connection:
+    with context.store.database.transaction() as connection:
         connection.execute(text(f"TRUNCATE {names} RESTART IDENTITY CASCADE"))
     with Redis.from_url(settings.required_broker_url()) as valkey:
         valkey.flushdb()

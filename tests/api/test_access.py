@@ -72,7 +72,7 @@ def test_malformed_and_unknown_keys_are_refused(guarded, secret) -> None:
 def test_expired_and_revoked_keys_are_refused_and_say_so(guarded, make_key, context) -> None:
     secret = make_key("submit", days=1)
     assert guarded.get("/v1/jobs", headers=bearer(secret)).status_code == 200
-    with context.database.transaction() as connection:
+    with context.store.database.transaction() as connection:
         connection.exec_driver_sql("UPDATE api_keys SET expires_at = now()")
     assert "expired" in guarded.get("/v1/jobs", headers=bearer(secret)).json()["detail"]
     other = make_key("admin")

@@ -39,7 +39,7 @@ def test_a_generated_client_submits_a_job(context, tmp_path) -> None:
     target = tmp_path / "arena"
     words = ["generate", "--path", str(CONTRACT), "--meta", "none", "--output-path", str(target)]
     subprocess.run([GENERATOR, *words], check=True, capture_output=True, cwd=tmp_path, timeout=120)
-    _, secret = context.keys.create(name="generated", scopes=["submit"])
+    _, secret = context.store.keys.create(name="generated", scopes=["submit"])
     with live_api(context) as url:
         done = subprocess.run(
             [sys.executable, "-c", PROGRAM, str(tmp_path), url, secret],
@@ -49,7 +49,7 @@ def test_a_generated_client_submits_a_job(context, tmp_path) -> None:
             timeout=120,
         )
     assert done.returncode == 0, done.stderr
-    assert context.jobs.get(done.stdout.strip()).seed == 5
+    assert context.store.jobs.get(done.stdout.strip()).seed == 5
 
 
 def test_operations_have_short_names_of_their_own() -> None:

@@ -27,7 +27,7 @@ def finish(api, context):
         api.post("/v1/sweeps", json=SWEEP)
         ended = []
         for _ in range(count):
-            lease = context.leases.claim("construct", owner="w")
+            lease = context.store.leases.claim("construct", owner="w")
             won = lease.job.model == "builtin/expert"
             score = JobScore(
                 **{
@@ -39,8 +39,8 @@ def finish(api, context):
                     **values,
                 }
             )
-            with context.database.transaction() as connection:
-                context.results.finish(lease, score, connection=connection)
+            with context.store.database.transaction() as connection:
+                context.store.results.finish(lease, score, connection=connection)
             ended.append(lease.job.id)
         return ended
 
@@ -52,7 +52,7 @@ def board(api, **params):
 
 
 def change(context, job_id: str, why: str | None = None, **values: object) -> None:
-    with context.database.transaction() as connection:
+    with context.store.database.transaction() as connection:
         if why is not None:
             connection.execute(
                 text("SELECT set_config('buildarena.why', :why, true)"), {"why": why}
@@ -143,7 +143,7 @@ def test_a_board_kept_up_to_date_equals_one_that_is_made_anew(api, context, fini
     change(context, ids[0], success=False, outcome="limit", indicator=0.0)
     assert api.get("/v1/leaderboard").content == fresh()
     change(context, ids[1], state="queued", outcome=None, success=None, indicator=None)
-    with context.database.transaction() as connection:
+    with context.store.database.transaction() as connection:
         connection.execute(delete(jobs).where(jobs.c.id == "nobody"))
     assert api.get("/v1/leaderboard").content == fresh()
     finish(6)
@@ -153,7 +153,7 @@ def test_a_board_kept_up_to_date_equals_one_that_is_made_anew(api, context, fini
 def test_a_change_that_was_not_yet_committed_is_seen_later(api, context, finish) -> None:
     """Ids and transactions become visible out of order; no change may be lost by that."""
     ids = finish(6)
-    slow = context.database.engine.connect()
+    slow = context.store.database.engine.connect()
     slow.execute(update(jobs).where(jobs.c.id == ids[0]).values(indicator=999.0))
     change(context, ids[1], indicator=55.0)
     board(api)
@@ -188,9 +188,8 @@ def test_the_change_log_tells_what_entered_left_and_was_rescored(api, context, f
 
 def test_an_errored_job_is_in_the_log_only_when_asked_for(api, context, sweep) -> None:
     api.post("/v1/sweeps", json=sweep)
-    lease = context.leases.claim("construct", owner="w")
-    with context.database.transaction() as connection:
-        context.leases.give_up(lease, "gone", reason="lost_worker", connection=connection)
+    lease = context.store.leases.claim("construct", owner="w")
+    context.store.leases.give_up(lease, "gone", reason="lost_worker")
     assert api.get("/v1/leaderboard/changes").json()["changes"] == []
     (entry,) = api.get("/v1/leaderboard/changes", params={"unscored": True}).json()["changes"]
     assert (entry["kind"], entry["after"]["reason"]) == ("unscored", "lost_worker")
@@ -222,9 +221,11 @@ def test_all_or_a_sample_of_a_models_results_are_verified(api, context, finish) 
     body = {"model": "builtin/expert", "sample": 3}
     accepted = api.post("/v1/leaderboard/verify", json=body).json()
     assert (accepted["scored"], len(accepted["verifications"])) == (10, 3)
-    checked = {context.verifications.get(id_).job_id for id_ in accepted["verifications"]}
+    checked = {context.store.verifications.get(id_).job_id for id_ in accepted["verifications"]}
     again = api.post("/v1/leaderboard/verify", json=body).json()
-    assert checked == {context.verifications.get(id_).job_id for id_ in again["verifications"]}
+    assert checked == {
+        context.store.verifications.get(id_).job_id for id_ in again["verifications"]
+    }
     everything = api.post("/v1/leaderboard/verify", json={"model": "builtin/expert"}).json()
     assert len(everything["verifications"]) == 10
     assert api.post("/v1/leaderboard/verify", json={"model": "x"}).status_code == 422

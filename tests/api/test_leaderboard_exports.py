@@ -13,7 +13,7 @@ from buildarena_store import JobScore
 def ended(api, context, sweep) -> None:
     api.post("/v1/sweeps", json=sweep)
     for outcome in ("success", "unsuccessful"):
-        lease = context.leases.claim("construct", owner="w")
+        lease = context.store.leases.claim("construct", owner="w")
         score = JobScore(
             outcome=outcome,
             success=outcome == "success",
@@ -21,8 +21,8 @@ def ended(api, context, sweep) -> None:
             metrics={"parts": 7},
             flags=["unstable"] if outcome == "unsuccessful" else [],
         )
-        with context.database.transaction() as connection:
-            context.results.finish(lease, score, connection=connection, actions=4)
+        with context.store.database.transaction() as connection:
+            context.store.results.finish(lease, score, connection=connection, actions=4)
 
 
 def exported(api, kind: str) -> bytes:

@@ -23,17 +23,16 @@ def samples(api) -> dict[str, list[tuple[dict[str, str], float]]]:
 
 def test_metrics_say_what_the_jobs_say(api, context, sweep) -> None:
     api.post("/v1/sweeps", json={**sweep, "seeds": [0, 1, 2]})
-    first = context.leases.claim("construct", owner="w")
+    first = context.store.leases.claim("construct", owner="w")
     usage = Usage(requests=1, input_tokens=70, output_tokens=7)
-    context.journal.append(
+    context.store.journal.append(
         first,
         JournalEntry(
             sequence=0, stage="plan", role="planner", request_hash="h", reply={}, usage=usage,
             latency_s=0.1,
         ),
     )  # fmt: skip
-    with context.database.transaction() as connection:
-        context.leases.give_up(first, "no key", reason="missing_key", connection=connection)
+    context.store.leases.give_up(first, "no key", reason="missing_key")
     found = samples(api)
     queued = {"state": "queued", "stage": "construct", "outcome": ""}
     assert (queued, 2.0) in found["buildarena_jobs"]
@@ -103,8 +102,10 @@ def test_what_people_write_can_not_forge_lines_of_the_log(api, capfd, monkeypatc
 def test_health_names_a_worker_whose_clock_is_wrong(api, context) -> None:
     report = {"kind": "construct", "queues": ["construct"], "host": "h", "versions": {}}
     now = datetime.now(UTC)
-    context.workers.report(worker_id="good", pid=1, own_time=now, **report)
-    context.workers.report(worker_id="late", pid=2, own_time=now - timedelta(hours=1), **report)
+    context.store.workers.report(worker_id="good", pid=1, own_time=now, **report)
+    context.store.workers.report(
+        worker_id="late", pid=2, own_time=now - timedelta(hours=1), **report
+    )
     checks = {check["name"]: check for check in api.get("/v1/health").json()["checks"]}
     clocks = checks["clocks"]
     assert not clocks["ok"]

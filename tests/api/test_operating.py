@@ -32,10 +32,9 @@ def test_a_job_is_cancelled_once(api, submitted) -> None:
 
 @pytest.mark.usefixtures("submitted")
 def test_only_errored_jobs_are_retried(api, context) -> None:
-    lease = context.leases.claim("construct", owner="w")
+    lease = context.store.leases.claim("construct", owner="w")
     assert api.post(f"/v1/jobs/{lease.job.id}/retry").status_code == 409
-    with context.database.transaction() as connection:
-        context.leases.give_up(lease, "gone", reason="lost_worker", connection=connection)
+    context.store.leases.give_up(lease, "gone", reason="lost_worker")
     errored = api.get("/v1/jobs", params={"outcome": "errored"}).json()["jobs"]
     assert [(job["id"], job["reason"]) for job in errored] == [(lease.job.id, "lost_worker")]
     assert api.post(f"/v1/jobs/{lease.job.id}/retry").json()["state"] == "queued"
@@ -43,11 +42,11 @@ def test_only_errored_jobs_are_retried(api, context) -> None:
 
 def test_a_paused_sweep_starts_nothing_until_it_is_resumed(api, context, submitted) -> None:
     assert api.post(f"/v1/sweeps/{submitted}/pause").json()["state"] == "paused"
-    assert states(api, submitted) == ["held", "held"]
-    assert context.leases.claim("construct", owner="w") is None
+    assert states(api, submitted) == ["on_hold", "on_hold"]
+    assert context.store.leases.claim("construct", owner="w") is None
     assert api.post(f"/v1/sweeps/{submitted}/pause").status_code == 409
     assert api.post(f"/v1/sweeps/{submitted}/resume").json()["state"] == "active"
-    assert context.leases.claim("construct", owner="w") is not None
+    assert context.store.leases.claim("construct", owner="w") is not None
 
 
 def test_cancelling_a_sweep_spares_jobs_that_another_wants(api, sweep, submitted) -> None:
@@ -136,8 +135,8 @@ def test_events_come_as_they_happen_and_from_where_one_left_off(context, submiss
         first = read_events(stream, 3)
         assert {kind for _, kind, _ in first} == {"queued", "submitted"}
         rest = threads.submit(read_events, stream, 2, **{"Last-Event-ID": str(first[-1][0])})
-        lease = context.leases.claim("construct", owner="w")
-        context.leases.hand_back(lease)
+        lease = context.store.leases.claim("construct", owner="w")
+        context.store.leases.hand_back(lease)
         assert [(kind, data["job"]) for _, kind, data in rest.result()] == [
             ("running", lease.job.id),
             ("queued", lease.job.id),

@@ -26,7 +26,7 @@ def end_all(context):
     """Ends all waiting jobs with one indicator; the expert's succeed."""
 
     def work(indicator: float) -> None:
-        while (lease := context.leases.claim("construct", owner="w")) is not None:
+        while (lease := context.store.leases.claim("construct", owner="w")) is not None:
             won = lease.job.model == "builtin/expert"
             score = JobScore(
                 outcome="success" if won else "unsuccessful",
@@ -34,8 +34,8 @@ def end_all(context):
                 indicator=indicator if won else 0.0,
                 metrics={"parts": 7},
             )
-            with context.database.transaction() as connection:
-                context.results.finish(lease, score, connection=connection)
+            with context.store.database.transaction() as connection:
+                context.store.results.finish(lease, score, connection=connection)
 
     return work
 

@@ -12,15 +12,15 @@ GOLDEN = Path(__file__).parent.parent / "data" / "openapi.json"
 
 
 def end_job(context, *, outcome: str = "success", indicator: float = 100.0) -> str:
-    lease = context.leases.claim("construct", owner="w")
+    lease = context.store.leases.claim("construct", owner="w")
     score = JobScore(
         outcome=outcome, success=outcome == "success", indicator=indicator, metrics={"parts": 7}
     )
-    with context.database.transaction() as connection:
-        if outcome == "errored":
-            context.leases.give_up(lease, "gone", reason="lost_worker", connection=connection)
-        else:
-            context.results.finish(lease, score, connection=connection)
+    if outcome == "errored":
+        context.store.leases.give_up(lease, "gone", reason="lost_worker")
+    else:
+        with context.store.database.transaction() as connection:
+            context.store.results.finish(lease, score, connection=connection)
     return lease.job.id
 
 
@@ -73,7 +73,7 @@ def test_health_tells_which_workers_are_missing(api, context) -> None:
     assert checks["database"]["ok"]
     assert checks["broker"]["ok"]
     assert checks["workers of construct"]["advice"] == "start a worker for the queue construct"
-    context.workers.report(
+    context.store.workers.report(
         worker_id="w", kind="construct", queues=["construct"], host="h", pid=1, versions={}
     )
     checks = {check["name"]: check for check in api.get("/v1/health").json()["checks"]}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from fire import WORKERS, Strike
+from faults import WORKERS, Strike
 from sqlalchemy import text
 
 from buildarena_store import Database
@@ -62,7 +62,7 @@ class PickUp:
     """How a dead worker's job was taken up again.
 
     Attributes:
-        seconds: From the death to the next hold.
+        seconds: From the death to the next attempt.
         waited_s: The part of them from when the hold was found to be over.
         stage: The job's stage.
         meanwhile: What else was struck in these seconds.

@@ -18,7 +18,7 @@ from running import wait_until
 from buildarena_pipeline.catalog.models import load_registry
 from buildarena_pipeline.catalog.specs import JobSpec
 from buildarena_pipeline.runtime.machine_documents import machine_bytes
-from buildarena_pipeline.runtime.reaper import Sweeper
+from buildarena_pipeline.runtime.reaper import Reaper
 from buildarena_pipeline.submission.submission import Submissions
 
 KILLS = int(os.environ.get("CHAOS_KILLS", "4"))
@@ -78,27 +78,27 @@ def test_a_session_that_is_killed_again_and_again_builds_the_same_machine(
                 seen = standin.counts.requests
                 wait_until(lambda seen=seen: standin.counts.requests > seen, 120, "a request")
                 time.sleep(rng.uniform(0, 12 * LATENCY_S))
-                if context.jobs.get(job.id).stage != "construct":
+                if context.store.jobs.get(job.id).stage != "construct":
                     break
                 os.kill(process.pid, signal.SIGKILL)
                 kills += 1
         with worker(environment):
-            sweeper = Sweeper(context)
+            reaper = Reaper(context)
 
             def built() -> bool:
-                sweeper.sweep()
-                return context.jobs.get(job.id).stage == "simulate"
+                reaper.reap()
+                return context.store.jobs.get(job.id).stage == "simulate"
 
             wait_until(built, 120, "the machine is built")
         extra = standin.counts.requests - len(undisturbed.entries)
     assert kills > 0
     assert 0 <= extra <= kills
-    journal = context.journal.read(job.id)
+    journal = context.store.journal.read(job.id)
     assert [entry.reply["text"] for entry in journal] == [
         entry.reply["text"] for entry in undisturbed.entries
     ]
-    assert sum(entry.usage.requests for entry in journal) == context.jobs.get(job.id).requests
-    (rollout,) = context.rollouts.read(job.id)
+    assert sum(entry.usage.requests for entry in journal) == context.store.jobs.get(job.id).requests
+    (rollout,) = context.store.rollouts.read(job.id)
     machine = machine_bytes(undisturbed.suspended.machine)
     assert context.artifacts.get(rollout.machine_hash) == machine
     sys.stdout.write(f"{kills} kills, {extra} requests more than undisturbed\n")

@@ -42,7 +42,7 @@ def sweep(context, submissions) -> str:
 def end_jobs(context, *, rounds: int = 1) -> None:
     rng = random.Random(7)
     snapshots = {name: entry.model for name, entry in load_registry().models.items()}
-    with context.database.transaction() as connection:
+    with context.store.database.transaction() as connection:
         found = connection.execute(select(jobs).where(jobs.c.state == "queued").order_by(jobs.c.id))
         for number, job in enumerate(found.all()):
             if number == 0:
@@ -195,7 +195,7 @@ def test_simulators_are_compared_on_the_same_machines(url, context, submissions,
             tasks=["support-1"], models=["openai/gpt-5"], samples=3, simulator=simulator
         )
         sweeps.append(submissions.submit_sweep(spec).sweep.id)
-    with context.database.transaction() as connection:
+    with context.store.database.transaction() as connection:
         for number, job in enumerate(connection.execute(select(jobs).order_by(jobs.c.id)).all()):
             won = number > 0
             connection.execute(
@@ -227,10 +227,9 @@ def test_a_report_of_nothing_scored_says_so(url, context, submissions, tmp_path)
         for ending in (".html", ".md", ".pdf"):
             printed(url, "report", sweep, "--out", str(tmp_path / f"r{ending}"))
         assert "No job was scored." in (tmp_path / "r.md").read_text()
-        lease = context.leases.claim("construct", owner="w")
+        lease = context.store.leases.claim("construct", owner="w")
         if lease:
-            with context.database.transaction() as connection:
-                context.leases.give_up(lease, "gone", reason="lost_worker", connection=connection)
+            context.store.leases.give_up(lease, "gone", reason="lost_worker")
     assert "1 errored" in (tmp_path / "r.md").read_text()
     bad = run_cli(url, "report", sweep, "--out", str(tmp_path / "r.doc"))
     assert (bad.returncode, "must end in .html" in bad.stderr) == (1, True)
@@ -245,11 +244,11 @@ def test_an_audit_tells_every_difference(url, context) -> None:
         """Stands in for the worker: every second check finds another indicator."""
         number = 0
         while not stopping.is_set():
-            for id_ in context.verifications.to_announce(10):
-                context.verifications.claim(id_)
+            for id_ in context.store.verifications.to_notify(10):
+                context.store.verifications.claim(id_)
                 number += 1
                 check = {"name": "score: indicator", "ok": number % 2 == 0, "kept": 1, "found": 2}
-                context.verifications.finish(id_, {"ok": check["ok"], "checks": [check]})
+                context.store.verifications.finish(id_, {"ok": check["ok"], "checks": [check]})
             time.sleep(0.05)
 
     worker = threading.Thread(target=verify)

@@ -22,7 +22,7 @@ def own_tasks(context) -> None:
     """The tasks that come as examples, uploaded."""
     for file in (EXAMPLES / "tasks").glob("*.yaml"):
         text = file.read_text()
-        context.catalogue.add(parse_own_task(text, origin=file.name), text)
+        context.tasks.add(parse_own_task(text, origin=file.name), text)
 
 
 def spec_of(file: Path) -> SweepSpec:

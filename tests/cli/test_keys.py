@@ -74,7 +74,7 @@ def test_running_a_file_again_takes_the_sweep_up_with_another_budget(call, tmp_p
     first = json.loads(call("sweep", "run", str(file), "--detach", "--json", key=key).stdout)
     more = ("--max-requests", "9")
     again = json.loads(call("sweep", "run", str(file), "--detach", "--json", *more, key=key).stdout)
-    assert (again["id"], again["taken_up"], again["added"]) == (first["id"], True, 0)
+    assert (again["id"], again["resumed"], again["added"]) == (first["id"], True, 0)
     shown = call("sweep", "status", first["id"], key=key).stdout
     assert "budget: 0 of 9 requests" in shown
     call("sweep", "pause", first["id"], key=key)

@@ -16,7 +16,8 @@ from mcp.client.streamable_http import streamable_http_client
 from running import wait_until
 
 from buildarena_cli.local import free_port
-from buildarena_pipeline.runtime.job_runner import LeaseKeeper, StageRunner
+from buildarena_pipeline.runtime.active_lease import LeaseKeeper
+from buildarena_pipeline.runtime.job_runner import JobRunner
 from buildarena_simworker.simulate import SimulateHandler
 from buildarena_worker.builtin.designs import DESIGNS
 from buildarena_worker.verify import Verifier
@@ -25,9 +26,11 @@ BUILDARENA = str(Path(sys.executable).parent / "buildarena")
 
 
 def simulate_all(context) -> None:
-    keeper = LeaseKeeper(context, lambda: None)
+    keeper = LeaseKeeper(context.store.leases, lambda: None)
     keeper.start()
-    StageRunner(context, SimulateHandler(context), keeper, "w").look("simulate.mujoco", "")
+    JobRunner(context.store.leases, SimulateHandler(context), keeper, "w").look(
+        "simulate.mujoco", ""
+    )
     keeper.stop()
 
 
@@ -76,7 +79,7 @@ def test_an_agent_builds_a_bridge_and_gets_its_score(context) -> None:
         result = asyncio.run(play(stdio_client(server), lambda: simulate_all(context)))
     assert result["outcome"] == "success"
     assert result["indicator"] > 100
-    (job,) = context.jobs.page(limit=2)
+    (job,) = context.store.jobs.page(limit=2)
     report = Verifier(context).verify(job.id)
     assert report["ok"], [check for check in report["checks"] if not check["ok"]]
 

@@ -129,7 +129,7 @@ def sweep_of_own(url, context, file) -> str:
     printed(url, "task", "add", str(file))
     new = json.loads(printed(url, *words))["id"]
     assert old != new
-    while (lease := context.leases.claim("construct", owner="w")) is not None:
+    while (lease := context.store.leases.claim("construct", owner="w")) is not None:
         won = lease.job.model == "openai/gpt-5"
         score = JobScore(
             outcome="success" if won else "unsuccessful",
@@ -137,8 +137,8 @@ def sweep_of_own(url, context, file) -> str:
             indicator=150.0 if won else 0.0,
             metrics={"parts": 7},
         )
-        with context.database.transaction() as connection:
-            context.results.finish(lease, score, connection=connection)
+        with context.store.database.transaction() as connection:
+            context.store.results.finish(lease, score, connection=connection)
     return f"{old} {new}"
 
 

@@ -16,7 +16,7 @@ def spec(**changes: object) -> SweepSpec:
 def test_a_sweep_is_the_product_of_its_lists(context, submissions) -> None:
     done = submissions.submit_sweep(spec())
     assert (done.jobs, done.added) == (6, 6)
-    jobs = context.jobs.page(limit=100, sweep_id=done.sweep.id)
+    jobs = context.store.jobs.page(limit=100, sweep_id=done.sweep.id)
     assert {(job.model, job.seed) for job in jobs} == {(m, s) for m in MODELS for s in (0, 1, 2)}
     assert context.queues.waiting("construct") == 6
 
@@ -25,7 +25,7 @@ def test_the_same_sweep_again_adds_no_job(context, submissions) -> None:
     submissions.submit_sweep(spec())
     again = submissions.submit_sweep(spec(models=[*MODELS, "builtin/random"]))
     assert (again.jobs, again.added) == (9, 3)
-    assert context.sweeps.progress(again.sweep.id).total == 9
+    assert context.store.sweeps.progress(again.sweep.id).total == 9
 
 
 def test_doubled_names_and_seeds_count_once(submissions) -> None:
@@ -64,13 +64,13 @@ def test_everything_that_is_wrong_is_named_with_the_choices(context, submissions
     assert "support-1" in errors["tasks[1]"].choices
     assert "builtin/expert" in errors["models[0]"].choices
     assert set(errors["simulator"].choices) == {"pybullet", "mujoco"}
-    assert context.jobs.page(limit=1) == []
+    assert context.store.jobs.page(limit=1) == []
 
 
 def test_an_oversized_sweep_is_refused(context, submissions) -> None:
     with pytest.raises(SubmissionError, match="200,000 jobs; the largest accepted has 100,000"):
         submissions.submit_sweep(spec(seeds=None, samples=100_000))
-    assert context.jobs.page(limit=1) == []
+    assert context.store.jobs.page(limit=1) == []
 
 
 def test_the_papers_samples_are_the_default() -> None:

@@ -23,8 +23,8 @@ def add(context: Context, new_job: Callable[..., NewJob]) -> Callable[..., list[
 
     def add_jobs(*seeds: int) -> list[str]:
         jobs = [new_job(seed) for seed in seeds]
-        with context.database.transaction() as connection:
-            context.jobs.add(jobs, connection=connection)
+        with context.store.database.transaction() as connection:
+            context.store.jobs.add(jobs, connection=connection)
         return [job.key.job_id for job in jobs]
 
     return add_jobs

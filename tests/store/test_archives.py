@@ -30,7 +30,7 @@ def elsewhere(context, tmp_path) -> Callable[[], Context]:
 
     def move() -> Context:
         names = ", ".join(table.name for table in metadata.sorted_tables)
-        with context.database.transaction() as connection:
+        with context.store.database.transaction() as connection:
             connection.execute(text(f"TRUNCATE {names} RESTART IDENTITY CASCADE"))
         return replace(context, artifacts=ArtifactStore(tmp_path / "other"))
 
@@ -43,31 +43,31 @@ def archive(context, submissions, tmp_path) -> tuple[str, Path]:
     sweep_id = submissions.submit_sweep(SPEC).sweep.id
     work(context)
     target = tmp_path / "sweep.zip"
-    write_archive(context.database, context.artifacts, sweep_id, target)
+    write_archive(context.store.database, context.artifacts, sweep_id, target)
     return sweep_id, target
 
 
 def test_a_sweep_arrives_whole_and_can_be_verified_there(context, archive, elsewhere) -> None:
     sweep_id, file = archive
-    before = context.jobs.page(limit=10, sweep_id=sweep_id)
-    journals = {job.id: context.journal.read(job.id) for job in before}
+    before = context.store.jobs.page(limit=10, sweep_id=sweep_id)
+    journals = {job.id: context.store.journal.read(job.id) for job in before}
     other = elsewhere()
-    done = read_archive(other.database, other.artifacts, file, owner="key_k")
+    done = read_archive(other.store.database, other.artifacts, file, owner="key_k")
     assert (done.sweep_id, done.jobs, done.added) == (sweep_id, 2, 2)
-    after = other.jobs.page(limit=10, sweep_id=sweep_id)
+    after = other.store.jobs.page(limit=10, sweep_id=sweep_id)
     assert after == [replace(job, owner="key_k", payer=sweep_id) for job in before]
-    assert {job.id: other.journal.read(job.id) for job in after} == journals
-    assert other.sweeps.progress(sweep_id).outcomes == {"success": 2}
+    assert {job.id: other.store.journal.read(job.id) for job in after} == journals
+    assert other.store.sweeps.progress(sweep_id).outcomes == {"success": 2}
     report = Verifier(other).verify(after[0].id)
     assert report["ok"], report
 
 
 def test_taking_in_twice_changes_nothing(context, archive) -> None:
     sweep_id, file = archive
-    before = context.jobs.page(limit=10)
-    assert read_archive(context.database, context.artifacts, file, owner="other").added == 0
-    assert context.jobs.page(limit=10) == before
-    assert context.sweeps.get(sweep_id).owner is None
+    before = context.store.jobs.page(limit=10)
+    assert read_archive(context.store.database, context.artifacts, file, owner="other").added == 0
+    assert context.store.jobs.page(limit=10) == before
+    assert context.store.sweeps.get(sweep_id).owner is None
 
 
 def test_an_unfinished_sweep_goes_on_elsewhere_from_its_journals(
@@ -75,16 +75,16 @@ def test_an_unfinished_sweep_goes_on_elsewhere_from_its_journals(
 ) -> None:
     sweep_id = submissions.submit_sweep(SPEC).sweep.id
     work(context, steps=1)
-    asked = {job.id: job.requests for job in context.jobs.page(limit=10)}
+    asked = {job.id: job.requests for job in context.store.jobs.page(limit=10)}
     assert sum(asked.values()) > 0
-    write_archive(context.database, context.artifacts, sweep_id, tmp_path / "half.zip")
+    write_archive(context.store.database, context.artifacts, sweep_id, tmp_path / "half.zip")
     other = elsewhere()
-    read_archive(other.database, other.artifacts, tmp_path / "half.zip")
-    assert other.sweeps.get(sweep_id).state == "paused"
-    assert {job.state for job in other.jobs.page(limit=10)} == {"held"}
-    submissions.resume(other.sweeps.get(sweep_id), None)
+    read_archive(other.store.database, other.artifacts, tmp_path / "half.zip")
+    assert other.store.sweeps.get(sweep_id).state == "paused"
+    assert {job.state for job in other.store.jobs.page(limit=10)} == {"on_hold"}
+    submissions.resume(sweep_id, None)
     work(other)
-    after = other.jobs.page(limit=10)
+    after = other.store.jobs.page(limit=10)
     assert {job.outcome for job in after} == {"success"}
     built = [job for job in after if asked[job.id]]
     assert [job.requests for job in built] == [asked[job.id] for job in built]
@@ -126,9 +126,9 @@ def test_a_changed_archive_is_refused_whole(archive, elsewhere, member, change, 
     _, file = archive
     other = elsewhere()
     with pytest.raises(ArchiveError, match=said):
-        read_archive(other.database, other.artifacts, changed(file, member, change))
-    assert other.jobs.page(limit=10) == []
-    assert other.sweeps.page(limit=10) == []
+        read_archive(other.store.database, other.artifacts, changed(file, member, change))
+    assert other.store.jobs.page(limit=10) == []
+    assert other.store.sweeps.page(limit=10) == []
 
 
 def test_names_that_leave_the_archive_are_refused(archive, elsewhere, tmp_path) -> None:
@@ -138,7 +138,7 @@ def test_names_that_leave_the_archive_are_refused(archive, elsewhere, tmp_path) 
         out.writestr("/etc/evil", b"x")
     other = elsewhere()
     # Members with other names are never opened.
-    assert read_archive(other.database, other.artifacts, file).added == 2
+    assert read_archive(other.store.database, other.artifacts, file).added == 2
     assert not list(tmp_path.rglob("evil"))
 
 
@@ -147,15 +147,15 @@ def test_a_bomb_is_not_unpacked(archive, elsewhere, monkeypatch) -> None:
     monkeypatch.setattr(archives, "LARGEST_MEMBER", 1000)
     other = elsewhere()
     with pytest.raises(ArchiveError, match="larger than 1,000 bytes"):
-        read_archive(other.database, other.artifacts, file)
+        read_archive(other.store.database, other.artifacts, file)
 
 
 def test_what_is_no_archive_is_refused(context, tmp_path) -> None:
     (tmp_path / "x.zip").write_bytes(b"PK nonsense")
     with pytest.raises(ArchiveError, match="no sound archive"):
-        read_archive(context.database, context.artifacts, tmp_path / "x.zip")
+        read_archive(context.store.database, context.artifacts, tmp_path / "x.zip")
     with pytest.raises(UnknownIdError, match="sweep_x"):
-        write_archive(context.database, context.artifacts, "sweep_x", tmp_path / "y.zip")
+        write_archive(context.store.database, context.artifacts, "sweep_x", tmp_path / "y.zip")
 
 
 def test_the_archive_is_plain_json_and_files(archive) -> None:

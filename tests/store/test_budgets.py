@@ -40,11 +40,11 @@ def sweep(context: Context, new_job) -> Callable[..., str]:
 
     def make(*seeds: int, name: str = "sweep_a", owner: str | None = None, **limits: object) -> str:
         new = [replace(new_job(seed), owner=owner, payer=name) for seed in seeds]
-        with context.database.transaction() as connection:
+        with context.store.database.transaction() as connection:
             if limits:
-                context.budgets.set(name, BudgetLimits(**limits), connection=connection)
-            context.jobs.add(new, connection=connection)
-            context.sweeps.add(
+                context.store.budgets.set(name, BudgetLimits(**limits), connection=connection)
+            context.store.jobs.add(new, connection=connection)
+            context.store.sweeps.add(
                 NewSweep(id=name, name=name, spec={}, owner=owner),
                 [job.key.job_id for job in new],
                 connection=connection,
@@ -55,7 +55,7 @@ def sweep(context: Context, new_job) -> Callable[..., str]:
 
 
 def claim(context: Context) -> Lease:
-    lease = context.leases.claim("construct", owner="w")
+    lease = context.store.leases.claim("construct", owner="w")
     assert lease is not None
     return lease
 
@@ -63,13 +63,13 @@ def claim(context: Context) -> Lease:
 def test_what_is_reserved_can_not_be_reserved_again(context: Context, sweep) -> None:
     sweep(0, 1, 2, max_cost_usd=Decimal("0.70"))
     first, second, third = (claim(context) for _ in range(3))
-    assert context.budgets.reserve(first, NEED) is None
-    assert context.budgets.reserve(second, NEED) is None
-    shortage = context.budgets.reserve(third, NEED)
+    assert context.store.budgets.reserve(first, NEED) is None
+    assert context.store.budgets.reserve(second, NEED) is None
+    shortage = context.store.budgets.reserve(third, NEED)
     assert shortage is not None
-    assert shortage.passing, "open requests may cost less than was put aside"
-    context.journal.append(first, reply(cost="0.05"))
-    assert context.budgets.reserve(third, NEED) is None
+    assert shortage.temporary, "open requests may cost less than was reserved"
+    context.store.journal.append(first, reply(cost="0.05"))
+    assert context.store.budgets.reserve(third, NEED) is None
 
 
 @pytest.mark.parametrize(
@@ -78,14 +78,14 @@ def test_what_is_reserved_can_not_be_reserved_again(context: Context, sweep) -> 
 def test_a_used_up_budget_says_what_is_lacking(context: Context, sweep, limits) -> None:
     name = sweep(0, **limits)
     lease = claim(context)
-    assert context.budgets.reserve(lease, NEED) is None
-    context.journal.append(lease, reply())
-    shortage = context.budgets.reserve(lease, NEED)
+    assert context.store.budgets.reserve(lease, NEED) is None
+    context.store.journal.append(lease, reply())
+    shortage = context.store.budgets.reserve(lease, NEED)
     assert shortage is not None
-    assert not shortage.passing
+    assert not shortage.temporary
     assert shortage.budget_id == name
     assert next(iter(limits)) in shortage.detail
-    budget = context.budgets.get(name)
+    budget = context.store.budgets.get(name)
     assert budget is not None
     assert (budget.spent_cost_usd, budget.spent_tokens) == (Decimal("0.250000"), 250)
     assert budget.spent_requests == 1
@@ -93,27 +93,27 @@ def test_a_used_up_budget_says_what_is_lacking(context: Context, sweep, limits) 
 
 def test_a_key_pays_beside_its_sweep(context: Context, sweep) -> None:
     sweep(0, owner="key_k", max_cost_usd=Decimal(10))
-    with context.database.transaction() as connection:
+    with context.store.database.transaction() as connection:
         limits = BudgetLimits(max_requests=1)
-        context.budgets.set("key_k", limits, connection=connection)
+        context.store.budgets.set("key_k", limits, connection=connection)
     lease = claim(context)
-    assert context.budgets.reserve(lease, NEED) is None
-    context.journal.append(lease, reply())
-    shortage = context.budgets.reserve(lease, NEED)
+    assert context.store.budgets.reserve(lease, NEED) is None
+    context.store.journal.append(lease, reply())
+    shortage = context.store.budgets.reserve(lease, NEED)
     assert shortage is not None
     assert shortage.budget_id == "key_k"
     for name in ("key_k", "sweep_a"):
-        budget = context.budgets.get(name)
+        budget = context.store.budgets.get(name)
         assert budget is not None
         assert budget.spent_requests == 1
 
 
 def test_a_budget_that_comes_later_counts_what_was_spent(context: Context, sweep) -> None:
     name = sweep(0)
-    context.journal.append(claim(context), reply())
-    with context.database.transaction() as connection:
-        context.budgets.set(name, BudgetLimits(max_requests=5), connection=connection)
-    budget = context.budgets.get(name)
+    context.store.journal.append(claim(context), reply())
+    with context.store.database.transaction() as connection:
+        context.store.budgets.set(name, BudgetLimits(max_requests=5), connection=connection)
+    budget = context.store.budgets.get(name)
     assert budget is not None
     assert (budget.spent_requests, budget.spent_tokens) == (1, 250)
 
@@ -121,24 +121,24 @@ def test_a_budget_that_comes_later_counts_what_was_spent(context: Context, sweep
 def test_the_end_of_a_hold_gives_its_reservation_back(context: Context, sweep) -> None:
     sweep(0, 1, max_requests=1)
     first, second = claim(context), claim(context)
-    assert context.budgets.reserve(first, NEED) is None
-    assert context.budgets.reserve(second, NEED) is not None
-    context.leases.hand_back(first)
-    assert context.budgets.reserve(second, NEED) is None
-    with context.database.transaction() as connection:
-        context.jobs.cancel([second.job.id], connection=connection)
-    assert context.budgets.reserve(claim(context), NEED) is None
+    assert context.store.budgets.reserve(first, NEED) is None
+    assert context.store.budgets.reserve(second, NEED) is not None
+    context.store.leases.hand_back(first)
+    assert context.store.budgets.reserve(second, NEED) is None
+    with context.store.database.transaction() as connection:
+        context.store.jobs.cancel([second.job.id], connection=connection)
+    assert context.store.budgets.reserve(claim(context), NEED) is None
 
 
 def test_a_reply_that_came_too_late_was_paid_for(context: Context, sweep) -> None:
     name = sweep(0, max_requests=5)
     lease = claim(context)
-    with context.database.transaction() as connection:
-        context.jobs.cancel([lease.job.id], connection=connection)
+    with context.store.database.transaction() as connection:
+        context.store.jobs.cancel([lease.job.id], connection=connection)
     with pytest.raises(StaleLeaseError):
-        context.journal.append(lease, reply())
-    context.budgets.charge_lost(lease, reply().usage)
-    budget = context.budgets.get(name)
+        context.store.journal.append(lease, reply())
+    context.store.budgets.charge_lost(lease, reply().usage)
+    budget = context.store.budgets.get(name)
     assert budget is not None
     assert budget.spent_requests == 1
 
@@ -148,43 +148,44 @@ def test_a_stopped_sweep_passes_on_what_another_wants_and_holds_the_rest(
 ) -> None:
     sweep(0, 1, max_requests=1)
     sweep(1, 2, name="sweep_b", owner="key_b")
-    with context.database.transaction() as connection:
-        assert context.budgets.stop("sweep_a", "used up", connection=connection) == ["sweep_a"]
-    jobs = {job.seed: job for job in context.jobs.page(limit=10)}
+    with context.store.lifecycle.command() as connection:
+        assert context.store.lifecycle.exhaust("sweep_a", "used up", connection=connection) == [
+            "sweep_a"
+        ]
+    jobs = {job.seed: job for job in context.store.jobs.page(limit=10)}
     assert {seed: (job.state, job.payer, job.owner) for seed, job in jobs.items()} == {
-        0: ("held", "sweep_a", None),
+        0: ("on_hold", "sweep_a", None),
         1: ("queued", "sweep_b", "key_b"),
         2: ("queued", "sweep_b", "key_b"),
     }
-    assert context.sweeps.get("sweep_a").state == "limit"
-    with context.database.transaction() as connection:
-        context.sweeps.resume("sweep_a", connection=connection)
-    assert context.jobs.get(jobs[0].id).state == "queued"
+    assert context.store.sweeps.get("sweep_a").state == "budget_exhausted"
+    context.store.lifecycle.resume("sweep_a")
+    assert context.store.jobs.get(jobs[0].id).state == "queued"
 
 
 def test_a_held_job_that_is_wanted_again_is_paid_by_who_wants_it(context: Context, sweep) -> None:
     sweep(0, max_requests=1)
-    with context.database.transaction() as connection:
-        context.budgets.stop("sweep_a", "used up", connection=connection)
+    with context.store.lifecycle.command() as connection:
+        context.store.lifecycle.exhaust("sweep_a", "used up", connection=connection)
     sweep(0, name="sweep_b")
-    (job,) = context.jobs.page(limit=2)
+    (job,) = context.store.jobs.page(limit=2)
     assert (job.state, job.payer) == ("queued", "sweep_b")
 
 
 def test_many_workers_together_never_reserve_more_than_there_is(context: Context, sweep) -> None:
     name = sweep(*range(8), owner="key_k", max_requests=20)
-    with context.database.transaction() as connection:
-        context.budgets.set("key_k", BudgetLimits(max_requests=25), connection=connection)
+    with context.store.database.transaction() as connection:
+        context.store.budgets.set("key_k", BudgetLimits(max_requests=25), connection=connection)
     leases = [claim(context) for _ in range(8)]
     errors: list[BaseException] = []
 
     def work(lease: Lease) -> None:
         try:
             for sequence in range(5):
-                while (shortage := context.budgets.reserve(lease, NEED)) is not None:
-                    if not shortage.passing:
+                while (shortage := context.store.budgets.reserve(lease, NEED)) is not None:
+                    if not shortage.temporary:
                         return
-                context.journal.append(lease, reply(sequence))
+                context.store.journal.append(lease, reply(sequence))
         except BaseException as error:
             errors.append(error)
             raise
@@ -195,6 +196,6 @@ def test_many_workers_together_never_reserve_more_than_there_is(context: Context
     for thread in threads:
         thread.join()
     assert not errors
-    budget = context.budgets.get(name)
+    budget = context.store.budgets.get(name)
     assert budget is not None
     assert budget.spent_requests == 20

@@ -8,23 +8,23 @@ from buildarena_store import UnknownIdError
 
 def test_a_job_with_the_same_key_is_the_same_job(context: Context, new_job, add) -> None:
     (first,) = add(1)
-    with context.database.transaction() as connection:
-        added = context.jobs.add([new_job(1), new_job(2)], connection=connection)
+    with context.store.database.transaction() as connection:
+        added = context.store.jobs.add([new_job(1), new_job(2)], connection=connection)
     assert added == 1
-    assert context.jobs.get(first).seed == 1
-    assert len(context.jobs.page(limit=10)) == 2
+    assert context.store.jobs.get(first).seed == 1
+    assert len(context.store.jobs.page(limit=10)) == 2
 
 
 def test_an_unknown_id_is_named(context: Context) -> None:
     with pytest.raises(UnknownIdError, match="there is no job 'job_x'"):
-        context.jobs.get("job_x")
+        context.store.jobs.get("job_x")
 
 
 def test_pages_hold_every_job_once(context: Context, add) -> None:
     ids = set(add(*range(7)))
     seen: list[str] = []
     after = None
-    while page := context.jobs.page(limit=3, after=after):
+    while page := context.store.jobs.page(limit=3, after=after):
         seen += [job.id for job in page]
         after = (page[-1].created_at, page[-1].id)
     assert len(seen) == 7
@@ -33,33 +33,32 @@ def test_pages_hold_every_job_once(context: Context, add) -> None:
 
 def test_a_cancelled_job_is_opened_again_when_it_is_wanted_again(context, new_job, add) -> None:
     (job_id,) = add(1)
-    with context.database.transaction() as connection:
-        assert context.jobs.cancel([job_id], connection=connection) == [job_id]
-    assert context.jobs.get(job_id).outcome == "cancelled"
-    with context.database.transaction() as connection:
-        assert context.jobs.add([new_job(1)], connection=connection) == 1
-    assert context.jobs.get(job_id).state == "queued"
-    assert context.jobs.get(job_id).outcome is None
+    with context.store.database.transaction() as connection:
+        assert context.store.jobs.cancel([job_id], connection=connection) == [job_id]
+    assert context.store.jobs.get(job_id).outcome == "cancelled"
+    with context.store.database.transaction() as connection:
+        assert context.store.jobs.add([new_job(1)], connection=connection) == 1
+    assert context.store.jobs.get(job_id).state == "queued"
+    assert context.store.jobs.get(job_id).outcome is None
 
 
 def test_only_errored_jobs_are_retried(context: Context, add) -> None:
     (job_id,) = add(1)
-    with context.database.transaction() as connection:
-        assert not context.jobs.retry([job_id], connection=connection)
-    lease = context.leases.claim("construct", owner="w")
+    with context.store.database.transaction() as connection:
+        assert not context.store.jobs.retry([job_id], connection=connection)
+    lease = context.store.leases.claim("construct", owner="w")
     assert lease is not None
-    with context.database.transaction() as connection:
-        context.leases.give_up(lease, "no key", reason="missing_key", connection=connection)
-    assert context.jobs.get(job_id).outcome == "errored"
-    with context.database.transaction() as connection:
-        assert context.jobs.retry([job_id], connection=connection)
-    assert context.jobs.get(job_id).state == "queued"
+    context.store.leases.give_up(lease, "no key", reason="missing_key")
+    assert context.store.jobs.get(job_id).outcome == "errored"
+    with context.store.database.transaction() as connection:
+        assert context.store.jobs.retry([job_id], connection=connection)
+    assert context.store.jobs.get(job_id).state == "queued"
 
 
 def test_what_happened_to_a_job_is_told_in_order(context: Context, add) -> None:
     (job_id,) = add(1)
-    lease = context.leases.claim("construct", owner="w")
+    lease = context.store.leases.claim("construct", owner="w")
     assert lease is not None
-    context.leases.hand_back(lease)
-    kinds = [event.kind for event in context.events.after(0, job_id=job_id)]
+    context.store.leases.hand_back(lease)
+    kinds = [event.kind for event in context.store.events.after(0, job_id=job_id)]
     assert kinds == ["queued", "running", "queued"]

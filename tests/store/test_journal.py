@@ -28,15 +28,15 @@ def entry(sequence: int) -> JournalEntry:
 
 def test_a_reply_and_its_cost_are_written_together(context: Context, add) -> None:
     (job_id,) = add(1)
-    lease = context.leases.claim("construct", owner="w")
+    lease = context.store.leases.claim("construct", owner="w")
     assert lease is not None
-    context.journal.append(lease, entry(0))
-    context.journal.append(lease, entry(1))
+    context.store.journal.append(lease, entry(0))
+    context.store.journal.append(lease, entry(1))
     with pytest.raises(IntegrityError):
-        context.journal.append(lease, entry(1))
-    job = context.jobs.get(job_id)
+        context.store.journal.append(lease, entry(1))
+    job = context.store.jobs.get(job_id)
     assert (job.requests, job.input_tokens, job.cost_usd) == (2, 200, Decimal("0.500000"))
-    read = context.journal.read(job_id)
+    read = context.store.journal.read(job_id)
     assert [e.sequence for e in read] == [0, 1]
     assert read[0].reply == {"text": "ü"}
     assert read[0].usage == USAGE

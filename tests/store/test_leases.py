@@ -14,13 +14,13 @@ SCORE = JobScore(outcome="success", success=True, indicator=7.5)
 
 
 def claim(context: Context, owner: str = "w", hint: str | None = None) -> Lease:
-    lease = context.leases.claim("construct", owner=owner, hint=hint)
+    lease = context.store.leases.claim("construct", owner=owner, hint=hint)
     assert lease is not None
     return lease
 
 
 def expire(context: Context) -> None:
-    with context.database.transaction() as connection:
+    with context.store.database.transaction() as connection:
         connection.exec_driver_sql("UPDATE jobs SET lease_expires_at = now() - interval '1 s'")
 
 
@@ -29,7 +29,7 @@ def test_a_job_is_leased_to_one_worker_at_a_time(context: Context, add) -> None:
     taken: list[str] = []
 
     def work(owner: str) -> None:
-        while lease := context.leases.claim("construct", owner=owner):
+        while lease := context.store.leases.claim("construct", owner=owner):
             taken.append(lease.job.id)
 
     threads = [threading.Thread(target=work, args=(f"w{n}",)) for n in range(4)]
@@ -46,22 +46,22 @@ def test_the_hinted_job_is_taken_first_and_a_recovered_one_before_it(context, ad
     assert claim(context, hint=third).job.id == third
     lost = claim(context, hint=second)
     expire(context)
-    assert set(context.leases.recover()) == {second, third}
+    assert set(context.store.leases.recover()) == {second, third}
     assert claim(context, hint=first).job.id in {lost.job.id, third}
 
 
 def test_a_hint_that_is_gone_still_brings_another_job(context: Context, add) -> None:
     (only,) = add(1)
     assert claim(context, hint="job_gone").job.id == only
-    assert context.leases.claim("construct", owner="w") is None
-    assert context.leases.claim("simulate.mujoco", owner="w") is None
+    assert context.store.leases.claim("construct", owner="w") is None
+    assert context.store.leases.claim("simulate.mujoco", owner="w") is None
 
 
 def test_a_stale_lease_can_write_nothing(context: Context, add) -> None:
     (job_id,) = add(1)
     stale = claim(context, "slow")
     expire(context)
-    context.leases.recover()
+    context.store.leases.recover()
     fresh = claim(context, "quick")
     assert fresh.token > stale.token
     entry = JournalEntry(
@@ -74,86 +74,86 @@ def test_a_stale_lease_can_write_nothing(context: Context, add) -> None:
         latency_s=0,
     )
     with pytest.raises(StaleLeaseError):
-        context.journal.append(stale, entry)
-    with pytest.raises(StaleLeaseError), context.database.transaction() as connection:
-        context.results.finish(stale, SCORE, connection=connection)
+        context.store.journal.append(stale, entry)
+    with pytest.raises(StaleLeaseError), context.store.database.transaction() as connection:
+        context.store.results.finish(stale, SCORE, connection=connection)
     with pytest.raises(StaleLeaseError):
-        context.leases.hand_back(stale)
-    assert context.journal.read(job_id) == []
-    with context.database.transaction() as connection:
-        context.results.finish(fresh, SCORE, connection=connection)
-    job = context.jobs.get(job_id)
+        context.store.leases.hand_back(stale)
+    assert context.store.journal.read(job_id) == []
+    with context.store.database.transaction() as connection:
+        context.store.results.finish(fresh, SCORE, connection=connection)
+    job = context.store.jobs.get(job_id)
     assert (job.outcome, job.indicator) == ("success", 7.5)
 
 
 def test_a_scored_job_cannot_be_scored_again(context: Context, add) -> None:
     add(1)
     lease = claim(context)
-    with context.database.transaction() as connection:
-        context.results.finish(lease, SCORE, connection=connection)
-    with pytest.raises(StaleLeaseError), context.database.transaction() as connection:
-        context.results.finish(lease, SCORE, connection=connection)
-    assert context.leases.claim("construct", owner="w") is None
+    with context.store.database.transaction() as connection:
+        context.store.results.finish(lease, SCORE, connection=connection)
+    with pytest.raises(StaleLeaseError), context.store.database.transaction() as connection:
+        context.store.results.finish(lease, SCORE, connection=connection)
+    assert context.store.leases.claim("construct", owner="w") is None
 
 
 def test_heartbeats_keep_a_lease_and_tell_of_lost_ones(context: Context, add) -> None:
     add(1, 2)
     kept, lost = claim(context), claim(context)
-    with context.database.transaction() as connection:
-        context.jobs.cancel([lost.job.id], connection=connection)
-    assert context.leases.heartbeat([kept, lost]) == {kept.job.id: False}
-    context.leases.duration = timedelta(seconds=0.05)
-    context.leases.heartbeat([kept])
+    with context.store.database.transaction() as connection:
+        context.store.jobs.cancel([lost.job.id], connection=connection)
+    assert context.store.leases.heartbeat([kept, lost]) == {kept.job.id: False}
+    context.store.leases.duration = timedelta(seconds=0.05)
+    context.store.leases.heartbeat([kept])
     time.sleep(0.1)
-    assert context.leases.recover() == [kept.job.id]
+    assert context.store.leases.recover() == [kept.job.id]
 
 
 def test_a_job_that_keeps_losing_its_workers_is_given_up(context: Context, add) -> None:
     (job_id,) = add(1)
-    leases = Leases(context.database, duration_s=1, max_faults=2)
+    leases = Leases(context.store.database, duration_s=1, max_faults=2)
     for _ in range(2):
         assert leases.claim("construct", owner="w") is not None
         expire(context)
         leases.recover()
-    job = context.jobs.get(job_id)
+    job = context.store.jobs.get(job_id)
     assert (job.outcome, job.reason, job.success) == ("errored", "lost_worker", None)
-    assert [attempt.result for attempt in context.jobs.attempts(job_id)] == ["lost", "lost"]
+    assert [attempt.result for attempt in context.store.jobs.attempts(job_id)] == ["lost", "lost"]
 
 
 def test_a_fault_waits_before_the_next_attempt(context: Context, add) -> None:
     add(1)
     lease = claim(context)
-    assert context.leases.fault(lease, "outage", delay_s=30, reason="provider_outage")
-    assert context.leases.claim("construct", owner="w") is None
-    assert context.leases.to_announce("construct", 10) == []
+    assert context.store.leases.fault(lease, "outage", delay_s=30, reason="provider_outage")
+    assert context.store.leases.claim("construct", owner="w") is None
+    assert context.store.leases.to_notify("construct", 10) == []
 
 
 def test_handing_back_is_no_fault(context: Context, add) -> None:
     (job_id,) = add(1)
-    context.leases.hand_back(claim(context))
-    job = context.jobs.get(job_id)
+    context.store.leases.hand_back(claim(context))
+    job = context.store.jobs.get(job_id)
     assert (job.state, job.faults) == ("queued", 0)
 
 
 def test_waiting_jobs_are_announced_once(context: Context, add) -> None:
     ids = add(1, 2, 3)
-    assert set(context.leases.to_announce("construct", 10)) == set(ids)
-    assert context.leases.to_announce("construct", 10) == []
+    assert set(context.store.leases.to_notify("construct", 10)) == set(ids)
+    assert context.store.leases.to_notify("construct", 10) == []
 
 
 def test_a_cancelled_job_frees_its_worker(context: Context, add) -> None:
     (job_id,) = add(1)
     lease = claim(context)
-    with context.database.transaction() as connection:
-        context.jobs.cancel([job_id], connection=connection)
-    with pytest.raises(StaleLeaseError), context.database.transaction() as connection:
-        context.results.finish(lease, SCORE, connection=connection)
-    assert context.jobs.get(job_id).outcome == "cancelled"
+    with context.store.database.transaction() as connection:
+        context.store.jobs.cancel([job_id], connection=connection)
+    with pytest.raises(StaleLeaseError), context.store.database.transaction() as connection:
+        context.store.results.finish(lease, SCORE, connection=connection)
+    assert context.store.jobs.get(job_id).outcome == "cancelled"
 
 
 def test_a_job_that_gets_on_is_not_given_up(context: Context, add) -> None:
     (job_id,) = add(1)
-    leases = Leases(context.database, duration_s=1, max_faults=2)
+    leases = Leases(context.store.database, duration_s=1, max_faults=2)
     for sequence in range(4):
         lease = leases.claim("construct", owner="w")
         assert lease is not None
@@ -166,7 +166,7 @@ def test_a_job_that_gets_on_is_not_given_up(context: Context, add) -> None:
             usage=Usage(),
             latency_s=0,
         )
-        context.journal.append(lease, entry)
+        context.store.journal.append(lease, entry)
         expire(context)
         leases.recover()
-    assert context.jobs.get(job_id).state == "queued"
+    assert context.store.jobs.get(job_id).state == "queued"

@@ -11,7 +11,7 @@ from buildarena_store.database import alembic_config, expected_schema
 
 
 def test_the_migrations_make_the_tables_that_the_code_knows(context: Context) -> None:
-    command.check(alembic_config(context.database.url))
+    command.check(alembic_config(context.store.database.url))
 
 
 def test_another_schema_is_refused_with_advice(database_url: str) -> None:
@@ -35,10 +35,10 @@ def test_a_connection_that_the_server_dropped_is_noticed(
     context: Context, monkeypatch: pytest.MonkeyPatch, idle_s: float
 ) -> None:
     monkeypatch.setattr(database_module, "IDLE_S", idle_s)
-    other = Database(context.database.url)
+    other = Database(context.store.database.url)
 
     def backend() -> int:
-        with context.database.statement() as connection:
+        with context.store.database.statement() as connection:
             return int(connection.exec_driver_sql("SELECT pg_backend_pid()").scalar_one())
 
     before = backend()

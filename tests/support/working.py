@@ -5,8 +5,9 @@ from __future__ import annotations
 from concurrent.futures import ThreadPoolExecutor
 
 from buildarena_pipeline.catalog.models import load_registry
+from buildarena_pipeline.runtime.active_lease import LeaseKeeper
 from buildarena_pipeline.runtime.context import Context
-from buildarena_pipeline.runtime.job_runner import LeaseKeeper, StageRunner
+from buildarena_pipeline.runtime.job_runner import JobRunner
 from buildarena_simworker.simulate import SimulateHandler
 from buildarena_worker.construct import ConstructHandler
 
@@ -16,19 +17,22 @@ def work(context: Context, *, steps: int = 1000, threads: int = 1) -> None:
 
     Args:
         context: Where the jobs are.
-        steps: Stages at the most.
+        steps: Stages at most.
         threads: Stages at once.
     """
-    keeper = LeaseKeeper(context, lambda: None)
+    keeper = LeaseKeeper(context.store.leases, lambda: None)
     keeper.start()
     handlers = {
         "construct": ConstructHandler(context, load_registry()),
         "simulate": SimulateHandler(context),
     }
-    runners = {stage: StageRunner(context, made, keeper, "w") for stage, made in handlers.items()}
+    runners = {
+        stage: JobRunner(context.store.leases, made, keeper, "w")
+        for stage, made in handlers.items()
+    }
     with ThreadPoolExecutor(threads) as pool:
-        while steps > 0 and (waiting := context.jobs.page(limit=100, state="queued")):
+        while steps > 0 and (waiting := context.store.jobs.page(limit=100, state="queued")):
             waiting = waiting[:steps]
             steps -= len(waiting)
-            list(pool.map(lambda job: runners[job.stage].look(job.queue, job.id), waiting))
+            list(pool.map(lambda job: runners[job.stage].process_next(job.queue, job.id), waiting))
     keeper.stop()

@@ -13,23 +13,23 @@ def test_a_sweep_stops_at_its_budget_and_goes_on_with_more(context, submissions)
     spec = SweepSpec(**WISH, seeds=[0, 1, 2, 3, 4, 5], budget=Budget(max_requests=20))
     sweep_id = submissions.submit_sweep(spec).sweep.id
     work(context, threads=4)
-    assert context.sweeps.get(sweep_id).state == "limit"
-    budget = context.budgets.get(sweep_id)
+    assert context.store.sweeps.get(sweep_id).state == "budget_exhausted"
+    budget = context.store.budgets.get(sweep_id)
     assert budget.spent_requests == 20
-    held = context.jobs.page(limit=10, state="held")
+    held = context.store.jobs.page(limit=10, state="on_hold")
     assert held
     assert all("max_requests is 20" in job.detail for job in held if job.requests)
 
     again = submissions.submit_sweep(
-        spec.model_copy(update={"budget": Budget(max_requests=10_000)}), take_up=True
+        spec.model_copy(update={"budget": Budget(max_requests=10_000)}), resume=True
     )
-    assert (again.sweep.id, again.taken_up) == (sweep_id, True)
+    assert (again.sweep.id, again.resumed) == (sweep_id, True)
     work(context, threads=4)
-    assert context.sweeps.progress(sweep_id).outcomes == {"success": 6}
-    jobs = context.jobs.page(limit=10)
+    assert context.store.sweeps.progress(sweep_id).outcomes == {"success": 6}
+    jobs = context.store.jobs.page(limit=10)
     # No reply was paid for twice: the budget knows of no request that the journals lack.
-    journaled = sum(len(context.journal.read(job.id)) for job in jobs)
-    assert context.budgets.get(sweep_id).spent_requests == journaled
+    journaled = sum(len(context.store.journal.read(job.id)) for job in jobs)
+    assert context.store.budgets.get(sweep_id).spent_requests == journaled
     assert journaled == sum(job.requests for job in jobs)
 
 
@@ -37,9 +37,9 @@ def test_a_small_token_budget_stops_before_the_first_request(context, submission
     spec = SweepSpec(**WISH, seeds=[0], budget=Budget(max_tokens=1000))
     sweep_id = submissions.submit_sweep(spec).sweep.id
     work(context, threads=4)
-    assert context.sweeps.get(sweep_id).state == "limit"
-    assert context.budgets.get(sweep_id).spent_requests == 0
-    (job,) = context.jobs.page(limit=2)
+    assert context.store.sweeps.get(sweep_id).state == "budget_exhausted"
+    assert context.store.budgets.get(sweep_id).spent_requests == 0
+    (job,) = context.store.jobs.page(limit=2)
     assert job.outcome is None
     assert "max_tokens is 1,000, 0 is spent" in job.detail
 
@@ -48,7 +48,7 @@ def test_taking_up_a_finished_sweep_does_nothing_twice(context, submissions) -> 
     spec = SweepSpec(**WISH, seeds=[0])
     first = submissions.submit_sweep(spec)
     work(context, threads=4)
-    second = submissions.submit_sweep(spec, take_up=True)
+    second = submissions.submit_sweep(spec, resume=True)
     assert (second.sweep.id, second.added) == (first.sweep.id, 0)
-    other = submissions.submit_sweep(SweepSpec(**WISH, seeds=[0, 1]), take_up=True)
-    assert (other.taken_up, other.added) == (False, 1)
+    other = submissions.submit_sweep(SweepSpec(**WISH, seeds=[0, 1]), resume=True)
+    assert (other.resumed, other.added) == (False, 1)

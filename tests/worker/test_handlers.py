@@ -25,7 +25,7 @@ def run(context, submissions) -> Callable[..., Job]:
             )
         )
         work(context)
-        return context.jobs.get(job.id)
+        return context.store.jobs.get(job.id)
 
     return submit_and_work
 
@@ -33,8 +33,8 @@ def run(context, submissions) -> Callable[..., Job]:
 def test_a_bridge_is_built_simulated_scored_and_verified(context, run) -> None:
     job = run()
     assert (job.outcome, job.success) == ("success", True)
-    assert job.manifest["machine"] == context.jobs.artifacts(job.id)["machine"]
-    assert job.requests == len(context.journal.read(job.id))
+    assert job.manifest["machine"] == context.store.jobs.artifacts(job.id)["machine"]
+    assert job.requests == len(context.store.journal.read(job.id))
     report = Verifier(context).verify(job.id)
     assert report["ok"], [check for check in report["checks"] if not check["ok"]]
     names = {check["name"] for check in report["checks"]}
@@ -56,7 +56,7 @@ def test_a_bridge_is_built_simulated_scored_and_verified(context, run) -> None:
 )
 def test_any_changed_figure_is_found(context, run, statement, check) -> None:
     job = run()
-    with context.database.transaction() as connection:
+    with context.store.database.transaction() as connection:
         connection.exec_driver_sql(statement)
     report = Verifier(context).verify(job.id)
     assert not report["ok"]
@@ -76,7 +76,7 @@ def test_a_limit_keeps_what_was_built(context, run) -> None:
     job = run(limits={"max_requests": 20})
     assert (job.outcome, job.reason, job.requests) == ("limit", "max_requests", 20)
     assert job.metrics["parts"] > 5
-    assert "machine" in context.jobs.artifacts(job.id)
+    assert "machine" in context.store.jobs.artifacts(job.id)
     assert Verifier(context).verify(job.id)["ok"]
 
 
@@ -98,7 +98,7 @@ def test_a_missing_key_ends_the_job_as_errored(run, monkeypatch) -> None:
 def test_a_driven_car_is_tried_three_times_and_the_best_counts(context, run) -> None:
     job = run(task="transport-1")
     assert job.outcome == "success"
-    records = context.rollouts.read(job.id)
+    records = context.store.rollouts.read(job.id)
     assert [(record.number, record.final) for record in records] == [
         (0, False),
         (1, False),

@@ -110,9 +110,9 @@ def test_lures_in_a_good_machine_go_the_whole_road_as_text(
         JobSpec(task="lift-1", model="builtin/expert", simulator="mujoco")
     )
     work(context)
-    job = context.jobs.get(job.id)
+    job = context.store.jobs.get(job.id)
     assert job.outcome == "success", job.detail
-    transcript = context.artifacts.get(context.jobs.artifacts(job.id)["transcript"]).decode()
+    transcript = context.artifacts.get(context.store.jobs.artifacts(job.id)["transcript"]).decode()
     assert "etc/passwd" in transcript
     written = {path.relative_to(tmp_path) for path in tmp_path.rglob("*") if path.is_file()}
     assert all(re.fullmatch(r"data/artifacts/..\/[0-9a-f]{64}", str(path)) for path in written)

@@ -9,7 +9,7 @@ import pytest
 from provider_standin import ProviderStandIn
 
 from buildarena_pipeline.catalog.models import ModelEntry, Price, ProviderEntry
-from buildarena_pipeline.errors import PassingFaultError, PermanentFaultError
+from buildarena_pipeline.errors import PermanentError, TransientError
 from buildarena_store import Usage
 from buildarena_worker.errors import ConstructionFailedError
 from buildarena_worker.providers.provider import ProviderClient
@@ -91,7 +91,7 @@ def test_passing_faults_are_retried(wire, fault, client) -> None:
 def test_retries_are_bounded(client) -> None:
     with (
         ProviderStandIn("idle", fault=lambda _: "500") as standin,
-        pytest.raises(PassingFaultError, match="5 tries failed") as caught,
+        pytest.raises(TransientError, match="5 tries failed") as caught,
     ):
         client(standin).complete(ask())
     assert standin.counts.requests == 5
@@ -111,7 +111,7 @@ def test_a_silent_provider_times_out(client) -> None:
 def test_refusals_that_stay_are_not_retried(fault, reason, client) -> None:
     with (
         ProviderStandIn("idle", fault=lambda _: fault) as standin,
-        pytest.raises(PermanentFaultError) as caught,
+        pytest.raises(PermanentError) as caught,
     ):
         client(standin).complete(ask())
     assert standin.counts.requests == 1
@@ -122,7 +122,7 @@ def test_refusals_that_stay_are_not_retried(fault, reason, client) -> None:
 def test_a_missing_key_is_named() -> None:
     entry = ModelEntry(name="x/y", provider="x", model="y")
     provider = ProviderEntry(wire="openai", base_url="http://127.0.0.1:9", key="NO_SUCH_KEY")
-    with pytest.raises(PermanentFaultError, match="NO_SUCH_KEY"):
+    with pytest.raises(PermanentError, match="NO_SUCH_KEY"):
         ProviderClient(entry, provider)
 
 

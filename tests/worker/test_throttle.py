@@ -82,7 +82,7 @@ throttle.HOLD_S = 1
 
 async def hold():
     async with throttle.Throttle(sys.argv[1], "p", start=1).slot():
-        print("held", flush=True)
+        print("on_hold", flush=True)
         await asyncio.sleep(60)
 
 asyncio.run(hold())

@@ -8,7 +8,7 @@ from scripted import Scripted, call
 from buildarena_benchmark import builtin_tasks
 from buildarena_geometry import Machine
 from buildarena_pipeline.catalog.prompt_packs import PromptPack, PromptPacks
-from buildarena_pipeline.errors import PermanentFaultError, StartupError
+from buildarena_pipeline.errors import PermanentError, StartupError
 from buildarena_simulation import simulate
 from buildarena_worker.builtin.expert import reply as expert
 from buildarena_worker.builtin.reading import read_situation
@@ -163,7 +163,7 @@ def test_a_workflow_that_cannot_be_loaded_is_named(tmp_path: Path) -> None:
     file.write_text("raise RuntimeError('no')")
     with pytest.raises(StartupError, match=r"workflow .own. can.t be loaded .* no"):
         Workflows({"own": f"{file}:Own"})
-    with pytest.raises(PermanentFaultError, match="no workflow 'other'; it has five-role"):
+    with pytest.raises(PermanentError, match="no workflow 'other'; it has five-role"):
         Workflows({}).find("other")
 
 

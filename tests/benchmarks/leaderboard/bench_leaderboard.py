@@ -91,11 +91,11 @@ def fill(context: Context, count: int) -> None:
                 "refused_actions": 4,
             }
         )
-    with context.database.transaction() as connection:
+    with context.store.database.transaction() as connection:
         for start in range(0, count, CHUNK):
             connection.execute(insert(jobs), rows[start : start + CHUNK])
         connection.execute(update(jobs).values(finished_at=jobs.c.created_at))
-    with context.database.engine.connect() as connection:
+    with context.store.database.engine.connect() as connection:
         connection.execution_options(isolation_level="AUTOCOMMIT").execute(text("VACUUM ANALYZE"))
 
 
@@ -140,7 +140,7 @@ def measure(url: str, requests: int) -> dict[str, object]:
         assert answer.status_code in {200, 304}, answer.text
 
     def end_a_job(number: int) -> None:
-        with context.database.transaction() as connection:
+        with context.store.database.transaction() as connection:
             connection.execute(
                 update(jobs)
                 .where(jobs.c.id == f"job_{number * 37:08d}")

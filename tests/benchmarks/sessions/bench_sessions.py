@@ -67,7 +67,7 @@ class Service:
         )
         stack.callback(self.worker.wait)
         stack.callback(self.worker.terminate)
-        while not [w for w in self.context.workers.all() if w.alive]:
+        while not [w for w in self.context.store.workers.all() if w.alive]:
             time.sleep(POLL_S)
         self._submissions = Submissions(self.context, load_registry(registry_file))
 
@@ -84,7 +84,7 @@ class Service:
         return sweep.id, time.monotonic() - started
 
     def _built(self, sweep_id: str) -> int:
-        return self.context.sweeps.progress(sweep_id).stages.get("simulate queued", 0)
+        return self.context.store.sweeps.progress(sweep_id).stages.get("simulate queued", 0)
 
 
 def _measure(service: Service, provider: int, sessions: int, latency_s: float) -> dict[str, object]:
@@ -94,12 +94,12 @@ def _measure(service: Service, provider: int, sessions: int, latency_s: float) -
     sweep_id, wall_s = service.run(list(range(sessions)))
     busy_s, provider_s = _cpu_s(worker) - before[0], _cpu_s(provider) - before[1]
     context = service.context
-    requests = [job.requests for job in context.jobs.page(limit=1000, sweep_id=sweep_id)]
+    requests = [job.requests for job in context.store.jobs.page(limit=1000, sweep_id=sweep_id)]
     turns, ideal_s = sum(requests), max(requests) * latency_s
     waits = [
         entry.latency_s
-        for job in context.jobs.page(limit=20, sweep_id=sweep_id)
-        for entry in context.journal.read(job.id)
+        for job in context.store.jobs.page(limit=20, sweep_id=sweep_id)
+        for entry in context.store.journal.read(job.id)
     ]
     return {
         "sessions": sessions,
@@ -147,7 +147,7 @@ def _backends(
     )
     context = open_context(settings)
     stack.callback(context.close)
-    context.database.migrate()
+    context.store.database.migrate()
     environment = {
         **os.environ,
         "BUILDARENA_DATABASE_URL": postgres.url,

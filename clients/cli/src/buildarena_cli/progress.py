@@ -44,7 +44,7 @@ def ended(sweep: dict[str, Any]) -> bool:
     progress = sweep["progress"]
     moving = [name for name in progress["stages"] if not name.endswith(" held")]
     return not moving and (
-        progress["done"] == progress["total"] or sweep["state"] in {"limit", "paused"}
+        progress["done"] == progress["total"] or sweep["state"] in {"budget_exhausted", "paused"}
     )
 
 

@@ -1,7 +1,7 @@
-"""The road of a job: its stages and leases, the queues, submissions, and the embedded servers.
+"""The life cycle of a job: what can be submitted, its stages and leases, and the queues.
 
-Postgres is the truth; messages only say "look at this job". A lost message, a doubled message
-or a dead worker therefore loses nothing: the sweeper announces again what waits too long.
+Postgres is the truth; messages are only hints. A lost message, a doubled message or a dead worker
+therefore loses nothing: the reaper notifies workers again of what waits too long.
 """
 
 __version__ = "0.1.0"

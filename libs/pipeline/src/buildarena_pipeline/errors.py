@@ -1,4 +1,4 @@
-"""What can go wrong on the road of a job."""
+"""What can go wrong between a submission and its score."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ class StartupError(PipelineError):
     """A process can't start; the message is one sentence that says why and what to do."""
 
 
-class PassingFaultError(PipelineError):
-    """An infrastructure fault that another attempt may not meet: never scored, retried.
+class TransientError(PipelineError):
+    """An infrastructure fault that another attempt may not meet: never scored, retryable.
 
     Attributes:
         reason: Its class, for example ``provider_outage``.
@@ -28,7 +28,7 @@ class PassingFaultError(PipelineError):
         self.delay_s = delay_s
 
 
-class PermanentFaultError(PipelineError):
+class PermanentError(PipelineError):
     """An infrastructure fault that no other attempt can mend: the job ends as errored.
 
     Attributes:

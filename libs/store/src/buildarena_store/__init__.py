@@ -1,7 +1,7 @@
 """What BuildArena keeps: tables, repositories and artifacts.
 
 Postgres is the truth about jobs; the artifact store keeps the large results by content hash.
-Rows leave this room as frozen dataclasses, never as database objects.
+Rows leave this package as frozen dataclasses, never as database objects.
 """
 
 from buildarena_store.accounts.budgets import Budget, BudgetLimits, Budgets, Need, Shortage
@@ -14,17 +14,26 @@ from buildarena_store.errors import (
     SchemaVersionError,
     StaleLeaseError,
     StoreError,
+    TransitionError,
     UnknownIdError,
 )
 from buildarena_store.events import Event, Events
 from buildarena_store.figures import STAGE_SECONDS, Figures, ServiceFigures
 from buildarena_store.jobs.external_calls import ExternalCall, ExternalCalls
-from buildarena_store.jobs.jobs import Job, JobKey, Jobs, NewJob
+from buildarena_store.jobs.job import Job, JobKey, NewJob
+from buildarena_store.jobs.jobs import Jobs
 from buildarena_store.jobs.journal import Journal, JournalEntry, Usage
 from buildarena_store.jobs.leases import Lease, Leases
 from buildarena_store.jobs.results import JobScore, Results
 from buildarena_store.jobs.rollouts import RolloutRecord, RolloutRequest, Rollouts
 from buildarena_store.jobs.verifications import Verification, Verifications
+from buildarena_store.states import (
+    JobState,
+    Outcome,
+    Stage,
+    SweepState,
+)
+from buildarena_store.store import Store, open_store
 from buildarena_store.sweeps.sweeps import NewSweep, Sweep, SweepProgress, Sweeps
 from buildarena_store.tasks import StoredTask, Tasks
 from buildarena_store.text import clean
@@ -52,6 +61,7 @@ __all__ = [
     "Job",
     "JobKey",
     "JobScore",
+    "JobState",
     "Jobs",
     "Journal",
     "JournalEntry",
@@ -61,6 +71,7 @@ __all__ = [
     "Need",
     "NewJob",
     "NewSweep",
+    "Outcome",
     "Results",
     "RolloutRecord",
     "RolloutRequest",
@@ -69,13 +80,17 @@ __all__ = [
     "SchemaVersionError",
     "ServiceFigures",
     "Shortage",
+    "Stage",
     "StaleLeaseError",
+    "Store",
     "StoreError",
     "StoredTask",
     "Sweep",
     "SweepProgress",
+    "SweepState",
     "Sweeps",
     "Tasks",
+    "TransitionError",
     "UnknownIdError",
     "Usage",
     "Verification",
@@ -83,4 +98,5 @@ __all__ = [
     "WorkerInfo",
     "Workers",
     "clean",
+    "open_store",
 ]

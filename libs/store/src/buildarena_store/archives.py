@@ -26,7 +26,8 @@ from buildarena_store import events
 from buildarena_store.artifacts import ArtifactStore
 from buildarena_store.database import Database, expected_schema
 from buildarena_store.errors import StoreError, UnknownIdError
-from buildarena_store.jobs.jobs import JobKey
+from buildarena_store.jobs.job import JobKey
+from buildarena_store.states import JobState, SweepState
 from buildarena_store.tables import (
     artifacts,
     attempts,
@@ -135,7 +136,7 @@ def read_archive(
 ) -> Imported:
     """Takes a sweep in: all that is not there yet, or nothing.
 
-    Jobs that had not ended come in as held, and the sweep as paused: resuming it goes on from
+    Jobs that had not ended come in on hold, and the sweep as paused: resuming it goes on from
     their journals.
 
     Args:
@@ -228,13 +229,13 @@ def _take_in(
             raise ArchiveError(f"{table.name} speaks of jobs that are not in the archive")
         _insert(connection, table, (row for row in rows if row["job_id"] in added))
     (sweep,) = _rows(archive, sweeps)
-    open_jobs = any(row["state"] != "done" for row in job_rows)
+    open_jobs = any(row["state"] != JobState.DONE for row in job_rows)
     arriving = {
         **sweep,
         "id": sweep_id,
         "owner": owner,
         "request_key": None,
-        "state": "paused" if open_jobs else sweep["state"],
+        "state": SweepState.PAUSED if open_jobs else sweep["state"],
     }
     if _insert(connection, sweeps, [arriving], returning=sweeps.c.id):
         _insert(connection, sweep_jobs, [{"sweep_id": sweep_id, "job_id": id_} for id_ in ids])
@@ -246,9 +247,14 @@ def _arriving(row: dict[str, Any], sweep_id: str, owner: str | None) -> dict[str
     key = JobKey(**{name: row[name] for name in JobKey.__dataclass_fields__})
     if row["id"] != key.job_id:
         raise ArchiveError(f"job {row['id']} is not what its id says: it was changed")
-    held = {"state": "held", "lease_owner": None, "lease_expires_at": None, "nudged_at": None}
-    ended = row["state"] == "done"
-    return {**row, "owner": owner, "payer": sweep_id, **({} if ended else held)}
+    waiting = {
+        "state": JobState.ON_HOLD,
+        "lease_owner": None,
+        "lease_expires_at": None,
+        "notified_at": None,
+    }
+    ended = row["state"] == JobState.DONE
+    return {**row, "owner": owner, "payer": sweep_id, **({} if ended else waiting)}
 
 
 def _insert(

@@ -12,6 +12,8 @@ from sqlalchemy import Connection, Integer, Row, cast, func, select, text
 
 from buildarena_benchmark.leaderboard import Trial
 from buildarena_store.database import Database
+from buildarena_store.rows import columns_of, value_of
+from buildarena_store.states import JobState
 from buildarena_store.tables import board_changes, jobs, rollouts, sweep_jobs, tasks
 
 CHUNK = 5000
@@ -92,14 +94,14 @@ class Boards:
             marks = connection.execute(select(oldest.op("::")(text("text")), uploaded)).one()
             new_mark, task_versions = int(marks[0]), int(marks[1])
             if mark is None:
-                query = select(*_COLUMNS).where(jobs.c.state == "done")
+                query = select(*_COLUMNS).where(jobs.c.state == JobState.DONE)
                 put = list(_trials(connection, query))
                 return BoardFeed(mark=new_mark, put=put, gone=(), task_versions=task_versions)
             changed = select(board_changes.c.job_id).where(board_changes.c.transaction >= mark)
             ids = {row.job_id for row in connection.execute(changed.distinct())}
             put = []
             if ids:
-                query = select(*_COLUMNS).where(jobs.c.state == "done", jobs.c.id.in_(ids))
+                query = select(*_COLUMNS).where(jobs.c.state == JobState.DONE, jobs.c.id.in_(ids))
                 put = list(_trials(connection, query))
         gone = sorted(ids - {trial.job_id for trial in put})
         return BoardFeed(mark=new_mark, put=put, gone=gone, task_versions=task_versions)
@@ -109,7 +111,7 @@ class Boards:
         members = select(sweep_jobs.c.job_id).where(sweep_jobs.c.sweep_id == sweep_id)
         query = (
             select(*_COLUMNS)
-            .where(jobs.c.state == "done", jobs.c.id.in_(members))
+            .where(jobs.c.state == JobState.DONE, jobs.c.id.in_(members))
             .order_by(jobs.c.task, jobs.c.model, jobs.c.seed, jobs.c.id)
         )
         simulated = (
@@ -141,20 +143,16 @@ class Boards:
             limit: Rows at the most.
             scored_only: Leave out jobs that ended without a score.
         """
-        columns = [board_changes.c[name] for name in BoardChange.__dataclass_fields__]
-        query = select(*columns).where(board_changes.c.track == track)
+        query = select(*columns_of(BoardChange, board_changes)).where(
+            board_changes.c.track == track
+        )
         if before is not None:
             query = query.where(board_changes.c.id < before)
         if scored_only:
             query = query.where(board_changes.c.kind != "unscored")
         query = query.order_by(board_changes.c.id.desc()).limit(limit)
         with self._database.transaction() as connection:
-            return [
-                BoardChange(
-                    **{name: getattr(row, name) for name in BoardChange.__dataclass_fields__}
-                )
-                for row in connection.execute(query)
-            ]
+            return [value_of(BoardChange, row) for row in connection.execute(query)]
 
     def manifest_values(
         self, track: str, task: str, task_version: str, model: str

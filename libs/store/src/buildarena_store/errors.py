@@ -19,6 +19,24 @@ class UnknownIdError(StoreError):
         self.id = id_
 
 
+class TransitionError(StoreError):
+    """A sweep or job is in a state that it may not leave for the one that was asked for.
+
+    Attributes:
+        kind: ``sweep`` or ``job``.
+        id: Which one.
+        state: The state it is in.
+        to: What it was to become.
+    """
+
+    def __init__(self, kind: str, id_: str, state: str, to: str) -> None:
+        super().__init__(f"{kind} {id_} is {state}; it can't become {to}")
+        self.kind = kind
+        self.id = id_
+        self.state = state
+        self.to = to
+
+
 class StaleLeaseError(StoreError):
     """A write came from an owner whose lease on the job is over; nothing was written."""
 

@@ -11,7 +11,7 @@ from sqlalchemy import Connection, cast, func, insert, literal, or_, select
 from sqlalchemy.dialects.postgresql import JSONB
 
 from buildarena_store.database import Database
-from buildarena_store.rows import bound_texts
+from buildarena_store.rows import bound_texts, columns_of, value_of
 from buildarena_store.tables import events, sweep_jobs
 
 now = func.clock_timestamp()
@@ -73,9 +73,9 @@ class Events:
             last_id: Only events with greater ids.
             job_id: Only this job's.
             sweep_id: Only this sweep's own and its jobs'.
-            limit: Rows at the most.
+            limit: Rows at most.
         """
-        query = select(events).where(events.c.id > last_id)
+        query = select(*columns_of(Event, events)).where(events.c.id > last_id)
         if job_id is not None:
             query = query.where(events.c.job_id == job_id)
         if sweep_id is not None:
@@ -83,7 +83,4 @@ class Events:
             query = query.where(or_(events.c.sweep_id == sweep_id, events.c.job_id.in_(members)))
         query = query.order_by(events.c.id).limit(limit)
         with self._database.transaction() as connection:
-            return [
-                Event(**{name: getattr(row, name) for name in Event.__dataclass_fields__})
-                for row in connection.execute(query)
-            ]
+            return [value_of(Event, row) for row in connection.execute(query)]

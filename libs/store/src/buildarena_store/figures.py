@@ -9,6 +9,7 @@ from sqlalchemy import ARRAY, Connection, Double, case, cast, func, select, text
 
 from buildarena_store import events
 from buildarena_store.database import Database
+from buildarena_store.states import JobState, Outcome
 from buildarena_store.tables import attempts, jobs, sweeps
 
 STAGE_SECONDS = (0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 30, 60, 120, 300, 600, 1800, 3600)
@@ -48,12 +49,12 @@ class ModelUse:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StageTimes:
-    """How long holds on jobs lasted.
+    """How long attempts at jobs took.
 
     Attributes:
         stage: ``construct`` or ``simulate``.
         result: How they ended.
-        counts: Holds in each class of STAGE_SECONDS, and in the last those above all.
+        counts: Attempts in each class of STAGE_SECONDS, and in the last those above all.
         total_s: Sum of their durations.
     """
 
@@ -94,7 +95,7 @@ class Figures:
 
 
 def _jobs(connection: Connection) -> list[JobCount]:
-    errored = case((jobs.c.outcome == "errored", func.coalesce(jobs.c.reason, "")), else_="")
+    errored = case((jobs.c.outcome == Outcome.ERRORED, func.coalesce(jobs.c.reason, "")), else_="")
     where = [
         jobs.c.state,
         jobs.c.stage,
@@ -109,7 +110,7 @@ def _queues(connection: Connection) -> list[QueueDepth]:
     waits = func.extract("epoch", events.now - func.min(jobs.c.available_at))
     query = (
         select(jobs.c.queue, func.count().label("jobs"), func.greatest(waits, 0).label("oldest_s"))
-        .where(jobs.c.state == "queued")
+        .where(jobs.c.state == JobState.QUEUED)
         .group_by(jobs.c.queue)
     )
     return [
@@ -139,19 +140,19 @@ def _models(connection: Connection) -> list[ModelUse]:
 
 
 def _stages(connection: Connection) -> list[StageTimes]:
-    lasted = cast(func.extract("epoch", attempts.c.ended_at - attempts.c.started_at), Double)
+    took = cast(func.extract("epoch", attempts.c.ended_at - attempts.c.started_at), Double)
     bounds = cast([float(bound) for bound in STAGE_SECONDS], ARRAY(Double))
-    number = func.width_bucket(lasted, bounds).label("number")
+    number = func.width_bucket(took, bounds).label("number")
     key = [attempts.c.stage, attempts.c.result]
     query = (
-        select(*key, number, func.count().label("holds"), func.sum(lasted).label("total_s"))
+        select(*key, number, func.count().label("attempts"), func.sum(took).label("total_s"))
         .where(attempts.c.ended_at.is_not(None))
         .group_by(*key, number)
     )
     found: dict[tuple[str, str], tuple[list[int], float]] = {}
     for row in connection.execute(query):
         counts, total = found.get((row.stage, row.result), ([0] * (len(STAGE_SECONDS) + 1), 0.0))
-        counts[row.number] = row.holds
+        counts[row.number] = row.attempts
         found[row.stage, row.result] = (counts, total + row.total_s)
     return [
         StageTimes(stage=stage, result=result, counts=counts, total_s=total)

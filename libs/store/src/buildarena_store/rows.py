@@ -1,14 +1,41 @@
-"""Many values as one: arrays and tables that travel to Postgres as a single parameter."""
+"""Rows as values: from a row to a dataclass, and many values as one parameter."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
-from sqlalchemy import ARRAY, BindParameter, Column, Text, bindparam, column, func, literal
+from sqlalchemy import (
+    ARRAY,
+    BindParameter,
+    Column,
+    Table,
+    Text,
+    bindparam,
+    column,
+    func,
+    literal,
+)
 from sqlalchemy.dialects.postgresql import JSONB
 from sqlalchemy.sql.selectable import TableValuedAlias
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+    Value = TypeVar("Value", bound=DataclassInstance)
+else:
+    Value = TypeVar("Value")
+
+
+def columns_of(kind: type[Value], table: Table) -> list[Column[Any]]:
+    """The columns of a table that a dataclass has fields of the same names for."""
+    return [table.c[name] for name in kind.__dataclass_fields__]
+
+
+def value_of(kind: type[Value], row: Any) -> Value:
+    """A row as a dataclass whose fields have the names of its columns."""
+    return kind(**{name: getattr(row, name) for name in kind.__dataclass_fields__})
 
 
 def bound_texts(values: Sequence[str]) -> BindParameter[Sequence[str]]:

@@ -22,6 +22,8 @@ from sqlalchemy import (
 )
 from sqlalchemy.dialects.postgresql import JSON, JSONB
 
+from buildarena_store.states import JobState
+
 metadata = MetaData(
     naming_convention={
         "pk": "pk_%(table_name)s",
@@ -74,7 +76,7 @@ jobs = Table(
     Column("lease_token", BigInteger, nullable=False, server_default=text("0")),
     _time("lease_expires_at"),
     _time("available_at", now=True),
-    _time("nudged_at"),
+    _time("notified_at"),
     # What it scored.
     Column("success", Boolean),
     Column("indicator", Double),
@@ -101,18 +103,18 @@ Index(
     jobs.c.queue,
     jobs.c.created_at,
     jobs.c.id,
-    postgresql_where=jobs.c.state == "queued",
+    postgresql_where=jobs.c.state == JobState.QUEUED,
 )
 Index(
     "ix_jobs_recovered",
     jobs.c.queue,
-    postgresql_where=(jobs.c.state == "queued") & (jobs.c.faults > 0),
+    postgresql_where=(jobs.c.state == JobState.QUEUED) & (jobs.c.faults > 0),
 )
-Index("ix_jobs_leased", jobs.c.lease_expires_at, postgresql_where=jobs.c.state == "running")
+Index("ix_jobs_leased", jobs.c.lease_expires_at, postgresql_where=jobs.c.state == JobState.RUNNING)
 Index("ix_jobs_board", jobs.c.track, jobs.c.task, jobs.c.model)
 Index("ix_jobs_newest", jobs.c.created_at.desc(), jobs.c.id)
-Index("ix_jobs_payer", jobs.c.payer, postgresql_where=jobs.c.state != "done")
-Index("ix_jobs_owner", jobs.c.owner, postgresql_where=jobs.c.state != "done")
+Index("ix_jobs_payer", jobs.c.payer, postgresql_where=jobs.c.state != JobState.DONE)
+Index("ix_jobs_owner", jobs.c.owner, postgresql_where=jobs.c.state != JobState.DONE)
 
 sweeps = Table(
     "sweeps",
@@ -280,7 +282,7 @@ verifications = Table(
     Column("report", JSONB),
     _time("created_at", now=True),
     _time("claimed_at"),
-    _time("nudged_at"),
+    _time("notified_at"),
     _time("finished_at"),
 )
 

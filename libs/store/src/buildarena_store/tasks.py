@@ -1,4 +1,4 @@
-"""Users' own tasks: every version that was ever uploaded, for jobs may still need it."""
+"""Custom tasks: every version that was ever uploaded, for jobs may still need it."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from sqlalchemy import Select, select, tuple_
 from sqlalchemy.dialects.postgresql import distinct_on, insert
 
 from buildarena_store.database import Database
+from buildarena_store.rows import columns_of, value_of
 from buildarena_store.tables import tasks
 
 TaskKey = tuple[str, str]
@@ -82,12 +83,8 @@ class Tasks:
             return {(row.name, row.version): row.document for row in connection.execute(query)}
 
     def _read(self, query: Select[Any]) -> list[StoredTask]:
-        names = StoredTask.__dataclass_fields__
         with self._database.transaction() as connection:
-            return [
-                StoredTask(**{name: getattr(row, name) for name in names})
-                for row in connection.execute(query)
-            ]
+            return [value_of(StoredTask, row) for row in connection.execute(query)]
 
 
-_COLUMNS = [tasks.c[name] for name in StoredTask.__dataclass_fields__]
+_COLUMNS = columns_of(StoredTask, tasks)

@@ -13,6 +13,7 @@ from sqlalchemy.types import DateTime, Double
 
 from buildarena_store import events
 from buildarena_store.database import Database
+from buildarena_store.rows import value_of
 from buildarena_store.tables import workers
 
 FORGOTTEN_AFTER = timedelta(hours=1)
@@ -99,10 +100,7 @@ class Workers:
         alive = (workers.c.seen_at > events.now - self._alive_for).label("alive")
         query = select(workers, alive).order_by(workers.c.seen_at.desc())
         with self._database.transaction() as connection:
-            return [
-                WorkerInfo(**{name: getattr(row, name) for name in WorkerInfo.__dataclass_fields__})
-                for row in connection.execute(query)
-            ]
+            return [value_of(WorkerInfo, row) for row in connection.execute(query)]
 
 
 def _ahead(own_time: datetime) -> ColumnElement[float]:

@@ -29,7 +29,7 @@ def main() -> None:
         tracing = Tracing("api", settings.otlp_endpoint)
         registry = load_registry(settings.models_file)
         context = open_context(settings, pool_size=POOL_SIZE)
-        context.database.require_schema()
+        context.store.database.require_schema()
     except (StartupError, SchemaVersionError, ValueError) as error:
         sys.exit(f"api: {error}")
     except OperationalError as error:

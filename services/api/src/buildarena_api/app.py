@@ -34,7 +34,7 @@ from buildarena_pipeline import __version__
 from buildarena_pipeline.agents.sessions import ExternalSessions
 from buildarena_pipeline.catalog.models import ModelRegistry
 from buildarena_pipeline.runtime.context import Context
-from buildarena_pipeline.runtime.reaper import Sweeper
+from buildarena_pipeline.runtime.reaper import Reaper
 from buildarena_pipeline.submission.submission import Submissions
 
 DESCRIPTION = """Find out whether language models can engineer: submit task x model x seed jobs,
@@ -49,7 +49,7 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
         context: Connections; they stay the caller's to close.
         registry: The models that jobs can name.
     """
-    sweeper = Sweeper(context)
+    sweeper = Reaper(context)
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
@@ -75,7 +75,7 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
     app.state.context = context
     app.state.hub = EventHub(context)
     app.state.registry = registry
-    app.state.boards = BoardCache(context.results.boards, context.catalogue)
+    app.state.boards = BoardCache(context.store.results.boards, context.tasks)
     app.state.submissions = Submissions(context, registry)
     app.state.external = ExternalSessions(context)
     app.state.rate_limits = RateLimits(

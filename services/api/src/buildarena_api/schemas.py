@@ -3,13 +3,33 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from buildarena_store import Budget, Job, SweepProgress
+from buildarena_store import Budget, Job, JobState, Outcome, Stage, SweepProgress, SweepState
+from buildarena_store.states import AttemptResult
 
-Outcome = Literal["success", "unsuccessful", "construction_failed", "limit", "errored", "cancelled"]
+# Spelled out, because the contract lists the values in place.
+AnyOutcome = Literal[
+    Outcome.SUCCESS,
+    Outcome.UNSUCCESSFUL,
+    Outcome.CONSTRUCTION_FAILED,
+    Outcome.LIMIT,
+    Outcome.ERRORED,
+    Outcome.CANCELLED,
+]
+AnyJobState = Literal[JobState.QUEUED, JobState.ON_HOLD, JobState.RUNNING, JobState.DONE]
+AnyStage = Literal[Stage.CONSTRUCT, Stage.SIMULATE]
+DONE: Final = "done"
+"""The state that is shown of an active sweep whose jobs have all ended."""
+AnySweepState = Literal[
+    SweepState.ACTIVE,
+    SweepState.PAUSED,
+    SweepState.BUDGET_EXHAUSTED,
+    SweepState.CANCELLED,
+    "done",
+]
 
 
 class _Answer(BaseModel):
@@ -28,14 +48,14 @@ class UsageView(_Answer):
 
 
 class AttemptView(_Answer):
-    """One worker's hold on a job."""
+    """One worker's attempt at a job's stage."""
 
-    token: int = Field(description="Fencing token: grows with every hold")
+    token: int = Field(description="Fencing token: grows with every attempt")
     stage: str
     worker: str
     started_at: datetime
     ended_at: datetime | None
-    result: str | None = Field(description="done, lost, fault or handed_back")
+    result: str | None = Field(description=", ".join(AttemptResult))
     detail: str | None
 
 
@@ -49,9 +69,9 @@ class JobView(_Answer):
     track: str
     seed: int
     owner: str | None = Field(description="Id of the API key that submitted it")
-    state: Literal["queued", "held", "running", "done"]
-    stage: Literal["construct", "simulate"]
-    outcome: Outcome | None = Field(description="How it ended; null while it goes on")
+    state: AnyJobState
+    stage: AnyStage
+    outcome: AnyOutcome | None = Field(description="How it ended; null while it goes on")
     reason: str | None = Field(description="Class of the failure, if any")
     detail: str | None
     success: bool | None
@@ -139,16 +159,13 @@ class BudgetView(_Answer):
         )
 
 
-SweepState = Literal["active", "paused", "limit", "cancelled", "done"]
-
-
 class SweepView(_Answer):
     """A sweep with its progress."""
 
     id: str = Field(examples=["sweep_0a1b2c3d4e5f60718293"])
     name: str
-    state: SweepState = Field(
-        description="limit when a budget is used up; done when every job has ended"
+    state: AnySweepState = Field(
+        description="budget_exhausted when a budget is used up; done when every job has ended"
     )
     owner: str | None = Field(description="Id of the API key that submitted it")
     created_at: datetime
@@ -163,7 +180,7 @@ class SweepAccepted(_Answer):
     id: str
     jobs: int = Field(description="Jobs it consists of")
     added: int = Field(description="Jobs that are new; the others had been submitted before")
-    taken_up: bool = Field(
+    resumed: bool = Field(
         default=False, description="Whether an earlier submission of the same jobs goes on"
     )
 

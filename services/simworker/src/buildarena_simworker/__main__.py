@@ -6,12 +6,12 @@ import argparse
 import sys
 
 from buildarena_geometry import __version__ as geometry_version
-from buildarena_pipeline.broker.queues import simulate_queue
 from buildarena_pipeline.errors import StartupError
 from buildarena_pipeline.runtime.settings import Settings
 from buildarena_pipeline.runtime.worker_process import WorkerSpec, run_worker
 from buildarena_simulation import ENGINES, SIMULATION_VERSION
 from buildarena_simworker.simulate import SimulateHandler
+from buildarena_store.states import simulate_queue
 
 
 def main() -> None:

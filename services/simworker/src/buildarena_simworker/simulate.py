@@ -10,10 +10,9 @@ from typing import Any
 
 from buildarena_benchmark import Score, Task, failed_score, score
 from buildarena_geometry import KeyPress, Machine
-from buildarena_pipeline.broker.queues import CONSTRUCT
-from buildarena_pipeline.errors import PassingFaultError, PermanentFaultError
+from buildarena_pipeline.errors import PermanentError, TransientError
+from buildarena_pipeline.runtime.active_lease import ActiveLease
 from buildarena_pipeline.runtime.context import Context
-from buildarena_pipeline.runtime.job_runner import Hold
 from buildarena_pipeline.runtime.scoring import best_rollout, rollout_score, task_of
 from buildarena_simulation import (
     SIMULATION_VERSION,
@@ -27,8 +26,10 @@ from buildarena_store import (
     ArtifactInfo,
     ArtifactMissingError,
     RolloutRecord,
+    Stage,
     StaleLeaseError,
 )
+from buildarena_store.states import CONSTRUCT_QUEUE
 
 PARQUET = "application/vnd.apache.parquet"
 
@@ -53,39 +54,39 @@ class SimulateHandler:
     def __init__(self, context: Context) -> None:
         self._context = context
 
-    def __call__(self, hold: Hold) -> None:
+    def __call__(self, active: ActiveLease) -> None:
         """Simulates the job's waiting rollout; the job ends, or goes back to its session."""
-        context, lease = self._context, hold.lease
+        context, lease = self._context, active.lease
         job = lease.job
-        records = context.rollouts.read(job.id)
+        records = context.store.rollouts.read(job.id)
         waiting = [record for record in records if record.finished_at is None]
         if not waiting:
-            raise PermanentFaultError("no rollout waits", reason="no_rollout")
+            raise PermanentError("no rollout waits", reason="no_rollout")
         request = waiting[0]
         same = _same_trial(request, records)
         if same is not None:
             values = {name: getattr(same, name) for name in MADE} | {"wall_s": 0.0}
             trajectory = None
         else:
-            task = task_of(job, context.catalogue)
-            done = self._simulate(task, request, lambda: _require(hold))
+            task = task_of(job, context.tasks)
+            done = self._simulate(task, request, lambda: _require(active))
             values, trajectory = _values(request, done), done.trajectory
-        with context.database.transaction() as connection:
+        with context.store.database.transaction() as connection:
             if trajectory is not None:
                 made = {f"trajectory-{request.number}": trajectory}
-                context.results.attach(job.id, made, connection=connection)
-            completed = context.rollouts.complete(
+                context.store.results.attach(job.id, made, connection=connection)
+            completed = context.store.rollouts.complete(
                 job.id, request.number, connection=connection, **values
             )
             if request.final:
                 final = rollout_score(job, best_rollout([*records, completed]))
-                context.results.finish(lease, final, connection=connection)
+                context.store.results.finish(lease, final, connection=connection)
             else:
-                context.leases.queue_again(
-                    lease, stage="construct", queue=CONSTRUCT, connection=connection
+                context.store.leases.queue_again(
+                    lease, stage=Stage.CONSTRUCT, queue=CONSTRUCT_QUEUE, connection=connection
                 )
         if not request.final:
-            context.queues.nudge(CONSTRUCT, job.id)
+            context.queues.notify_one(CONSTRUCT_QUEUE, job.id)
 
     def _simulate(
         self, task: Task, request: RolloutRecord, require_held: Callable[[], None]
@@ -108,7 +109,7 @@ class SimulateHandler:
                 wall_s=time.perf_counter() - started,
             )
         except SimulationError as error:
-            raise PassingFaultError(str(error), reason="simulator_fault", delay_s=2.0) from error
+            raise TransientError(str(error), reason="simulator_fault", delay_s=2.0) from error
         kept = self._context.artifacts.put(trajectory.to_parquet(), PARQUET)
         return _Done(
             score=score(task, machine, trajectory),
@@ -121,7 +122,7 @@ class SimulateHandler:
         try:
             document: dict[str, Any] = json.loads(self._context.artifacts.get(digest))
         except ArtifactMissingError as error:
-            raise PassingFaultError(str(error), reason="artifact_missing", delay_s=5.0) from error
+            raise TransientError(str(error), reason="artifact_missing", delay_s=5.0) from error
         return Machine.from_document(document)
 
 
@@ -170,9 +171,9 @@ def _controls(presses: Sequence[Any] | None) -> tuple[KeyPress, ...] | None:
     return None if presses is None else tuple(KeyPress(**press) for press in presses)
 
 
-def _require(hold: Hold) -> None:
-    if hold.over:
-        raise StaleLeaseError(hold.lease.job.id, hold.lease.token)
+def _require(active: ActiveLease) -> None:
+    if active.lost:
+        raise StaleLeaseError(active.lease.job.id, active.lease.token)
 
 
 def _trace(trajectory: Trajectory) -> list[list[float]]:

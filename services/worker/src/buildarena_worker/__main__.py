@@ -7,13 +7,13 @@ from collections.abc import Callable, Mapping
 
 from buildarena_geometry import FEEDBACK_VERSION
 from buildarena_geometry import __version__ as geometry_version
-from buildarena_pipeline.broker.queues import CONSTRUCT, VERIFY
 from buildarena_pipeline.catalog.models import load_registry
 from buildarena_pipeline.errors import StartupError
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.job_runner import StageHandler
 from buildarena_pipeline.runtime.settings import Settings
 from buildarena_pipeline.runtime.worker_process import WorkerSpec, run_worker
+from buildarena_store.states import CONSTRUCT_QUEUE, VERIFY_QUEUE
 from buildarena_worker.construct import ConstructHandler
 from buildarena_worker.verify import VerificationRunner
 
@@ -28,12 +28,12 @@ def main() -> None:
             return ConstructHandler(context, registry)
 
         def make_others(context: Context) -> Mapping[str, Callable[[str], None]]:
-            return {VERIFY: VerificationRunner(context).look}
+            return {VERIFY_QUEUE: VerificationRunner(context).look}
 
         run_worker(
             WorkerSpec(
                 kind="construct",
-                queues=[CONSTRUCT, VERIFY],
+                queues=[CONSTRUCT_QUEUE, VERIFY_QUEUE],
                 pool="threads",
                 concurrency=settings.sessions_per_worker,
                 make_handler=make_handler,

@@ -1,4 +1,4 @@
-"""The budget guard: no model request is sent before its means are put aside."""
+"""The budget guard: no model request is sent before its means are reserved."""
 
 from __future__ import annotations
 
@@ -6,16 +6,16 @@ import time
 from collections.abc import Callable
 from decimal import Decimal
 
-from buildarena_pipeline.runtime.job_runner import Hold
+from buildarena_pipeline.runtime.active_lease import ActiveLease
 from buildarena_store import Budgets, Need, Shortage
 from buildarena_worker.errors import LeaseLostError, WorkerError
 from buildarena_worker.session.messages import Request
 
 WAIT_S = 0.2
 CHARACTERS_PER_TOKEN = 3
-"""English has about four; fewer puts aside a little too much rather than too little."""
+"""English has about four; fewer reserves a little too much rather than too little."""
 OUTPUT_TOKENS = 4096
-"""Put aside for a reply whose length is not limited: more than nearly all replies have."""
+"""Reserved for a reply whose length is not limited: more than nearly all replies have."""
 
 Price = Callable[[int, int], Decimal]
 """US dollars for input and output tokens."""
@@ -38,30 +38,30 @@ class BudgetGuard:
 
     Args:
         budgets: Where budgets are.
-        hold: The hold on the job. A budget that its sweep is given meanwhile takes effect with the
-            next heartbeat.
+        active: The lease on the job. A budget that its sweep is given meanwhile takes effect with
+            the next heartbeat.
         price: What tokens of the job's model cost.
     """
 
-    def __init__(self, budgets: Budgets, hold: Hold, price: Price) -> None:
+    def __init__(self, budgets: Budgets, active: ActiveLease, price: Price) -> None:
         self._budgets = budgets
-        self._hold = hold
+        self._active = active
         self._price = price
 
     def __call__(self, request: Request) -> None:
-        """Puts aside what a request may cost; waits while open requests may give back enough.
+        """Reserves what a request may cost; waits while open requests may give back enough.
 
         Raises:
             BudgetUsedUpError: No budget is left for it.
-            LeaseLostError: The hold ended while it waited.
+            LeaseLostError: The lease ended while it waited.
         """
-        if not self._hold.budgeted:
+        if not self._active.budgeted:
             return
         need = self._need(request)
-        while (shortage := self._budgets.reserve(self._hold.lease, need)) is not None:
-            if not shortage.passing:
+        while (shortage := self._budgets.reserve(self._active.lease, need)) is not None:
+            if not shortage.temporary:
                 raise BudgetUsedUpError(shortage)
-            if self._hold.over:
+            if self._active.lost:
                 raise LeaseLostError("the lease ended while the job waited for its budget")
             time.sleep(WAIT_S)
 

@@ -13,7 +13,7 @@ PATIENCE_S = 1.0
 """Whoever waited so long goes in all the same: nothing that happens inside can stop the others."""
 
 
-class Turnstile:
+class ConcurrencyGate:
     """Keeps a crowd of sessions from all working at the same time.
 
     Model replies come in bursts. If all sessions that got one work at once, each is done only when
@@ -32,7 +32,7 @@ class Turnstile:
         self._mine = threading.local()
 
     @contextmanager
-    def inside(self) -> Iterator[None]:
+    def acquired(self) -> Iterator[None]:
         """Waits for a place and has it inside the block."""
         self._enter()
         try:
@@ -41,7 +41,7 @@ class Turnstile:
             self._leave()
 
     @contextmanager
-    def outside(self) -> Iterator[None]:
+    def released(self) -> Iterator[None]:
         """Gives the thread's place away inside the block, in which it waits for something."""
         self._leave()
         try:

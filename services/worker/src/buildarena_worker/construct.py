@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from decimal import Decimal
 
-from buildarena_pipeline.broker.queues import simulate_queue
 from buildarena_pipeline.catalog.models import ModelRegistry
 from buildarena_pipeline.catalog.prices import price_usd
 from buildarena_pipeline.catalog.prompt_packs import PromptPack, PromptPacks
-from buildarena_pipeline.errors import PermanentFaultError, StartupError
+from buildarena_pipeline.errors import PermanentError, StartupError
+from buildarena_pipeline.runtime.active_lease import ActiveLease
 from buildarena_pipeline.runtime.context import Context
-from buildarena_pipeline.runtime.job_runner import Hold
 from buildarena_pipeline.runtime.machine_documents import machine_bytes
 from buildarena_pipeline.runtime.scoring import failure_score, rollout_score, task_of
 from buildarena_simulation import Trajectory
@@ -19,11 +18,14 @@ from buildarena_store import (
     JobScore,
     JournalEntry,
     Lease,
+    Outcome,
     RolloutRequest,
+    Stage,
     StaleLeaseError,
 )
+from buildarena_store.states import AttemptResult, JobState, simulate_queue
 from buildarena_worker.budget_guard import BudgetGuard, BudgetUsedUpError, Price
-from buildarena_worker.concurrency_gate import Turnstile
+from buildarena_worker.concurrency_gate import ConcurrencyGate
 from buildarena_worker.errors import (
     ConstructionFailedError,
     JournalMismatchError,
@@ -53,53 +55,53 @@ class ConstructHandler:
         self._clients = ModelClients(registry, context.settings.broker_url)
         self._packs = PromptPacks(context.settings.prompt_packs)
         self._workflows = Workflows(context.settings.workflows)
-        self._turnstile = Turnstile()
+        self._gate = ConcurrencyGate()
 
-    def __call__(self, hold: Hold) -> None:
+    def __call__(self, active: ActiveLease) -> None:
         """Runs the job's session as far as it gets: to a simulation, or to its end."""
-        lease, job = hold.lease, hold.lease.job
-        guard = BudgetGuard(self._context.budgets, hold, self._price_of(job))
-        task = task_of(job, self._context.catalogue)
+        lease, job = active.lease, active.lease.job
+        guard = BudgetGuard(self._context.store.budgets, active, self._price_of(job))
+        task = task_of(job, self._context.tasks)
         pack = pack_of(job, self._packs)
         io = SessionIO(
             client=self._clients.for_config(job.model_config),
-            entries=[] if lease.first else self._context.journal.read(job.id),
-            rollouts=[] if lease.first else self._context.rollouts.read(job.id),
+            entries=[] if lease.first else self._context.store.journal.read(job.id),
+            rollouts=[] if lease.first else self._context.store.rollouts.read(job.id),
             append=lambda entry: self._append(lease, entry),
-            still_held=lambda: not hold.over,
+            still_held=lambda: not active.lost,
             limits=job.limits,
             load_trajectory=lambda digest: Trajectory.from_parquet(
                 self._context.artifacts.get(digest)
             ),
             reserve=guard,
-            waiting=self._turnstile.outside,
+            waiting=self._gate.released,
         )
         session = Session(task=task, seed=job.seed, model_config=job.model_config, pack=pack, io=io)
         try:
             workflow = self._workflows.find(str(job.track_config["workflow"]))
-            with self._turnstile.inside():
+            with self._gate.acquired():
                 end = run_session(session, workflow, loop_of(job))
         except SuspendedError as suspended:
             self._suspend(lease, session, suspended)
         except BudgetUsedUpError as used_up:
             self._stop(lease, used_up)
         except ConstructionFailedError as failure:
-            self._fail(lease, session, "construction_failed", failure.reason, str(failure))
+            self._fail(lease, session, Outcome.CONSTRUCTION_FAILED, failure.reason, str(failure))
         except LimitReachedError as limit:
-            self._fail(lease, session, "limit", limit.limit, str(limit))
+            self._fail(lease, session, Outcome.LIMIT, limit.limit, str(limit))
         except LeaseLostError as lost:
             raise StaleLeaseError(job.id, lease.token) from lost
         except JournalMismatchError as mismatch:
-            raise PermanentFaultError(str(mismatch), reason="journal_mismatch") from mismatch
+            raise PermanentError(str(mismatch), reason="journal_mismatch") from mismatch
         else:
             self._finish(lease, session, end)
 
     def _append(self, lease: Lease, entry: JournalEntry) -> None:
         try:
-            self._context.journal.append(lease, entry)
+            self._context.store.journal.append(lease, entry)
         except StaleLeaseError:
             # The job was cancelled or lost meanwhile, but its budgets did pay for the reply.
-            self._context.budgets.charge_lost(lease, entry.usage)
+            self._context.store.budgets.charge_lost(lease, entry.usage)
             raise
 
     def _price_of(self, job: Job) -> Price:
@@ -117,17 +119,19 @@ class ConstructHandler:
     def _stop(self, lease: Lease, used_up: BudgetUsedUpError) -> None:
         """Hands the job back as it is and stops the sweep whose budget is used up."""
         context, detail = self._context, str(used_up)
-        with context.database.transaction() as connection:
-            context.leases.advance(
+        with context.store.lifecycle.command() as connection:
+            context.store.leases.advance(
                 lease,
+                to=JobState.QUEUED,
                 connection=connection,
-                result="limit",
+                result=AttemptResult.BUDGET_EXHAUSTED,
                 note=detail,
-                state="queued",
-                nudged_at=None,
+                notified_at=None,
                 detail=detail,
             )
-            context.budgets.stop(used_up.shortage.budget_id, detail, connection=connection)
+            context.store.lifecycle.exhaust(
+                used_up.shortage.budget_id, detail, connection=connection
+            )
 
     def _suspend(self, lease: Lease, session: Session, suspended: SuspendedError) -> None:
         """Keeps the machine and hands the job to its simulator, all in one transaction."""
@@ -149,20 +153,22 @@ class ConstructHandler:
             controls=controls,
         )
         queue = simulate_queue(engine)
-        with context.database.transaction() as connection:
+        with context.store.database.transaction() as connection:
             made = {"machine": machine, "transcript": transcript}
-            context.results.attach(job.id, made, connection=connection)
-            context.rollouts.request(job.id, request, connection=connection)
-            context.leases.queue_again(
+            context.store.results.attach(job.id, made, connection=connection)
+            context.store.rollouts.request(job.id, request, connection=connection)
+            context.store.leases.queue_again(
                 lease,
-                stage="simulate",
+                stage=Stage.SIMULATE,
                 queue=queue,
                 connection=connection,
                 **_counts(session),
             )
-        context.queues.nudge(queue, job.id)
+        context.queues.notify_one(queue, job.id)
 
-    def _fail(self, lease: Lease, session: Session, outcome: str, reason: str, detail: str) -> None:
+    def _fail(
+        self, lease: Lease, session: Session, outcome: Outcome, reason: str, detail: str
+    ) -> None:
         """Scores a session that ended without a simulation; what it built is kept."""
         score = failure_score(
             lease.job, session.task, session.machine, outcome=outcome, reason=reason, detail=detail
@@ -177,9 +183,9 @@ class ConstructHandler:
         made = {"transcript": context.artifacts.put(session.transcript.to_json(), JSON)}
         if session.machine is not None and session.machine.started:
             made["machine"] = context.artifacts.put(machine_bytes(session.machine), JSON)
-        with context.database.transaction() as connection:
-            context.results.attach(job.id, made, connection=connection)
-            context.results.finish(lease, score, connection=connection, **_counts(session))
+        with context.store.database.transaction() as connection:
+            context.store.results.attach(job.id, made, connection=connection)
+            context.store.results.finish(lease, score, connection=connection, **_counts(session))
 
 
 def _counts(session: Session) -> dict[str, object]:
@@ -195,15 +201,15 @@ def pack_of(job: Job, packs: PromptPacks) -> PromptPack:
     """The job's prompt pack, as long as it is still the one that the job was submitted with.
 
     Raises:
-        PermanentFaultError: It has changed, or it is not on this worker.
+        PermanentError: It has changed, or it is not on this worker.
     """
     name, wanted = str(job.track_config["prompts"]), job.track_config["prompts_digest"]
     try:
         pack = packs.load(name)
     except StartupError as error:
-        raise PermanentFaultError(str(error), reason="no_prompts") from error
+        raise PermanentError(str(error), reason="no_prompts") from error
     if pack.digest != wanted:
-        raise PermanentFaultError(
+        raise PermanentError(
             f"prompt pack {pack.name!r} has changed since the job was submitted: submit it again "
             "to run it on the new track",
             reason="prompts_changed",

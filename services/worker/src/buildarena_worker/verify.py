@@ -17,9 +17,9 @@ import structlog
 from buildarena_benchmark import failed_score, score
 from buildarena_geometry import KeyPress, Machine
 from buildarena_pipeline.agents.workbench import Workbench
-from buildarena_pipeline.broker.queues import EXTERNAL
 from buildarena_pipeline.catalog.prompt_packs import PromptPacks
-from buildarena_pipeline.errors import PermanentFaultError
+from buildarena_pipeline.catalog.tracks import EXTERNAL_WORKFLOW
+from buildarena_pipeline.errors import PermanentError
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.machine_documents import machine_bytes
 from buildarena_pipeline.runtime.scoring import best_rollout, task_of
@@ -81,20 +81,20 @@ class Verifier:
         Returns:
             ``{"ok", "checks": [{"name", "ok", "kept", "found"}]}``.
         """
-        job = self._context.jobs.get(job_id)
+        job = self._context.store.jobs.get(job_id)
         checks = self._checks(job)
         return {"ok": all(check.ok for check in checks), "checks": [asdict(c) for c in checks]}
 
     def _checks(self, job: Job) -> list[Check]:
         if job.state != "done" or job.success is None:
             return [_compare("scored", kept=True, found=False)]
-        if job.track_config["workflow"] == EXTERNAL:
+        if job.track_config["workflow"] == EXTERNAL_WORKFLOW:
             return self._external_checks(job)
         try:
             session, io, failure = self._replay(job)
-        except (JournalMismatchError, PermanentFaultError, SuspendedError) as error:
+        except (JournalMismatchError, PermanentError, SuspendedError) as error:
             return [Check(name="replay", ok=False, kept="the journal", found=str(error))]
-        records = self._context.rollouts.read(job.id)
+        records = self._context.store.rollouts.read(job.id)
         checks = [
             _compare(
                 "transcript", self._artifact(job, "transcript"), _hash(session.transcript.to_json())
@@ -113,14 +113,14 @@ class Verifier:
 
     def _external_checks(self, job: Job) -> list[Check]:
         """An outside agent's calls are made again; what it thought in between is its own."""
-        with self._context.database.transaction() as connection:
-            calls = self._context.external.read(job.id, connection=connection)
+        with self._context.store.database.transaction() as connection:
+            calls = self._context.store.external_calls.read(job.id, connection=connection)
         bench = Workbench()
         again = [bench.call(call.machine, call.tool, call.arguments) for call in calls]
         checks = [_compare("calls", [_said(call) for call in calls], [_said(c) for c in again])]
         chosen = bench.result()
         machine = None if chosen is None else chosen[1]
-        records = self._context.rollouts.read(job.id)
+        records = self._context.store.rollouts.read(job.id)
         if machine is not None:
             for record in records:
                 checks += self._rollout_checks(job, record, machine, None)
@@ -129,8 +129,8 @@ class Verifier:
     def _replay(self, job: Job) -> tuple[Session, _ReplayIO, Exception | None]:
         io = _ReplayIO(
             client=None,
-            entries=self._context.journal.read(job.id),
-            rollouts=self._context.rollouts.read(job.id),
+            entries=self._context.store.journal.read(job.id),
+            rollouts=self._context.store.rollouts.read(job.id),
             append=lambda _: None,
             still_held=lambda: True,
             limits=job.limits,
@@ -140,7 +140,7 @@ class Verifier:
         )
         io.machines = []
         session = Session(
-            task=task_of(job, self._context.catalogue),
+            task=task_of(job, self._context.tasks),
             seed=job.seed,
             model_config=job.model_config,
             pack=pack_of(job, self._packs),
@@ -164,7 +164,7 @@ class Verifier:
         checks = [_compare(f"{name}: machine", record.machine_hash, _hash(machine_bytes(machine)))]
         simulated_by = (record.versions or {}).get("simulation")
         checks.append(_compare(f"{name}: simulation version", simulated_by, SIMULATION_VERSION))
-        task = task_of(job, self._context.catalogue)
+        task = task_of(job, self._context.tasks)
         try:
             trajectory = simulate(
                 machine,
@@ -189,12 +189,12 @@ class Verifier:
             best = best_rollout(records)
             wanted = {name: _plain(getattr(best, name)) for name in SCORED}
         else:
-            failed = failed_score(task_of(job, self._context.catalogue), machine)
+            failed = failed_score(task_of(job, self._context.tasks), machine)
             wanted = {name: _plain(getattr(failed, name)) for name in SCORED}
         return [_compare(f"score: {n}", _plain(getattr(job, n)), v) for n, v in wanted.items()]
 
     def _artifact(self, job: Job, name: str) -> str | None:
-        return self._context.jobs.artifacts(job.id).get(name)
+        return self._context.store.jobs.artifacts(job.id).get(name)
 
 
 class VerificationRunner:
@@ -210,7 +210,7 @@ class VerificationRunner:
 
     def look(self, verification_id: str) -> None:
         """Does a verification, unless another worker has it."""
-        claimed = self._context.verifications.claim(verification_id)
+        claimed = self._context.store.verifications.claim(verification_id)
         if claimed is None:
             return
         try:
@@ -219,7 +219,7 @@ class VerificationRunner:
             log.exception("verification_failed", job=claimed.job_id)
             failed = Check(name="verification", ok=False, kept=None, found=f"it broke off: {error}")
             report = {"ok": False, "checks": [asdict(failed)]}
-        self._context.verifications.finish(verification_id, report)
+        self._context.store.verifications.finish(verification_id, report)
 
 
 SCORED = ("success", "indicator", "metrics", "flags")

@@ -18,10 +18,10 @@ from buildarena_cli.errors import CommandError
 from buildarena_cli.local.stack import Stack
 from buildarena_cli.output import console, leaderboard_tables
 from buildarena_cli.progress import exit_code, watch_sweep
-from buildarena_pipeline.broker.queues import CONSTRUCT, simulate_queue
 from buildarena_pipeline.catalog.tracks import SIMULATORS
 from buildarena_pipeline.runtime.settings import Settings
 from buildarena_store import Database
+from buildarena_store.states import CONSTRUCT_QUEUE, simulate_queue
 
 DEMO_SWEEP = {
     "name": "demo",
@@ -92,7 +92,7 @@ def start_worker(
 ) -> None:
     """Serve a queue from this process, with the servers that BUILDARENA_* name, until Ctrl-C."""
     programs = {
-        CONSTRUCT: ["buildarena_worker"],
+        CONSTRUCT_QUEUE: ["buildarena_worker"],
         **{
             simulate_queue(engine): ["buildarena_simworker", "--engine", engine]
             for engine in SIMULATORS

@@ -72,11 +72,11 @@ def run_sweep(
         if dry_run:
             _show_estimate(client.post("/v1/sweeps/estimate", sweep.content), as_json=as_json)
             return
-        accepted = client.post("/v1/sweeps?take_up=true", sweep.content)
+        accepted = client.post("/v1/sweeps?resume=true", sweep.content)
     except RefusedError as error:
         raise sweep.refused(error) from error
     if not as_json:
-        news = "taken up again" if accepted["taken_up"] else f"{accepted['added']} of them new"
+        news = "resumed" if accepted["resumed"] else f"{accepted['added']} of them new"
         console.print(f"{accepted['id']}: {accepted['jobs']} jobs, {news}")
     if detach:
         if as_json:
@@ -221,7 +221,7 @@ def _show_estimate(estimate: dict[str, Any], *, as_json: bool) -> None:
 
 
 def _tell_of_limit(sweep: dict[str, Any]) -> None:
-    if sweep["state"] == "limit":
+    if sweep["state"] == "budget_exhausted":
         console.print(
             f"The budget is used up: `buildarena sweep resume {sweep['id']} --max-cost-usd …` "
             "gives it more.",

@@ -10,7 +10,8 @@ from buildarena_benchmark.leaderboard.published import (
     published_overall,
     published_rows,
 )
-from buildarena_benchmark.leaderboard.trials import SCORED, Trial
+from buildarena_benchmark.leaderboard.trials import Trial
+from buildarena_benchmark.outcomes import SCORED
 
 __all__ = [
     "SCORED",

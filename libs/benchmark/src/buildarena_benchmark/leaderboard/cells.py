@@ -13,7 +13,8 @@ from zlib import crc32
 import numpy as np
 from numpy.typing import NDArray
 
-from buildarena_benchmark.leaderboard.trials import SIMULATED, Trial
+from buildarena_benchmark.leaderboard.trials import Trial
+from buildarena_benchmark.outcomes import SIMULATED, Outcome
 from buildarena_benchmark.statistics import (
     cost_per_success,
     mean_interval,
@@ -131,8 +132,8 @@ def summarise(trials: Sequence[Trial], *, include_flagged: bool = False) -> Cell
         decoding=first.decoding,
         trials=number,
         ended=len(trials),
-        errored=outcomes["errored"],
-        cancelled=outcomes["cancelled"],
+        errored=outcomes[Outcome.ERRORED],
+        cancelled=outcomes[Outcome.CANCELLED],
         flagged=sum(trial.scored for trial in trials) - number,
         simulated=sum(trial.outcome in SIMULATED for trial in counted),
         successes=successes,

@@ -8,10 +8,8 @@ from datetime import datetime
 from types import MappingProxyType
 from typing import Any, Final
 
-SCORED: Final = frozenset({"success", "unsuccessful", "construction_failed", "limit"})
-"""Outcomes that count in the averages; faults and cancelled jobs never do."""
-SIMULATED: Final = frozenset({"success", "unsuccessful"})
-"""Outcomes of machines that were finished and tried."""
+from buildarena_benchmark.outcomes import SCORED
+
 _NOTHING: Final[Mapping[str, Any]] = MappingProxyType({})
 
 

@@ -1,4 +1,4 @@
-"""Sessions of outside agents: opened, played through tool calls, submitted, and then simulated."""
+"""Sessions of external agents: opened, played through tool calls, submitted, and then simulated."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from typing import Any
 
 from buildarena_benchmark import Task, broken_constraint
 from buildarena_pipeline.agents.workbench import Workbench, rebuild
-from buildarena_pipeline.broker.queues import simulate_queue
 from buildarena_pipeline.catalog.tracks import SIMULATORS, external_track
 from buildarena_pipeline.errors import FieldError, PipelineError, SubmissionError
 from buildarena_pipeline.runtime.context import Context
@@ -23,13 +22,16 @@ from buildarena_store import (
     JobKey,
     Lease,
     NewJob,
+    Outcome,
     RolloutRequest,
+    Stage,
     UnknownIdError,
 )
 from buildarena_store.ids import content_hash
+from buildarena_store.states import simulate_queue
 
 AGENT_NAME = re.compile(r"^[A-Za-z0-9_.-]{1,80}$")
-MOST_CALLS = 2000
+MAX_CALLS = 2000
 CACHED_BENCHES = 256
 JSON = "application/json"
 
@@ -43,7 +45,7 @@ class NothingToSubmitError(PipelineError):
 
 
 class ExternalSessions:
-    """Lets outside agents build through tool calls.
+    """Lets external agents build through tool calls.
 
     Args:
         context: The process' connections.
@@ -52,7 +54,7 @@ class ExternalSessions:
     def __init__(self, context: Context) -> None:
         self._context = context
         self._benches: OrderedDict[tuple[str, int], Workbench] = OrderedDict()
-        self._guard = Lock()
+        self._lock = Lock()
 
     def open(
         self, *, task: str, agent: str, seed: int, simulator: str, owner: str | None = None
@@ -79,13 +81,13 @@ class ExternalSessions:
             track_config=track.as_config(),
             owner=owner,
         )
-        with self._context.database.transaction() as connection:
-            self._context.jobs.add([new], connection=connection)
-            opened = self._context.external.open(key.job_id, connection=connection)
+        with self._context.store.database.transaction() as connection:
+            self._context.store.jobs.add([new], connection=connection)
+            opened = self._context.store.external_calls.open(key.job_id, connection=connection)
         if not opened:
             message = f"agent {agent!r} has played seed {seed} of {task}: take another seed"
             raise SubmissionError([FieldError(field="seed", message=message)])
-        return self._context.jobs.get(key.job_id)
+        return self._context.store.jobs.get(key.job_id)
 
     def call(self, job_id: str, *, machine: str, tool: str, arguments: Any) -> ExternalCall:
         """Carries out one tool call and keeps it.
@@ -93,16 +95,16 @@ class ExternalSessions:
         Raises:
             SessionClosedError: The session is not open, or it made too many calls.
         """
-        with self._context.database.transaction() as connection:
-            lease = self._lease(job_id, connection)
+        with self._context.store.database.transaction() as connection:
+            lease = self._open_lease(job_id, connection)
             count = lease.job.actions
-            if count >= MOST_CALLS:
+            if count >= MAX_CALLS:
                 raise SessionClosedError(
-                    f"session {job_id} has made {MOST_CALLS} calls, which is all it may: submit it"
+                    f"session {job_id} has made {MAX_CALLS} calls, which is all it may: submit it"
                 )
             bench = self._bench(job_id, count, connection)
             done = bench.call(machine, tool, arguments)
-            self._context.external.append(lease, count, done, connection=connection)
+            self._context.store.external_calls.append(lease, count, done, connection=connection)
         self._keep_bench(job_id, count + 1, bench)
         return done
 
@@ -115,10 +117,10 @@ class ExternalSessions:
         """
         context = self._context
         engine = None
-        with context.database.transaction() as connection:
-            lease = self._lease(job_id, connection)
+        with context.store.database.transaction() as connection:
+            lease = self._open_lease(job_id, connection)
             job = lease.job
-            calls = context.external.read(job_id, connection=connection)
+            calls = context.store.external_calls.read(job_id, connection=connection)
             chosen = rebuild(calls).result()
             if chosen is None:
                 raise NothingToSubmitError(
@@ -128,39 +130,44 @@ class ExternalSessions:
             transcript = context.artifacts.put(_transcript(calls), JSON)
             kept = context.artifacts.put(machine_bytes(machine), JSON)
             made = {"machine": kept, "transcript": transcript}
-            context.results.attach(job_id, made, connection=connection)
+            context.store.results.attach(job_id, made, connection=connection)
             refusals = dict(Counter(c.reason or "refused" for c in calls if not c.ok))
-            task = task_of(job, context.catalogue)
+            task = task_of(job, context.tasks)
             broken = broken_constraint(task, machine)
             if broken is not None:
                 reason, detail = broken
                 score = failure_score(
-                    job, task, machine, outcome="construction_failed", reason=reason, detail=detail
+                    job,
+                    task,
+                    machine,
+                    outcome=Outcome.CONSTRUCTION_FAILED,
+                    reason=reason,
+                    detail=detail,
                 )
-                context.results.finish(lease, score, connection=connection, refusals=refusals)
+                context.store.results.finish(lease, score, connection=connection, refusals=refusals)
             else:
                 engine = str(job.track_config["simulator"])
                 request = RolloutRequest(
                     number=0, final=True, engine=engine, machine_hash=kept.hash
                 )
-                context.rollouts.request(job_id, request, connection=connection)
-                context.leases.queue_again(
+                context.store.rollouts.request(job_id, request, connection=connection)
+                context.store.leases.queue_again(
                     lease,
-                    stage="simulate",
+                    stage=Stage.SIMULATE,
                     queue=simulate_queue(engine),
                     connection=connection,
                     refusals=refusals,
                 )
         if engine is not None:
-            context.queues.announce(simulate_queue(engine), [job_id])
-        return context.jobs.get(job_id)
+            context.queues.notify(simulate_queue(engine), [job_id])
+        return context.store.jobs.get(job_id)
 
     def _check(self, task: str, agent: str, simulator: str) -> Task:
         """The newest version of the task, if all that was named is there."""
         errors = []
-        found = self._context.catalogue.named([task]).get(task)
+        found = self._context.tasks.named([task]).get(task)
         if found is None:
-            errors.append(_unknown("task", task, sorted(self._context.catalogue.newest())))
+            errors.append(_unknown("task", task, sorted(self._context.tasks.newest())))
         if simulator not in SIMULATORS:
             errors.append(_unknown("simulator", simulator, SIMULATORS))
         if not AGENT_NAME.match(agent):
@@ -170,11 +177,11 @@ class ExternalSessions:
             raise SubmissionError(errors)
         return found
 
-    def _lease(self, job_id: str, connection: Any) -> Lease:
-        lease = self._context.external.lease(job_id, connection=connection)
+    def _open_lease(self, job_id: str, connection: Any) -> Lease:
+        lease = self._context.store.external_calls.lease(job_id, connection=connection)
         if lease is None:
             try:
-                job = self._context.jobs.get(job_id)
+                job = self._context.store.jobs.get(job_id)
             except UnknownIdError as error:
                 raise UnknownIdError("session", job_id) from error
             state = job.outcome or f"{job.stage} {job.state}"
@@ -183,14 +190,14 @@ class ExternalSessions:
 
     def _bench(self, job_id: str, count: int, connection: Any) -> Workbench:
         """The workbench after so many calls: kept from the last call, or built again."""
-        with self._guard:
+        with self._lock:
             bench = self._benches.pop((job_id, count), None)
         if bench is not None:
             return bench
-        return rebuild(self._context.external.read(job_id, connection=connection))
+        return rebuild(self._context.store.external_calls.read(job_id, connection=connection))
 
     def _keep_bench(self, job_id: str, count: int, bench: Workbench) -> None:
-        with self._guard:
+        with self._lock:
             self._benches[job_id, count] = bench
             while len(self._benches) > CACHED_BENCHES:
                 self._benches.popitem(last=False)

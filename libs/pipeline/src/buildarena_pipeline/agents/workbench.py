@@ -1,4 +1,4 @@
-"""The workbench of an outside agent: the machines it builds, by name, and their assembly."""
+"""The workbench of an external agent: the machines it builds, by name, and their assembly."""
 
 from __future__ import annotations
 
@@ -60,5 +60,5 @@ def rebuild(calls: Sequence[ExternalCall]) -> Workbench:
 
 
 def agent_tools() -> tuple[ToolDefinition, ...]:
-    """The tools of outside agents: all actions of the geometry library."""
+    """The tools of external agents: all actions of the geometry library."""
     return tool_definitions(GROUPS)

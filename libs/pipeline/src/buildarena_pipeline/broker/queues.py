@@ -1,7 +1,7 @@
-"""Queues: Celery messages that only say "look at this job".
+"""Queues: Celery messages that only say "process your queue's next job, this one if you can".
 
-Messages are acknowledged when they are received. Losing one costs seconds, because the sweeper
-announces waiting jobs again; so nothing rests on the broker's redelivery.
+Messages are acknowledged when they are received. Losing one costs seconds, because the reaper
+notifies workers of waiting jobs again; so nothing rests on the broker's redelivery.
 """
 
 from __future__ import annotations
@@ -15,49 +15,16 @@ from kombu.exceptions import OperationalError
 from redis import Redis
 from redis.exceptions import RedisError
 
-LOOK = "buildarena.look"
-"""Name of the one message kind; its arguments are the queue's name and a job id."""
+from buildarena_pipeline.broker.app import celery_app
 
-CONSTRUCT = "construct"
-VERIFY = "verify"
-EXTERNAL = "external"
-"""Where jobs of outside agents are while they build: no worker serves it."""
-BATCH = 200
+PROCESS_NEXT = "buildarena.process_next"
+"""Name of the one message kind; its arguments are the queue's name and a job id."""
+MAX_WAITING = 200
 """Messages kept waiting per queue; more are sent as workers take them."""
-PLENTY = 50
-"""Messages that are enough for a queue until the sweeper looks again, a second later."""
+ENOUGH_WAITING = 50
+"""Messages that are enough for a queue until the reaper runs again, a second later."""
 
 log = structlog.get_logger(__name__)
-
-
-def simulate_queue(engine: str) -> str:
-    """The queue of a simulator."""
-    return f"simulate.{engine}"
-
-
-def celery_app(broker_url: str) -> Celery:
-    """The Celery application of every process, without a result backend."""
-    app = Celery("buildarena", broker=broker_url)
-    app.conf.update(
-        task_ignore_result=True,
-        task_acks_late=False,
-        task_create_missing_queues=True,
-        worker_prefetch_multiplier=1,
-        worker_hijack_root_logger=False,
-        worker_send_task_events=False,
-        worker_enable_remote_control=False,
-        broker_connection_retry=True,
-        broker_connection_retry_on_startup=True,
-        broker_connection_max_retries=None,
-        broker_transport_options={
-            "socket_connect_timeout": 2,
-            "socket_timeout": 10,
-            "max_retries": 1,
-            "interval_start": 0,
-            "interval_max": 0.2,
-        },
-    )
-    return app
 
 
 class Queues:
@@ -71,22 +38,26 @@ class Queues:
         self.app = celery_app(broker_url)
         self._sender = celery_app(broker_url)
         self._broker_url = broker_url
-        self._guard = threading.Lock()
+        self._lock = threading.Lock()
         # Celery's queues are lists of the same name.
         self._redis = Redis.from_url(broker_url, socket_connect_timeout=2, socket_timeout=10)
 
-    def announce(self, queue: str, job_ids: Sequence[str]) -> bool:
-        """Tells a queue's workers of jobs, as well as it can.
+    def notify(self, queue: str, job_ids: Sequence[str]) -> bool:
+        """Sends a queue's workers a message for each job, as well as it can.
 
         Returns:
-            False when the broker could not be reached; the sweeper will try again.
+            False when the broker could not be reached; the reaper will try again.
         """
         sender = self._sender
         try:
             with sender.producer_pool.acquire(block=True) as producer:
                 for job_id in job_ids:
                     sender.send_task(
-                        LOOK, args=(queue, job_id), queue=queue, producer=producer, retry=False
+                        PROCESS_NEXT,
+                        args=(queue, job_id),
+                        queue=queue,
+                        producer=producer,
+                        retry=False,
                     )
         except (OperationalError, RedisError, OSError) as error:
             log.warning("broker_unreachable", queue=queue, error=str(error))
@@ -94,15 +65,15 @@ class Queues:
             return False
         return True
 
-    def nudge(self, queue: str, job_id: str) -> None:
-        """Tells of one more job, unless so many messages wait that workers will come anyway.
+    def notify_one(self, queue: str, job_id: str) -> None:
+        """Sends a message for one more job, unless so many wait that workers will come anyway.
 
-        Any message makes a worker take whatever waits, and the sweeper adds messages as they are
+        Any message makes a worker take whatever waits, and the reaper adds messages as they are
         taken; asking how many wait costs a tenth of sending one.
         """
         waiting = self.waiting(queue)
-        if waiting is not None and waiting < PLENTY:
-            self.announce(queue, [job_id])
+        if waiting is not None and waiting < ENOUGH_WAITING:
+            self.notify(queue, [job_id])
 
     def waiting(self, queue: str) -> int | None:
         """Messages that no worker has taken, or None when the broker can't be reached."""
@@ -114,7 +85,7 @@ class Queues:
 
     def _renew_sender(self, failed: Celery) -> None:
         """Takes a fresh sender: a pool's connections to a server that is gone stay in its way."""
-        with self._guard:
+        with self._lock:
             if self._sender is failed:
                 self._sender = celery_app(self._broker_url)
 

@@ -19,8 +19,8 @@ from buildarena_store.tasks import TaskKey
 
 log = structlog.get_logger(__name__)
 
-MOST_PARSED = 2000
-"""Parsed tasks in memory at the most; each is a few kilobytes, at worst a hundred."""
+MAX_PARSED = 2000
+"""Parsed tasks in memory at most; each is a few kilobytes, at worst a hundred."""
 
 
 class TaskChangedError(PipelineError):
@@ -46,7 +46,7 @@ class CatalogueEntry:
     created_at: datetime | None = None
 
 
-class TaskCatalogue:
+class TaskCatalog:
     """Finds tasks. One serves a whole process, from any thread.
 
     A version's text never changes, so each is read and parsed once a process.
@@ -71,7 +71,7 @@ class TaskCatalogue:
     def named(self, names: Collection[str]) -> Mapping[str, Task]:
         """The newest versions of those of the names that there are.
 
-        The database is asked only when a name is not a built-in task's.
+        The database is queried only when a name is not a built-in task's.
         """
         builtin = builtin_tasks()
         found = {name: builtin[name] for name in names if name in builtin}
@@ -186,7 +186,7 @@ class TaskCatalogue:
         return found
 
     def _keep(self, name: str, version: str, task: Task | None) -> None:
-        if len(self._parsed) >= MOST_PARSED:
+        if len(self._parsed) >= MAX_PARSED:
             self._parsed = {}  # a new one: other threads read the old one
         self._parsed[name, version] = task
 

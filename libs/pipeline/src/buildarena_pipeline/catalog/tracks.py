@@ -7,12 +7,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from buildarena_geometry import FEEDBACK_VERSION
-from buildarena_pipeline.broker.queues import EXTERNAL
 from buildarena_pipeline.catalog.prompt_packs import PromptPack
 from buildarena_pipeline.catalog.specs import ClosedLoop
 from buildarena_pipeline.catalog.workflows import WorkflowSource
 from buildarena_simulation import ENGINES, SIMULATION_VERSION
 
+EXTERNAL_WORKFLOW = "external"
+"""What external agents play: their own."""
 SIMULATORS = tuple(ENGINES)
 """Simulators that jobs can name; each has a queue of its own."""
 
@@ -66,9 +67,9 @@ class Track:
 
 
 def external_track(simulator: str) -> Track:
-    """The track of outside agents, which bring their own prompts."""
+    """The track of external agents, which bring their own prompts."""
     return Track(
-        workflow=EXTERNAL,
+        workflow=EXTERNAL_WORKFLOW,
         simulator=simulator,
         simulation_version=SIMULATION_VERSION,
         prompts="own",

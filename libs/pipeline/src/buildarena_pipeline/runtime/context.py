@@ -1,85 +1,39 @@
-"""One process' connections: the database with its repositories, the artifacts, the queues."""
+"""What a process is connected to: the store, the artifacts, the queues and the tasks."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 from buildarena_pipeline.broker.queues import Queues
-from buildarena_pipeline.catalog.tasks import TaskCatalogue
+from buildarena_pipeline.catalog.tasks import TaskCatalog
 from buildarena_pipeline.runtime.settings import Settings
-from buildarena_store import (
-    ApiKeys,
-    ArtifactStore,
-    Budgets,
-    Database,
-    Events,
-    ExternalCalls,
-    Figures,
-    Jobs,
-    Journal,
-    Leases,
-    Results,
-    Rollouts,
-    Sweeps,
-    Tasks,
-    Verifications,
-    Workers,
-)
+from buildarena_store import ArtifactStore, Database, Store, open_store
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Context:
-    """Everything that stages, sweeper and API share."""
+    """A process' connections; what a process runs is handed those that it uses."""
 
     settings: Settings
-    database: Database
+    store: Store
     artifacts: ArtifactStore
     queues: Queues
-    jobs: Jobs
-    sweeps: Sweeps
-    leases: Leases
-    journal: Journal
-    rollouts: Rollouts
-    results: Results
-    events: Events
-    workers: Workers
-    verifications: Verifications
-    external: ExternalCalls
-    keys: ApiKeys
-    budgets: Budgets
-    figures: Figures
-    tasks: Tasks
-    catalogue: TaskCatalogue
+    tasks: TaskCatalog
 
     def close(self) -> None:
         """Closes the connections."""
         self.queues.close()
-        self.database.close()
+        self.store.database.close()
 
 
 def open_context(settings: Settings, *, pool_size: int = 5) -> Context:
     """Connects to what the settings name; nothing is contacted before it is used."""
     database = Database(settings.required_database_url(), pool_size=pool_size)
-    tasks = Tasks(database)
-    leases = Leases(database, duration_s=settings.lease_s, max_faults=settings.max_faults)
+    store = open_store(database, lease_s=settings.lease_s, max_faults=settings.max_faults)
     return Context(
         settings=settings,
-        database=database,
+        store=store,
         artifacts=ArtifactStore(settings.artifacts_location),
         queues=Queues(settings.required_broker_url()),
-        jobs=Jobs(database),
-        sweeps=Sweeps(database),
-        leases=leases,
-        journal=Journal(database),
-        rollouts=Rollouts(database),
-        results=Results(database, leases),
-        events=Events(database),
-        workers=Workers(database),
-        verifications=Verifications(database),
-        external=ExternalCalls(database),
-        keys=ApiKeys(database),
-        budgets=Budgets(database),
-        figures=Figures(database),
-        tasks=tasks,
-        catalogue=TaskCatalogue(tasks),
+        tasks=TaskCatalog(store.tasks),
     )

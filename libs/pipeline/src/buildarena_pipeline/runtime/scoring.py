@@ -9,20 +9,20 @@ from buildarena_benchmark import Task, failed_score
 from buildarena_geometry import DOCUMENT_VERSION, Machine
 from buildarena_geometry import __version__ as geometry_version
 from buildarena_pipeline import __version__
-from buildarena_pipeline.catalog.tasks import TaskCatalogue
-from buildarena_pipeline.errors import PermanentFaultError
-from buildarena_store import Job, JobScore, RolloutRecord
+from buildarena_pipeline.catalog.tasks import TaskCatalog
+from buildarena_pipeline.errors import PermanentError
+from buildarena_store import Job, JobScore, Outcome, RolloutRecord
 
 
-def task_of(job: Job, catalogue: TaskCatalogue) -> Task:
+def task_of(job: Job, catalogue: TaskCatalog) -> Task:
     """The job's task, in the version that the job was submitted for.
 
     Raises:
-        PermanentFaultError: It is gone, or is no longer scored as it was.
+        PermanentError: It is gone, or is no longer scored as it was.
     """
     task = catalogue.exact(job.task, job.task_version)
     if task is None:
-        raise PermanentFaultError(
+        raise PermanentError(
             f"task {job.task} is no longer at version {job.task_version[:12]}: submit it again",
             reason="task_changed",
         )
@@ -39,7 +39,7 @@ def rollout_score(job: Job, record: RolloutRecord) -> JobScore:
     """The score of a job whose best rollout this is."""
     success = bool(record.success)
     return JobScore(
-        outcome="success" if success else "unsuccessful",
+        outcome=Outcome.SUCCESS if success else Outcome.UNSUCCESSFUL,
         success=success,
         indicator=float(record.indicator or 0.0),
         metrics=record.metrics or {},
@@ -49,7 +49,7 @@ def rollout_score(job: Job, record: RolloutRecord) -> JobScore:
 
 
 def failure_score(
-    job: Job, task: Task, machine: Machine | None, *, outcome: str, reason: str, detail: str
+    job: Job, task: Task, machine: Machine | None, *, outcome: Outcome, reason: str, detail: str
 ) -> JobScore:
     """The score of a job that ended without a rollout.
 

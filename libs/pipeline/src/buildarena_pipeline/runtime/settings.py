@@ -48,7 +48,9 @@ class Settings(BaseSettings):
         dict[str, str],
         Field(description='Further workflows as JSON, {"name": "path/to/file.py:Class"}'),
     ] = {}
-    lease_s: Annotated[float, Field(description="Lease without heartbeat, seconds", gt=1)] = 10.0
+    lease_s: Annotated[
+        float, Field(description="Seconds that a lease is valid without a heartbeat", gt=1)
+    ] = 10.0
     max_faults: Annotated[
         int, Field(description="Faults without progress before a job is given up", ge=1)
     ] = 8

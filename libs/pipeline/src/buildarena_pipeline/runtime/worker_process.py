@@ -16,14 +16,15 @@ import structlog
 from celery.signals import worker_process_init, worker_process_shutdown, worker_ready
 from sqlalchemy.exc import OperationalError
 
-from buildarena_pipeline.broker.queues import LOOK
-from buildarena_pipeline.broker.watchdog import Hearing
+from buildarena_pipeline.broker.queues import PROCESS_NEXT
+from buildarena_pipeline.broker.watchdog import ConsumerWatchdog
 from buildarena_pipeline.errors import StartupError
+from buildarena_pipeline.runtime.active_lease import LeaseKeeper
 from buildarena_pipeline.runtime.context import Context, open_context
-from buildarena_pipeline.runtime.job_runner import LeaseKeeper, StageHandler, StageRunner
+from buildarena_pipeline.runtime.job_runner import JobRunner, StageHandler
 from buildarena_pipeline.runtime.logs import set_up_logs
 from buildarena_pipeline.runtime.processes import die_with_parent
-from buildarena_pipeline.runtime.reaper import Sweeper
+from buildarena_pipeline.runtime.reaper import Reaper
 from buildarena_pipeline.runtime.settings import Settings
 from buildarena_pipeline.runtime.tracing import Tracing
 from buildarena_store import SchemaVersionError
@@ -63,16 +64,16 @@ class _Runtime:
         self.tracing = Tracing(f"{spec.kind}-worker", settings.otlp_endpoint)
         self.id = f"{spec.kind}@{socket.gethostname()}:{os.getpid()}"
         self._spec = spec
-        self.keeper = LeaseKeeper(self.context, self.report)
+        self.keeper = LeaseKeeper(self.context.store.leases, self.report)
         self.others = spec.make_others(self.context)
-        self.runner = StageRunner(
-            self.context, spec.make_handler(self.context), self.keeper, self.id
+        self.runner = JobRunner(
+            self.context.store.leases, spec.make_handler(self.context), self.keeper, self.id
         )
 
     def report(self) -> None:
-        """Tells the register that this process lives."""
+        """Reports to the register that this process is alive."""
         peak_kib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-        self.context.workers.report(
+        self.context.store.workers.report(
             worker_id=self.id,
             kind=self._spec.kind,
             queues=self._spec.queues,
@@ -91,13 +92,13 @@ class _Runtime:
     def stop(self) -> None:
         """Hands leases back, leaves the register and closes the connections."""
         self.keeper.stop()
-        self.context.workers.leave(self.id)
+        self.context.store.workers.leave(self.id)
         self.context.close()
         self.tracing.close()
 
 
 def run_worker(spec: WorkerSpec, settings: Settings) -> None:
-    """Serves queues until the process is told to stop.
+    """Serves queues until the process is asked to stop.
 
     Raises:
         StartupError: The database has another schema, or the settings are incomplete.
@@ -118,21 +119,21 @@ def run_worker(spec: WorkerSpec, settings: Settings) -> None:
         if runtime is not None:
             runtime.stop()
 
-    def look(queue: str, job_id: str) -> None:
+    def process_next(queue: str, job_id: str) -> None:
         runtime = runtimes[os.getpid()]
         if queue in runtime.others:
             runtime.others[queue](job_id)
         else:
-            runtime.runner.look(queue, job_id)
+            runtime.runner.process_next(queue, job_id)
 
     app = context.queues.app
-    app.task(name=LOOK)(look)
-    sweeper = Sweeper(context)
-    hearing = Hearing(context.queues, spec.queues)
+    app.task(name=PROCESS_NEXT)(process_next)
+    reaper = Reaper(context)
+    watchdog = ConsumerWatchdog(context.queues, spec.queues)
 
     def begin(sender: Any, **_: Any) -> None:
-        sweeper.start()
-        hearing.start(sender)
+        reaper.start()
+        watchdog.start(sender)
 
     worker_ready.connect(begin, weak=False)
     if forks:
@@ -153,8 +154,8 @@ def run_worker(spec: WorkerSpec, settings: Settings) -> None:
     try:
         worker.start()
     finally:
-        hearing.stop()
-        sweeper.stop()
+        watchdog.stop()
+        reaper.stop()
         if not forks:
             stop_runtime()
         context.close()
@@ -164,7 +165,7 @@ def run_worker(spec: WorkerSpec, settings: Settings) -> None:
 def _checked_context(settings: Settings) -> Context:
     try:
         context = open_context(settings)
-        context.database.require_schema()
+        context.store.database.require_schema()
     except (ValueError, SchemaVersionError) as error:
         raise StartupError(str(error)) from error
     except OperationalError as error:

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from buildarena_benchmark import Task
-from buildarena_pipeline.broker.queues import CONSTRUCT
 from buildarena_pipeline.catalog.models import ModelRegistry
 from buildarena_pipeline.catalog.prompt_packs import PromptPacks
 from buildarena_pipeline.catalog.specs import Budget, Decoding, JobSpec, SweepSpec
@@ -15,10 +14,11 @@ from buildarena_pipeline.catalog.tracks import SIMULATORS, make_track
 from buildarena_pipeline.catalog.workflows import workflow_sources
 from buildarena_pipeline.errors import FieldError, SubmissionError
 from buildarena_pipeline.runtime.context import Context
-from buildarena_pipeline.runtime.reaper import announce_waiting
+from buildarena_pipeline.runtime.notify import notify_waiting
 from buildarena_pipeline.submission.estimates import SweepEstimate, estimate
 from buildarena_store import Job, JobKey, NewJob, NewSweep, Sweep
 from buildarena_store.ids import content_hash, new_id
+from buildarena_store.states import CONSTRUCT_QUEUE
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,13 +29,13 @@ class Submitted:
         sweep: The sweep.
         jobs: How many jobs it has.
         added: How many of them are new; the others were there before.
-        taken_up: Whether an earlier submission of the same jobs goes on.
+        resumed: Whether an earlier submission of the same jobs goes on.
     """
 
     sweep: Sweep
     jobs: int
     added: int
-    taken_up: bool = False
+    resumed: bool = False
 
 
 class Submissions:
@@ -53,7 +53,7 @@ class Submissions:
         self._workflows = workflow_sources(context.settings.workflows)
 
     def submit_job(self, spec: JobSpec, *, owner: str | None = None) -> tuple[Job, bool]:
-        """Stores a job and announces it.
+        """Stores a job and notifies workers of it.
 
         Args:
             spec: The job.
@@ -75,10 +75,10 @@ class Submissions:
             fields={"tasks[0]": "task", "models[0]": "model"},
         )
         own = [replace(job, owner=owner) for job in new]
-        with self._context.database.transaction() as connection:
-            added = self._context.jobs.add(own, connection=connection)
-        announce_waiting(self._context, CONSTRUCT)
-        return self._context.jobs.get(new[0].key.job_id), added > 0
+        with self._context.store.lifecycle.submission() as connection:
+            added = self._context.store.jobs.add(own, connection=connection)
+        notify_waiting(self._context, CONSTRUCT_QUEUE)
+        return self._context.store.jobs.get(new[0].key.job_id), added > 0
 
     def submit_sweep(
         self,
@@ -86,15 +86,15 @@ class Submissions:
         *,
         owner: str | None = None,
         request_key: str | None = None,
-        take_up: bool = False,
+        resume: bool = False,
     ) -> Submitted:
-        """Stores a sweep with its jobs and announces them.
+        """Stores a sweep with its jobs and notifies workers of them.
 
         Args:
             spec: The sweep.
             owner: Id of the API key that submits it, if any.
             request_key: Idempotency key, if any.
-            take_up: Whether the owner's earlier sweep of just these jobs, if there is one, goes
+            resume: Whether the owner's earlier sweep of just these jobs, if there is one, goes
                 on with this one's budget, instead of a further sweep being stored.
 
         Raises:
@@ -103,12 +103,6 @@ class Submissions:
         new = self.plan(spec)
         job_ids = [job.key.job_id for job in new]
         jobs_hash = content_hash(sorted(job_ids))
-        if take_up:
-            before = self._context.sweeps.with_jobs(jobs_hash, owner=owner)
-            if before is not None:
-                self.resume(before, spec.budget)
-                found = self._context.sweeps.get(before.id)
-                return Submitted(sweep=found, jobs=len(new), added=0, taken_up=True)
         sweep = NewSweep(
             id=new_id("sweep"),
             name=spec.name,
@@ -119,22 +113,38 @@ class Submissions:
             jobs_hash=jobs_hash,
         )
         own = [replace(job, owner=owner, payer=sweep.id) for job in new]
-        with self._context.database.transaction() as connection:
-            if spec.budget is not None:
-                self._context.budgets.set(sweep.id, spec.budget.as_limits(), connection=connection)
-            added = self._context.jobs.add(own, connection=connection)
-            self._context.sweeps.add(sweep, job_ids, connection=connection)
-        announce_waiting(self._context, CONSTRUCT)
-        return Submitted(sweep=self._context.sweeps.get(sweep.id), jobs=len(new), added=added)
+        limits = None if spec.budget is None else spec.budget.as_limits()
+        store = self._context.store
+        with store.lifecycle.submission() as connection:
+            before = None
+            if resume:
+                before = store.sweeps.with_jobs(jobs_hash, owner=owner, connection=connection)
+            if before is None:
+                if limits is not None:
+                    store.budgets.set(sweep.id, limits, connection=connection)
+                added = store.jobs.add(own, connection=connection)
+                store.sweeps.add(sweep, job_ids, connection=connection)
+        if before is not None:
+            store.lifecycle.ensure_active(before, limits)
+            added = 0
+        notify_waiting(self._context, CONSTRUCT_QUEUE)
+        return Submitted(
+            sweep=store.sweeps.get(before or sweep.id),
+            jobs=len(new),
+            added=added,
+            resumed=before is not None,
+        )
 
-    def resume(self, sweep: Sweep, budget: Budget | None) -> None:
-        """Lets a sweep go on, with another budget if one is given."""
-        with self._context.database.transaction() as connection:
-            if budget is not None:
-                self._context.budgets.set(sweep.id, budget.as_limits(), connection=connection)
-            if sweep.state != "active":
-                self._context.sweeps.resume(sweep.id, connection=connection)
-        announce_waiting(self._context, CONSTRUCT)
+    def resume(self, sweep_id: str, budget: Budget | None) -> None:
+        """Lets a paused or stopped sweep go on, with another budget if one is given.
+
+        Raises:
+            UnknownIdError: There is no such sweep.
+            TransitionError: It is active or cancelled.
+        """
+        limits = None if budget is None else budget.as_limits()
+        self._context.store.lifecycle.resume(sweep_id, limits)
+        notify_waiting(self._context, CONSTRUCT_QUEUE)
 
     def estimate(self, spec: SweepSpec) -> SweepEstimate:
         """What a sweep would use, without storing anything.
@@ -154,7 +164,7 @@ class Submissions:
         Raises:
             SubmissionError: Something of it is unknown, or it is too large.
         """
-        tasks = self._context.catalogue.named(spec.tasks)
+        tasks = self._context.tasks.named(spec.tasks)
         self._check(spec, tasks, fields or {})
         track = make_track(
             self._workflows[spec.workflow],
@@ -192,7 +202,7 @@ class Submissions:
     def _check(self, spec: SweepSpec, tasks: Mapping[str, Task], fields: dict[str, str]) -> None:
         if any(name not in tasks for name in spec.tasks):
             # The choices are all there are.
-            tasks = self._context.catalogue.newest()
+            tasks = self._context.tasks.newest()
         errors = [
             *_unknown("tasks", "task", spec.tasks, tasks),
             *_unknown("models", "model", spec.models, self._registry.models),

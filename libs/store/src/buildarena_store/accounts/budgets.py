@@ -13,14 +13,13 @@ from dataclasses import dataclass
 from decimal import Decimal
 from typing import Any
 
-from sqlalchemy import Connection, and_, func, literal, or_, select, update
-from sqlalchemy.dialects.postgresql import distinct_on, insert
+from sqlalchemy import Connection, func, literal, or_, select, update
+from sqlalchemy.dialects.postgresql import insert
 
-from buildarena_store import events
 from buildarena_store.database import Database
 from buildarena_store.jobs.journal import Usage
 from buildarena_store.jobs.leases import Lease
-from buildarena_store.tables import budgets, jobs, reservations, sweep_jobs, sweeps
+from buildarena_store.tables import budgets, jobs, reservations
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,12 +71,12 @@ class Shortage:
     Attributes:
         budget_id: The budget that lacks the means.
         detail: What is lacking, for people.
-        passing: Whether open requests may give back enough, so that waiting helps.
+        temporary: Whether open requests may give back enough, so that waiting helps.
     """
 
     budget_id: str
     detail: str
-    passing: bool
+    temporary: bool
 
 
 class Budgets:
@@ -121,10 +120,10 @@ class Budgets:
         return None if row is None else _budget(row)
 
     def reserve(self, lease: Lease, need: Need) -> Shortage | None:
-        """Puts aside what the job's next request may cost, in all its budgets or in none.
+        """Reserves what the job's next request may cost, in all its budgets or in none.
 
         Returns:
-            None when it was put aside, else what is lacking.
+            None when it is reserved, otherwise what is lacking.
         """
         job_id = lease.job.id
         # Locked in the order of their ids, so that two jobs never wait for each other.
@@ -142,10 +141,10 @@ class Budgets:
                 if shortage is not None:
                     return shortage
             if found:
-                self._put_aside(found, lease, need, connection)
+                self._write_reservations(found, lease, need, connection)
         return None
 
-    def _put_aside(
+    def _write_reservations(
         self, found: Sequence[Budget], lease: Lease, need: Need, connection: Connection
     ) -> None:
         rows = [
@@ -177,75 +176,6 @@ class Budgets:
                 )
             )
 
-    def stop(self, budget_id: str, detail: str, *, connection: Connection) -> list[str]:
-        """Brings the sweeps of a used-up budget to the state ``limit``; nothing new starts.
-
-        Waiting jobs that another active sweep with another budget wants go over to that sweep;
-        the others are held.
-
-        Returns:
-            Ids of the sweeps that were stopped.
-        """
-        stopped = [
-            row.id
-            for row in connection.execute(
-                update(sweeps)
-                .where(
-                    or_(sweeps.c.id == budget_id, sweeps.c.owner == budget_id),
-                    sweeps.c.state == "active",
-                )
-                .values(state="limit")
-                .returning(sweeps.c.id)
-            )
-        ]
-        for sweep_id in stopped:
-            events.record_sweep(connection, sweep_id, "limit", {"detail": detail})
-        waiting = and_(
-            or_(jobs.c.payer == budget_id, jobs.c.owner == budget_id),
-            jobs.c.state == "queued",
-            jobs.c.stage == "construct",
-        )
-        self.pass_on(waiting, connection=connection)
-        rows = connection.execute(
-            update(jobs).where(waiting).values(state="held", nudged_at=None).returning(jobs.c.id)
-        )
-        held = [row.id for row in rows]
-        events.record_jobs(connection, held, "held", {"why": detail})
-        return stopped
-
-    def release_single_jobs(self, key_id: str, *, connection: Connection) -> None:
-        """Queues a key's held jobs that belong to no sweep."""
-        rows = connection.execute(
-            update(jobs)
-            .where(jobs.c.owner == key_id, jobs.c.payer.is_(None), jobs.c.state == "held")
-            .values(state="queued")
-            .returning(jobs.c.id)
-        )
-        events.record_jobs(connection, [row.id for row in rows], "queued", {"why": "budget"})
-
-    def pass_on(self, which: Any, *, connection: Connection) -> None:
-        """Makes another active sweep, where one wants a job, the one that pays for it.
-
-        Args:
-            which: Condition on the jobs.
-            connection: The transaction it is part of.
-        """
-        taker = (
-            select(sweeps.c.id, sweeps.c.owner, sweep_jobs.c.job_id)
-            .join(sweep_jobs, sweep_jobs.c.sweep_id == sweeps.c.id)
-            .where(sweeps.c.state == "active")
-            .ext(distinct_on(sweep_jobs.c.job_id))
-            .order_by(sweep_jobs.c.job_id, sweeps.c.created_at)
-            .subquery("taker")
-        )
-        connection.execute(
-            update(jobs)
-            .where(
-                which, taker.c.job_id == jobs.c.id, taker.c.id != func.coalesce(jobs.c.payer, "")
-            )
-            .values(payer=taker.c.id, owner=taker.c.owner)
-        )
-
 
 _PAYS = or_(budgets.c.id == jobs.c.payer, budgets.c.id == jobs.c.owner)
 
@@ -264,7 +194,7 @@ def _budget(row: Any) -> Budget:
 
 
 def _reserved(budget_id: str, job_id: str, connection: Connection) -> tuple[Decimal, int, int]:
-    """Dollars, tokens and requests put aside for the budget's other jobs."""
+    """Dollars, tokens and requests reserved for the budget's other jobs."""
     row = connection.execute(
         select(
             func.coalesce(func.sum(reservations.c.cost_usd), literal(0)),
@@ -282,13 +212,13 @@ def _shortage(budget: Budget, reserved: tuple[Decimal, int, int], need: Need) ->
         ("max_tokens", limits.max_tokens, budget.spent_tokens, reserved[1], need.tokens),
         ("max_requests", limits.max_requests, budget.spent_requests, reserved[2], 1),
     )
-    for name, most, spent, aside, wanted in rows:
-        if most is None or spent + aside + wanted <= most:
+    for name, limit, spent, reserved_now, wanted in rows:
+        if limit is None or spent + reserved_now + wanted <= limit:
             continue
-        passing = spent + wanted <= most
+        temporary = spent + wanted <= limit
         detail = (
-            f"budget of {budget.id}: {name} is {most:,}, {spent:,} is spent, and the next "
+            f"budget of {budget.id}: {name} is {limit:,}, {spent:,} is spent, and the next "
             f"request may use {wanted:,}"
         )
-        return Shortage(budget_id=budget.id, detail=detail, passing=passing)
+        return Shortage(budget_id=budget.id, detail=detail, temporary=temporary)
     return None

@@ -14,6 +14,7 @@ from buildarena_store import events
 from buildarena_store.database import Database
 from buildarena_store.errors import UnknownIdError
 from buildarena_store.ids import new_id
+from buildarena_store.rows import columns_of, value_of
 from buildarena_store.tables import api_keys
 
 SECRET_PREFIX = "ba_"  # noqa: S105 - what secrets begin with, for scanners that look for leaks
@@ -64,14 +65,14 @@ class ApiKeys:
         self._database = database
 
     def create(
-        self, *, name: str, scopes: Sequence[str], lasts: timedelta | None = None
+        self, *, name: str, scopes: Sequence[str], ttl: timedelta | None = None
     ) -> tuple[ApiKey, str]:
         """Makes a key.
 
         Args:
             name: Who holds it.
             scopes: What it may do.
-            lasts: How long it is good; None for ever.
+            ttl: How long it is valid; None for no limit.
 
         Returns:
             The key, and its secret, which can't be read again.
@@ -84,13 +85,13 @@ class ApiKeys:
                 name=name,
                 secret_hash=secret_hash(secret),
                 scopes=list(scopes),
-                expires_at=None if lasts is None else events.now + lasts,
+                expires_at=None if ttl is None else events.now + ttl,
             )
             .returning(*_COLUMNS)
         )
         with self._database.transaction() as connection:
             row = connection.execute(statement).one()
-        return ApiKey(**row._mapping), secret  # noqa: SLF001 - the documented way to a mapping
+        return value_of(ApiKey, row), secret
 
     def check(self, secret: str) -> KeyCheck | None:
         """The key that has this secret, and whether it is still good; None when nobody has it."""
@@ -104,7 +105,7 @@ class ApiKeys:
             ).first()
             if row is None:
                 return None
-            key = ApiKey(**{name: getattr(row, name) for name in ApiKey.__dataclass_fields__})
+            key = value_of(ApiKey, row)
             if key.revoked_at is not None:
                 return KeyCheck(key=key, refusal="revoked")
             if row.expired:
@@ -119,7 +120,7 @@ class ApiKeys:
         """Every key, oldest first, those that ended included."""
         query = select(*_COLUMNS).order_by(api_keys.c.created_at, api_keys.c.id)
         with self._database.transaction() as connection:
-            return [ApiKey(**row._mapping) for row in connection.execute(query)]  # noqa: SLF001
+            return [value_of(ApiKey, row) for row in connection.execute(query)]
 
     def get(self, key_id: str) -> ApiKey:
         """The key with this id.
@@ -132,7 +133,7 @@ class ApiKeys:
             row = connection.execute(query).first()
         if row is None:
             raise UnknownIdError("key", key_id)
-        return ApiKey(**row._mapping)  # noqa: SLF001
+        return value_of(ApiKey, row)
 
     def revoke(self, key_id: str) -> ApiKey:
         """Ends a key at once; revoking it again changes nothing.
@@ -150,7 +151,7 @@ class ApiKeys:
             row = connection.execute(statement).first()
         if row is None:
             raise UnknownIdError("key", key_id)
-        return ApiKey(**row._mapping)  # noqa: SLF001
+        return value_of(ApiKey, row)
 
 
 def new_secret() -> str:
@@ -167,4 +168,4 @@ def secret_hash(secret: str) -> str:
     return hashlib.sha256(secret.encode()).hexdigest()
 
 
-_COLUMNS = [api_keys.c[name] for name in ApiKey.__dataclass_fields__]
+_COLUMNS = columns_of(ApiKey, api_keys)

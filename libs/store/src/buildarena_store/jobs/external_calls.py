@@ -1,8 +1,7 @@
-"""Sessions of outside agents: the tool calls they made, kept in order."""
+"""Sessions of external agents: the tool calls they made, kept in order."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import timedelta
 from typing import Any
@@ -12,11 +11,13 @@ from sqlalchemy import Connection, insert, select, update
 from buildarena_store import events
 from buildarena_store.database import Database
 from buildarena_store.errors import StaleLeaseError
-from buildarena_store.jobs.jobs import JOB_COLUMNS, Job, job_from_row
+from buildarena_store.jobs.job import JOB_COLUMNS, Job
 from buildarena_store.jobs.leases import Lease
+from buildarena_store.jobs.transitions import transition
+from buildarena_store.rows import columns_of, value_of
+from buildarena_store.states import EXTERNAL_QUEUE, JobState, Outcome
 from buildarena_store.tables import external_calls, jobs
 
-OWNER = "external"
 IDLE_FOR = timedelta(hours=24)
 """A session that makes no call for so long is cancelled."""
 
@@ -31,7 +32,7 @@ class ExternalCall:
         arguments: What the agent gave.
         ok: Whether the action was accepted.
         reason: Refusal class, if it was refused.
-        feedback: What the agent was told.
+        feedback: What the agent was answered.
     """
 
     machine: str
@@ -43,7 +44,7 @@ class ExternalCall:
 
 
 class ExternalCalls:
-    """Opens sessions of outside agents and keeps their calls."""
+    """Opens sessions of external agents and keeps their calls."""
 
     def __init__(self, database: Database) -> None:
         self._database = database
@@ -54,32 +55,35 @@ class ExternalCalls:
         Returns:
             False when the job had been there before.
         """
-        row = connection.execute(
-            update(jobs)
-            .where(jobs.c.id == job_id, jobs.c.state == "queued", jobs.c.lease_token == 0)
-            .values(
-                state="running",
-                queue=OWNER,
-                lease_owner=OWNER,
-                lease_token=1,
-                started_at=events.now,
-                available_at=events.now,
-            )
-            .returning(jobs.c.id)
-        ).first()
-        return row is not None
+        opened = transition(
+            jobs.c.id == job_id,
+            jobs.c.lease_token == 0,
+            to=JobState.RUNNING,
+            allowed_from={JobState.QUEUED},
+            connection=connection,
+            queue=EXTERNAL_QUEUE,
+            lease_owner=EXTERNAL_QUEUE,
+            lease_token=1,
+            started_at=events.now,
+            available_at=events.now,
+        )
+        return bool(opened)
 
     def lease(self, job_id: str, *, connection: Connection) -> Lease | None:
         """The agent's hold on its open session, locked until the transaction ends."""
         row = connection.execute(
             select(*JOB_COLUMNS)
-            .where(jobs.c.id == job_id, jobs.c.state == "running", jobs.c.queue == OWNER)
+            .where(
+                jobs.c.id == job_id,
+                jobs.c.state == JobState.RUNNING,
+                jobs.c.queue == EXTERNAL_QUEUE,
+            )
             .with_for_update()
         ).first()
         if row is None:
             return None
-        job: Job = job_from_row(row)
-        return Lease(job=job, owner=OWNER, token=job.lease_token)
+        job = value_of(Job, row)
+        return Lease(job=job, owner=EXTERNAL_QUEUE, token=job.lease_token)
 
     def append(
         self, lease: Lease, sequence: int, call: ExternalCall, *, connection: Connection
@@ -91,7 +95,7 @@ class ExternalCalls:
         """
         changed = connection.execute(
             update(jobs)
-            .where(jobs.c.id == lease.job.id, jobs.c.state == "running")
+            .where(jobs.c.id == lease.job.id, jobs.c.state == JobState.RUNNING)
             .values(
                 actions=jobs.c.actions + 1,
                 refused_actions=jobs.c.refused_actions + (0 if call.ok else 1),
@@ -116,34 +120,24 @@ class ExternalCalls:
     def read(self, job_id: str, *, connection: Connection) -> list[ExternalCall]:
         """All calls of a session, in order."""
         query = (
-            select(external_calls)
+            select(*columns_of(ExternalCall, external_calls))
             .where(external_calls.c.job_id == job_id)
             .order_by(external_calls.c.sequence)
         )
-        names = ExternalCall.__dataclass_fields__
-        return [
-            ExternalCall(**{name: getattr(row, name) for name in names})
-            for row in connection.execute(query)
-        ]
+        return [value_of(ExternalCall, row) for row in connection.execute(query)]
 
     def abandon_idle(self) -> None:
         """Cancels sessions that made no call for a day."""
         with self._database.transaction() as connection:
-            rows = connection.execute(
-                update(jobs)
-                .where(
-                    jobs.c.state == "running",
-                    jobs.c.queue == OWNER,
-                    jobs.c.available_at < events.now - IDLE_FOR,
-                )
-                .values(
-                    state="done",
-                    outcome="cancelled",
-                    reason="abandoned",
-                    lease_owner=None,
-                    finished_at=events.now,
-                )
-                .returning(jobs.c.id)
-            ).all()
-            ended: Mapping[str, str] = {"outcome": "cancelled"}
-            events.record_jobs(connection, [row.id for row in rows], "done", ended)
+            transition(
+                jobs.c.queue == EXTERNAL_QUEUE,
+                jobs.c.available_at < events.now - IDLE_FOR,
+                to=JobState.DONE,
+                allowed_from={JobState.RUNNING},
+                data={"outcome": Outcome.CANCELLED},
+                connection=connection,
+                outcome=Outcome.CANCELLED,
+                reason="abandoned",
+                lease_owner=None,
+                finished_at=events.now,
+            )

@@ -1,136 +1,23 @@
-"""Jobs: one task x model x seed on one track, and everything known about it."""
+"""Jobs in the database: added once for each key, found, cancelled and retried."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
 from datetime import datetime
-from decimal import Decimal
 from typing import Any
 
-from sqlalchemy import Connection, Row, and_, any_, or_, select, update
+from sqlalchemy import Connection, and_, any_, or_, select, update
 from sqlalchemy.dialects.postgresql import insert
 
 from buildarena_store import events
-from buildarena_store.accounts.reservations import release
 from buildarena_store.database import Database
 from buildarena_store.errors import UnknownIdError
-from buildarena_store.ids import content_hash
-from buildarena_store.rows import bound_texts, rows_of
+from buildarena_store.jobs.attempts import Attempt, Ending, end_attempts
+from buildarena_store.jobs.job import JOB_COLUMNS, Job, NewJob
+from buildarena_store.jobs.transitions import REOPENED, transition
+from buildarena_store.rows import bound_texts, columns_of, rows_of, value_of
+from buildarena_store.states import CONSTRUCT_QUEUE, AttemptResult, JobState, Outcome, Stage
 from buildarena_store.tables import attempts, job_artifacts, jobs, sweep_jobs
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class JobKey:
-    """What makes a job unique; two submissions with equal keys are one job.
-
-    Attributes:
-        task: Task name.
-        task_version: Content hash of the task.
-        model_hash: Content hash of the model's configuration, decoding included.
-        track: Track identifier.
-        seed: Seed or sample number, 0 or more.
-    """
-
-    task: str
-    task_version: str
-    model_hash: str
-    track: str
-    seed: int
-
-    @property
-    def job_id(self) -> str:
-        """The job's id, derived from the key: the same job has the same id everywhere."""
-        key = [self.task, self.task_version, self.model_hash, self.track, self.seed]
-        return "job_" + content_hash(key)[:20]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class NewJob:
-    """A job to be added.
-
-    Attributes:
-        key: Its unique key.
-        model: Model name.
-        model_config: The model's configuration, whose hash is in the key.
-        track_config: The track's parts, whose spelling is in the key.
-        limits: Token, request, cost and time limits of its session.
-        owner: Id of the API key that submits it, if any.
-        payer: Id of the sweep whose budget pays for it, if any.
-    """
-
-    key: JobKey
-    model: str
-    model_config: Mapping[str, Any]
-    track_config: Mapping[str, Any]
-    limits: Mapping[str, Any] = field(default_factory=dict)
-    owner: str | None = None
-    payer: str | None = None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Job:
-    """A job as the database has it. Times are in UTC; names are those of the columns."""
-
-    id: str
-    task: str
-    task_version: str
-    model: str
-    model_hash: str
-    model_config: Mapping[str, Any]
-    track: str
-    track_config: Mapping[str, Any]
-    seed: int
-    limits: Mapping[str, Any]
-    owner: str | None
-    payer: str | None
-    stage: str
-    queue: str
-    state: str
-    outcome: str | None
-    reason: str | None
-    detail: str | None
-    faults: int
-    lease_owner: str | None
-    lease_token: int
-    success: bool | None
-    indicator: float | None
-    metrics: Mapping[str, Any] | None
-    flags: Sequence[str] | None
-    manifest: Mapping[str, Any] | None
-    requests: int
-    input_tokens: int
-    output_tokens: int
-    cached_tokens: int
-    reasoning_tokens: int
-    cost_usd: Decimal
-    actions: int
-    refused_actions: int
-    refusals: Mapping[str, int] | None
-    created_at: datetime
-    started_at: datetime | None
-    finished_at: datetime | None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Attempt:
-    """One worker's hold on a job: who, when, and how it ended."""
-
-    token: int
-    stage: str
-    worker: str
-    started_at: datetime
-    ended_at: datetime | None
-    result: str | None
-    detail: str | None
-
-
-JOB_COLUMNS = [jobs.c[name] for name in Job.__dataclass_fields__]
-
-
-def job_from_row(row: Row[Any]) -> Job:
-    """A row that was selected with JOB_COLUMNS, as a value."""
-    return Job(**{name: getattr(row, name) for name in Job.__dataclass_fields__})
 
 
 class Jobs:
@@ -142,8 +29,8 @@ class Jobs:
     def add(self, new: Sequence[NewJob], *, connection: Connection) -> int:
         """Adds the jobs that do not exist yet; the others stay as they are.
 
-        A job that was cancelled or held before is opened again, because somebody wants it now,
-        who pays for the rest of it.
+        A job that was cancelled or put on hold before is opened again, because somebody wants it
+        now, who pays for the rest of it.
 
         Returns:
             How many were added or opened again.
@@ -155,22 +42,23 @@ class Jobs:
         statement = insert(jobs).from_select([column.name for column in columns], select(given))
         inserted = connection.execute(statement.on_conflict_do_nothing().returning(jobs.c.id))
         ids = list(inserted.scalars())
+        events.record_jobs(connection, ids, JobState.QUEUED, {"stage": Stage.CONSTRUCT})
         if len(ids) < len(rows):
             ids += self._reopen([row["id"] for row in rows], new[0], connection)
-        events.record_jobs(connection, ids, "queued", {"stage": "construct"})
         return len(ids)
 
     def _reopen(self, ids: Sequence[str], wanted: NewJob, connection: Connection) -> list[str]:
-        again = connection.execute(
-            update(jobs)
-            .where(
-                jobs.c.id == any_(bound_texts(ids)),
-                (jobs.c.outcome == "cancelled") | (jobs.c.state == "held"),
-            )
-            .values(**REOPENED, owner=wanted.owner, payer=wanted.payer)
-            .returning(jobs.c.id)
+        return transition(
+            jobs.c.id == any_(bound_texts(ids)),
+            (jobs.c.outcome == Outcome.CANCELLED) | (jobs.c.state == JobState.ON_HOLD),
+            to=JobState.QUEUED,
+            allowed_from={JobState.DONE, JobState.ON_HOLD},
+            data={"why": "wanted again"},
+            connection=connection,
+            owner=wanted.owner,
+            payer=wanted.payer,
+            **REOPENED,
         )
-        return list(again.scalars())
 
     def get(self, job_id: str) -> Job:
         """The job with this id.
@@ -182,7 +70,7 @@ class Jobs:
             row = connection.execute(select(*JOB_COLUMNS).where(jobs.c.id == job_id)).first()
         if row is None:
             raise UnknownIdError("job", job_id)
-        return job_from_row(row)
+        return value_of(Job, row)
 
     def page(
         self,
@@ -195,7 +83,7 @@ class Jobs:
         """The newest jobs first, with keyset paging.
 
         Args:
-            limit: Rows at the most.
+            limit: Rows at most.
             after: ``(created_at, id)`` of the last row of the page before.
             sweep_id: Only this sweep's jobs.
             equals: Column values to match; None means any.
@@ -218,16 +106,17 @@ class Jobs:
             )
         query = query.order_by(jobs.c.created_at.desc(), jobs.c.id).limit(limit)
         with self._database.statement() as connection:
-            return [job_from_row(row) for row in connection.execute(query)]
+            return [value_of(Job, row) for row in connection.execute(query)]
 
     def attempts(self, job_id: str) -> list[Attempt]:
-        """Every hold on the job, oldest first."""
-        query = select(attempts).where(attempts.c.job_id == job_id).order_by(attempts.c.token)
+        """Every attempt at the job, oldest first."""
+        query = (
+            select(*columns_of(Attempt, attempts))
+            .where(attempts.c.job_id == job_id)
+            .order_by(attempts.c.token)
+        )
         with self._database.statement() as connection:
-            return [
-                Attempt(**{name: getattr(row, name) for name in Attempt.__dataclass_fields__})
-                for row in connection.execute(query)
-            ]
+            return [value_of(Attempt, row) for row in connection.execute(query)]
 
     def artifacts(self, job_id: str) -> dict[str, str]:
         """Hashes of the job's artifacts by name, for example ``machine``."""
@@ -245,21 +134,28 @@ class Jobs:
         """
         rows = connection.execute(
             update(jobs)
-            .where(jobs.c.id.in_(ids), jobs.c.state != "done")
+            .where(jobs.c.id == any_(bound_texts(ids)), jobs.c.state != JobState.DONE)
             .values(
-                state="done",
-                outcome="cancelled",
+                state=JobState.DONE,
+                outcome=Outcome.CANCELLED,
                 lease_owner=None,
                 lease_expires_at=None,
                 lease_token=jobs.c.lease_token + 1,
                 finished_at=events.now,
             )
-            .returning(jobs.c.id)
+            .returning(jobs.c.id, jobs.c.lease_token)
         )
-        cancelled = [row.id for row in rows]
-        release(cancelled, connection=connection)
-        events.record_jobs(connection, cancelled, "done", {"outcome": "cancelled"})
-        return cancelled
+        endings = [
+            Ending(
+                job_id=row.id,
+                token=row.lease_token - 1,
+                state=JobState.DONE,
+                data={"outcome": Outcome.CANCELLED},
+            )
+            for row in rows
+        ]
+        end_attempts(endings, AttemptResult.CANCELLED, None, connection=connection)
+        return [ending.job_id for ending in endings]
 
     def retry(self, ids: Sequence[str], *, connection: Connection) -> list[str]:
         """Queues errored jobs again at the stage where they failed; never re-rolls a score.
@@ -267,27 +163,15 @@ class Jobs:
         Returns:
             The ids that were queued: those that had errored.
         """
-        rows = connection.execute(
-            update(jobs)
-            .where(jobs.c.id.in_(ids), jobs.c.outcome == "errored")
-            .values(**REOPENED)
-            .returning(jobs.c.id)
+        return transition(
+            jobs.c.id == any_(bound_texts(ids)),
+            jobs.c.outcome == Outcome.ERRORED,
+            to=JobState.QUEUED,
+            allowed_from={JobState.DONE},
+            data={"why": "retry"},
+            connection=connection,
+            **REOPENED,
         )
-        queued = [row.id for row in rows]
-        events.record_jobs(connection, queued, "queued", {"why": "retry"})
-        return queued
-
-
-REOPENED: dict[str, Any] = {
-    "state": "queued",
-    "outcome": None,
-    "reason": None,
-    "detail": None,
-    "faults": 0,
-    "finished_at": None,
-    "nudged_at": None,
-    "available_at": events.now,
-}
 
 
 def _new_row(job: NewJob) -> dict[str, Any]:
@@ -305,7 +189,7 @@ def _new_row(job: NewJob) -> dict[str, Any]:
         "limits": dict(job.limits),
         "owner": job.owner,
         "payer": job.payer,
-        "stage": "construct",
-        "queue": "construct",
-        "state": "queued",
+        "stage": Stage.CONSTRUCT,
+        "queue": CONSTRUCT_QUEUE,
+        "state": JobState.QUEUED,
     }

@@ -14,6 +14,7 @@ from sqlalchemy import bindparam, select, text
 from buildarena_store.database import Database
 from buildarena_store.errors import StaleLeaseError
 from buildarena_store.jobs.leases import Lease
+from buildarena_store.states import JobState
 from buildarena_store.tables import journal
 
 
@@ -79,8 +80,8 @@ class JournalEntry:
 
 # One statement, because it is the one that every turn of every session waits for.
 _APPEND = text(
-    """
-    WITH held AS (
+    f"""
+    WITH job AS (
         UPDATE jobs SET
             requests = requests + :requests,
             input_tokens = input_tokens + :input_tokens,
@@ -89,12 +90,12 @@ _APPEND = text(
             reasoning_tokens = reasoning_tokens + :reasoning_tokens,
             cost_usd = cost_usd + :cost_usd,
             faults = 0
-        WHERE id = :job_id AND lease_token = :token AND state = 'running'
+        WHERE id = :job_id AND lease_token = :token AND state = '{JobState.RUNNING}'
         RETURNING id, payer, owner
     ), settled AS (
-        DELETE FROM reservations USING held WHERE reservations.job_id = held.id
+        DELETE FROM reservations USING job WHERE reservations.job_id = job.id
     ), paying AS (
-        SELECT budgets.id FROM budgets JOIN held ON budgets.id IN (held.payer, held.owner)
+        SELECT budgets.id FROM budgets JOIN job ON budgets.id IN (job.payer, job.owner)
         ORDER BY budgets.id FOR UPDATE OF budgets
     ), charged AS (
         UPDATE budgets SET
@@ -111,8 +112,8 @@ _APPEND = text(
         id, :sequence, :token, :stage, :role, :request_hash, CAST(:reply AS json), :input_tokens,
         :output_tokens, :cached_tokens, :reasoning_tokens, :cost_usd, :latency_s, :tries,
         CAST(:provider_request_id AS text)
-    FROM held
-    """
+    FROM job
+    """  # noqa: S608 - the state is our own constant
 )
 
 
@@ -130,7 +131,7 @@ class Journal:
     def append(self, lease: Lease, entry: JournalEntry) -> None:
         """Writes a reply and charges its usage to the job and its budgets, all or nothing.
 
-        A job that gets on is not given up for the faults it met before.
+        A job that makes progress is not given up for the faults it met before.
 
         Raises:
             StaleLeaseError: The lease is over; nothing was written.

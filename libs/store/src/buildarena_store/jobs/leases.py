@@ -1,4 +1,4 @@
-"""Leases: who may work on a job, and the writes that only the holder may make.
+"""Leases: who may work on a job, and the writes that only their holders may make.
 
 Every claim raises the job's fencing token. A write names its token; when the job has a newer
 one, or is no longer running, nothing is written and StaleLeaseError is raised. All times are
@@ -7,8 +7,7 @@ the database's, so a worker with a wrong clock does no harm.
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import timedelta
 from typing import Any
@@ -27,14 +26,16 @@ from sqlalchemy import (
 )
 
 from buildarena_store import events
-from buildarena_store.accounts.reservations import release
 from buildarena_store.database import Database
 from buildarena_store.errors import StaleLeaseError
-from buildarena_store.jobs.jobs import JOB_COLUMNS, Job, job_from_row
-from buildarena_store.tables import attempts, budgets, jobs
+from buildarena_store.jobs.attempts import Ending, end_attempts
+from buildarena_store.jobs.job import JOB_COLUMNS, Job
+from buildarena_store.rows import value_of
+from buildarena_store.states import AttemptResult, JobState, Outcome, Stage
+from buildarena_store.tables import budgets, jobs
 
-RENUDGE_AFTER = timedelta(seconds=10)
-"""A queued job whose message may have been lost is announced again after this time."""
+NOTIFY_AGAIN_AFTER = timedelta(seconds=10)
+"""Workers are notified again of a queued job whose message may have been lost."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,17 +56,17 @@ class Lease:
 
     @property
     def first(self) -> bool:
-        """Whether nobody held the job before, so that it has neither journal nor rollouts."""
+        """Whether this is the job's first lease, so that it has neither journal nor rollouts."""
         return self.token == 1
 
 
 # One statement each, because every stage of every job waits for them.
-_WAITS = "state = 'queued' AND queue = :queue AND available_at <= clock_timestamp()"
+_WAITS = f"state = '{JobState.QUEUED}' AND queue = :queue AND available_at <= clock_timestamp()"
 _CLAIM = text(
     f"""
     WITH taken AS (
         UPDATE jobs SET
-            state = 'running',
+            state = '{JobState.RUNNING}',
             lease_owner = :owner,
             lease_token = lease_token + 1,
             lease_expires_at = clock_timestamp() + :duration,
@@ -79,29 +80,18 @@ _CLAIM = text(
              ORDER BY created_at, id LIMIT 1 FOR UPDATE SKIP LOCKED)
         )
         RETURNING *
-    ), held AS (
+    ), attempted AS (
         INSERT INTO attempts (job_id, token, stage, worker)
         SELECT id, lease_token, stage, lease_owner FROM taken
-    ), told AS (
+    ), recorded AS (
         INSERT INTO events (job_id, kind, data)
-        SELECT id, 'running', jsonb_build_object('stage', stage, 'worker', lease_owner) FROM taken
+        SELECT id, state, jsonb_build_object('stage', stage, 'worker', lease_owner) FROM taken
     )
     SELECT {", ".join(column.name for column in JOB_COLUMNS)},
         EXISTS (SELECT 1 FROM budgets WHERE budgets.id IN (payer, owner)) AS budgeted
     FROM taken
     """  # noqa: S608 - made of our own column names
 ).columns(*JOB_COLUMNS, column("budgeted", Boolean))
-_END_HOLD = text(
-    """
-    WITH released AS (
-        DELETE FROM reservations WHERE job_id = :job_id
-    ), ended AS (
-        UPDATE attempts SET ended_at = clock_timestamp(), result = :result, detail = :note
-        WHERE job_id = :job_id AND token = :token
-    )
-    INSERT INTO events (job_id, kind, data) VALUES (:job_id, :kind, CAST(:data AS jsonb))
-    """
-)
 
 
 class Leases:
@@ -109,7 +99,7 @@ class Leases:
 
     Args:
         database: Where the jobs are.
-        duration_s: How long a lease lasts without a heartbeat.
+        duration_s: Seconds that a lease is valid without a heartbeat.
         max_faults: Infrastructure faults without progress after which a job is given up.
     """
 
@@ -136,7 +126,7 @@ class Leases:
             row = connection.execute(_CLAIM, given).first()
         if row is None:
             return None
-        job = job_from_row(row)
+        job = value_of(Job, row)
         return Lease(job=job, owner=owner, token=job.lease_token, budgeted=row.budgeted)
 
     def heartbeat(self, leases: Sequence[Lease]) -> dict[str, bool]:
@@ -153,7 +143,10 @@ class Leases:
         with self._database.statement() as connection:
             rows = connection.execute(
                 update(jobs)
-                .where(jobs.c.state == "running", tuple_(jobs.c.id, jobs.c.lease_token).in_(pairs))
+                .where(
+                    jobs.c.state == JobState.RUNNING,
+                    tuple_(jobs.c.id, jobs.c.lease_token).in_(pairs),
+                )
                 .values(lease_expires_at=events.now + self.duration)
                 .returning(jobs.c.id, paying.exists().label("budgeted"))
             )
@@ -163,53 +156,48 @@ class Leases:
         self,
         lease: Lease,
         *,
+        to: JobState,
         connection: Connection,
-        result: str = "done",
+        result: AttemptResult = AttemptResult.DONE,
         note: str | None = None,
         **values: Any,
     ) -> None:
-        """Ends the lease and writes the job's next place, both or neither.
+        """Ends the lease with its attempt and writes the job's next place, all or nothing.
 
         Args:
             lease: The lease that ends.
+            to: The job's next state.
             connection: The transaction that also holds what belongs to this step.
-            result: How this hold ended: ``done``, ``fault``, ``handed_back``.
+            result: How the attempt ended.
             note: A sentence for people, kept with the attempt.
-            values: The job's columns to set, ``state`` among them.
+            values: Further columns of the job to set.
 
         Raises:
             StaleLeaseError: The lease is over; the transaction must be undone.
         """
         changed = connection.execute(
             update(jobs)
-            .where(*_held(lease))
-            .values(lease_owner=None, lease_expires_at=None, **values)
+            .where(*_valid(lease))
+            .values(state=to, lease_owner=None, lease_expires_at=None, **values)
         )
         if changed.rowcount != 1:
             raise StaleLeaseError(lease.job.id, lease.token)
-        shown = {name: values[name] for name in ("stage", "outcome", "reason") if values.get(name)}
-        ended = {
-            "job_id": lease.job.id,
-            "token": lease.token,
-            "result": result,
-            "note": note,
-            "kind": str(values["state"]),
-            "data": json.dumps(shown),
-        }
-        connection.execute(_END_HOLD, ended)
+        data = {name: values[name] for name in ("stage", "outcome", "reason") if values.get(name)}
+        ending = Ending(job_id=lease.job.id, token=lease.token, state=to, data=data)
+        end_attempts([ending], result, note, connection=connection)
 
     def queue_again(
-        self, lease: Lease, *, stage: str, queue: str, connection: Connection, **values: Any
+        self, lease: Lease, *, stage: Stage, queue: str, connection: Connection, **values: Any
     ) -> None:
         """Passes the job on to a stage, there to be claimed afresh; faults are forgiven."""
         self.advance(
             lease,
+            to=JobState.QUEUED,
             connection=connection,
-            state="queued",
             stage=stage,
             queue=queue,
             faults=0,
-            nudged_at=None,
+            notified_at=None,
             available_at=events.now,
             **values,
         )
@@ -218,7 +206,11 @@ class Leases:
         """Gives up the work without fault, for example when a worker shuts down."""
         with self._database.transaction() as connection:
             self.advance(
-                lease, connection=connection, result="handed_back", state="queued", nudged_at=None
+                lease,
+                to=JobState.QUEUED,
+                connection=connection,
+                result=AttemptResult.HANDED_BACK,
+                notified_at=None,
             )
 
     def fault(self, lease: Lease, detail: str, *, delay_s: float = 0.0, reason: str) -> bool:
@@ -240,28 +232,32 @@ class Leases:
             if again:
                 self.advance(
                     lease,
+                    to=JobState.QUEUED,
                     connection=connection,
-                    result="fault",
+                    result=AttemptResult.FAULT,
                     note=detail,
-                    state="queued",
                     faults=faults,
-                    nudged_at=None,
+                    notified_at=None,
                     available_at=events.now + timedelta(seconds=delay_s),
                     detail=detail,
                 )
             else:
-                self.give_up(lease, detail, reason=reason, connection=connection)
+                self._give_up(lease, detail, reason, connection)
         return again
 
-    def give_up(self, lease: Lease, detail: str, *, reason: str, connection: Connection) -> None:
+    def give_up(self, lease: Lease, detail: str, *, reason: str) -> None:
         """Ends the job as errored: outside every average, and kept in the dead-letter view."""
+        with self._database.transaction() as connection:
+            self._give_up(lease, detail, reason, connection)
+
+    def _give_up(self, lease: Lease, detail: str, reason: str, connection: Connection) -> None:
         self.advance(
             lease,
+            to=JobState.DONE,
             connection=connection,
-            result="fault",
+            result=AttemptResult.FAULT,
             note=detail,
-            state="done",
-            outcome="errored",
+            outcome=Outcome.ERRORED,
             reason=reason,
             faults=jobs.c.faults + 1,
             finished_at=events.now,
@@ -278,15 +274,15 @@ class Leases:
         with self._database.transaction() as connection:
             lost = (
                 select(jobs.c.id)
-                .where(jobs.c.state == "running", jobs.c.lease_expires_at < events.now)
+                .where(jobs.c.state == JobState.RUNNING, jobs.c.lease_expires_at < events.now)
                 .with_for_update(skip_locked=True)
             )
             rows = connection.execute(
                 update(jobs)
                 .where(jobs.c.id.in_(lost.scalar_subquery()))
                 .values(
-                    state=case((last, "done"), else_="queued"),
-                    outcome=case((last, literal("errored")), else_=None),
+                    state=case((last, literal(JobState.DONE.value)), else_=JobState.QUEUED.value),
+                    outcome=case((last, literal(Outcome.ERRORED.value)), else_=None),
                     reason=case((last, literal("lost_worker")), else_=None),
                     detail=case(
                         (last, literal("its workers were lost again and again")), else_=None
@@ -295,28 +291,40 @@ class Leases:
                     faults=jobs.c.faults + 1,
                     lease_owner=None,
                     lease_expires_at=None,
-                    nudged_at=None,
+                    notified_at=None,
                     available_at=events.now,
                 )
                 .returning(jobs.c.id, jobs.c.state, jobs.c.lease_token, jobs.c.stage)
             ).all()
-            release([row.id for row in rows], connection=connection)
-            for row in rows:
-                _end_attempt(connection, row.id, row.lease_token, "lost", "no heartbeat came")
-                shown: Mapping[str, str] = {"stage": row.stage, "why": "lost worker"}
-                events.record_jobs(connection, [row.id], row.state, shown)
-        return [row.id for row in rows if row.state == "queued"]
+            endings = [
+                Ending(
+                    job_id=row.id,
+                    token=row.lease_token,
+                    state=JobState(row.state),
+                    data={"stage": row.stage, "why": "lost worker"},
+                )
+                for row in rows
+            ]
+            end_attempts(endings, AttemptResult.LOST, "no heartbeat came", connection=connection)
+        return [row.id for row in rows if row.state == JobState.QUEUED]
 
-    def to_announce(self, queue: str, limit: int) -> list[str]:
-        """Waiting jobs that no message speaks of, oldest first; they are marked as announced."""
+    def waiting_queues(self) -> list[str]:
+        """Names of the queues that jobs wait in."""
+        query = select(jobs.c.queue).where(jobs.c.state == JobState.QUEUED).distinct()
+        with self._database.statement() as connection:
+            return list(connection.execute(query).scalars())
+
+    def to_notify(self, queue: str, limit: int) -> list[str]:
+        """Waiting jobs that no message names, oldest first; they are marked as notified."""
         with self._database.transaction() as connection:
-            silent = (
+            unnotified = (
                 select(jobs.c.id)
                 .where(
-                    jobs.c.state == "queued",
+                    jobs.c.state == JobState.QUEUED,
                     jobs.c.queue == queue,
                     jobs.c.available_at <= events.now,
-                    jobs.c.nudged_at.is_(None) | (jobs.c.nudged_at < events.now - RENUDGE_AFTER),
+                    jobs.c.notified_at.is_(None)
+                    | (jobs.c.notified_at < events.now - NOTIFY_AGAIN_AFTER),
                 )
                 .order_by((jobs.c.faults > 0).desc(), jobs.c.created_at, jobs.c.id)
                 .limit(limit)
@@ -324,26 +332,16 @@ class Leases:
             )
             rows = connection.execute(
                 update(jobs)
-                .where(jobs.c.id.in_(silent.scalar_subquery()))
-                .values(nudged_at=events.now)
+                .where(jobs.c.id.in_(unnotified.scalar_subquery()))
+                .values(notified_at=events.now)
                 .returning(jobs.c.id)
             )
             return [row.id for row in rows]
 
 
-def _held(lease: Lease) -> tuple[ColumnElement[bool], ...]:
+def _valid(lease: Lease) -> tuple[ColumnElement[bool], ...]:
     return (
         jobs.c.id == lease.job.id,
         jobs.c.lease_token == lease.token,
-        jobs.c.state == "running",
-    )
-
-
-def _end_attempt(
-    connection: Connection, job_id: str, token: int, result: str, detail: str | None
-) -> None:
-    connection.execute(
-        update(attempts)
-        .where(attempts.c.job_id == job_id, attempts.c.token == token)
-        .values(ended_at=events.now, result=result, detail=detail)
+        jobs.c.state == JobState.RUNNING,
     )

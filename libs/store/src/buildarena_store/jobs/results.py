@@ -13,6 +13,7 @@ from buildarena_store.artifacts import ArtifactInfo
 from buildarena_store.boards import Boards
 from buildarena_store.database import Database
 from buildarena_store.jobs.leases import Lease, Leases
+from buildarena_store.states import JobState, Outcome
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -20,7 +21,7 @@ class JobScore:
     """How a job ended.
 
     Attributes:
-        outcome: ``success``, ``unsuccessful``, ``construction_failed`` or ``limit``.
+        outcome: One of the scored outcomes.
         success: Whether the task's criterion was met.
         indicator: The task's performance indicator.
         metrics: Secondary metrics by name.
@@ -30,7 +31,7 @@ class JobScore:
         manifest: Versions of everything that can change the score.
     """
 
-    outcome: str
+    outcome: Outcome
     success: bool
     indicator: float
     metrics: Mapping[str, Any] = field(default_factory=dict)
@@ -68,7 +69,7 @@ class Results:
         self._leases.advance(
             lease,
             connection=connection,
-            state="done",
+            to=JobState.DONE,
             outcome=score.outcome,
             reason=score.reason,
             detail=score.detail,

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import Connection, Row, bindparam, insert, select, update
+from sqlalchemy import Connection, bindparam, insert, select, update
 
 from buildarena_store import events
 from buildarena_store.database import Database
+from buildarena_store.rows import value_of
 from buildarena_store.tables import rollouts
 
 
@@ -98,15 +99,10 @@ class Rollouts:
     ) -> RolloutRecord:
         """Writes a rollout's score and trajectory; returns the rollout as it is now."""
         given = {"of_job": job_id, "of_number": number, **values}
-        return _record(connection.execute(_COMPLETE, given).one())
+        return value_of(RolloutRecord, connection.execute(_COMPLETE, given).one())
 
     def read(self, job_id: str) -> list[RolloutRecord]:
         """All rollouts of a job in their order."""
         with self._database.statement() as connection:
-            return [_record(row) for row in connection.execute(_OF_JOB, {"job_id": job_id})]
-
-
-def _record(row: Row[Any]) -> RolloutRecord:
-    return RolloutRecord(
-        **{name: getattr(row, name) for name in RolloutRecord.__dataclass_fields__}
-    )
+            rows = connection.execute(_OF_JOB, {"job_id": job_id})
+            return [value_of(RolloutRecord, row) for row in rows]

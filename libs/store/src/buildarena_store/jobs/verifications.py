@@ -7,17 +7,19 @@ from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Any
 
-from sqlalchemy import Row, insert, or_, select, update
+from sqlalchemy import insert, or_, select, update
 
 from buildarena_store import events
 from buildarena_store.database import Database
 from buildarena_store.errors import UnknownIdError
 from buildarena_store.ids import new_id
+from buildarena_store.rows import columns_of, value_of
+from buildarena_store.states import VerificationState
 from buildarena_store.tables import verifications
 
 ABANDONED_AFTER = timedelta(minutes=10)
 """A verification whose worker says nothing for so long is done by another: it writes no score."""
-RENUDGE_AFTER = timedelta(seconds=10)
+NOTIFY_AGAIN_AFTER = timedelta(seconds=10)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,7 +27,7 @@ class Verification:
     """One check of one job.
 
     Attributes:
-        state: ``queued``, ``running`` or ``done``.
+        state: A `VerificationState`.
         report: What was compared, once it is done.
     """
 
@@ -44,11 +46,13 @@ class Verifications:
         self._database = database
 
     def request(self, job_id: str) -> str:
-        """Stores a wish to verify a job; returns its id."""
+        """Asks for a job to be verified; returns the verification's id."""
         verification_id = new_id("check")
         with self._database.transaction() as connection:
             connection.execute(
-                insert(verifications).values(id=verification_id, job_id=job_id, state="queued")
+                insert(verifications).values(
+                    id=verification_id, job_id=job_id, state=VerificationState.QUEUED
+                )
             )
         return verification_id
 
@@ -60,15 +64,15 @@ class Verifications:
                 .where(
                     verifications.c.id == verification_id,
                     or_(
-                        verifications.c.state == "queued",
-                        (verifications.c.state == "running")
+                        verifications.c.state == VerificationState.QUEUED,
+                        (verifications.c.state == VerificationState.RUNNING)
                         & (verifications.c.claimed_at < events.now - ABANDONED_AFTER),
                     ),
                 )
-                .values(state="running", claimed_at=events.now)
+                .values(state=VerificationState.RUNNING, claimed_at=events.now)
                 .returning(*_COLUMNS)
             ).first()
-        return None if row is None else _from_row(row)
+        return None if row is None else value_of(Verification, row)
 
     def finish(self, verification_id: str, report: Mapping[str, Any]) -> None:
         """Writes what was found."""
@@ -76,7 +80,7 @@ class Verifications:
             connection.execute(
                 update(verifications)
                 .where(verifications.c.id == verification_id)
-                .values(state="done", report=dict(report), finished_at=events.now)
+                .values(state=VerificationState.DONE, report=dict(report), finished_at=events.now)
             )
 
     def get(self, verification_id: str) -> Verification:
@@ -91,20 +95,20 @@ class Verifications:
             ).first()
         if row is None:
             raise UnknownIdError("verification", verification_id)
-        return _from_row(row)
+        return value_of(Verification, row)
 
-    def to_announce(self, limit: int) -> list[str]:
-        """Waiting or abandoned verifications that no message speaks of; they are marked."""
-        silent = (
+    def to_notify(self, limit: int) -> list[str]:
+        """Waiting or abandoned verifications that no message names; they are marked."""
+        unnotified = (
             select(verifications.c.id)
             .where(
                 or_(
-                    verifications.c.state == "queued",
-                    (verifications.c.state == "running")
+                    verifications.c.state == VerificationState.QUEUED,
+                    (verifications.c.state == VerificationState.RUNNING)
                     & (verifications.c.claimed_at < events.now - ABANDONED_AFTER),
                 ),
-                verifications.c.nudged_at.is_(None)
-                | (verifications.c.nudged_at < events.now - RENUDGE_AFTER),
+                verifications.c.notified_at.is_(None)
+                | (verifications.c.notified_at < events.now - NOTIFY_AGAIN_AFTER),
             )
             .order_by(verifications.c.created_at)
             .limit(limit)
@@ -113,15 +117,11 @@ class Verifications:
         with self._database.transaction() as connection:
             rows = connection.execute(
                 update(verifications)
-                .where(verifications.c.id.in_(silent.scalar_subquery()))
-                .values(nudged_at=events.now)
+                .where(verifications.c.id.in_(unnotified.scalar_subquery()))
+                .values(notified_at=events.now)
                 .returning(verifications.c.id)
             )
             return [row.id for row in rows]
 
 
-_COLUMNS = [verifications.c[name] for name in Verification.__dataclass_fields__]
-
-
-def _from_row(row: Row[Any]) -> Verification:
-    return Verification(**{name: getattr(row, name) for name in Verification.__dataclass_fields__})
+_COLUMNS = columns_of(Verification, verifications)

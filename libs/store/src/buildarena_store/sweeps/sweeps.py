@@ -8,13 +8,14 @@ from datetime import datetime
 from decimal import Decimal
 from typing import Any
 
-from sqlalchemy import Connection, func, literal, select, update
+from sqlalchemy import Connection, func, literal, select, text
 from sqlalchemy.dialects.postgresql import insert
 
 from buildarena_store import events
 from buildarena_store.database import Database
 from buildarena_store.errors import UnknownIdError
-from buildarena_store.rows import bound_texts
+from buildarena_store.rows import bound_texts, columns_of, value_of
+from buildarena_store.states import JobState, SweepState
 from buildarena_store.tables import jobs, sweep_jobs, sweeps
 
 
@@ -95,7 +96,7 @@ class Sweeps:
                 id=sweep.id,
                 name=sweep.name,
                 spec=dict(sweep.spec),
-                state="active",
+                state=SweepState.ACTIVE,
                 owner=sweep.owner,
                 request_key=sweep.request_key,
                 request_hash=sweep.request_hash,
@@ -121,34 +122,34 @@ class Sweeps:
         """The sweep that was submitted with this idempotency key, if any."""
         return self._find(sweeps.c.request_key == request_key)
 
-    def with_jobs(self, jobs_hash: str, *, owner: str | None) -> Sweep | None:
-        """An owner's newest sweep of just these jobs that was not cancelled, if any."""
+    def with_jobs(self, jobs_hash: str, *, owner: str | None, connection: Connection) -> str | None:
+        """Id of an owner's newest sweep of just these jobs that was not cancelled, if any.
+
+        Until the transaction ends, nobody else gets an answer for the same jobs: whoever finds no
+        sweep can store one, and it stays the only one.
+        """
+        connection.execute(_LOCK_JOBS_HASH, {"jobs_hash": jobs_hash})
         query = (
             select(sweeps.c.id)
             .where(
                 sweeps.c.jobs_hash == jobs_hash,
                 sweeps.c.owner.is_not_distinct_from(owner),
-                sweeps.c.state != "cancelled",
+                sweeps.c.state != SweepState.CANCELLED,
             )
             .order_by(sweeps.c.created_at.desc())
             .limit(1)
         )
-        with self._database.transaction() as connection:
-            found = connection.execute(query).scalar()
-        return None if found is None else self.get(found)
+        found: str | None = connection.execute(query).scalar()
+        return found
 
     def _find(self, condition: Any) -> Sweep | None:
-        columns = [sweeps.c[name] for name in Sweep.__dataclass_fields__]
         with self._database.statement() as connection:
-            row = connection.execute(select(*columns).where(condition)).first()
-        if row is None:
-            return None
-        return Sweep(**{name: getattr(row, name) for name in Sweep.__dataclass_fields__})
+            row = connection.execute(select(*_COLUMNS).where(condition)).first()
+        return None if row is None else value_of(Sweep, row)
 
     def page(self, *, limit: int, after: tuple[datetime, str] | None = None) -> list[Sweep]:
         """The newest sweeps first, with keyset paging as for jobs."""
-        columns = [sweeps.c[name] for name in Sweep.__dataclass_fields__]
-        query = select(*columns).order_by(sweeps.c.created_at.desc(), sweeps.c.id).limit(limit)
+        query = select(*_COLUMNS).order_by(sweeps.c.created_at.desc(), sweeps.c.id).limit(limit)
         if after is not None:
             created_at, id_ = after
             query = query.where(
@@ -156,10 +157,7 @@ class Sweeps:
                 | ((sweeps.c.created_at == created_at) & (sweeps.c.id > id_))
             )
         with self._database.statement() as connection:
-            return [
-                Sweep(**{name: getattr(row, name) for name in Sweep.__dataclass_fields__})
-                for row in connection.execute(query)
-            ]
+            return [value_of(Sweep, row) for row in connection.execute(query)]
 
     def progress(self, sweep_id: str) -> SweepProgress:
         """Counts a sweep's jobs by where they are, and what they cost."""
@@ -183,7 +181,7 @@ class Sweeps:
         stages: dict[str, int] = {}
         outcomes: dict[str, int] = {}
         for row in rows:
-            if row.state == "done":
+            if row.state == JobState.DONE:
                 outcomes[row.outcome] = outcomes.get(row.outcome, 0) + row.jobs
             else:
                 name = f"{row.stage} {row.state}"
@@ -198,48 +196,12 @@ class Sweeps:
             output_tokens=int(sum(row.output_tokens for row in rows)),
         )
 
-    def set_state(self, sweep_id: str, state: str, *, connection: Connection) -> None:
-        """Writes a sweep's state and tells its listeners."""
-        connection.execute(update(sweeps).where(sweeps.c.id == sweep_id).values(state=state))
-        events.record_sweep(connection, sweep_id, state, {})
-
-    def hold(self, sweep_id: str, *, connection: Connection) -> None:
-        """Keeps waiting jobs from being taken, unless another active sweep wants them."""
-        self._move(sweep_id, "queued", "held", connection)
-
-    def resume(self, sweep_id: str, *, connection: Connection) -> None:
-        """Lets a paused or stopped sweep go on, and its held jobs be taken again."""
-        self._move(sweep_id, "held", "queued", connection)
-        self.set_state(sweep_id, "active", connection=connection)
-
-    def _move(self, sweep_id: str, before: str, after: str, connection: Connection) -> None:
-        own = self.own_jobs(sweep_id, connection=connection)
-        rows = connection.execute(
-            update(jobs)
-            .where(jobs.c.id.in_(own), jobs.c.state == before)
-            .values(state=after, nudged_at=None)
-            .returning(jobs.c.id)
-        )
-        events.record_jobs(connection, [row.id for row in rows], after, {})
-
     def job_ids(self, sweep_id: str) -> list[str]:
         """Ids of all the sweep's jobs."""
         query = select(sweep_jobs.c.job_id).where(sweep_jobs.c.sweep_id == sweep_id)
         with self._database.statement() as connection:
             return [row.job_id for row in connection.execute(query)]
 
-    def own_jobs(self, sweep_id: str, *, connection: Connection) -> list[str]:
-        """Ids of the jobs that no other active sweep wants."""
-        other = sweep_jobs.alias("other")
-        wanted = (
-            select(literal(1))
-            .select_from(other.join(sweeps, sweeps.c.id == other.c.sweep_id))
-            .where(
-                other.c.job_id == sweep_jobs.c.job_id,
-                other.c.sweep_id != sweep_id,
-                sweeps.c.state == "active",
-            )
-            .exists()
-        )
-        query = select(sweep_jobs.c.job_id).where(sweep_jobs.c.sweep_id == sweep_id, ~wanted)
-        return [row.job_id for row in connection.execute(query)]
+
+_COLUMNS = columns_of(Sweep, sweeps)
+_LOCK_JOBS_HASH = text("SELECT pg_advisory_xact_lock(hashtextextended(:jobs_hash, 0))")

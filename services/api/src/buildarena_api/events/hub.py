@@ -82,13 +82,13 @@ class EventHub:
 
     def _before(self, last_id: int, sweep_id: str | None, job_ids: frozenset[str]) -> list[Event]:
         if sweep_id is not None:
-            return self._context.events.after(last_id, sweep_id=sweep_id)
+            return self._context.store.events.after(last_id, sweep_id=sweep_id)
         (job_id,) = job_ids
-        return self._context.events.after(last_id, job_id=job_id)
+        return self._context.store.events.after(last_id, job_id=job_id)
 
     async def _join(self, listener: _Listener) -> None:
         if self._floor is None:
-            self._floor = await asyncio.to_thread(self._context.events.newest)
+            self._floor = await asyncio.to_thread(self._context.store.events.newest)
         self._listeners.add(listener)
         if self._task is None or self._task.done():
             self._task = asyncio.create_task(self._poll())
@@ -97,7 +97,7 @@ class EventHub:
         while self._listeners:
             await asyncio.sleep(POLL_S)
             try:
-                events = await asyncio.to_thread(self._context.events.after, self._floor or 0)
+                events = await asyncio.to_thread(self._context.store.events.after, self._floor or 0)
             except SQLAlchemyError as error:
                 log.warning("events_unreadable", error=str(error).splitlines()[0])
                 continue

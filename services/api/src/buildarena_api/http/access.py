@@ -132,7 +132,7 @@ def _identify(context: Context, given: HTTPAuthorizationCredentials | None) -> C
         secret.encode(), settings.admin_key.get_secret_value().encode()
     ):
         return Caller(key_id=None, scope="admin")
-    found = context.keys.check(secret)
+    found = context.store.keys.check(secret)
     if found is None:
         raise _unauthorized("this API key is not known here")
     if found.refusal is not None:

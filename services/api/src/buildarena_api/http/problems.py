@@ -15,7 +15,7 @@ from sqlalchemy.exc import DataError, OperationalError
 from starlette.exceptions import HTTPException
 
 from buildarena_pipeline.errors import SubmissionError
-from buildarena_store import ArtifactMissingError, UnknownIdError
+from buildarena_store import ArtifactMissingError, TransitionError, UnknownIdError
 
 PROBLEM_JSON = "application/problem+json"
 
@@ -134,6 +134,10 @@ def add_problem_handlers(app: FastAPI) -> None:
 
 
 def _add_store_handlers(app: FastAPI) -> None:
+    @app.exception_handler(TransitionError)
+    async def on_transition(_: Request, error: TransitionError) -> JSONResponse:
+        return _answer(409, str(error))
+
     @app.exception_handler(UnknownIdError)
     async def on_unknown(_: Request, error: UnknownIdError) -> JSONResponse:
         return _answer(404, str(error))

@@ -10,7 +10,7 @@ from typing import Final
 from buildarena_api.http.etags import Answer
 from buildarena_benchmark import Task
 from buildarena_benchmark.leaderboard import Board, BoardQuery, TrackBoard, Trial
-from buildarena_pipeline.catalog.tasks import TaskCatalogue
+from buildarena_pipeline.catalog.tasks import TaskCatalog
 from buildarena_store import Boards
 
 KEPT_ANSWERS: Final = 256
@@ -28,7 +28,7 @@ class BoardCache:
         catalogue: Where tasks are read, when one was uploaded.
     """
 
-    def __init__(self, boards: Boards, catalogue: TaskCatalogue) -> None:
+    def __init__(self, boards: Boards, catalogue: TaskCatalog) -> None:
         self._boards = boards
         self._catalogue = catalogue
         self._task_versions: int | None = None

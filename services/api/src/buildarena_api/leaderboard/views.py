@@ -12,7 +12,7 @@ from buildarena_benchmark import builtin_tasks
 from buildarena_benchmark.leaderboard import Board as RankedBoard
 from buildarena_benchmark.leaderboard import Cell, published_overall, published_rows
 from buildarena_pipeline.catalog.models import ModelRegistry
-from buildarena_pipeline.catalog.tasks import TaskCatalogue
+from buildarena_pipeline.catalog.tasks import TaskCatalog
 
 
 class _View(BaseModel):
@@ -158,7 +158,7 @@ def board_view(
     track: str,
     tracks: list[str],
     registry: ModelRegistry,
-    catalogue: TaskCatalogue,
+    catalogue: TaskCatalog,
 ) -> Board:
     """A ranked board as it is answered."""
     newest = catalogue.named({found.task for found in board.tasks})

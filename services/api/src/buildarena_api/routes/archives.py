@@ -43,7 +43,7 @@ def export_sweep(sweep_id: str, context: ContextDep) -> FileResponse:
     """A sweep with its jobs, journals, rollouts and artifacts, as one ZIP file."""
     target = _scratch()
     try:
-        write_archive(context.database, context.artifacts, sweep_id, target)
+        write_archive(context.store.database, context.artifacts, sweep_id, target)
     except BaseException:
         target.unlink()
         raise
@@ -75,7 +75,7 @@ async def import_sweep(
     try:
         await _receive(request, source)
         done = await run_in_threadpool(
-            read_archive, context.database, context.artifacts, source, owner=caller.key_id
+            read_archive, context.store.database, context.artifacts, source, owner=caller.key_id
         )
     except ArchiveError as error:
         raise ProblemError(422, str(error)) from error

@@ -41,7 +41,7 @@ async def stream_job(
     job_id: str, context: ContextDep, request: Request, last_event_id: LastEventId = 0
 ) -> EventSourceResponse:
     """What happens to a job, from the beginning or from an event on."""
-    await run_in_threadpool(context.jobs.get, job_id)
+    await run_in_threadpool(context.store.jobs.get, job_id)
     hub: EventHub = request.app.state.hub
     events = hub.listen(last_id=last_event_id, sweep_id=None, job_ids=frozenset({job_id}))
     return EventSourceResponse(_sent(events), ping=PING_S)
@@ -56,8 +56,8 @@ async def stream_sweep(
     sweep_id: str, context: ContextDep, request: Request, last_event_id: LastEventId = 0
 ) -> EventSourceResponse:
     """What happens to a sweep and its jobs, from the beginning or from an event on."""
-    await run_in_threadpool(context.sweeps.get, sweep_id)
-    job_ids = frozenset(await run_in_threadpool(context.sweeps.job_ids, sweep_id))
+    await run_in_threadpool(context.store.sweeps.get, sweep_id)
+    job_ids = frozenset(await run_in_threadpool(context.store.sweeps.job_ids, sweep_id))
     hub: EventHub = request.app.state.hub
     events = hub.listen(last_id=last_event_id, sweep_id=sweep_id, job_ids=job_ids)
     return EventSourceResponse(_sent(events), ping=PING_S)

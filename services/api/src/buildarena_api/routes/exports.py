@@ -103,7 +103,7 @@ def export(
                 track=track or "",
                 tracks=tracks,
                 registry=registry,
-                catalogue=context.catalogue,
+                catalogue=context.tasks,
             ),
         )
 
@@ -120,7 +120,7 @@ def export(
 @router.get("/sweeps/{sweep_id}/results", responses=problem_responses(404, 503))
 def sweep_results(sweep_id: str, context: ContextDep) -> list[Result]:
     """All ended jobs of a sweep with their rounds: what a report is made of."""
-    context.sweeps.get(sweep_id)
+    context.store.sweeps.get(sweep_id)
     return [
         Result.model_validate(
             {
@@ -129,7 +129,7 @@ def sweep_results(sweep_id: str, context: ContextDep) -> list[Result]:
                 "rounds": rounds,
             }
         )
-        for trial, rounds in context.results.boards.of_sweep(sweep_id)
+        for trial, rounds in context.store.results.boards.of_sweep(sweep_id)
     ]
 
 

@@ -11,9 +11,9 @@ from pydantic import BaseModel, Field
 from sqlalchemy.exc import SQLAlchemyError
 
 from buildarena_api.dependencies import ContextDep
-from buildarena_pipeline.broker.queues import CONSTRUCT, simulate_queue
 from buildarena_pipeline.catalog.tracks import SIMULATORS
 from buildarena_pipeline.runtime.context import Context
+from buildarena_store.states import CONSTRUCT_QUEUE, simulate_queue
 
 router = APIRouter(prefix="/v1", tags=["health"])
 
@@ -55,7 +55,7 @@ def health(context: ContextDep, response: Response) -> Health:
 
 def _database(context: Context) -> Check:
     try:
-        context.database.require_schema()
+        context.store.database.require_schema()
     except SQLAlchemyError as error:
         return Check(
             name="database",
@@ -71,7 +71,7 @@ def _database(context: Context) -> Check:
 
 
 def _broker(context: Context) -> Check:
-    waiting = context.queues.waiting(CONSTRUCT)
+    waiting = context.queues.waiting(CONSTRUCT_QUEUE)
     if waiting is None:
         return Check(
             name="broker",
@@ -85,9 +85,9 @@ def _broker(context: Context) -> Check:
 def _workers(context: Context, database: Check) -> list[Check]:
     if not database.ok:
         return []
-    alive = [worker for worker in context.workers.all() if worker.alive]
+    alive = [worker for worker in context.store.workers.all() if worker.alive]
     checks = []
-    for queue in [CONSTRUCT, *(simulate_queue(engine) for engine in SIMULATORS)]:
+    for queue in [CONSTRUCT_QUEUE, *(simulate_queue(engine) for engine in SIMULATORS)]:
         serving = [worker for worker in alive if queue in worker.queues]
         checks.append(
             Check(
@@ -105,7 +105,7 @@ def _clocks(context: Context) -> Check:
     wrong = [
         f"{worker.id} is {abs(worker.clock_ahead_s):.0f} s "
         + ("ahead" if worker.clock_ahead_s > 0 else "behind")
-        for worker in context.workers.all()
+        for worker in context.store.workers.all()
         if worker.alive and worker.clock_ahead_s and abs(worker.clock_ahead_s) > CLOCK_TOLERANCE_S
     ]
     return Check(

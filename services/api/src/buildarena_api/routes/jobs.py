@@ -11,9 +11,9 @@ from buildarena_api.http import cursors
 from buildarena_api.http.access import CallerDep
 from buildarena_api.http.problems import ProblemError, problem_responses
 from buildarena_api.routes.transcripts import as_markdown
-from buildarena_api.schemas import AttemptView, JobDetail, JobPage, JobView
+from buildarena_api.schemas import AnyJobState, AttemptView, JobDetail, JobPage, JobView
 from buildarena_pipeline.catalog.specs import JobSpec
-from buildarena_pipeline.runtime.reaper import announce_waiting
+from buildarena_pipeline.runtime.notify import notify_waiting
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
 
@@ -41,15 +41,15 @@ def list_jobs(
     sweep: Annotated[str | None, Query(description="Only this sweep's jobs")] = None,
     task: Annotated[str | None, Query()] = None,
     model: Annotated[str | None, Query()] = None,
-    state: Annotated[Literal["queued", "held", "running", "done"] | None, Query()] = None,
+    state: Annotated[AnyJobState | None, Query()] = None,
     outcome: Annotated[str | None, Query()] = None,
     cursor: Annotated[str | None, Query(max_length=500)] = None,
     limit: Annotated[int, Query(ge=1, le=1000)] = 100,
 ) -> JobPage:
     """Lists jobs, newest first."""
     if sweep is not None:
-        context.sweeps.get(sweep)
-    found = context.jobs.page(
+        context.store.sweeps.get(sweep)
+    found = context.store.jobs.page(
         limit=limit,
         after=None if cursor is None else cursors.decode(cursor),
         sweep_id=sweep,
@@ -68,38 +68,38 @@ def list_jobs(
 @router.get("/{job_id}", responses=problem_responses(404, 503))
 def show_job(job_id: str, context: ContextDep) -> JobDetail:
     """Shows a job with its manifest, attempts and artifacts."""
-    job = context.jobs.get(job_id)
+    job = context.store.jobs.get(job_id)
     return JobDetail(
         **JobView.of(job).model_dump(),
         manifest=None if job.manifest is None else dict(job.manifest),
-        attempts=[AttemptView.model_validate(a) for a in context.jobs.attempts(job_id)],
-        artifacts=context.jobs.artifacts(job_id),
+        attempts=[AttemptView.model_validate(a) for a in context.store.jobs.attempts(job_id)],
+        artifacts=context.store.jobs.artifacts(job_id),
     )
 
 
 @router.post("/{job_id}/cancel", responses=problem_responses(404, 409, 503))
 def cancel_job(job_id: str, context: ContextDep, caller: CallerDep) -> JobView:
     """Ends a job that has not ended; its worker stops before its next model request."""
-    caller.require_owner(context.jobs.get(job_id).owner, f"job {job_id}")
-    with context.database.transaction() as connection:
-        cancelled = context.jobs.cancel([job_id], connection=connection)
+    caller.require_owner(context.store.jobs.get(job_id).owner, f"job {job_id}")
+    with context.store.database.transaction() as connection:
+        cancelled = context.store.jobs.cancel([job_id], connection=connection)
     if not cancelled:
         raise ProblemError(409, f"job {job_id} has ended already")
-    return JobView.of(context.jobs.get(job_id))
+    return JobView.of(context.store.jobs.get(job_id))
 
 
 @router.post("/{job_id}/retry", status_code=202, responses=problem_responses(404, 409, 503))
 def retry_job(job_id: str, context: ContextDep, caller: CallerDep) -> JobView:
     """Queues an errored job again where it failed. A scored job is never rolled again."""
-    job = context.jobs.get(job_id)
+    job = context.store.jobs.get(job_id)
     caller.require_owner(job.owner, f"job {job_id}")
-    with context.database.transaction() as connection:
-        again = context.jobs.retry([job_id], connection=connection)
+    with context.store.database.transaction() as connection:
+        again = context.store.jobs.retry([job_id], connection=connection)
     if not again:
         state = job.outcome or job.state
         raise ProblemError(409, f"only errored jobs are retried; job {job_id} is {state}")
-    announce_waiting(context, job.queue)
-    return JobView.of(context.jobs.get(job_id))
+    notify_waiting(context, job.queue)
+    return JobView.of(context.store.jobs.get(job_id))
 
 
 @router.get(
@@ -122,9 +122,9 @@ def get_artifact(
     ] = "json",
 ) -> Response:
     """The machine document, the transcript or a trajectory of a job."""
-    job = context.jobs.get(job_id)
+    job = context.store.jobs.get(job_id)
     name = f"trajectory-{number}" if artifact == "trajectory" else artifact
-    digest = context.jobs.artifacts(job_id).get(name)
+    digest = context.store.jobs.artifacts(job_id).get(name)
     if digest is None:
         raise ProblemError(404, f"job {job_id} has no {name} yet")
     data = context.artifacts.get(digest)

@@ -12,11 +12,11 @@ from buildarena_api.dependencies import ContextDep
 from buildarena_api.http.access import admin_only
 from buildarena_api.http.problems import problem_responses
 from buildarena_api.schemas import BudgetView
-from buildarena_pipeline.broker.queues import CONSTRUCT
 from buildarena_pipeline.catalog.specs import Budget, Title
 from buildarena_pipeline.runtime.context import Context
-from buildarena_pipeline.runtime.reaper import announce_waiting
+from buildarena_pipeline.runtime.notify import notify_waiting
 from buildarena_store import ApiKey
+from buildarena_store.states import CONSTRUCT_QUEUE
 
 router = APIRouter(prefix="/v1/keys", tags=["keys"], dependencies=[Depends(admin_only)])
 
@@ -61,11 +61,11 @@ class KeyCreated(KeyView):
 @router.post("", status_code=201, responses=problem_responses(422, 503))
 def create_key(body: NewKey, response: Response, context: ContextDep) -> KeyCreated:
     """Makes a key. Its secret is in this answer only."""
-    lasts = None if body.days is None else timedelta(days=body.days)
-    key, secret = context.keys.create(name=body.name, scopes=body.scopes, lasts=lasts)
+    ttl = None if body.days is None else timedelta(days=body.days)
+    key, secret = context.store.keys.create(name=body.name, scopes=body.scopes, ttl=ttl)
     if body.budget is not None:
-        with context.database.transaction() as connection:
-            context.budgets.set(key.id, body.budget.as_limits(), connection=connection)
+        with context.store.database.transaction() as connection:
+            context.store.budgets.set(key.id, body.budget.as_limits(), connection=connection)
     response.headers["Location"] = f"/v1/keys/{key.id}"
     response.headers["Cache-Control"] = "no-store"
     return KeyCreated(**_view(context, key).model_dump(), secret=secret)
@@ -74,13 +74,13 @@ def create_key(body: NewKey, response: Response, context: ContextDep) -> KeyCrea
 @router.get("", responses=problem_responses(503))
 def list_keys(context: ContextDep) -> list[KeyView]:
     """Lists all keys, oldest first, those that ended included."""
-    return [_view(context, key) for key in context.keys.all()]
+    return [_view(context, key) for key in context.store.keys.all()]
 
 
 @router.post("/{key_id}/revoke", responses=problem_responses(404, 503))
 def revoke_key(key_id: str, context: ContextDep) -> KeyView:
     """Ends a key at once. What was submitted with it goes on."""
-    return _view(context, context.keys.revoke(key_id))
+    return _view(context, context.store.keys.revoke(key_id))
 
 
 @router.put("/{key_id}/budget", responses=problem_responses(404, 422, 503))
@@ -89,15 +89,15 @@ def set_budget(key_id: str, body: Budget, context: ContextDep) -> KeyView:
 
     Sweeps that stopped for want of it go on when they are resumed.
     """
-    key = context.keys.get(key_id)
-    with context.database.transaction() as connection:
-        context.budgets.set(key_id, body.as_limits(), connection=connection)
-        context.budgets.release_single_jobs(key_id, connection=connection)
-    announce_waiting(context, CONSTRUCT)
+    key = context.store.keys.get(key_id)
+    with context.store.lifecycle.command() as connection:
+        context.store.budgets.set(key_id, body.as_limits(), connection=connection)
+        context.store.lifecycle.release_single_jobs(key_id, connection=connection)
+    notify_waiting(context, CONSTRUCT_QUEUE)
     return _view(context, key)
 
 
 def _view(context: Context, key: ApiKey) -> KeyView:
     view = KeyView.model_validate(key)
-    view.budget = BudgetView.of(context.budgets.get(key.id))
+    view.budget = BudgetView.of(context.store.budgets.get(key.id))
     return view

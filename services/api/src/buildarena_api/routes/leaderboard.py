@@ -15,7 +15,7 @@ from buildarena_api.leaderboard.filters import BoardsDep, SelectionDep, unknown
 from buildarena_api.leaderboard.views import Board, ChangePage, ChangeView, board_view
 from buildarena_api.routes import exports
 from buildarena_benchmark.leaderboard import SCORED, BoardQuery, TaskDuel, duel
-from buildarena_pipeline.broker.queues import VERIFY
+from buildarena_store.states import VERIFY_QUEUE
 
 router = APIRouter(prefix="/v1", tags=["leaderboard"])
 MOST_DISTINCT = 20
@@ -106,7 +106,7 @@ def leaderboard(
         "json " + " ".join(tracks),
         lambda board: (
             board_view(
-                board, track=track, tracks=tracks, registry=registry, catalogue=context.catalogue
+                board, track=track, tracks=tracks, registry=registry, catalogue=context.tasks
             )
             .model_dump_json()
             .encode()
@@ -162,7 +162,7 @@ def changes(
     """What entered a track's board, left it or was scored anew, and why; the newest first."""
     if selection.track is None:
         return ChangePage(track=None, changes=[], next_before=None)
-    found = context.results.boards.changes(
+    found = context.store.results.boards.changes(
         selection.track, before=before, limit=limit, scored_only=not unscored
     )
     return ChangePage(
@@ -182,7 +182,7 @@ def manifest(
     trials = boards.trials(selection.track, selection.query)
     entries: dict[str, list[dict[str, Any]]] = {}
     for task, version, model in sorted({(t.task, t.task_version, t.model) for t in trials}):
-        for name, value, jobs in context.results.boards.manifest_values(
+        for name, value, jobs in context.store.results.boards.manifest_values(
             selection.track, task, version, model
         ):
             entries.setdefault(name, []).append({"value": value, "jobs": jobs})
@@ -212,8 +212,8 @@ def verify(body: VerifyRequest, context: ContextDep, boards: BoardsDep) -> Verif
     if body.sample is not None and body.sample < len(scored):
         # Whoever names the seed gets the same sample again; nothing secret hangs on it.
         chosen = random.Random(body.seed).sample(scored, body.sample)  # noqa: S311
-    asked = [context.verifications.request(job_id) for job_id in chosen]
-    context.queues.announce(VERIFY, asked)
+    asked = [context.store.verifications.request(job_id) for job_id in chosen]
+    context.queues.notify(VERIFY_QUEUE, asked)
     return VerifyAccepted(scored=len(scored), verifications=asked)
 
 

@@ -20,7 +20,7 @@ from prometheus_client.registry import Collector
 
 from buildarena_api.http.problems import problem_responses
 from buildarena_pipeline.runtime.context import Context
-from buildarena_store import STAGE_SECONDS, ServiceFigures
+from buildarena_store import STAGE_SECONDS, Outcome, ServiceFigures
 
 router = APIRouter(prefix="/v1", tags=["health"])
 
@@ -64,7 +64,7 @@ class ServiceMetrics(Collector):
         workers = GaugeMetricFamily(
             "buildarena_workers", "Worker processes alive, by kind.", labels=["kind"]
         )
-        alive = [worker.kind for worker in self._context.workers.all() if worker.alive]
+        alive = [worker.kind for worker in self._context.store.workers.all() if worker.alive]
         for kind in sorted(set(alive)):
             workers.add_metric([kind], alive.count(kind))
         yield workers
@@ -73,7 +73,7 @@ class ServiceMetrics(Collector):
         with self._guard:
             now = time.monotonic()
             if self._figures is None or now - (self._read_at or 0.0) > KEPT_FOR_S:
-                self._figures = self._context.figures.read()
+                self._figures = self._context.store.figures.read()
                 self._read_at = now
             return self._figures
 
@@ -106,7 +106,7 @@ def _job_metrics(figures: ServiceFigures) -> Iterable[Metric]:
         jobs.add_metric(list(key), number)
     reasons: dict[str, int] = {}
     for count in figures.jobs:
-        if count.outcome == "errored":
+        if count.outcome == Outcome.ERRORED:
             reasons[count.reason] = reasons.get(count.reason, 0) + count.jobs
     for reason, number in reasons.items():
         errors.add_metric([reason], number)
@@ -150,7 +150,7 @@ def _model_metrics(figures: ServiceFigures) -> Iterable[Metric]:
 def _stage_metric(figures: ServiceFigures) -> Metric:
     stages = HistogramMetricFamily(
         "buildarena_stage_seconds",
-        "How long workers held jobs, by stage and how the hold ended.",
+        "How long attempts took, by stage and how they ended.",
         labels=["stage", "result"],
     )
     bounds = [*(str(float(bound)) for bound in STAGE_SECONDS), "+Inf"]

@@ -93,7 +93,7 @@ def open_session(
     response.headers["Location"] = f"/v1/jobs/{job.id}"
     return SessionOpened(
         id=job.id,
-        statement=task_of(job, context.catalogue).statement,
+        statement=task_of(job, context.tasks).statement,
         tools=[
             ToolView(name=tool.name, description=tool.description, parameters=dict(tool.parameters))
             for tool in agent_tools()
@@ -139,4 +139,4 @@ def _require_own(session_id: str, context: Context, caller: Caller) -> None:
     if caller.scope == "admin":
         return
     with contextlib.suppress(UnknownIdError):
-        caller.require_owner(context.jobs.get(session_id).owner, f"session {session_id}")
+        caller.require_owner(context.store.jobs.get(session_id).owner, f"session {session_id}")

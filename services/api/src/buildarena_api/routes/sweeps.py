@@ -13,6 +13,7 @@ from buildarena_api.http import cursors
 from buildarena_api.http.access import Caller, CallerDep
 from buildarena_api.http.problems import ProblemError, problem_responses
 from buildarena_api.schemas import (
+    DONE,
     BudgetView,
     ProgressView,
     SweepAccepted,
@@ -20,12 +21,12 @@ from buildarena_api.schemas import (
     SweepPage,
     SweepView,
 )
-from buildarena_pipeline.broker.queues import CONSTRUCT
 from buildarena_pipeline.catalog.specs import Budget, SweepSpec
 from buildarena_pipeline.runtime.context import Context
-from buildarena_pipeline.runtime.reaper import announce_waiting
+from buildarena_pipeline.runtime.notify import notify_waiting
 from buildarena_pipeline.submission.submission import spec_hash
-from buildarena_store import Sweep
+from buildarena_store import Sweep, SweepState
+from buildarena_store.states import CONSTRUCT_QUEUE
 
 router = APIRouter(prefix="/v1/sweeps", tags=["sweeps"])
 
@@ -41,7 +42,7 @@ RequestKey = Annotated[
 ]
 
 
-TakeUp = Annotated[
+Resume = Annotated[
     bool,
     Query(
         description="Let the caller's earlier sweep of just these jobs, if there is one, go on "
@@ -67,27 +68,27 @@ def submit_sweep(
     submissions: SubmissionsDep,
     caller: CallerDep,
     request_key: RequestKey = None,
-    take_up: TakeUp = False,
+    resume: Resume = False,
 ) -> SweepAccepted:
     """Submits every task with every model and every seed; all of it is stored, or nothing."""
     if request_key is not None:
         # One key's idempotency keys are not another's.
         request_key = f"{caller.key_id or ''}/{request_key}"
-        before = context.sweeps.by_request_key(request_key)
+        before = context.store.sweeps.by_request_key(request_key)
         if before is not None:
             return _accepted_before(before, spec, response, context)
     try:
         done = submissions.submit_sweep(
-            spec, owner=caller.key_id, request_key=request_key, take_up=take_up
+            spec, owner=caller.key_id, request_key=request_key, resume=resume
         )
     except IntegrityError:
         # Another request with this key was quicker.
-        before = None if request_key is None else context.sweeps.by_request_key(request_key)
+        before = None if request_key is None else context.store.sweeps.by_request_key(request_key)
         if before is None:
             raise
         return _accepted_before(before, spec, response, context)
     response.headers["Location"] = f"/v1/sweeps/{done.sweep.id}"
-    return SweepAccepted(id=done.sweep.id, jobs=done.jobs, added=done.added, taken_up=done.taken_up)
+    return SweepAccepted(id=done.sweep.id, jobs=done.jobs, added=done.added, resumed=done.resumed)
 
 
 def _accepted_before(
@@ -96,7 +97,7 @@ def _accepted_before(
     if sweep.request_hash != spec_hash(spec):
         raise ProblemError(409, "this Idempotency-Key was used for another sweep")
     response.headers["Location"] = f"/v1/sweeps/{sweep.id}"
-    total = context.sweeps.progress(sweep.id).total
+    total = context.store.sweeps.progress(sweep.id).total
     return SweepAccepted(id=sweep.id, jobs=total, added=0)
 
 
@@ -108,12 +109,10 @@ def estimate_sweep(spec: SweepSpec, submissions: SubmissionsDep) -> SweepEstimat
 
 @router.post("/{sweep_id}/pause", responses=problem_responses(404, 409, 503))
 def pause_sweep(sweep_id: str, context: ContextDep, caller: CallerDep) -> SweepView:
-    """Holds the sweep's waiting jobs; jobs that have begun go on to their end."""
-    _changeable(context, caller, sweep_id, "paused")
-    with context.database.transaction() as connection:
-        context.sweeps.hold(sweep_id, connection=connection)
-        context.sweeps.set_state(sweep_id, "paused", connection=connection)
-    return _view(context, context.sweeps.get(sweep_id))
+    """Puts the sweep's waiting jobs on hold; jobs that have begun go on to their end."""
+    _require_owner(context, caller, sweep_id)
+    context.store.lifecycle.pause(sweep_id)
+    return _view(context, context.store.sweeps.get(sweep_id))
 
 
 @router.post("/{sweep_id}/resume", responses=problem_responses(404, 409, 422, 503))
@@ -125,48 +124,30 @@ def resume_sweep(
     body: Resumption | None = None,
 ) -> SweepView:
     """Lets a sweep go on that was paused or whose budget is used up, with more budget if given."""
-    sweep = _changeable(context, caller, sweep_id, "active")
-    submissions.resume(sweep, None if body is None else body.budget)
-    return _view(context, context.sweeps.get(sweep_id))
+    _require_owner(context, caller, sweep_id)
+    submissions.resume(sweep_id, None if body is None else body.budget)
+    return _view(context, context.store.sweeps.get(sweep_id))
 
 
 @router.post("/{sweep_id}/cancel", responses=problem_responses(404, 409, 503))
 def cancel_sweep(sweep_id: str, context: ContextDep, caller: CallerDep) -> SweepView:
     """Ends the sweep's jobs that have not ended and that no other active sweep wants."""
-    _changeable(context, caller, sweep_id, "cancelled")
-    with context.database.transaction() as connection:
-        own = context.sweeps.own_jobs(sweep_id, connection=connection)
-        context.jobs.cancel(own, connection=connection)
-        context.sweeps.set_state(sweep_id, "cancelled", connection=connection)
-    return _view(context, context.sweeps.get(sweep_id))
+    _require_owner(context, caller, sweep_id)
+    context.store.lifecycle.cancel(sweep_id)
+    return _view(context, context.store.sweeps.get(sweep_id))
 
 
-@router.post("/{sweep_id}/retry", status_code=202, responses=problem_responses(404, 503))
+@router.post("/{sweep_id}/retry", status_code=202, responses=problem_responses(404, 409, 503))
 def retry_sweep(sweep_id: str, context: ContextDep, caller: CallerDep) -> SweepView:
     """Queues the sweep's errored jobs again where they failed; scored ones are never redone."""
-    sweep = context.sweeps.get(sweep_id)
-    caller.require_owner(sweep.owner, f"sweep {sweep_id}")
-    with context.database.transaction() as connection:
-        context.jobs.retry(context.sweeps.job_ids(sweep_id), connection=connection)
-    announce_waiting(context, CONSTRUCT)
-    return _view(context, sweep)
+    _require_owner(context, caller, sweep_id)
+    context.store.lifecycle.retry(sweep_id)
+    notify_waiting(context, CONSTRUCT_QUEUE)
+    return _view(context, context.store.sweeps.get(sweep_id))
 
 
-ALLOWED = {
-    "paused": {"active"},
-    "active": {"paused", "limit"},
-    "cancelled": {"active", "paused", "limit"},
-}
-"""From which states a sweep may come into one."""
-
-
-def _changeable(context: Context, caller: Caller, sweep_id: str, state: str) -> Sweep:
-    """The sweep, as long as the caller may bring it into the state now."""
-    sweep = context.sweeps.get(sweep_id)
-    caller.require_owner(sweep.owner, f"sweep {sweep_id}")
-    if sweep.state not in ALLOWED[state]:
-        raise ProblemError(409, f"sweep {sweep_id} is {sweep.state}; it can't become {state}")
-    return sweep
+def _require_owner(context: Context, caller: Caller, sweep_id: str) -> None:
+    caller.require_owner(context.store.sweeps.get(sweep_id).owner, f"sweep {sweep_id}")
 
 
 @router.get("", responses=problem_responses(422, 503))
@@ -176,7 +157,7 @@ def list_sweeps(
     limit: Annotated[int, Query(ge=1, le=100)] = 20,
 ) -> SweepPage:
     """Lists sweeps, newest first."""
-    found = context.sweeps.page(
+    found = context.store.sweeps.page(
         limit=limit, after=None if cursor is None else cursors.decode(cursor)
     )
     more = len(found) == limit
@@ -189,13 +170,13 @@ def list_sweeps(
 @router.get("/{sweep_id}", responses=problem_responses(404, 503))
 def show_sweep(sweep_id: str, context: ContextDep) -> SweepView:
     """Shows a sweep and how far it is."""
-    return _view(context, context.sweeps.get(sweep_id))
+    return _view(context, context.store.sweeps.get(sweep_id))
 
 
 def _view(context: Context, sweep: Sweep) -> SweepView:
-    progress = context.sweeps.progress(sweep.id)
-    ended = sweep.state == "active" and progress.done == progress.total
-    state: Any = "done" if ended else sweep.state
+    progress = context.store.sweeps.progress(sweep.id)
+    ended = sweep.state == SweepState.ACTIVE and progress.done == progress.total
+    state: Any = DONE if ended else sweep.state
     return SweepView(
         id=sweep.id,
         name=sweep.name,
@@ -203,6 +184,6 @@ def _view(context: Context, sweep: Sweep) -> SweepView:
         owner=sweep.owner,
         created_at=sweep.created_at,
         spec=dict(sweep.spec),
-        budget=BudgetView.of(context.budgets.get(sweep.id)),
+        budget=BudgetView.of(context.store.budgets.get(sweep.id)),
         progress=ProgressView.of(progress),
     )

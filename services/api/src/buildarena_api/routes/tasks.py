@@ -112,7 +112,7 @@ def add_task(
     caller: CallerDep,
 ) -> TaskDetail:
     """Uploads a task, or a new version of one of your own; new submissions get it from then on."""
-    catalogue = context.catalogue
+    catalogue = context.tasks
     try:
         task = parse_own_task(text, origin="task")
     except TaskError as error:
@@ -131,7 +131,7 @@ def add_task(
 @router.get("", response_model=list[TaskView], responses=problem_responses(503))
 def list_tasks(context: ContextDep, request: Request) -> Any:
     """Lists the tasks in their newest versions, the built-in ones first."""
-    views = [TaskView(**_fields(entry)) for entry in context.catalogue.entries()]
+    views = [TaskView(**_fields(entry)) for entry in context.tasks.entries()]
     return conditional(request, Answer.of(_LIST.dump_json(views)), "application/json")
 
 
@@ -145,7 +145,7 @@ def show_task(
     ] = None,
 ) -> Any:
     """Shows a task with its whole document."""
-    view = _detail(context.catalogue.find(name, version))
+    view = _detail(context.tasks.find(name, version))
     return conditional(request, Answer.of(view.model_dump_json().encode()), "application/json")
 
 

@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from buildarena_api.dependencies import ContextDep
 from buildarena_api.http.problems import ProblemError, problem_responses
-from buildarena_pipeline.broker.queues import VERIFY
+from buildarena_store.states import VERIFY_QUEUE
 
 router = APIRouter(prefix="/v1", tags=["verification"])
 
@@ -33,16 +33,16 @@ class VerificationView(BaseModel):
 @router.post("/jobs/{job_id}/verify", status_code=202, responses=problem_responses(404, 409, 503))
 def verify_job(job_id: str, context: ContextDep, response: Response) -> VerificationView:
     """Has a scored job replayed without a model, re-simulated, and every figure compared."""
-    job = context.jobs.get(job_id)
+    job = context.store.jobs.get(job_id)
     if job.success is None:
         raise ProblemError(409, f"job {job_id} has no score to verify")
-    verification_id = context.verifications.request(job_id)
-    context.queues.announce(VERIFY, [verification_id])
+    verification_id = context.store.verifications.request(job_id)
+    context.queues.notify(VERIFY_QUEUE, [verification_id])
     response.headers["Location"] = f"/v1/verifications/{verification_id}"
-    return VerificationView.model_validate(context.verifications.get(verification_id))
+    return VerificationView.model_validate(context.store.verifications.get(verification_id))
 
 
 @router.get("/verifications/{verification_id}", responses=problem_responses(404, 503))
 def show_verification(verification_id: str, context: ContextDep) -> VerificationView:
     """Shows a verification and, once it is done, what it found."""
-    return VerificationView.model_validate(context.verifications.get(verification_id))
+    return VerificationView.model_validate(context.store.verifications.get(verification_id))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from decimal import Decimal
 
-from buildarena_pipeline.errors import PermanentFaultError
+from buildarena_pipeline.errors import PermanentError
 from buildarena_store import Usage
 from buildarena_worker.builtin import expert, idle, random_builder
 from buildarena_worker.session.host import Answer
@@ -26,12 +26,12 @@ class BuiltinClient:
         name: ``expert``, ``random`` or ``idle``.
 
     Raises:
-        PermanentFaultError: There is no such model.
+        PermanentError: There is no such model.
     """
 
     def __init__(self, name: str) -> None:
         if name not in MODELS:
-            raise PermanentFaultError(
+            raise PermanentError(
                 f"no built-in model {name!r}; there are {', '.join(MODELS)}", reason="unknown_model"
             )
         self._reply = MODELS[name]

@@ -17,7 +17,7 @@ GATHER_S = 0.005
 """How long commands gather: little beside a model's seconds."""
 
 
-class GatheredStore:
+class BatchedRedis:
     """Sends the commands of one event loop in batches over one connection, in their order.
 
     Args:

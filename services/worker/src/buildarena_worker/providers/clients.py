@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from buildarena_pipeline.catalog.models import ModelRegistry
-from buildarena_pipeline.errors import PermanentFaultError
+from buildarena_pipeline.errors import PermanentError
 from buildarena_worker.builtin import BuiltinClient
 from buildarena_worker.session.host import ModelClient
 
@@ -30,7 +30,7 @@ class ModelClients:
         """The client for a job's model.
 
         Raises:
-            PermanentFaultError: The operator's registry lacks the model, or its key is not set.
+            PermanentError: The operator's registry lacks the model, or its key is not set.
         """
         name = str(model_config["name"])
         with self._guard:
@@ -41,7 +41,7 @@ class ModelClients:
     def _make(self, name: str) -> ModelClient:
         entry = self._registry.models.get(name)
         if entry is None:
-            raise PermanentFaultError(
+            raise PermanentError(
                 f"this worker's model registry lacks {name!r}", reason="unknown_model"
             )
         provider = self._registry.provider_of(entry)

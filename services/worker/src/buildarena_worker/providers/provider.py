@@ -28,7 +28,7 @@ from pydantic_ai.settings import ModelSettings
 
 from buildarena_pipeline.catalog.models import ModelEntry, ProviderEntry
 from buildarena_pipeline.catalog.prices import price_usd
-from buildarena_pipeline.errors import PassingFaultError, PermanentFaultError
+from buildarena_pipeline.errors import PermanentError, TransientError
 from buildarena_store import Usage
 from buildarena_worker.providers.request_loop import RequestLoop
 from buildarena_worker.providers.retries import RetryPolicy
@@ -77,8 +77,8 @@ class ProviderClient:
         """Asks the model, with the policy's retries.
 
         Raises:
-            PassingFaultError: The provider failed through all tries.
-            PermanentFaultError: The provider refuses the key, the model or the account.
+            TransientError: The provider failed through all tries.
+            PermanentError: The provider refuses the key, the model or the account.
         """
         return REQUESTS.run(self._complete(request))
 
@@ -103,7 +103,7 @@ class ProviderClient:
             except Exception as error:
                 _raise_if_permanent(error, self._entry, self._key)
                 if tries == self._policy.tries:
-                    raise PassingFaultError(
+                    raise TransientError(
                         f"{self._entry.name}: {tries} tries failed, the last with "
                         f"{type(error).__name__}: {_first_line(error, self._key)}",
                         reason="provider_outage",
@@ -173,7 +173,7 @@ def _key_of(entry: ModelEntry, provider: ProviderEntry) -> str:
     """The provider's API key, from the environment; a provider may need none."""
     key = "none" if provider.key is None else os.environ.get(provider.key, "")
     if not key:
-        raise PermanentFaultError(
+        raise PermanentError(
             f"{entry.name} needs the API key in {provider.key}, which is not set on the worker",
             reason="missing_key",
         )
@@ -196,11 +196,11 @@ def _raise_if_permanent(error: Exception, entry: ModelEntry, key: str) -> None:
     )
     for kind, reason in reasons:
         if isinstance(error, kind):
-            raise PermanentFaultError(
+            raise PermanentError(
                 f"{entry.name}: {_first_line(error, key)}", reason=reason
             ) from error
     if isinstance(error, ModelHTTPError) and error.status_code not in RETRIED_STATUS:
-        raise PermanentFaultError(
+        raise PermanentError(
             f"{entry.name}: HTTP {error.status_code}: {_first_line(error, key)}",
             reason="request_refused",
         ) from error

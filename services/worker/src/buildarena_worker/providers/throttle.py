@@ -20,7 +20,7 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
 from typing import Any
 
-from buildarena_worker.providers.batched_redis import GatheredStore
+from buildarena_worker.providers.batched_redis import BatchedRedis
 
 START, LEAST, MOST = 64.0, 1.0, 2048.0
 HOLD_S = 30
@@ -80,7 +80,7 @@ class Throttle:
     """
 
     def __init__(self, url: str | None, provider: str, *, start: float = START) -> None:
-        self._store = None if url is None else GatheredStore(url)
+        self._store = None if url is None else BatchedRedis(url)
         self._keys = [f"buildarena:throttle:{provider}:{part}" for part in _PARTS]
         self._start = start
         self._held: set[str] = set()
@@ -115,7 +115,7 @@ class Throttle:
             self._store.tell("ZREM", self._keys[0], *self._held)
         await self._store.close()
 
-    async def _take(self, store: GatheredStore) -> str | None:
+    async def _take(self, store: BatchedRedis) -> str | None:
         """The id of a slot; None when the store fails, without which requests go on."""
         slot_id, standing = uuid.uuid4().hex, "new"
         while not self._spare:
@@ -129,7 +129,7 @@ class Throttle:
             await asyncio.sleep(random.uniform(*ASK_AGAIN_S))  # noqa: S311 - spreads waits
         return self._spare.pop()[0]
 
-    def _give(self, store: GatheredStore, slot_id: str, verdict: str) -> None:
+    def _give(self, store: BatchedRedis, slot_id: str, verdict: str) -> None:
         """Frees a slot soon; the request that had it does not wait for that."""
 
         def heard(answer: asyncio.Future[Any]) -> None:
@@ -143,7 +143,7 @@ class Throttle:
         told = self._eval(store, _GIVE, slot_id, verdict, self._start)
         told.add_done_callback(heard)
 
-    def _return_spares(self, store: GatheredStore) -> None:
+    def _return_spares(self, store: BatchedRedis) -> None:
         """Gives back the slots that nobody has wanted for a while."""
         oldest = asyncio.get_running_loop().time() - SPARE_S
         while self._spare and self._spare[0][1] <= oldest:
@@ -151,18 +151,18 @@ class Throttle:
             self._held.discard(slot_id)
             store.tell("ZREM", self._keys[0], slot_id)
 
-    def _hold(self, store: GatheredStore, slot_id: str) -> None:
+    def _hold(self, store: BatchedRedis, slot_id: str) -> None:
         self._held.add(slot_id)
         if self._renewing is None or self._renewing.done():
             self._renewing = asyncio.create_task(self._renew(store))
 
-    async def _renew(self, store: GatheredStore) -> None:
+    async def _renew(self, store: BatchedRedis) -> None:
         while self._held:
             await asyncio.sleep(HOLD_S / 3)
             with suppress(Exception):  # the store has logged it; the next time may do
                 await self._eval(store, _RENEW, HOLD_S, *self._held)
 
-    def _eval(self, store: GatheredStore, script: str, *arguments: Any) -> asyncio.Future[Any]:
+    def _eval(self, store: BatchedRedis, script: str, *arguments: Any) -> asyncio.Future[Any]:
         return store.ask("EVAL", script, len(self._keys), *self._keys, *arguments)
 
 

@@ -39,8 +39,8 @@ class ModelClient(Protocol):
         """Asks the model.
 
         Raises:
-            PassingFaultError: The provider failed, after the declared retries.
-            PermanentFaultError: The provider will never answer, for example a bad key.
+            TransientError: The provider failed, after the declared retries.
+            PermanentError: The provider will never answer, for example a bad key.
         """
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from types import ModuleType
 
 from buildarena_pipeline.catalog.workflows import WorkflowSource, workflow_sources
-from buildarena_pipeline.errors import PermanentFaultError, StartupError
+from buildarena_pipeline.errors import PermanentError, StartupError
 from buildarena_worker.workflow.base import Workflow
 from buildarena_worker.workflow.builder import Builder
 from buildarena_worker.workflow.five_role import FiveRole
@@ -38,10 +38,10 @@ class Workflows:
         """A workflow with this name.
 
         Raises:
-            PermanentFaultError: There is none on this worker.
+            PermanentError: There is none on this worker.
         """
         if name not in self._makers:
-            raise PermanentFaultError(
+            raise PermanentError(
                 f"this worker has no workflow {name!r}; it has {', '.join(self._makers)}",
                 reason="unknown_workflow",
             )

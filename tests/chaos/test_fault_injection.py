@@ -18,7 +18,7 @@ from pathlib import Path
 import httpx
 import pytest
 from accounts import pick_ups, wrongs
-from fire import Fire
+from faults import Fire
 from running import running_stack, wait_until
 from sqlalchemy.exc import OperationalError
 

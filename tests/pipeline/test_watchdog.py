@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from celery.signals import task_received
 
-from buildarena_pipeline.broker.watchdog import Hearing, reconnect
+from buildarena_pipeline.broker.watchdog import ConsumerWatchdog, reconnect
 
 SOON_S = 10
 
@@ -26,14 +26,14 @@ class Consumer:
 @pytest.fixture
 def consumer(context) -> Iterator[Consumer]:
     watched = Consumer()
-    hearing = Hearing(context.queues, ["simulate.x"], period_s=0.02, deaf_after_s=0.1)
+    hearing = ConsumerWatchdog(context.queues, ["simulate.x"], period_s=0.02, stalled_after_s=0.1)
     hearing.start(watched)
     yield watched
     hearing.stop()
 
 
 def test_an_idle_worker_takes_a_new_connection_when_messages_wait(context, consumer) -> None:
-    context.queues.announce("simulate.x", ["job_1"])
+    context.queues.notify("simulate.x", ["job_1"])
     assert consumer.called.get(timeout=SOON_S) is reconnect
     with pytest.raises(OSError, match="taken anew"):
         reconnect()
@@ -45,8 +45,8 @@ def test_a_worker_without_messages_keeps_its_connection(consumer) -> None:
         consumer.called.get(timeout=0.5)
 
 
-def test_a_worker_that_hears_keeps_its_connection(context, consumer) -> None:
-    context.queues.announce("simulate.x", ["job_1"])
+def test_a_worker_that_receives_messages_keeps_its_connection(context, consumer) -> None:
+    context.queues.notify("simulate.x", ["job_1"])
     ends = time.monotonic() + 0.5
     while time.monotonic() < ends:
         task_received.send(sender=None)

@@ -6,8 +6,9 @@ from collections.abc import Callable
 import pytest
 
 from buildarena_pipeline.catalog.specs import JobSpec, SweepSpec
-from buildarena_pipeline.errors import PassingFaultError, PermanentFaultError
-from buildarena_pipeline.runtime.job_runner import Hold, LeaseKeeper, StageRunner
+from buildarena_pipeline.errors import PermanentError, TransientError
+from buildarena_pipeline.runtime.active_lease import ActiveLease, LeaseKeeper
+from buildarena_pipeline.runtime.job_runner import JobRunner
 from buildarena_store import BudgetLimits, JobScore
 
 SCORE = JobScore(outcome="unsuccessful", success=False, indicator=1.0)
@@ -19,19 +20,19 @@ def run(context, submissions):
 
     def work(handler: Callable[..., None]):
         job, _ = submissions.submit_job(JobSpec(task="support-1", model="builtin/idle"))
-        keeper = LeaseKeeper(context, lambda: None)
+        keeper = LeaseKeeper(context.store.leases, lambda: None)
         keeper.start()
-        StageRunner(context, handler, keeper, "worker").look("construct", job.id)
+        JobRunner(context.store.leases, handler, keeper, "worker").process_next("construct", job.id)
         keeper.stop()
-        return context.jobs.get(job.id)
+        return context.store.jobs.get(job.id)
 
     return work
 
 
 def finisher(context) -> Callable[..., None]:
-    def finish(hold: Hold) -> None:
-        with context.database.transaction() as connection:
-            context.results.finish(hold.lease, SCORE, connection=connection)
+    def finish(active: ActiveLease) -> None:
+        with context.store.database.transaction() as connection:
+            context.store.results.finish(active.lease, SCORE, connection=connection)
 
     return finish
 
@@ -41,11 +42,11 @@ def test_a_handler_ends_the_job(context, run) -> None:
 
 
 def test_a_lease_lives_as_long_as_its_handler(context, run) -> None:
-    def slow(hold: Hold) -> None:
+    def slow(active: ActiveLease) -> None:
         time.sleep(context.settings.lease_s * 1.5)
-        context.leases.recover()
-        assert not hold.over
-        finisher(context)(hold)
+        context.store.leases.recover()
+        assert not active.lost
+        finisher(context)(active)
 
     assert run(slow).outcome == "unsuccessful"
 
@@ -53,13 +54,13 @@ def test_a_lease_lives_as_long_as_its_handler(context, run) -> None:
 def test_a_handler_hears_that_its_job_was_cancelled(context, run) -> None:
     heard: list[bool] = []
 
-    def cancelled(hold: Hold) -> None:
-        with context.database.transaction() as connection:
-            context.jobs.cancel([hold.lease.job.id], connection=connection)
+    def cancelled(active: ActiveLease) -> None:
+        with context.store.database.transaction() as connection:
+            context.store.jobs.cancel([active.lease.job.id], connection=connection)
         deadline = time.monotonic() + 5
-        while not hold.over and time.monotonic() < deadline:
+        while not active.lost and time.monotonic() < deadline:
             time.sleep(0.05)
-        heard.append(hold.over)
+        heard.append(active.lost)
 
     assert run(cancelled).outcome == "cancelled"
     assert heard == [True]
@@ -70,19 +71,21 @@ def test_a_handler_hears_of_a_budget_that_was_given_meanwhile(context, submissio
     sweep_id = submissions.submit_sweep(spec).sweep.id
     heard: list[bool] = []
 
-    def paid_for_later(hold: Hold) -> None:
-        heard.append(hold.budgeted)
-        with context.database.transaction() as connection:
-            context.budgets.set(sweep_id, BudgetLimits(max_requests=5), connection=connection)
+    def paid_for_later(active: ActiveLease) -> None:
+        heard.append(active.budgeted)
+        with context.store.database.transaction() as connection:
+            context.store.budgets.set(sweep_id, BudgetLimits(max_requests=5), connection=connection)
         deadline = time.monotonic() + 20
-        while not hold.budgeted and time.monotonic() < deadline:
+        while not active.budgeted and time.monotonic() < deadline:
             time.sleep(0.05)
-        heard.append(hold.budgeted)
-        finisher(context)(hold)
+        heard.append(active.budgeted)
+        finisher(context)(active)
 
-    keeper = LeaseKeeper(context, lambda: None)
+    keeper = LeaseKeeper(context.store.leases, lambda: None)
     keeper.start()
-    StageRunner(context, paid_for_later, keeper, "worker").look("construct", "any")
+    JobRunner(context.store.leases, paid_for_later, keeper, "worker").process_next(
+        "construct", "any"
+    )
     keeper.stop()
     assert heard == [False, True]
 
@@ -90,8 +93,8 @@ def test_a_handler_hears_of_a_budget_that_was_given_meanwhile(context, submissio
 @pytest.mark.parametrize(
     ("error", "state", "outcome", "reason"),
     [
-        (PassingFaultError("outage", reason="provider_outage", delay_s=9), "queued", None, None),
-        (PermanentFaultError("no key", reason="missing_key"), "done", "errored", "missing_key"),
+        (TransientError("outage", reason="provider_outage", delay_s=9), "queued", None, None),
+        (PermanentError("no key", reason="missing_key"), "done", "errored", "missing_key"),
         (ZeroDivisionError("a bug"), "queued", None, None),
     ],
 )
@@ -107,11 +110,11 @@ def test_faults_are_never_scored(run, error, state, outcome, reason) -> None:
 
 def test_what_is_held_at_shutdown_is_handed_back(context, submissions) -> None:
     job, _ = submissions.submit_job(JobSpec(task="support-1", model="builtin/idle"))
-    keeper = LeaseKeeper(context, lambda: None)
+    keeper = LeaseKeeper(context.store.leases, lambda: None)
     keeper.start()
-    lease = context.leases.claim("construct", owner="w")
-    with keeper.keeping(lease) as hold:
+    lease = context.store.leases.claim("construct", owner="w")
+    with keeper.keeping(lease) as active:
         keeper.stop()
-        assert hold.over
-    assert context.jobs.get(job.id).state == "queued"
-    assert [a.result for a in context.jobs.attempts(job.id)] == ["handed_back"]
+        assert active.lost
+    assert context.store.jobs.get(job.id).state == "queued"
+    assert [a.result for a in context.store.jobs.attempts(job.id)] == ["handed_back"]

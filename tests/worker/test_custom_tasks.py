@@ -34,7 +34,7 @@ def finish(context) -> Callable[[str], Job]:
 
     def finish_job(job_id: str) -> Job:
         work(context)
-        return context.jobs.get(job_id)
+        return context.store.jobs.get(job_id)
 
     return finish_job
 
@@ -66,7 +66,7 @@ def play(context) -> Callable[..., Job]:
 
 def add(context, text: str) -> str:
     task = parse_own_task(text, origin="task")
-    context.catalogue.add(task, text)
+    context.tasks.add(task, text)
     return task.version
 
 
@@ -95,7 +95,7 @@ def test_a_job_in_work_is_tried_and_verified_with_its_own_version(context, play,
     new = play("narrow-gap", seed=1)
     assert (finish(old.id).indicator, finish(new.id).indicator) == (200.0, 300.0)
     for job in (old, new):
-        assert_verified(context, context.jobs.get(job.id))
+        assert_verified(context, context.store.jobs.get(job.id))
 
 
 def test_what_a_task_asks_of_modules_is_checked(context, play) -> None:

@@ -5,7 +5,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from buildarena_worker.concurrency_gate import Turnstile
+from buildarena_worker.concurrency_gate import ConcurrencyGate
 
 
 class Crowd:
@@ -22,15 +22,15 @@ class Crowd:
 
 
 def test_few_are_inside_at_once_and_all_get_their_turn() -> None:
-    turnstile, crowd = Turnstile(places=3, patience_s=60), Crowd()
+    gate, crowd = ConcurrencyGate(places=3, patience_s=60), Crowd()
 
     def session(_: int) -> None:
-        with turnstile.inside():
+        with gate.acquired():
             for _ in range(20):
                 crowd.come()
                 threading.Event().wait(0.0005)
                 crowd.come(-1)
-                with turnstile.outside():
+                with gate.released():
                     threading.Event().wait(0.0005)
 
     with ThreadPoolExecutor(16) as threads:
@@ -40,34 +40,34 @@ def test_few_are_inside_at_once_and_all_get_their_turn() -> None:
 
 
 def test_who_waits_outside_leaves_its_place_to_others() -> None:
-    turnstile, inside = Turnstile(places=1, patience_s=60), threading.Event()
+    gate, inside = ConcurrencyGate(places=1, patience_s=60), threading.Event()
 
     def other() -> None:
-        with turnstile.inside():
+        with gate.acquired():
             inside.set()
 
-    with turnstile.inside(), ThreadPoolExecutor(1) as threads:
+    with gate.acquired(), ThreadPoolExecutor(1) as threads:
         came = threads.submit(other)
-        with turnstile.outside():
+        with gate.released():
             assert inside.wait(30)
         came.result()
 
 
 def test_a_session_that_is_stuck_inside_does_not_stop_the_others() -> None:
-    turnstile = Turnstile(places=1, patience_s=0.01)
+    gate = ConcurrencyGate(places=1, patience_s=0.01)
 
     def other() -> str:
-        with turnstile.inside(), turnstile.outside():
+        with gate.acquired(), gate.released():
             return "done"
 
-    with turnstile.inside(), ThreadPoolExecutor(4) as threads:
+    with gate.acquired(), ThreadPoolExecutor(4) as threads:
         assert list(threads.map(lambda _: other(), range(4))) == ["done"] * 4
 
 
 def test_an_error_gives_the_place_back() -> None:
-    turnstile = Turnstile(places=1, patience_s=60)
+    gate = ConcurrencyGate(places=1, patience_s=60)
     for _ in range(3):
-        with pytest.raises(ZeroDivisionError), turnstile.inside(), turnstile.outside():
+        with pytest.raises(ZeroDivisionError), gate.acquired(), gate.released():
             raise ZeroDivisionError
-    with turnstile.inside(), ThreadPoolExecutor(1) as threads:
-        assert not threads.submit(turnstile._places.acquire, blocking=False).result()
+    with gate.acquired(), ThreadPoolExecutor(1) as threads:
+        assert not threads.submit(gate._places.acquire, blocking=False).result()

@@ -1,0 +1,30 @@
+"""How a job can end."""
+
+from enum import StrEnum
+from typing import Final
+
+
+class Outcome(StrEnum):
+    """How a job ended; the values are what tables, documents and the API hold.
+
+    Attributes:
+        SUCCESS: The machine met the task's criterion.
+        UNSUCCESSFUL: It was simulated and did not.
+        CONSTRUCTION_FAILED: The session ended without a machine that may be simulated.
+        LIMIT: The session reached one of the job's limits.
+        ERRORED: Infrastructure failed: never scored.
+        CANCELLED: Somebody ended it: never scored.
+    """
+
+    SUCCESS = "success"
+    UNSUCCESSFUL = "unsuccessful"
+    CONSTRUCTION_FAILED = "construction_failed"
+    LIMIT = "limit"
+    ERRORED = "errored"
+    CANCELLED = "cancelled"
+
+
+SIMULATED: Final = frozenset({Outcome.SUCCESS, Outcome.UNSUCCESSFUL})
+"""Outcomes of machines that were finished and tried."""
+SCORED: Final = SIMULATED | {Outcome.CONSTRUCTION_FAILED, Outcome.LIMIT}
+"""Outcomes that count in the averages; faults and cancelled jobs never do."""

@@ -1,0 +1,108 @@
+"""A job as a value: one task x model x seed on one track, and everything known about it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import datetime
+from decimal import Decimal
+from typing import Any
+
+from buildarena_store.ids import content_hash
+from buildarena_store.rows import columns_of
+from buildarena_store.tables import jobs
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JobKey:
+    """What makes a job unique; two submissions with equal keys are one job.
+
+    Attributes:
+        task: Task name.
+        task_version: Content hash of the task.
+        model_hash: Content hash of the model's configuration, decoding included.
+        track: Track identifier.
+        seed: Seed or sample number, 0 or more.
+    """
+
+    task: str
+    task_version: str
+    model_hash: str
+    track: str
+    seed: int
+
+    @property
+    def job_id(self) -> str:
+        """The job's id, derived from the key: the same job has the same id everywhere."""
+        key = [self.task, self.task_version, self.model_hash, self.track, self.seed]
+        return "job_" + content_hash(key)[:20]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NewJob:
+    """A job to be added.
+
+    Attributes:
+        key: Its unique key.
+        model: Model name.
+        model_config: The model's configuration, whose hash is in the key.
+        track_config: The track's parts, whose spelling is in the key.
+        limits: Token, request, cost and time limits of its session.
+        owner: Id of the API key that submits it, if any.
+        payer: Id of the sweep whose budget pays for it, if any.
+    """
+
+    key: JobKey
+    model: str
+    model_config: Mapping[str, Any]
+    track_config: Mapping[str, Any]
+    limits: Mapping[str, Any] = field(default_factory=dict)
+    owner: str | None = None
+    payer: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Job:
+    """A job as the database has it. Times are in UTC; names are those of the columns."""
+
+    id: str
+    task: str
+    task_version: str
+    model: str
+    model_hash: str
+    model_config: Mapping[str, Any]
+    track: str
+    track_config: Mapping[str, Any]
+    seed: int
+    limits: Mapping[str, Any]
+    owner: str | None
+    payer: str | None
+    stage: str
+    queue: str
+    state: str
+    outcome: str | None
+    reason: str | None
+    detail: str | None
+    faults: int
+    lease_owner: str | None
+    lease_token: int
+    success: bool | None
+    indicator: float | None
+    metrics: Mapping[str, Any] | None
+    flags: Sequence[str] | None
+    manifest: Mapping[str, Any] | None
+    requests: int
+    input_tokens: int
+    output_tokens: int
+    cached_tokens: int
+    reasoning_tokens: int
+    cost_usd: Decimal
+    actions: int
+    refused_actions: int
+    refusals: Mapping[str, int] | None
+    created_at: datetime
+    started_at: datetime | None
+    finished_at: datetime | None
+
+
+JOB_COLUMNS = columns_of(Job, jobs)

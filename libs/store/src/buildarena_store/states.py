@@ -1,0 +1,140 @@
+"""States of jobs and sweeps, which may follow which, and the queues that jobs wait in.
+
+The values are what the tables, the event log and the API hold.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from enum import StrEnum
+from types import MappingProxyType
+from typing import Final
+
+from buildarena_benchmark.outcomes import Outcome
+
+__all__ = [
+    "CONSTRUCT_QUEUE",
+    "EXTERNAL_QUEUE",
+    "JOB_TRANSITIONS",
+    "SWEEP_TRANSITIONS",
+    "VERIFY_QUEUE",
+    "AttemptResult",
+    "JobState",
+    "Outcome",
+    "Stage",
+    "SweepState",
+    "VerificationState",
+    "require_legal",
+    "simulate_queue",
+    "sweep_states_before",
+]
+
+
+CONSTRUCT_QUEUE: Final = "construct"
+VERIFY_QUEUE: Final = "verify"
+EXTERNAL_QUEUE: Final = "external"
+"""Where jobs of external agents are while they build: no worker serves it."""
+
+
+def simulate_queue(simulator: str) -> str:
+    """The queue of a simulator."""
+    return f"simulate.{simulator}"
+
+
+class JobState(StrEnum):
+    """Where a job is.
+
+    Attributes:
+        QUEUED: It waits for a worker.
+        RUNNING: A worker, or an external agent, has it.
+        ON_HOLD: Its sweep is paused or out of budget.
+        DONE: It has ended; its outcome says how.
+    """
+
+    QUEUED = "queued"
+    RUNNING = "running"
+    ON_HOLD = "on_hold"
+    DONE = "done"
+
+
+class Stage(StrEnum):
+    """What is done with a job next: its session goes on, or a machine of it is simulated."""
+
+    CONSTRUCT = "construct"
+    SIMULATE = "simulate"
+
+
+class SweepState(StrEnum):
+    """What a sweep's owner, or its budget, wants of it. A cancelled sweep stays cancelled."""
+
+    ACTIVE = "active"
+    PAUSED = "paused"
+    BUDGET_EXHAUSTED = "budget_exhausted"
+    CANCELLED = "cancelled"
+
+
+class AttemptResult(StrEnum):
+    """How a worker's attempt at a job's stage ended.
+
+    Attributes:
+        DONE: The stage was done.
+        FAULT: Infrastructure failed.
+        HANDED_BACK: The worker shut down.
+        LOST: The worker sent no heartbeat.
+        BUDGET_EXHAUSTED: No budget was left for the next model request.
+        CANCELLED: The job was cancelled meanwhile.
+    """
+
+    DONE = "done"
+    FAULT = "fault"
+    HANDED_BACK = "handed_back"
+    LOST = "lost"
+    BUDGET_EXHAUSTED = "budget_exhausted"
+    CANCELLED = "cancelled"
+
+
+class VerificationState(StrEnum):
+    """Where a verification is."""
+
+    QUEUED = "queued"
+    RUNNING = "running"
+    DONE = "done"
+
+
+JOB_TRANSITIONS: Final[Mapping[JobState, frozenset[JobState]]] = MappingProxyType(
+    {
+        JobState.QUEUED: frozenset({JobState.RUNNING, JobState.ON_HOLD, JobState.DONE}),
+        JobState.RUNNING: frozenset({JobState.QUEUED, JobState.DONE}),
+        JobState.ON_HOLD: frozenset({JobState.QUEUED, JobState.DONE}),
+        # An errored job is retried; a cancelled one is wanted again.
+        JobState.DONE: frozenset({JobState.QUEUED}),
+    }
+)
+"""Which states may follow a job's state."""
+SWEEP_TRANSITIONS: Final[Mapping[SweepState, frozenset[SweepState]]] = MappingProxyType(
+    {
+        SweepState.ACTIVE: frozenset(
+            {SweepState.PAUSED, SweepState.BUDGET_EXHAUSTED, SweepState.CANCELLED}
+        ),
+        SweepState.PAUSED: frozenset({SweepState.ACTIVE, SweepState.CANCELLED}),
+        SweepState.BUDGET_EXHAUSTED: frozenset({SweepState.ACTIVE, SweepState.CANCELLED}),
+        SweepState.CANCELLED: frozenset(),
+    }
+)
+"""Which states may follow a sweep's state."""
+
+
+def sweep_states_before(state: SweepState) -> tuple[SweepState, ...]:
+    """The states that a sweep may leave for this one."""
+    return tuple(before for before, after in SWEEP_TRANSITIONS.items() if state in after)
+
+
+def require_legal(to: JobState, allowed_from: Collection[JobState]) -> None:
+    """Checks that a transition is one that jobs have; it is a mistake in the code when not.
+
+    Raises:
+        ValueError: It is not.
+    """
+    illegal = [state for state in allowed_from if to not in JOB_TRANSITIONS[state]]
+    if illegal:
+        raise ValueError(f"no job goes from {', '.join(illegal)} to {to}")

@@ -1,0 +1,73 @@
+"""The store of one database: everything that is read from and written to it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from buildarena_store.accounts.budgets import Budgets
+from buildarena_store.accounts.keys import ApiKeys
+from buildarena_store.database import Database
+from buildarena_store.events import Events
+from buildarena_store.figures import Figures
+from buildarena_store.jobs.external_calls import ExternalCalls
+from buildarena_store.jobs.jobs import Jobs
+from buildarena_store.jobs.journal import Journal
+from buildarena_store.jobs.leases import Leases
+from buildarena_store.jobs.results import Results
+from buildarena_store.jobs.rollouts import Rollouts
+from buildarena_store.jobs.verifications import Verifications
+from buildarena_store.sweeps.lifecycle import SweepLifecycle
+from buildarena_store.sweeps.sweeps import Sweeps
+from buildarena_store.tasks import Tasks
+from buildarena_store.workers import Workers
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Store:
+    """The repositories of one database; several written in one transaction change together."""
+
+    database: Database
+    jobs: Jobs
+    leases: Leases
+    journal: Journal
+    rollouts: Rollouts
+    results: Results
+    external_calls: ExternalCalls
+    verifications: Verifications
+    sweeps: Sweeps
+    lifecycle: SweepLifecycle
+    keys: ApiKeys
+    budgets: Budgets
+    tasks: Tasks
+    events: Events
+    workers: Workers
+    figures: Figures
+
+
+def open_store(database: Database, *, lease_s: float, max_faults: int) -> Store:
+    """The repositories of a database.
+
+    Args:
+        database: The database.
+        lease_s: Seconds that a lease is valid without a heartbeat.
+        max_faults: Infrastructure faults without progress after which a job is given up.
+    """
+    leases = Leases(database, duration_s=lease_s, max_faults=max_faults)
+    return Store(
+        database=database,
+        jobs=Jobs(database),
+        leases=leases,
+        journal=Journal(database),
+        rollouts=Rollouts(database),
+        results=Results(database, leases),
+        external_calls=ExternalCalls(database),
+        verifications=Verifications(database),
+        sweeps=Sweeps(database),
+        lifecycle=SweepLifecycle(database),
+        keys=ApiKeys(database),
+        budgets=Budgets(database),
+        tasks=Tasks(database),
+        events=Events(database),
+        workers=Workers(database),
+        figures=Figures(database),
+    )
