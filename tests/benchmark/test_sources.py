@@ -8,7 +8,7 @@ import pytest
 from pydantic import BaseModel, ConfigDict
 
 from buildarena_benchmark import SourceError
-from buildarena_benchmark.tasks.sources import MOST_BYTES, path_of, read_model, read_source
+from buildarena_benchmark.tasks.sources import MAX_BYTES, path_of, read_model, read_source
 
 BOMB = "a0: &a0 [x, x]\n" + "".join(
     f"a{n}: &a{n} [*a{n - 1}, *a{n - 1}, *a{n - 1}, *a{n - 1}]\n" for n in range(1, 30)
@@ -40,15 +40,15 @@ class Outer(BaseModel):
         ("- " * 30_000 + "x", "file:1: more than 16 levels"),
         ("a: 1\nb: 2\na: 3\n", "file:3: a: stands twice, first in line 1"),
         ("a:\n  - {b: 1}\n  - {b: 1, b: 2}\n", "file:3: a[1].b: stands twice"),
-        ("a: 1\n2: 3\n", "file:2: the key 2 is no word"),
-        ("a: 1\n? [b]\n: c\n", "file:2: no valid YAML"),
-        ("a: [\n", "file:2: no valid YAML"),
-        ("a: 1\n---\nb: 1\n", "file:2: no valid YAML"),
-        ("a: 1\nb: \0\n", "file:2: no valid YAML: special characters"),
-        ("a: 1\nb: !!python/object/apply:os.getcwd []\n", "file:2: no valid YAML"),
+        ("a: 1\n2: 3\n", "file:2: the key 2 is not a word"),
+        ("a: 1\n? [b]\n: c\n", "file:2: not valid YAML"),
+        ("a: [\n", "file:2: not valid YAML"),
+        ("a: 1\n---\nb: 1\n", "file:2: not valid YAML"),
+        ("a: 1\nb: \0\n", "file:2: not valid YAML: special characters"),
+        ("a: 1\nb: !!python/object/apply:os.getcwd []\n", "file:2: not valid YAML"),
         ("a: 1\nb: " + "9" * 20_000, "file:2: the value cannot be read"),
         ("a: 2020-13-01\n", "file:1: the value cannot be read"),
-        ("a: " + "x" * MOST_BYTES, "file: 65,539 bytes; at most 65,536 are read"),
+        ("a: " + "x" * MAX_BYTES, "file: 65,539 bytes; at most 65,536 are read"),
     ],
 )
 def test_what_is_not_read_is_told_with_its_line(text: str, says: str) -> None:

@@ -122,7 +122,7 @@ def test_what_cannot_change_a_score_keeps_the_version() -> None:
         ("duration_s: 10", "duration_s: 10.01", ["duration_s", "0.04"]),
         ("title: A suspended bridge\n", "", ["title", "required"]),
         ("max_blocks: 100", "max_blocks: many", ["task:8: constraints.max_blocks: ", "integer"]),
-        ("indicator: {", "indicator: [", ["no valid YAML"]),
+        ("indicator: {", "indicator: [", ["not valid YAML"]),
     ],
 )
 def test_an_error_names_line_field_and_choices(old: str, new: str, parts: list[str]) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from buildarena_benchmark import parse_own_task
+from buildarena_benchmark import parse_custom_task
 from buildarena_benchmark.leaderboard import published_rows
 from buildarena_cli.commands.report import variant
 from buildarena_pipeline.catalog.models import load_registry
@@ -22,7 +22,7 @@ def own_tasks(context) -> None:
     """The tasks that come as examples, uploaded."""
     for file in (EXAMPLES / "tasks").glob("*.yaml"):
         text = file.read_text()
-        context.tasks.add(parse_own_task(text, origin=file.name), text)
+        context.tasks.add(parse_custom_task(text, origin=file.name), text)
 
 
 def spec_of(file: Path) -> SweepSpec:

@@ -28,7 +28,7 @@ BUILDARENA = str(Path(sys.executable).parent / "buildarena")
 def simulate_all(context) -> None:
     keeper = LeaseKeeper(context.store.leases, lambda: None)
     keeper.start()
-    JobRunner(context.store.leases, SimulateHandler(context), keeper, "w").look(
+    JobRunner(context.store.leases, SimulateHandler(context), keeper, "w").process_next(
         "simulate.mujoco", ""
     )
     keeper.stop()

@@ -73,7 +73,7 @@ def test_a_port_that_is_no_port() -> None:
 
 @pytest.mark.parametrize(
     ("text", "says"),
-    [("tasks: [", "no valid YAML"), ("- 1", "must be a mapping"), (None, "No such")],
+    [("tasks: [", "not valid YAML"), ("- 1", "must be a mapping"), (None, "No such")],
 )
 def test_a_bad_sweep_file(tmp_path: Path, text: str | None, says: str) -> None:
     file = tmp_path / "sweep.yaml"

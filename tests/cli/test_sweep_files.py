@@ -42,7 +42,7 @@ def file(tmp_path: Path) -> Path:
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ("samples: 3", "samples: [", "8: no valid YAML"),
+        ("samples: 3", "samples: [", "8: not valid YAML"),
         ("samples: 3", "samples: three", "6: samples: Input should be a valid integer"),
         ("samples: 3", "samples: 0", "6: samples: Input should be greater than or equal to 1"),
         ("samples: 3", "samples: 3\nseeds: [1]", "6: samples: give either seeds or samples"),

@@ -46,7 +46,7 @@ def test_an_operator_adds_models_and_providers(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("models: [", "is no YAML"),
+        ("models: [", "is not valid YAML"),
         ("models:\n  - {name: a/b, provider: nobody, model: b}", "'nobody'; known are alibaba"),
         ("models:\n  - {name: b, provider: openai, model: b}", r"models\.0\.name"),
         ("modles: []", "modles"),

@@ -59,7 +59,7 @@ def test_everything_that_is_wrong_is_named_with_the_choices(context, submissions
         submissions.submit_sweep(
             spec(tasks=["support-1", "support-9"], models=["gpt"], simulator="moon", workflow="x")
         )
-    errors = {error.field: error for error in caught.value.errors}
+    errors = {issue.path: issue for issue in caught.value.issues}
     assert set(errors) == {"tasks[1]", "models[0]", "simulator", "workflow"}
     assert "support-1" in errors["tasks[1]"].choices
     assert "builtin/expert" in errors["models[0]"].choices

@@ -6,7 +6,7 @@ import pytest
 from sqlalchemy import event
 
 from buildarena_api.routes.tasks import EXAMPLE
-from buildarena_benchmark import TaskError, builtin_tasks, parse_own_task
+from buildarena_benchmark import TaskError, builtin_tasks, parse_custom_task
 from buildarena_benchmark.tasks import task as task_module
 from buildarena_pipeline.catalog.specs import JobSpec, SweepSpec
 from buildarena_pipeline.catalog.tasks import TaskCatalog, TaskChangedError
@@ -31,7 +31,7 @@ def queries(context):
 
 
 def add(context, text: str) -> str:
-    task = parse_own_task(text, origin="task")
+    task = parse_custom_task(text, origin="task")
     context.tasks.add(task, text)
     return task.version
 
@@ -58,7 +58,7 @@ def test_the_newest_version_is_named_and_every_version_is_kept(context) -> None:
 
 
 def test_the_same_content_is_stored_once(context) -> None:
-    task = parse_own_task(EXAMPLE, origin="task")
+    task = parse_custom_task(EXAMPLE, origin="task")
     assert context.tasks.add(task, EXAMPLE, owner=None)
     assert not context.tasks.add(task, EXAMPLE + "# again\n")
     assert len(context.store.tasks.versions("narrow-gap")) == 1
@@ -66,14 +66,14 @@ def test_the_same_content_is_stored_once(context) -> None:
 
 def test_a_built_in_tasks_name_is_taken() -> None:
     with pytest.raises(TaskError, match=r"task:1: name: support-1 is a built-in task"):
-        parse_own_task(EXAMPLE.replace("narrow-gap", "support-1"), origin="task")
+        parse_custom_task(EXAMPLE.replace("narrow-gap", "support-1"), origin="task")
 
 
 def test_a_title_alone_does_not_change(context) -> None:
     add(context, EXAMPLE)
     text = EXAMPLE.replace("A bridge", "No bridge").replace("unit: mass units", "unit: kg")
     with pytest.raises(TaskChangedError, match="another title and indicator"):
-        context.tasks.add(parse_own_task(text, origin="task"), text)
+        context.tasks.add(parse_custom_task(text, origin="task"), text)
 
 
 def test_a_job_keeps_its_version_when_the_task_changes(context, submissions) -> None:
@@ -100,8 +100,8 @@ def test_unknown_tasks_are_refused_with_own_ones_among_the_choices(context, subm
     add(context, EXAMPLE)
     with pytest.raises(SubmissionError) as caught:
         submissions.plan(SweepSpec(tasks=["narrow-gap", "wide-gap"], models=["builtin/idle"]))
-    (error,) = caught.value.errors
-    assert error.field == "tasks[1]"
+    (error,) = caught.value.issues
+    assert error.path == "tasks[1]"
     assert {"narrow-gap", "support-1"} <= set(error.choices)
 
 

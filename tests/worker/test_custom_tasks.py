@@ -12,7 +12,7 @@ from suspension_bridge import suspension_bridge
 from working import work
 
 from buildarena_api.routes.tasks import EXAMPLE
-from buildarena_benchmark import builtin_tasks, parse_own_task
+from buildarena_benchmark import builtin_tasks, parse_custom_task
 from buildarena_pipeline.agents.sessions import ExternalSessions
 from buildarena_pipeline.catalog.models import load_registry
 from buildarena_pipeline.catalog.prompt_packs import PromptPacks
@@ -65,7 +65,7 @@ def play(context) -> Callable[..., Job]:
 
 
 def add(context, text: str) -> str:
-    task = parse_own_task(text, origin="task")
+    task = parse_custom_task(text, origin="task")
     context.tasks.add(task, text)
     return task.version
 
@@ -168,7 +168,7 @@ def test_the_papers_suspension_bridge_is_built_from_parts_and_scored(
 
 def test_a_prompt_pack_without_the_task_uses_the_tasks_own_words() -> None:
     pack = replace(PromptPacks().load("default"), statements={"support-1": "Of another task."})
-    task = parse_own_task(EXAMPLE, origin="task")
+    task = parse_custom_task(EXAMPLE, origin="task")
     io = SessionIO(
         client=None,
         entries=[],

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from scripted import Scripted, call
 
-from buildarena_benchmark import parse_own_task
+from buildarena_benchmark import parse_custom_task
 from buildarena_worker.builtin.designs import DESIGNS
 from buildarena_worker.session.messages import Reply
 
@@ -41,5 +41,5 @@ def test_every_design_is_explained() -> None:
 def test_the_guides_task_is_a_task() -> None:
     guide = (DOCS / "extending.md").read_text()
     (text,) = re.findall(r"```yaml\n(name: narrow-gap.*?)```", guide, re.DOTALL)
-    task = parse_own_task(text, origin="extending.md")
+    task = parse_custom_task(text, origin="extending.md")
     assert (task.constraints.max_blocks, task.scorer) == (30, "support")

@@ -9,13 +9,13 @@ from typing import Any, Final
 
 from pydantic import ValidationError
 
-from buildarena_benchmark import Fault, SourceError
+from buildarena_benchmark import SourceError, ValidationIssue
 from buildarena_benchmark.tasks.sources import Source, path_of, read_source
 from buildarena_cli.client import RefusedError
 from buildarena_cli.errors import CommandError
 from buildarena_pipeline.catalog.specs import SweepSpec
 
-MOST_BYTES: Final = 2 * 1024 * 1024
+MAX_BYTES: Final = 2 * 1024 * 1024
 """Largest file: room for the 100,000 seeds that a sweep can name."""
 FLAGS: Final[Mapping[str, str]] = {
     "tasks": "--task",
@@ -48,9 +48,9 @@ class SpecFile:
         """The same file with values from the command line in the place of its fields."""
         return replace(self, content={**self.content, **given}, overridden=frozenset(given))
 
-    def refusal(self, faults: Sequence[Fault]) -> CommandError:
-        """Faults in words, each with its line of the file or the flag that it came from."""
-        return CommandError("\n".join(self._told(fault) for fault in faults))
+    def refusal(self, issues: Sequence[ValidationIssue]) -> CommandError:
+        """Issues in words, each with its line of the file or the flag that it came from."""
+        return CommandError("\n".join(self._line(issue) for issue in issues))
 
     def refused(self, error: RefusedError) -> CommandError:
         """What the service says against the content, in words."""
@@ -58,8 +58,8 @@ class SpecFile:
             return error
         return self.refusal(
             [
-                Fault(
-                    field=entry["field"],
+                ValidationIssue(
+                    path=entry["field"],
                     message=entry["message"],
                     line=self.source.line_of(path_of(entry["field"])),
                     choices=tuple(entry["choices"]),
@@ -68,12 +68,12 @@ class SpecFile:
             ]
         )
 
-    def _told(self, fault: Fault) -> str:
-        top = next(iter(path_of(fault.field)), "")
+    def _line(self, issue: ValidationIssue) -> str:
+        top = next(iter(path_of(issue.path)), "")
         if top not in self.overridden:
-            return fault.told(self.source.origin)
-        given = Fault(field=fault.field, message=fault.message, choices=fault.choices)
-        return given.told(FLAGS[str(top)])
+            return issue.describe(self.source.origin)
+        given = ValidationIssue(path=issue.path, message=issue.message, choices=issue.choices)
+        return given.describe(FLAGS[str(top)])
 
 
 def read_fields(file: Path) -> SpecFile:
@@ -84,7 +84,7 @@ def read_fields(file: Path) -> SpecFile:
     """
     try:
         text = file.read_text(encoding="utf-8")
-        source = read_source(text, origin=str(file), most_bytes=MOST_BYTES)
+        source = read_source(text, origin=str(file), max_bytes=MAX_BYTES)
     except OSError as error:
         raise CommandError(f"{file}: {error.strerror}") from error
     except UnicodeDecodeError as error:
@@ -114,7 +114,7 @@ def read_sweep(file: Path, flags: Mapping[str, Any]) -> SpecFile:
     try:
         SweepSpec.model_validate(sweep.content)
     except ValidationError as error:
-        raise sweep.refusal(sweep.source.faults(error, SweepSpec)) from error
+        raise sweep.refusal(sweep.source.issues(error, SweepSpec)) from error
     return sweep
 
 

@@ -1,23 +1,28 @@
 """Tasks, scorers, statistics and leaderboard mathematics of BuildArena."""
 
 from buildarena_benchmark.constraints import broken_constraint
-from buildarena_benchmark.errors import BenchmarkError, Fault, SourceError, TaskError
+from buildarena_benchmark.errors import BenchmarkError, SourceError, TaskError, ValidationIssue
 from buildarena_benchmark.scores import Score, failed_score, score
-from buildarena_benchmark.tasks.loading import builtin_tasks, load_task, parse_own_task, parse_task
+from buildarena_benchmark.tasks.loading import (
+    builtin_tasks,
+    load_task,
+    parse_custom_task,
+    parse_task,
+)
 from buildarena_benchmark.tasks.task import Task
 
 __all__ = [
     "BenchmarkError",
-    "Fault",
     "Score",
     "SourceError",
     "Task",
     "TaskError",
+    "ValidationIssue",
     "broken_constraint",
     "builtin_tasks",
     "failed_score",
     "load_task",
-    "parse_own_task",
+    "parse_custom_task",
     "parse_task",
     "score",
 ]

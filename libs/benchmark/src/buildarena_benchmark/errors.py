@@ -1,47 +1,58 @@
-"""Errors of the benchmark room."""
+"""Errors of the benchmark, and the one form in which anything reports invalid input."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field
 
 
 class BenchmarkError(Exception):
-    """Base of every error this room raises."""
+    """Base of every error that this package raises."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Fault:
-    """One thing that is wrong with a file.
+class ValidationIssue(BaseModel):
+    """One thing that is wrong with a file or a request.
 
     Attributes:
+        path: Where, such as "scenario.cargo.size[1]"; "" for the whole. The API calls it `field`.
         message: What is wrong.
-        field: Where, such as "scenario.cargo.size[1]"; "" for the file as a whole.
-        line: The line, from 1; None when it has none.
+        line: The line of the text, from 1; None when it has none.
         choices: What would be valid, where that can be listed.
     """
 
-    message: str
-    field: str = ""
-    line: int | None = None
-    choices: tuple[str, ...] = ()
+    model_config = ConfigDict(
+        frozen=True,
+        validate_by_name=True,
+        validate_by_alias=True,
+        json_schema_extra={"description": "One thing that is wrong with a file or a request."},
+    )
 
-    def told(self, origin: str) -> str:
-        """One line for people: ``origin:line: field: message; choose from …``."""
+    path: Annotated[
+        str,
+        Field(alias="field", description="Where, for example tasks[1]", examples=["tasks[0]"]),
+    ] = ""
+    message: Annotated[str, Field(examples=["there is no task 'support-9'"])]
+    line: Annotated[int | None, Field(description="Line of an uploaded text, from 1")] = None
+    choices: Annotated[tuple[str, ...], Field(description="What would be valid, where known")] = ()
+
+    def describe(self, origin: str) -> str:
+        """One line for people: ``origin:line: path: message; choose from …``."""
         place = origin if self.line is None else f"{origin}:{self.line}"
-        field = f"{self.field}: " if self.field else ""
+        path = f"{self.path}: " if self.path else ""
         choices = f"; choose from {', '.join(self.choices)}" if self.choices else ""
-        return f"{place}: {field}{self.message}{choices}"
+        return f"{place}: {path}{self.message}{choices}"
 
 
 class SourceError(BenchmarkError, ValueError):
-    """A file that somebody wrote is wrong; the message has a line for each fault.
+    """A file that somebody wrote is wrong; the message has a line for each issue.
 
     Attributes:
-        faults: All that is wrong.
+        issues: All that is wrong.
     """
 
-    def __init__(self, faults: Sequence[Fault], *, origin: str) -> None:
-        super().__init__("\n".join(fault.told(origin) for fault in faults))
-        self.faults = tuple(faults)
+    def __init__(self, issues: Sequence[ValidationIssue], *, origin: str) -> None:
+        super().__init__("\n".join(issue.describe(origin) for issue in issues))
+        self.issues = tuple(issues)
 
 
 class TaskError(SourceError):

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+
+from buildarena_benchmark import ValidationIssue
 
 
 class PipelineError(Exception):
@@ -40,28 +41,13 @@ class PermanentError(PipelineError):
         self.reason = reason
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FieldError:
-    """One thing wrong with a submission.
-
-    Attributes:
-        field: Where, for example ``tasks[1]``.
-        message: What is wrong.
-        choices: What would have been valid, where that can be listed.
-    """
-
-    field: str
-    message: str
-    choices: Sequence[str] = ()
-
-
 class SubmissionError(PipelineError):
     """A submission was refused; nothing of it was stored.
 
     Attributes:
-        errors: Everything that is wrong with it.
+        issues: Everything that is wrong with it.
     """
 
-    def __init__(self, errors: Sequence[FieldError]) -> None:
-        super().__init__("; ".join(f"{error.field}: {error.message}" for error in errors))
-        self.errors = tuple(errors)
+    def __init__(self, issues: Sequence[ValidationIssue]) -> None:
+        super().__init__("; ".join(f"{issue.path}: {issue.message}" for issue in issues))
+        self.issues = tuple(issues)

@@ -28,7 +28,7 @@ def main() -> None:
             return ConstructHandler(context, registry)
 
         def make_others(context: Context) -> Mapping[str, Callable[[str], None]]:
-            return {VERIFY_QUEUE: VerificationRunner(context).look}
+            return {VERIFY_QUEUE: VerificationRunner(context).process}
 
         run_worker(
             WorkerSpec(

@@ -208,7 +208,7 @@ class VerificationRunner:
         self._context = context
         self._verifier = Verifier(context)
 
-    def look(self, verification_id: str) -> None:
+    def process(self, verification_id: str) -> None:
         """Does a verification, unless another worker has it."""
         claimed = self._context.store.verifications.claim(verification_id)
         if claimed is None:

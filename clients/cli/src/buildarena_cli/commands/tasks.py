@@ -10,7 +10,7 @@ import typer
 from rich.markup import escape
 from rich.table import Table
 
-from buildarena_benchmark import Fault, Task, TaskError, parse_own_task
+from buildarena_benchmark import Task, TaskError, ValidationIssue, parse_custom_task
 from buildarena_cli.client import Client, RefusedError
 from buildarena_cli.errors import FAILED, CommandError
 from buildarena_cli.options import DEFAULT_URL, JsonOption, UrlOption
@@ -73,7 +73,7 @@ def check_task(file: TaskFile, *, as_json: JsonOption = False) -> None:
     except TaskError as error:
         if not as_json:
             raise CommandError(str(error)) from error
-        print_json({"ok": False, "errors": [_plain(fault) for fault in error.faults]})
+        print_json({"ok": False, "errors": [_plain(issue) for issue in error.issues]})
         raise typer.Exit(FAILED) from error
     if as_json:
         print_json({"ok": True, "name": task.name, "version": task.version, "errors": []})
@@ -110,21 +110,23 @@ def _read(file: Path) -> Task:
     try:
         text = file.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        raise TaskError([Fault(message=f"cannot be read: {error}")], origin=str(file)) from error
-    return parse_own_task(text, origin=str(file))
+        raise TaskError(
+            [ValidationIssue(message=f"cannot be read: {error}")], origin=str(file)
+        ) from error
+    return parse_custom_task(text, origin=str(file))
 
 
 def _told(errors: Sequence[dict[str, Any]], file: Path) -> str:
     return "\n".join(
-        Fault(
-            field=entry["field"],
+        ValidationIssue(
+            path=entry["field"],
             message=entry["message"],
             line=entry.get("line"),
             choices=tuple(entry["choices"]),
-        ).told(str(file))
+        ).describe(str(file))
         for entry in errors
     )
 
 
-def _plain(fault: Fault) -> dict[str, Any]:
-    return {name: getattr(fault, name) for name in ("line", "field", "message", "choices")}
+def _plain(issue: ValidationIssue) -> dict[str, Any]:
+    return issue.model_dump(mode="json", by_alias=True)

@@ -1,4 +1,4 @@
-"""Reads task files: the built-in ones and a user's own."""
+"""Reads task files: the built-in ones and custom ones."""
 
 from collections.abc import Mapping
 from functools import cache
@@ -7,7 +7,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Final
 
-from buildarena_benchmark.errors import Fault, SourceError, TaskError
+from buildarena_benchmark.errors import SourceError, TaskError, ValidationIssue
 from buildarena_benchmark.tasks.document import TaskDocument
 from buildarena_benchmark.tasks.sources import read_model, read_source
 from buildarena_benchmark.tasks.task import Task, task_of
@@ -35,7 +35,7 @@ def load_task(source: str | Path) -> Task:
         source: A `Path`, a one-line string naming a file, or the YAML text itself.
 
     Raises:
-        TaskError: The file cannot be read or is no valid task; names line, field and choices.
+        TaskError: The file cannot be read or is not a valid task; names line, field and choices.
     """
     if isinstance(source, Path) or "\n" not in source:
         path = Path(source)
@@ -43,7 +43,7 @@ def load_task(source: str | Path) -> Task:
             text = path.read_text(encoding="utf-8")
         except (OSError, UnicodeDecodeError) as error:
             raise TaskError(
-                [Fault(message=f"cannot be read: {error}")], origin=str(path)
+                [ValidationIssue(message=f"cannot be read: {error}")], origin=str(path)
             ) from error
         return parse_task(text, origin=path.name)
     return parse_task(source, origin="task")
@@ -57,23 +57,23 @@ def parse_task(text: str, *, origin: str) -> Task:
         origin: What it is called in messages.
 
     Raises:
-        TaskError: It is no valid task; names line, field and choices.
+        TaskError: It is not a valid task; names line, field and choices.
     """
     try:
         return task_of(read_model(text, TaskDocument, origin=origin))
     except SourceError as error:
-        raise TaskError(error.faults, origin=origin) from error
+        raise TaskError(error.issues, origin=origin) from error
 
 
-def parse_own_task(text: str, *, origin: str) -> Task:
-    """A user's own task from a YAML text: as `parse_task`, but for names that are taken.
+def parse_custom_task(text: str, *, origin: str) -> Task:
+    """A custom task from a YAML text: as `parse_task`, but for names that are taken.
 
     Raises:
-        TaskError: It is no valid task, or its name is a built-in task's.
+        TaskError: It is not a valid task, or its name is a built-in task's.
     """
     task = parse_task(text, origin=origin)
     if task.name in builtin_tasks():
         line = read_source(text, origin=origin).line_of(["name"])
         message = f"{task.name} is a built-in task: choose another name"
-        raise TaskError([Fault(field="name", line=line, message=message)], origin=origin)
+        raise TaskError([ValidationIssue(path="name", line=line, message=message)], origin=origin)
     return task

@@ -1,4 +1,4 @@
-"""YAML texts that people write: read with care, and every fault named with its line.
+"""YAML texts that people write: read with care, and every mistake named with its line.
 
 Nothing in a text can make reading it costly: its size and depth are bounded, and anchors, aliases
 and merge keys, with which a few lines can stand for gigabytes, are refused.
@@ -13,12 +13,12 @@ import yaml
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from buildarena_benchmark.errors import Fault, SourceError
+from buildarena_benchmark.errors import SourceError, ValidationIssue
 
-MOST_BYTES: Final = 64 * 1024
+MAX_BYTES: Final = 64 * 1024
 """Largest text: the longest built-in task has 3 KiB, a sweep of 10,000 named seeds 60."""
 
-MOST_LEVELS: Final = 16
+MAX_LEVELS: Final = 16
 """Deepest nesting; a task has five levels."""
 
 Path = Sequence[int | str]
@@ -48,13 +48,13 @@ class Source:
         """The line of a field, or of the nearest thing around it; from 1."""
         return self._located(path)[1]
 
-    def faults(self, error: ValidationError, model: type[BaseModel]) -> tuple[Fault, ...]:
+    def issues(self, error: ValidationError, model: type[BaseModel]) -> tuple[ValidationIssue, ...]:
         """What a model says against the content, in words, with lines and valid choices."""
         schema = model.model_json_schema()
-        found = [self._fault(item, schema) for item in error.errors(include_url=False)]
+        found = [self._issue(item, schema) for item in error.errors(include_url=False)]
         return tuple(dict.fromkeys(found))
 
-    def _fault(self, item: ErrorDetails, schema: _Schema) -> Fault:
+    def _issue(self, item: ErrorDetails, schema: _Schema) -> ValidationIssue:
         field, line = self._located(item["loc"])
         choices: Sequence[str] = item.get("ctx", {}).get("choices", ())
         message = item["msg"].removeprefix("Value error, ")
@@ -62,7 +62,7 @@ class Source:
             message, choices = "there is no such field", _fields_beside(item["loc"], schema)
         elif item["type"] in _MAPPING_WANTED:
             message = "must be a mapping of fields"
-        return Fault(field=field, line=line, message=message, choices=tuple(choices))
+        return ValidationIssue(path=field, line=line, message=message, choices=tuple(choices))
 
     def _located(self, path: Path) -> tuple[str, int | None]:
         node, spelled = self.root, ""
@@ -78,21 +78,21 @@ class Source:
         return spelled, line
 
 
-def read_source(text: str, *, origin: str, most_bytes: int = MOST_BYTES) -> Source:
+def read_source(text: str, *, origin: str, max_bytes: int = MAX_BYTES) -> Source:
     """Reads a YAML text.
 
     Args:
         text: One YAML document.
         origin: What it is called in messages.
-        most_bytes: Largest size accepted, as UTF-8.
+        max_bytes: Largest size accepted, as UTF-8.
 
     Raises:
-        SourceError: It is too large, no YAML, or uses what is refused.
+        SourceError: It is too large, not valid YAML, or uses what is refused.
     """
     size = len(text.encode("utf-8", "surrogatepass"))
-    if size > most_bytes:
-        message = f"{size:,} bytes; at most {most_bytes:,} are read"
-        raise SourceError([Fault(message=message)], origin=origin)
+    if size > max_bytes:
+        message = f"{size:,} bytes; at most {max_bytes:,} are read"
+        raise SourceError([ValidationIssue(message=message)], origin=origin)
     try:
         loader = _CarefulLoader(text)
         try:
@@ -105,14 +105,14 @@ def read_source(text: str, *, origin: str, most_bytes: int = MOST_BYTES) -> Sour
         line = None if mark is None else mark.line + 1
         message = str(error.problem or error.context)
         if not isinstance(error, _Refused):
-            message = f"no valid YAML: {message}"
-        raise SourceError([Fault(message=message, line=line)], origin=origin) from error
+            message = f"not valid YAML: {message}"
+        raise SourceError([ValidationIssue(message=message, line=line)], origin=origin) from error
     except yaml.reader.ReaderError as error:
         line = text.count("\n", 0, error.position) + 1
-        message = f"no valid YAML: {error.reason}"
-        raise SourceError([Fault(message=message, line=line)], origin=origin) from error
-    if faults := list(_key_faults(root, "")):
-        raise SourceError(faults, origin=origin)
+        message = f"not valid YAML: {error.reason}"
+        raise SourceError([ValidationIssue(message=message, line=line)], origin=origin) from error
+    if issues := list(_key_issues(root, "")):
+        raise SourceError(issues, origin=origin)
     return Source(origin=origin, content=content, root=root)
 
 
@@ -126,7 +126,7 @@ def read_model(text: str, model: type[_Model], *, origin: str) -> _Model:
     try:
         return model.model_validate(source.content)
     except ValidationError as error:
-        raise SourceError(source.faults(error, model), origin=origin) from error
+        raise SourceError(source.issues(error, model), origin=origin) from error
 
 
 def path_of(field: str) -> Path:
@@ -150,8 +150,8 @@ class _CarefulLoader(yaml.SafeLoader):
         if isinstance(event, yaml.AliasEvent) or getattr(event, "anchor", None):
             message = "anchors and aliases are not allowed: write the value out"
             raise _Refused(problem=message, problem_mark=event.start_mark)
-        if self._level >= MOST_LEVELS:
-            message = f"more than {MOST_LEVELS} levels inside each other"
+        if self._level >= MAX_LEVELS:
+            message = f"more than {MAX_LEVELS} levels inside each other"
             raise _Refused(problem=message, problem_mark=event.start_mark)
         self._level += 1
         node = super().compose_node(parent, index)
@@ -173,26 +173,26 @@ class _CarefulLoader(yaml.SafeLoader):
             raise _Refused(problem=message, problem_mark=node.start_mark) from error
 
 
-def _key_faults(node: yaml.Node | None, around: str) -> Iterator[Fault]:
-    """Keys that are no words, or that stand twice in one mapping."""
+def _key_issues(node: yaml.Node | None, around: str) -> Iterator[ValidationIssue]:
+    """Keys that are not words, or that stand twice in one mapping."""
     if isinstance(node, yaml.SequenceNode):
         for index, item in enumerate(node.value):
-            yield from _key_faults(item, f"{around}[{index}]")
+            yield from _key_issues(item, f"{around}[{index}]")
     if not isinstance(node, yaml.MappingNode):
         return
     lines: dict[str, int] = {}
     for key, value in node.value:
         line = key.start_mark.line + 1
         if not isinstance(key, yaml.ScalarNode) or key.tag != "tag:yaml.org,2002:str":
-            told = key.value if isinstance(key, yaml.ScalarNode) else "a collection"
-            yield Fault(field=around, line=line, message=f"the key {told} is no word")
+            shown = key.value if isinstance(key, yaml.ScalarNode) else "a collection"
+            yield ValidationIssue(path=around, line=line, message=f"the key {shown} is not a word")
             continue
         field = f"{around}.{key.value}" if around else key.value
         if key.value in lines:
             message = f"stands twice, first in line {lines[key.value]}"
-            yield Fault(field=field, line=line, message=message)
+            yield ValidationIssue(path=field, line=line, message=message)
         lines.setdefault(key.value, line)
-        yield from _key_faults(value, field)
+        yield from _key_issues(value, field)
 
 
 def _child(node: yaml.Node | None, step: int | str) -> tuple[yaml.Node, int] | None:

@@ -9,10 +9,10 @@ from collections.abc import Mapping, Sequence
 from threading import Lock
 from typing import Any
 
-from buildarena_benchmark import Task, broken_constraint
+from buildarena_benchmark import Task, ValidationIssue, broken_constraint
 from buildarena_pipeline.agents.workbench import Workbench, rebuild
 from buildarena_pipeline.catalog.tracks import SIMULATORS, external_track
-from buildarena_pipeline.errors import FieldError, PipelineError, SubmissionError
+from buildarena_pipeline.errors import PipelineError, SubmissionError
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.machine_documents import machine_bytes
 from buildarena_pipeline.runtime.scoring import failure_score, task_of
@@ -86,7 +86,7 @@ class ExternalSessions:
             opened = self._context.store.external_calls.open(key.job_id, connection=connection)
         if not opened:
             message = f"agent {agent!r} has played seed {seed} of {task}: take another seed"
-            raise SubmissionError([FieldError(field="seed", message=message)])
+            raise SubmissionError([ValidationIssue(path="seed", message=message)])
         return self._context.store.jobs.get(key.job_id)
 
     def call(self, job_id: str, *, machine: str, tool: str, arguments: Any) -> ExternalCall:
@@ -172,7 +172,7 @@ class ExternalSessions:
             errors.append(_unknown("simulator", simulator, SIMULATORS))
         if not AGENT_NAME.match(agent):
             message = "1 to 80 letters, digits, dots, dashes and underscores"
-            errors.append(FieldError(field="agent", message=message))
+            errors.append(ValidationIssue(path="agent", message=message))
         if errors or found is None:
             raise SubmissionError(errors)
         return found
@@ -203,8 +203,10 @@ class ExternalSessions:
                 self._benches.popitem(last=False)
 
 
-def _unknown(field: str, value: str, choices: Sequence[str]) -> FieldError:
-    return FieldError(field=field, message=f"there is no {field} {value!r}", choices=choices)
+def _unknown(field: str, value: str, choices: Sequence[str]) -> ValidationIssue:
+    return ValidationIssue(
+        path=field, message=f"there is no {field} {value!r}", choices=tuple(choices)
+    )
 
 
 def _transcript(calls: Sequence[ExternalCall]) -> bytes:

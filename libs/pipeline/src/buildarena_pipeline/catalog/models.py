@@ -105,7 +105,7 @@ def _parse(text: str, name: str) -> _File:
         raw: Any = yaml.safe_load(text)
         return _File.model_validate(raw if raw is not None else {})
     except yaml.YAMLError as error:
-        raise StartupError(f"models file {name} is no YAML: {error}") from error
+        raise StartupError(f"models file {name} is not valid YAML: {error}") from error
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"])

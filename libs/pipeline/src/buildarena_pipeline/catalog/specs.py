@@ -71,7 +71,7 @@ class ClosedLoop(BaseModel):
     ] = False
 
 
-class _Variant(BaseModel):
+class Variant(BaseModel):
     """What makes a track, and the limits of its sessions."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -85,7 +85,7 @@ class _Variant(BaseModel):
     limits: Limits = Limits()
 
 
-class JobSpec(_Variant):
+class JobSpec(Variant):
     """One job: a task, a model and a seed."""
 
     task: Name
@@ -93,7 +93,7 @@ class JobSpec(_Variant):
     seed: Seed = 0
 
 
-class SweepSpec(_Variant):
+class SweepSpec(Variant):
     """A matrix of jobs: every task with every model and every seed."""
 
     name: Title = "sweep"

@@ -117,7 +117,7 @@ class TaskCatalog:
         """Stores a task, unless this version of it is there.
 
         Args:
-            task: What `parse_own_task` made of the text.
+            task: What `parse_custom_task` made of the text.
             text: The YAML text.
             owner: Id of the API key that uploads it, if any.
 

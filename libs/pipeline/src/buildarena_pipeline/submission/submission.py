@@ -6,13 +6,13 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from buildarena_benchmark import Task
+from buildarena_benchmark import Task, ValidationIssue
 from buildarena_pipeline.catalog.models import ModelRegistry
 from buildarena_pipeline.catalog.prompt_packs import PromptPacks
-from buildarena_pipeline.catalog.specs import Budget, Decoding, JobSpec, SweepSpec
+from buildarena_pipeline.catalog.specs import Budget, Decoding, JobSpec, SweepSpec, Variant
 from buildarena_pipeline.catalog.tracks import SIMULATORS, make_track
 from buildarena_pipeline.catalog.workflows import workflow_sources
-from buildarena_pipeline.errors import FieldError, SubmissionError
+from buildarena_pipeline.errors import SubmissionError
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.notify import notify_waiting
 from buildarena_pipeline.submission.estimates import SweepEstimate, estimate
@@ -65,15 +65,7 @@ class Submissions:
         Raises:
             SubmissionError: Something of it is unknown; nothing was stored.
         """
-        new = self.plan(
-            SweepSpec(
-                tasks=[spec.task],
-                models=[spec.model],
-                seeds=[spec.seed],
-                **spec.model_dump(exclude={"task", "model", "seed"}),
-            ),
-            fields={"tasks[0]": "task", "models[0]": "model"},
-        )
+        new = self._plan(spec, {"task": spec.task}, {"model": spec.model}, [spec.seed])
         own = [replace(job, owner=owner) for job in new]
         with self._context.store.lifecycle.submission() as connection:
             added = self._context.store.jobs.add(own, connection=connection)
@@ -154,38 +146,47 @@ class Submissions:
         """
         return estimate(self.plan(spec), self._registry)
 
-    def plan(self, spec: SweepSpec, *, fields: dict[str, str] | None = None) -> list[NewJob]:
+    def plan(self, spec: SweepSpec) -> list[NewJob]:
         """The jobs that a sweep consists of, without storing anything.
-
-        Args:
-            spec: The sweep.
-            fields: Other names for fields in error messages.
 
         Raises:
             SubmissionError: Something of it is unknown, or it is too large.
         """
-        tasks = self._context.tasks.named(spec.tasks)
-        self._check(spec, tasks, fields or {})
+        tasks = {f"tasks[{index}]": name for index, name in enumerate(spec.tasks)}
+        models = {f"models[{index}]": name for index, name in enumerate(spec.models)}
+        return self._plan(spec, tasks, models, spec.all_seeds())
+
+    def _plan(
+        self,
+        variant: Variant,
+        tasks: Mapping[str, str],
+        models: Mapping[str, str],
+        seeds: Sequence[int],
+    ) -> list[NewJob]:
+        """Every task with every model and every seed; names come by their paths in the spec."""
+        found = self._context.tasks.named(list(tasks.values()))
+        self._require_known(variant, tasks, models, found)
+        task_names, model_names = set(tasks.values()), set(models.values())
+        self._require_size(len(task_names) * len(model_names) * len(seeds))
         track = make_track(
-            self._workflows[spec.workflow],
-            spec.simulator,
-            self._packs.load(spec.prompts),
-            one_shot=spec.one_shot,
-            closed_loop=spec.closed_loop,
+            self._workflows[variant.workflow],
+            variant.simulator,
+            self._packs.load(variant.prompts),
+            one_shot=variant.one_shot,
+            closed_loop=variant.closed_loop,
         )
         track_config = track.as_config()
-        limits = spec.limits.model_dump(exclude_none=True)
-        seeds = spec.all_seeds()
+        limits = variant.limits.model_dump(exclude_none=True)
         new = []
-        for task_name in dict.fromkeys(spec.tasks):
-            for model_name in dict.fromkeys(spec.models):
-                config = model_config(self._registry, model_name, spec.decoding)
+        for task_name in dict.fromkeys(tasks.values()):
+            for model_name in dict.fromkeys(models.values()):
+                config = model_config(self._registry, model_name, variant.decoding)
                 config_hash = content_hash(config)
                 new += [
                     NewJob(
                         key=JobKey(
                             task=task_name,
-                            task_version=tasks[task_name].version,
+                            task_version=found[task_name].version,
                             model_hash=config_hash,
                             track=track.id,
                             seed=seed,
@@ -199,33 +200,31 @@ class Submissions:
                 ]
         return new
 
-    def _check(self, spec: SweepSpec, tasks: Mapping[str, Task], fields: dict[str, str]) -> None:
-        if any(name not in tasks for name in spec.tasks):
+    def _require_known(
+        self,
+        variant: Variant,
+        tasks: Mapping[str, str],
+        models: Mapping[str, str],
+        found: Mapping[str, Task],
+    ) -> None:
+        if any(name not in found for name in tasks.values()):
             # The choices are all there are.
-            tasks = self._context.tasks.newest()
-        errors = [
-            *_unknown("tasks", "task", spec.tasks, tasks),
-            *_unknown("models", "model", spec.models, self._registry.models),
-            *_unknown("workflow", "workflow", [spec.workflow], self._workflows),
-            *_unknown("simulator", "simulator", [spec.simulator], SIMULATORS),
-            *_unknown("prompts", "prompt pack", [spec.prompts], self._packs.names),
+            found = self._context.tasks.newest()
+        issues = [
+            *_unknown("task", tasks, found),
+            *_unknown("model", models, self._registry.models),
+            *_unknown("workflow", {"workflow": variant.workflow}, self._workflows),
+            *_unknown("simulator", {"simulator": variant.simulator}, SIMULATORS),
+            *_unknown("prompt pack", {"prompts": variant.prompts}, self._packs.names),
         ]
-        size = len(set(spec.tasks)) * len(set(spec.models)) * len(spec.all_seeds())
+        if issues:
+            raise SubmissionError(issues)
+
+    def _require_size(self, jobs: int) -> None:
         largest = self._context.settings.max_sweep_jobs
-        if size > largest:
-            message = f"the sweep has {size:,} jobs; the largest accepted has {largest:,}"
-            errors.append(FieldError(field="seeds", message=message))
-        if errors:
-            raise SubmissionError(
-                [
-                    FieldError(
-                        field=fields.get(error.field, error.field),
-                        message=error.message,
-                        choices=error.choices,
-                    )
-                    for error in errors
-                ]
-            )
+        if jobs > largest:
+            message = f"the sweep has {jobs:,} jobs; the largest accepted has {largest:,}"
+            raise SubmissionError([ValidationIssue(path="seeds", message=message)])
 
 
 def spec_hash(spec: SweepSpec) -> str:
@@ -244,16 +243,12 @@ def model_config(registry: ModelRegistry, name: str, decoding: Decoding) -> dict
     }
 
 
-def _unknown(
-    field: str, kind: str, names: Sequence[str], known: Collection[str]
-) -> list[FieldError]:
-    several = field.endswith("s") and field != "prompts"
+def _unknown(kind: str, names: Mapping[str, str], known: Collection[str]) -> list[ValidationIssue]:
+    """An issue for each unknown name; names come by their paths."""
     return [
-        FieldError(
-            field=f"{field}[{index}]" if several else field,
-            message=f"there is no {kind} {name!r}",
-            choices=sorted(known),
+        ValidationIssue(
+            path=path, message=f"there is no {kind} {name!r}", choices=tuple(sorted(known))
         )
-        for index, name in enumerate(names)
+        for path, name in names.items()
         if name not in known
     ]

@@ -6,7 +6,8 @@ import base64
 import binascii
 from datetime import datetime
 
-from buildarena_api.http.problems import FieldProblem, ProblemError
+from buildarena_api.http.problems import ProblemError
+from buildarena_benchmark import ValidationIssue
 
 
 def encode(created_at: datetime, id_: str) -> str:
@@ -34,5 +35,5 @@ def decode(cursor: str) -> tuple[datetime, str]:
 def _bad() -> ProblemError:
     message = "not a cursor; take next_cursor of the page before, or leave it out"
     return ProblemError(
-        422, f"cursor: {message}", errors=[FieldProblem(field="cursor", message=message)]
+        422, f"cursor: {message}", errors=[ValidationIssue(path="cursor", message=message)]
     )

@@ -11,7 +11,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from buildarena_api.http.problems import PROBLEM_JSON
 from buildarena_api.routes.archives import IMPORT_PATH
 
-MOST_BYTES = 4 * 1024 * 1024
+MAX_BYTES = 4 * 1024 * 1024
 """Largest request body: a sweep of 100,000 seeds has less than a megabyte."""
 SECURITY_HEADERS = {
     "X-Content-Type-Options": "nosniff",
@@ -26,12 +26,12 @@ class Guards:
 
     Args:
         app: The application.
-        most_bytes: Largest request body accepted.
+        max_bytes: Largest request body accepted.
     """
 
-    def __init__(self, app: ASGIApp, most_bytes: int = MOST_BYTES) -> None:
+    def __init__(self, app: ASGIApp, max_bytes: int = MAX_BYTES) -> None:
         self._app = app
-        self._most_bytes = most_bytes
+        self._max_bytes = max_bytes
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Passes a request on, or refuses it for its size."""
@@ -44,7 +44,7 @@ class Guards:
             await self._app(scope, receive, safe_send)
             return
         length = Headers(scope=scope).get("content-length")
-        if length is not None and length.isdigit() and int(length) > self._most_bytes:
+        if length is not None and length.isdigit() and int(length) > self._max_bytes:
             await self._refuse(safe_send)
             return
         body = await self._read(receive)
@@ -61,7 +61,7 @@ class Guards:
             if message["type"] != "http.request":
                 return bytes(body)
             body += message.get("body", b"")
-            if len(body) > self._most_bytes:
+            if len(body) > self._max_bytes:
                 return None
             if not message.get("more_body", False):
                 return bytes(body)
@@ -72,7 +72,7 @@ class Guards:
             "type": "about:blank",
             "title": status.phrase,
             "status": status.value,
-            "detail": f"the request is larger than {self._most_bytes:,} bytes",
+            "detail": f"the request is larger than {self._max_bytes:,} bytes",
             "errors": [],
         }
         data = json.dumps(problem).encode()

@@ -14,21 +14,13 @@ from pydantic import BaseModel, Field
 from sqlalchemy.exc import DataError, OperationalError
 from starlette.exceptions import HTTPException
 
+from buildarena_benchmark import ValidationIssue
 from buildarena_pipeline.errors import SubmissionError
 from buildarena_store import ArtifactMissingError, TransitionError, UnknownIdError
 
 PROBLEM_JSON = "application/problem+json"
 
 log = structlog.get_logger(__name__)
-
-
-class FieldProblem(BaseModel):
-    """One thing that is wrong with a request."""
-
-    field: str = Field(description="Where, for example tasks[1]", examples=["tasks[0]"])
-    message: str = Field(examples=["there is no task 'support-9'"])
-    line: int | None = Field(default=None, description="Line of an uploaded text, from 1")
-    choices: list[str] = Field(default=[], description="What would be valid, where known")
 
 
 class Problem(BaseModel):
@@ -38,7 +30,7 @@ class Problem(BaseModel):
     title: str = Field(examples=["Unprocessable Content"])
     status: int = Field(examples=[422])
     detail: str = Field(examples=["tasks[0]: there is no task 'support-9'"])
-    errors: list[FieldProblem] = []
+    errors: list[ValidationIssue] = []
 
 
 class ProblemError(Exception):
@@ -47,7 +39,7 @@ class ProblemError(Exception):
     Attributes:
         status: HTTP status.
         detail: What went wrong, for people.
-        errors: Field errors.
+        errors: What is wrong with the request.
         headers: Headers of the answer.
     """
 
@@ -56,7 +48,7 @@ class ProblemError(Exception):
         status: int,
         detail: str,
         *,
-        errors: Sequence[FieldProblem] = (),
+        errors: Sequence[ValidationIssue] = (),
         headers: dict[str, str] | None = None,
     ) -> None:
         super().__init__(detail)
@@ -81,14 +73,17 @@ def problem_responses(*statuses: int) -> dict[int | str, dict[str, Any]]:
 def _answer(
     status: int,
     detail: str,
-    errors: Sequence[FieldProblem] = (),
+    errors: Sequence[ValidationIssue] = (),
     headers: dict[str, str] | None = None,
 ) -> JSONResponse:
     problem = Problem(
         title=HTTPStatus(status).phrase, status=status, detail=detail, errors=list(errors)
     )
     return JSONResponse(
-        problem.model_dump(), status_code=status, media_type=PROBLEM_JSON, headers=headers
+        problem.model_dump(mode="json", by_alias=True),
+        status_code=status,
+        media_type=PROBLEM_JSON,
+        headers=headers,
     )
 
 
@@ -101,19 +96,15 @@ def add_problem_handlers(app: FastAPI) -> None:
 
     @app.exception_handler(SubmissionError)
     async def on_submission(_: Request, error: SubmissionError) -> JSONResponse:
-        errors = [
-            FieldProblem(field=e.field, message=e.message, choices=list(e.choices))
-            for e in error.errors
-        ]
-        return _answer(422, str(error), errors)
+        return _answer(422, str(error), error.issues)
 
     @app.exception_handler(RequestValidationError)
     async def on_invalid(_: Request, error: RequestValidationError) -> JSONResponse:
         errors = [
-            FieldProblem(field=_field(entry["loc"]), message=entry["msg"])
+            ValidationIssue(path=_field(entry["loc"]), message=entry["msg"])
             for entry in error.errors()
         ]
-        detail = "; ".join(f"{entry.field}: {entry.message}" for entry in errors)
+        detail = "; ".join(f"{entry.path}: {entry.message}" for entry in errors)
         return _answer(422, detail, errors)
 
     @app.exception_handler(HTTPException)

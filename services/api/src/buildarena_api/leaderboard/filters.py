@@ -8,9 +8,9 @@ from typing import Annotated
 
 from fastapi import Depends, Query, Request
 
-from buildarena_api.http.problems import FieldProblem, ProblemError
+from buildarena_api.http.problems import ProblemError
 from buildarena_api.leaderboard.cache import BoardCache
-from buildarena_benchmark import builtin_tasks
+from buildarena_benchmark import ValidationIssue, builtin_tasks
 from buildarena_benchmark.leaderboard import BoardQuery
 
 
@@ -62,7 +62,7 @@ def select_board(
         if time is not None and time.tzinfo is None:
             message = f"{time.isoformat()} has no time zone"
             raise ProblemError(
-                422, f"{field}: {message}", errors=[FieldProblem(field=field, message=message)]
+                422, f"{field}: {message}", errors=[ValidationIssue(path=field, message=message)]
             )
     chosen = None
     if task or level:
@@ -96,5 +96,5 @@ def unknown(field: str, value: str, choices: list[str]) -> ProblemError:
     return ProblemError(
         422,
         f"{field}: {message}",
-        errors=[FieldProblem(field=field, message=message, choices=choices)],
+        errors=[ValidationIssue(path=field, message=message, choices=tuple(choices))],
     )

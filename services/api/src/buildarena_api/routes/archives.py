@@ -19,7 +19,7 @@ from buildarena_store.archives import ArchiveError, read_archive, write_archive
 router = APIRouter(prefix="/v1", tags=["archives"])
 
 IMPORT_PATH = "/v1/archives"
-MOST_BYTES = 8 << 30
+MAX_BYTES = 8 << 30
 """Largest archive taken in: the paper's whole matrix has about 3 GB of trajectories."""
 ZIP = "application/zip"
 
@@ -90,8 +90,8 @@ async def _receive(request: Request, target: Path) -> None:
     with target.open("wb") as file:
         async for chunk in request.stream():
             received += len(chunk)
-            if received > MOST_BYTES:
-                raise ProblemError(413, f"the archive is larger than {MOST_BYTES:,} bytes")
+            if received > MAX_BYTES:
+                raise ProblemError(413, f"the archive is larger than {MAX_BYTES:,} bytes")
             file.write(chunk)
 
 

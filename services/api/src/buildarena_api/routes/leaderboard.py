@@ -18,7 +18,7 @@ from buildarena_benchmark.leaderboard import SCORED, BoardQuery, TaskDuel, duel
 from buildarena_store.states import VERIFY_QUEUE
 
 router = APIRouter(prefix="/v1", tags=["leaderboard"])
-MOST_DISTINCT = 20
+MAX_DISTINCT = 20
 """Values of a manifest that are spelled out; of a name with more, seeds say, only their number."""
 
 
@@ -190,7 +190,7 @@ def manifest(
         ManifestEntry(
             name=name,
             distinct=len(values),
-            values=values if len(values) <= MOST_DISTINCT else [],
+            values=values if len(values) <= MAX_DISTINCT else [],
         )
         for name, values in entries.items()
     ]

@@ -12,9 +12,9 @@ from pydantic import BaseModel, Field, TypeAdapter
 from buildarena_api.dependencies import ContextDep
 from buildarena_api.http.access import CallerDep
 from buildarena_api.http.etags import Answer, conditional
-from buildarena_api.http.problems import FieldProblem, ProblemError, problem_responses
-from buildarena_benchmark import TaskError, parse_own_task
-from buildarena_benchmark.tasks.sources import MOST_BYTES
+from buildarena_api.http.problems import ProblemError, problem_responses
+from buildarena_benchmark import TaskError, ValidationIssue, parse_custom_task
+from buildarena_benchmark.tasks.sources import MAX_BYTES
 from buildarena_pipeline.catalog.tasks import CatalogueEntry, TaskChangedError
 from buildarena_store import UnknownIdError
 
@@ -75,14 +75,14 @@ async def _yaml_text(request: Request) -> str:
         message = f"the body's type is {media_type or 'not named'}; send {YAML}"
         raise ProblemError(415, message, headers={"Accept-Post": YAML})
     body = await request.body()
-    if len(body) > MOST_BYTES:
-        raise ProblemError(413, f"a task has at most {MOST_BYTES:,} bytes, this {len(body):,}")
+    if len(body) > MAX_BYTES:
+        raise ProblemError(413, f"a task has at most {MAX_BYTES:,} bytes, this {len(body):,}")
     try:
         return body.decode()
     except UnicodeDecodeError as error:
         line = body.count(b"\n", 0, error.start) + 1
-        message = "the text is no UTF-8"
-        problem = FieldProblem(field="", message=message, line=line)
+        message = "the text is not UTF-8"
+        problem = ValidationIssue(path="", message=message, line=line)
         raise ProblemError(422, f"line {line}: {message}", errors=[problem]) from error
 
 
@@ -98,7 +98,7 @@ async def _yaml_text(request: Request) -> str:
             "required": True,
             "content": {
                 YAML: {
-                    "schema": {"type": "string", "maxLength": MOST_BYTES},
+                    "schema": {"type": "string", "maxLength": MAX_BYTES},
                     "examples": {"bridge": {"summary": "A narrow gap", "value": EXAMPLE}},
                 }
             },
@@ -114,7 +114,7 @@ def add_task(
     """Uploads a task, or a new version of one of your own; new submissions get it from then on."""
     catalogue = context.tasks
     try:
-        task = parse_own_task(text, origin="task")
+        task = parse_custom_task(text, origin="task")
     except TaskError as error:
         raise _refusal(error) from error
     with contextlib.suppress(UnknownIdError):
@@ -169,10 +169,4 @@ def _detail(entry: CatalogueEntry) -> TaskDetail:
 
 
 def _refusal(error: TaskError) -> ProblemError:
-    problems = [
-        FieldProblem(
-            field=fault.field, message=fault.message, line=fault.line, choices=list(fault.choices)
-        )
-        for fault in error.faults
-    ]
-    return ProblemError(422, str(error), errors=problems)
+    return ProblemError(422, str(error), errors=error.issues)

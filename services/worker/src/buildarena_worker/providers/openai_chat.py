@@ -34,7 +34,7 @@ from buildarena_worker.session.messages import Message, Tool
 
 CONNECT_S = 10.0
 """Longest wait for a connection; the retry policy's own timeout rules the whole."""
-MOST_FRAMES = 256
+MAX_FRAMES = 256
 """Frames kept; a role needs one, and a process has few roles."""
 SAMPLE: Sequence[ModelMessage] = (
     ModelRequest(parts=[SystemPromptPart(content="s"), UserPromptPart(content="u")]),
@@ -128,7 +128,7 @@ class OpenAIChat:
         key = json.dumps([[[t.name, t.description, t.parameters] for t in tools], shared])
         frame = self._frames.get(key)
         if frame is None:
-            if len(self._frames) >= MOST_FRAMES:
+            if len(self._frames) >= MAX_FRAMES:
                 self._frames.clear()
             frame = self._frames[key] = await self._make_frame(tools, settings)
         return frame
