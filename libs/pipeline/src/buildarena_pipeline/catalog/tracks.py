@@ -14,7 +14,7 @@ from buildarena_pipeline.catalog.workflows import WorkflowSource
 from buildarena_simulation import ENGINES, SIMULATION_VERSION
 
 SIMULATORS = tuple(ENGINES)
-"""Simulators that jobs can name; each has a queue of its own."""
+"""Simulators that jobs can name, the first by default; each has a queue of its own."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
