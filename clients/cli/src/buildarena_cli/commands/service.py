@@ -132,12 +132,12 @@ def _settings(data: Path | None, port: int | None, *, require_keys: bool | None 
 def _unlocked(settings: Settings) -> bool:
     import fcntl
 
-    with (settings.data / "lock").open("w") as lock:
-        try:
+    try:
+        with (settings.data / "lock").open("w") as lock:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            return False
-        return True
+    except OSError:
+        return False
+    return True
 
 
 def _interrupt_on_terminate() -> None:

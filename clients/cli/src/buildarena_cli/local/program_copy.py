@@ -1,4 +1,4 @@
-"""A copy of the Postgres program, for an account that can't enter the folder it is installed in."""
+"""A copy of the Postgres program, for when its folder can't be used by its path."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import time
 from collections.abc import Iterable
 from pathlib import Path
 
-from buildarena_cli.local.accounts import Account, others_can_enter
+from buildarena_cli.local.accounts import Account, run_as, usable_by_path
 from buildarena_pipeline.errors import StartupError
 
 PREFIX = "buildarena-program-"
@@ -30,7 +30,7 @@ class ProgramCopy:
 
     Args:
         install: Folder of the program, ``bin/postgres`` and what belongs to it, in its package.
-        account: Who shall run it.
+        account: Who shall run it; None for this process' own account.
         places: Folders to try, in this order; the system's temporary folder comes first.
 
     Attributes:
@@ -42,7 +42,9 @@ class ProgramCopy:
 
     install: Path
 
-    def __init__(self, install: Path, account: Account, places: Iterable[str] = PLACES) -> None:
+    def __init__(
+        self, install: Path, account: Account | None, places: Iterable[str] = PLACES
+    ) -> None:
         refused = []
         for place in dict.fromkeys([tempfile.gettempdir(), *places]):
             try:
@@ -52,9 +54,9 @@ class ProgramCopy:
             else:
                 return
         raise StartupError(
-            f"Postgres does not run as root, and the account {account.name!r} can't enter "
-            f"{install} nor run a copy of it from {', '.join(refused)}: run BuildArena as an "
-            "ordinary user, let others enter that folder (chmod o+x), or set "
+            f"Postgres, as {'this user' if account is None else account.name}, can't be run from "
+            f"{install}, nor can a copy of it from {', '.join(refused)}: run BuildArena from a "
+            "folder that others can enter (chmod o+x) or as an ordinary user, or set "
             "BUILDARENA_DATABASE_URL to a Postgres server"
         )
 
@@ -63,9 +65,9 @@ class ProgramCopy:
         self._folder.cleanup()
         os.close(self._lock)
 
-    def _copy_to(self, place: Path, install: Path, account: Account) -> None:
-        if not others_can_enter(place):
-            raise PermissionError(f"{account.name!r} can't enter it")
+    def _copy_to(self, place: Path, install: Path, account: Account | None) -> None:
+        if not usable_by_path(place, account):
+            raise PermissionError("Postgres can't use its path")
         if os.statvfs(place).f_flag & os.ST_NOEXEC:
             raise PermissionError("mounted noexec")
         _remove_left(place)
@@ -92,7 +94,6 @@ def _copied(install: Path, target: Path) -> Path:
             shutil.copytree(
                 source,
                 target / source.name,
-                symlinks=True,
                 ignore=lambda folder, names: UNUSED(folder, names) | others,
                 copy_function=_copy_readable,
             )
@@ -102,13 +103,13 @@ def _copied(install: Path, target: Path) -> Path:
 
 
 def _copy_readable(source: str, target: str) -> str:
-    """Copies a file for everybody's eyes: under a strict umask the original is its owner's alone."""
+    """Copies a file for all to read: under a strict umask the original is its owner's alone."""
     shutil.copyfile(source, target)
     Path(target).chmod(0o755 if os.access(source, os.X_OK) else 0o644)
     return target
 
 
-def _require_it_runs(install: Path, account: Account) -> None:
+def _require_it_runs(install: Path, account: Account | None) -> None:
     subprocess.run(
         [install / "bin" / "postgres", "--version"],
         check=True,
@@ -116,9 +117,7 @@ def _require_it_runs(install: Path, account: Account) -> None:
         timeout=30,
         cwd="/",
         env={},
-        user=account.uid,
-        group=account.gid,
-        extra_groups=[],
+        **run_as(account),
     )
 
 

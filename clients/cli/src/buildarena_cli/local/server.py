@@ -9,6 +9,7 @@ import socket
 import subprocess
 import time
 from collections.abc import Callable
+from itertools import takewhile
 from pathlib import Path
 from typing import Protocol
 
@@ -95,7 +96,7 @@ def size_of(file: Path) -> int:
 
 
 def reason_in(log_file: Path, since: int = 0) -> str:
-    """Why a server gave up: the last line that names an error, else the last that says anything.
+    """Why a server gave up: its last error with details, else the last line that says anything.
 
     Args:
         log_file: Where the server writes what it does.
@@ -108,8 +109,12 @@ def reason_in(log_file: Path, since: int = 0) -> str:
     except OSError:
         return "it wrote no log"
     lines = [TIMESTAMP.sub("", line.strip()) for line in text.splitlines() if line.strip()]
-    errors = [line for line in lines if ERROR.search(line)]
-    return (errors or lines or ["it wrote no log"])[-1]
+    if not lines:
+        return "it wrote no log"
+    errors = [number for number, line in enumerate(lines) if ERROR.search(line)]
+    last = errors[-1] if errors else len(lines) - 1
+    details = takewhile(lambda line: line.startswith(("DETAIL:", "HINT:")), lines[last + 1 :])
+    return " ".join([lines[last], *details])
 
 
 def stop_process(process: subprocess.Popen[bytes], signal_number: int, within_s: float) -> None:
