@@ -4,7 +4,6 @@ set -euo pipefail
 venv=$1
 shift
 here=$(dirname "$0")
-newest_with_wheels=3.13
 
 uv() {
     bash "$here/uv.sh" "$@"
@@ -45,7 +44,7 @@ install_requirements() {
         echo "PyBullet has no wheel for $system and there is no C++ compiler: without it, machines are simulated with MuJoCo alone."
         return
     fi
-    echo "PyBullet has no wheel for $system: compiling it, which takes some minutes; Python $newest_with_wheels or older would not need to."
+    echo "PyBullet has no wheel for $system: compiling it, which takes some minutes. README.md names the systems that need not."
     sync requirements.lock 2>"$venv/pybullet.log" ||
         echo "PyBullet could not be compiled (see $venv/pybullet.log): without it, machines are simulated with MuJoCo alone."
 }
