@@ -88,6 +88,18 @@ print([process.wait() for process in started])
     assert run_elsewhere(both, ["-c", program, *arguments]) == "[0, 0]\n"
 
 
+def test_postgres_gets_its_own_folder_and_nothing_around_it() -> None:
+    program = SERVERS + (
+        "(data / 'notes').write_text('for everybody who can enter')\n"
+        "print(once(\"SELECT pg_read_file('PG_VERSION')\").strip())\n"
+        "try:\n    once(\"SELECT pg_read_file('../../notes')\")\n"
+        "except psycopg.Error as error:\n    print(error)"
+    )
+    version, refusal = run_elsewhere(Case(), ["-c", program, "{data}"]).splitlines()
+    assert int(version) >= 16
+    assert refusal.endswith("Permission denied")
+
+
 def test_data_that_an_older_version_kept_elsewhere_is_found_again() -> None:
     program = (
         SERVERS

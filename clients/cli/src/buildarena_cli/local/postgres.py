@@ -178,6 +178,7 @@ class EmbeddedPostgres:
                 f"{' '.join(sorted(READ_BY_SHELLS))}, or lies where only root can enter, as whom "
                 "Postgres does not run; choose another folder with --data or BUILDARENA_DATA"
             )
+        folder.parent.chmod(0o700)  # else the way up from the open folder would be open too
         opened = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
         try:
             yield str(OPEN_FILES / str(opened)), (opened,)
