@@ -67,6 +67,11 @@ def test_the_servers_start_anywhere(case: Case, user: str) -> None:
     assert printed.splitlines() == ["42", "True", "", "cluster password"]
 
 
+def test_root_in_a_container_needs_no_further_privilege() -> None:
+    printed = run_elsewhere(Case(contained=True), ["-c", BOTH, "{data}"])
+    assert printed.splitlines() == ["42", "True", "", "cluster password"]
+
+
 def test_two_clones_start_side_by_side() -> None:
     second = Case(folder="clone/second")
     both = Case(

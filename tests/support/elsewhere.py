@@ -18,6 +18,11 @@ PLACE = Path("/mnt")
 HIDING = PLACE / "hiding"
 ORDINARY = pwd.getpwnam("daemon").pw_uid
 """An account that every system has."""
+IN_CONTAINERS = (
+    "-all,+chown,+dac_override,+fowner,+fsetid,+kill,+setgid,+setuid,+setpcap,"
+    "+net_bind_service,+net_raw,+sys_chroot,+mknod,+audit_write,+setfcap"
+)
+"""Capabilities that root has in a container by default; mounting is not among them."""
 SOURCES = ["libs/*/src", "services/*/src", "clients/cli/src", "tests/support"]
 
 
@@ -33,6 +38,7 @@ class Case:
         read_only: Whether the checkout can't be written.
         unset: Variables that are not set.
         temporary: What TMPDIR names, below `folder`; a private folder.
+        contained: Whether root has only what containers usually leave it.
         hidden: A module that can't be imported, as if it were not installed.
         before: Further commands as root, when all is mounted.
     """
@@ -44,6 +50,7 @@ class Case:
     read_only: bool = False
     unset: tuple[str, ...] = ()
     temporary: str | None = None
+    contained: bool = False
     hidden: str | None = None
     before: tuple[str, ...] = ()
 
@@ -69,8 +76,8 @@ def require_mounts(case: Case) -> None:
         pytest.skip("only root can mount a clone at an odd place")
     if not _works("unshare", "--mount", "mount", "-t", "tmpfs", "none", str(PLACE)):
         pytest.skip("no mount namespaces here")
-    if case.ordinary and not _works("setpriv", "--version"):
-        pytest.skip("no setpriv here, which starts programs as an ordinary user")
+    if (case.ordinary or case.contained) and not _works("setpriv", "--version"):
+        pytest.skip("no setpriv here, which starts programs with fewer privileges")
 
 
 def start_elsewhere(case: Case, arguments: list[str]) -> subprocess.Popen[str]:
@@ -82,6 +89,8 @@ def start_elsewhere(case: Case, arguments: list[str]) -> subprocess.Popen[str]:
     if case.ordinary:
         ids = [f"--reuid={ORDINARY}", f"--regid={ORDINARY}", "--clear-groups"]
         command = ["setpriv", *ids, *command]
+    if case.contained:
+        command = ["setpriv", "--bounding-set", IN_CONTAINERS, *command]
     environment = {"PATH": os.environ["PATH"], "HOME": str(case.place), "LANG": "C.UTF-8"}
     environment |= {"PYTHONDONTWRITEBYTECODE": "1", "PYTHONPATH": _import_path(case.clone)}
     if case.hidden is not None:
