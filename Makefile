@@ -1,12 +1,14 @@
 # Two commands matter to a newcomer: `make demo` and `make test`.
 SHELL := /bin/bash
-PYTHON ?= python3
+# The Python to use; without it, set-up looks for one that has wheels for everything.
+PYTHON ?=
+export PYTHON
 VENV := .venv
 BIN := $(VENV)/bin
 PACKAGES := libs/geometry libs/simulation libs/benchmark libs/store libs/pipeline services/api services/worker services/simworker clients/cli
 CODE := $(addsuffix /src,$(PACKAGES)) migrations tests
 STAMP := $(VENV)/.installed
-WORKERS ?= $(shell nproc)
+WORKERS ?= $(shell getconf _NPROCESSORS_ONLN)
 
 .PHONY: help install demo up test check lock clean openapi
 
@@ -16,12 +18,7 @@ help: ## Lists the targets
 install: $(STAMP) ## Makes the environment in .venv
 
 $(STAMP): requirements.lock $(addsuffix /pyproject.toml,$(PACKAGES))
-	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "BuildArena needs Python 3.11 or newer; set PYTHON=/path/to/python3.11"; exit 1; }
-	@$(PYTHON) -m uv --version >/dev/null 2>&1 || $(PYTHON) -m pip install --quiet uv || { $(PYTHON) -m venv $(VENV)-uv && $(VENV)-uv/bin/pip install --quiet uv; }
-	@UV="$(PYTHON) -m uv"; [ -x $(VENV)-uv/bin/uv ] && UV=$(VENV)-uv/bin/uv; \
-	$$UV venv --quiet --allow-existing --python $(PYTHON) $(VENV) && \
-	$$UV pip sync --quiet --python $(BIN)/python requirements.lock && \
-	$$UV pip install --quiet --python $(BIN)/python --no-deps --no-build-isolation $(addprefix -e ,$(PACKAGES))
+	@bash mk/install.sh $(VENV) $(PACKAGES)
 	@touch $@
 
 demo: $(STAMP) ## One small sweep from start to leaderboard; stops everything in the end
@@ -46,7 +43,7 @@ openapi: $(STAMP) ## Writes the API's contract anew, after a wanted change
 	@$(BIN)/python -m buildarena_api.contract > tests/data/openapi.json
 
 lock: ## Compiles requirements.lock anew
-	$(PYTHON) -m uv pip compile --quiet --universal --generate-hashes --all-extras --no-annotate \
+	bash mk/uv.sh pip compile --quiet --universal --generate-hashes --all-extras --no-annotate \
 		$(foreach p,$(PACKAGES),--no-emit-package $(subst /,-,buildarena-$(notdir $(p)))) \
 		--custom-compile-command "make lock" -o requirements.lock \
 		$(addsuffix /pyproject.toml,$(PACKAGES)) requirements-dev.in

@@ -34,7 +34,6 @@ def pytest_configure(config: pytest.Config) -> None:
     with ExitStack() as stack:
         folder = Path(tempfile.mkdtemp(prefix="buildarena-tests-"))
         stack.callback(shutil.rmtree, folder, ignore_errors=True)
-        folder.chmod(0o755)  # Postgres runs as nobody when the tests run as root
         postgres = EmbeddedPostgres(folder / "pg", folder / "pg.log", durable=False)
         stack.callback(postgres.stop, postgres.start())
         valkey = EmbeddedValkey(folder / "valkey", folder / "valkey.log")

@@ -28,10 +28,6 @@ def wait_until(condition: Callable[[], Any], within_s: float, what: str) -> Any:
 @contextmanager
 def running_stack(folder: Path, **settings: Any) -> Iterator[Stack]:
     """A whole service in a folder; its processes are gone afterwards."""
-    folder.chmod(0o755)
-    for parent in folder.parents[:3]:
-        if parent.stat().st_mode & 0o001 == 0:
-            parent.chmod(parent.stat().st_mode | 0o011)  # Postgres runs as nobody under root
     stack = Stack(
         Settings(data=folder / "data", port=free_port(), **{"lease_s": 3.0, **settings}),
         simulators=("mujoco",),

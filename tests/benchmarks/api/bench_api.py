@@ -65,7 +65,6 @@ def service() -> Iterator[tuple[str, psutil.Process]]:
     """An API process with its database and broker, and no workers."""
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
-        folder.chmod(0o755)
         postgres = EmbeddedPostgres(folder / "pg", folder / "pg.log")
         stack.callback(postgres.stop, postgres.start())
         valkey = EmbeddedValkey(folder / "valkey", folder / "valkey.log")

@@ -41,7 +41,6 @@ CHUNK = 2000
 @contextmanager
 def database(folder: Path) -> Iterator[str]:
     """A migrated database that is gone afterwards."""
-    folder.chmod(0o755)  # Postgres runs as nobody under root
     postgres = EmbeddedPostgres(folder / "pg", folder / "pg.log", durable=False)
     stop = postgres.start()
     try:

@@ -42,7 +42,6 @@ def main() -> None:
     given = parser.parse_args()
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
-        folder.chmod(0o755)
         provider = subprocess.Popen(
             [sys.executable, str(STANDIN), str(given.latency)], stdout=subprocess.PIPE
         )

@@ -91,7 +91,10 @@ def _tools() -> list[types.Tool]:
                     "task": {"type": "string", "description": "Task name, e.g. support-1."},
                     "agent": {"type": "string", "description": "Your name on the leaderboard."},
                     "seed": {"type": "integer", "minimum": 0, "default": 0},
-                    "simulator": {"type": "string", "default": "pybullet"},
+                    "simulator": {
+                        "type": "string",
+                        "description": "The service's first by default.",
+                    },
                 },
                 "required": ["task", "agent"],
             },

@@ -15,7 +15,7 @@ from buildarena_simulation.control import (
     plan_schedule,
     recoil,
 )
-from buildarena_simulation.engines import create_engine, engine_version
+from buildarena_simulation.engines import ENGINES, create_engine, engine_version
 from buildarena_simulation.engines.base import Engine, World
 from buildarena_simulation.errors import SimulationError, SimulationRoomError
 from buildarena_simulation.machine import bindings_of, structure_of
@@ -39,7 +39,7 @@ _PROGRESS_EVERY = 10
 def simulate(
     machine: "Machine",
     scenario: Scenario,
-    engine: str = "pybullet",
+    engine: str = ENGINES[0],
     *,
     controls: Sequence[KeyHold] | None = None,
     seed: int | None = None,

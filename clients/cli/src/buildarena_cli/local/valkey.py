@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import signal
 import subprocess
 from pathlib import Path
@@ -14,6 +15,7 @@ from buildarena_cli.local.server import (
     LOOPBACK,
     free_port,
     secret_in,
+    size_of,
     stop_process,
     wait_until_ready,
 )
@@ -43,11 +45,12 @@ class EmbeddedValkey:
         """Starts the server on its port and waits until it answers."""
         config = self._folder / "valkey.conf"
         config.touch(mode=0o600)
-        config.write_text(
-            f"bind {LOOPBACK}\nport {self._port}\ndir {self._folder.absolute()}\n"
-            f"requirepass {self._password}\nappendonly yes\nappendfsync everysec\nsave ''\n"
-            "maxmemory-policy noeviction\n"
+        config.write_bytes(
+            b"dir " + _quoted(self._folder.absolute()) + b"\n"
+            b"appendonly yes\nappendfsync everysec\nsave ''\nmaxmemory-policy noeviction\n"
+            + f"bind {LOOPBACK}\nport {self._port}\nrequirepass {self._password}\n".encode()
         )
+        since = size_of(self._log_file)
         with self._log_file.open("ab") as log:
             process = subprocess.Popen(
                 [_binary(), str(config.absolute())],
@@ -56,7 +59,9 @@ class EmbeddedValkey:
                 start_new_session=True,
                 preexec_fn=die_with_parent,  # noqa: PLW1509 - one system call
             )
-        wait_until_ready(self.name, process, lambda: self._serves(process), self._log_file)
+        wait_until_ready(
+            self.name, process, lambda: self._serves(process), self._log_file, since=since
+        )
         return process
 
     def _serves(self, process: subprocess.Popen[bytes]) -> bool:
@@ -67,6 +72,11 @@ class EmbeddedValkey:
     def stop(self, process: subprocess.Popen[bytes]) -> None:
         """Asks it to save and end."""
         stop_process(process, signal.SIGTERM, within_s=10)
+
+
+def _quoted(path: Path) -> bytes:
+    """A path as one word of Valkey's configuration, whatever it holds."""
+    return b'"' + b"".join(b"\\x%02x" % byte for byte in os.fsencode(path)) + b'"'
 
 
 def _binary() -> str:

@@ -7,6 +7,7 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, StrictInt, ValidationInfo, field_validator
 
+from buildarena_simulation import ENGINES
 from buildarena_store import BudgetLimits
 
 MAX_SEED = 2**53 - 1
@@ -77,7 +78,7 @@ class Variant(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     workflow: Name = "five-role"
-    simulator: Name = "pybullet"
+    simulator: Name = ENGINES[0]
     prompts: Name = "default"
     one_shot: Annotated[bool, Field(description="Show an example construction")] = False
     closed_loop: ClosedLoop | None = None

@@ -15,7 +15,7 @@ from buildarena_simulation import ENGINES, SIMULATION_VERSION
 EXTERNAL_WORKFLOW = "external"
 """What external agents play: their own."""
 SIMULATORS = tuple(ENGINES)
-"""Simulators that jobs can name; each has a queue of its own."""
+"""Simulators that jobs can name, the first by default; each has a queue of its own."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

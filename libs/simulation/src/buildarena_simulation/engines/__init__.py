@@ -1,6 +1,7 @@
 """The engines behind one seam; each is imported only when a trial asks for it."""
 
 import importlib
+from importlib.util import find_spec
 from types import ModuleType
 from typing import TYPE_CHECKING, Final
 
@@ -9,10 +10,14 @@ from buildarena_simulation.errors import SimulationError, UnknownEngineError
 if TYPE_CHECKING:
     from buildarena_simulation.engines.base import Engine, World
 
-ENGINES: Final = ("pybullet", "mujoco")
-"""Names of the engines; the first is the default."""
-
 _CLASSES: Final = {"pybullet": "PyBulletEngine", "mujoco": "MujocoEngine"}
+
+ENGINES: Final = tuple(name for name in _CLASSES if name == "mujoco" or find_spec(name))
+"""Names of the engines that are installed; the first is the default.
+
+PyBullet has wheels for few systems and is missing where it can't be compiled; MuJoCo is always
+there.
+"""
 
 
 def create_engine(name: str, world: "World") -> "Engine":
@@ -38,7 +43,7 @@ def engine_version(name: str) -> str:
 
 def _load(name: str) -> ModuleType:
     if name not in ENGINES:
-        raise UnknownEngineError(f"no engine {name!r}; there are {', '.join(ENGINES)}")
+        raise UnknownEngineError(f"no engine {name!r} is installed; there are {', '.join(ENGINES)}")
     try:
         return importlib.import_module(f"buildarena_simulation.engines.{name}")
     except ImportError as error:

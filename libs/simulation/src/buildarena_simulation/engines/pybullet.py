@@ -12,6 +12,7 @@ import shutil
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError
 from importlib.metadata import version as distribution_version
 from pathlib import Path
 
@@ -61,7 +62,10 @@ _GROUND_REACH = 2000.0
 
 def version() -> str:
     """Version of the PyBullet library."""
-    return distribution_version("pybullet")
+    try:
+        return distribution_version("pybullet")
+    except PackageNotFoundError:
+        return distribution_version("pybullet-arm64")  # the same library with more wheels
 
 
 class PyBulletEngine:

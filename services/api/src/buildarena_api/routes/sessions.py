@@ -15,6 +15,7 @@ from buildarena_api.schemas import JobView
 from buildarena_pipeline.agents.sessions import NothingToSubmitError, SessionClosedError
 from buildarena_pipeline.agents.workbench import ASSEMBLY, MAIN, agent_tools
 from buildarena_pipeline.catalog.specs import Name, Seed
+from buildarena_pipeline.catalog.tracks import SIMULATORS
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.scoring import task_of
 from buildarena_store import UnknownIdError
@@ -32,7 +33,7 @@ class OpenSession(BaseModel):
     task: Name
     agent: Annotated[str, Field(description="The agent's name on the leaderboard", max_length=80)]
     seed: Seed = 0
-    simulator: Name = "pybullet"
+    simulator: Name = SIMULATORS[0]
 
 
 class ToolView(BaseModel):

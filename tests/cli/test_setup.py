@@ -1,0 +1,136 @@
+"""Set-up with a uv that only notes what it is asked and fails as wished."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+SCRIPTS = Path(__file__).parents[2] / "mk"
+REST = "numpy==2.0 \\\n    --hash=a\nscipy==1.0\n"
+LOCK = REST.replace("scipy", "pybullet==3.2.7 ; a \\\n    --hash=b \\\n    --hash=c\nscipy")
+UV = """#!/bin/sh
+echo "$@" >> calls
+case "$*" in
+{answers}
+"python find"*) exit 1;;
+"venv"*) mkdir -p .venv/bin; ln -sf {python} .venv/bin/python;;
+esac
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "requirements.lock").write_text(LOCK)
+    (tmp_path / "bin").mkdir()
+    for name in ("sh", "bash", "awk", "dirname", "mkdir", "ln", "cat", "cp", "mktemp", "rm"):
+        (tmp_path / "bin" / name).symlink_to(shutil.which(name))
+    program(tmp_path / "bin" / "python3", f'exec {shlex.quote(sys.executable)} "$@"')
+    return tmp_path
+
+
+def program(path: Path, text: str) -> None:
+    path.write_text(f"#!/bin/sh\n{text}\n")
+    path.chmod(0o755)
+
+
+def set_up(folder: Path, *answers: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    uv = folder / "bin" / "uv"
+    uv.write_text(UV.format(answers="\n".join(answers), python=shlex.quote(sys.executable)))
+    uv.chmod(0o755)
+    return run(folder, "install.sh", ".venv", "libs/a", **environment)
+
+
+def run(folder: Path, script: str, *words: str, **more: str) -> subprocess.CompletedProcess[str]:
+    environment = {"PATH": str(folder / "bin"), "TMPDIR": os.environ.get("TMPDIR", "/tmp"), **more}
+    command = ["/bin/bash", str(SCRIPTS / script), *words]
+    return subprocess.run(
+        command, check=False, cwd=folder, env=environment, capture_output=True, text=True
+    )
+
+
+def calls(folder: Path) -> list[str]:
+    return (folder / "calls").read_text().splitlines()
+
+
+def test_set_up_says_nothing_where_everything_has_a_wheel(folder: Path) -> None:
+    done = set_up(folder)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    (sync,) = [call for call in calls(folder) if "sync" in call]
+    assert sync.endswith("--only-binary pybullet --only-binary pybullet-arm64 requirements.lock")
+    assert calls(folder)[-1].endswith("--no-deps --no-build-isolation -e libs/a")
+
+
+NO_WHEEL = '*"--only-binary"*) echo no wheel >&2; exit 1;;'
+NO_COMPILING = '*"sync"*"requirements.lock") echo cc1plus is missing >&2; exit 1;;'
+
+
+def test_without_wheel_and_compiler_all_but_pybullet_is_installed(folder: Path) -> None:
+    done = set_up(folder, NO_WHEEL, NO_COMPILING)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "there is no C++ compiler: without it, machines are simulated with MuJoCo" in done.stdout
+    assert (folder / ".venv/without-pybullet.lock").read_text() == REST
+
+
+def test_pybullet_that_cannot_be_compiled_is_left_out_in_words(folder: Path) -> None:
+    program(folder / "bin" / "c++", "exit 1")
+    done = set_up(folder, NO_WHEEL, NO_COMPILING)
+    assert (done.returncode, done.stderr) == (0, "")
+    before, after = done.stdout.splitlines()
+    assert "compiling it, which takes some minutes" in before
+    assert "could not be compiled (see .venv/pybullet.log)" in after
+    assert "cc1plus is missing" in (folder / ".venv/pybullet.log").read_text()
+
+
+def test_a_failure_of_other_packages_is_shown_as_it_is(folder: Path) -> None:
+    done = set_up(folder, '*"sync"*) echo no index >&2; exit 1;;')
+    assert done.returncode != 0
+    assert done.stderr == "no index\n"
+    assert done.stdout == ""
+
+
+def test_a_python_with_wheels_is_preferred_and_else_fetched(folder: Path) -> None:
+    python = shlex.quote(sys.executable)
+    set_up(folder, f'"python find"*3.12) echo {python};;')
+    assert f"venv --quiet --clear --no-project --python {sys.executable} .venv" in calls(folder)
+    assert not [call for call in calls(folder) if "install --quiet 3" in call]
+    (folder / "calls").unlink()
+    (folder / ".venv/bin/python").unlink()
+    set_up(folder)
+    assert "python install --quiet 3.11" in calls(folder)
+
+
+def test_a_given_python_is_used_unless_it_is_too_old(folder: Path) -> None:
+    assert set_up(folder, PYTHON=sys.executable).returncode == 0
+    assert not [call for call in calls(folder) if "python find" in call]
+    program(folder / "old", "exit 1")
+    done = set_up(folder, PYTHON="./old")
+    assert done.returncode == 1
+    assert "needs Python 3.11 or newer, and ./old is older or missing" in done.stderr
+
+
+def test_what_pip_says_before_another_way_works_is_not_shown(folder: Path) -> None:
+    program(
+        folder / "managed",
+        'case "$*" in\n'
+        '"-m venv"*) mkdir -p .venv-uv/bin; cp ./managed .venv-uv/bin/python;;\n'
+        '*"--target"*) echo error: externally-managed-environment >&2; exit 1;;\n'
+        '"-m pip install"*) ln -s ../../own .venv-uv/bin/uv;;\n'
+        "*) exit 1;;\nesac",
+    )
+    program(folder / "own", 'echo "own uv: $@"')
+    done = run(folder, "uv.sh", "pip", "list", PYTHON="./managed")
+    assert (done.returncode, done.stdout, done.stderr) == (0, "own uv: pip list\n", "")
+
+
+def test_without_any_uv_the_reason_is_shown(folder: Path) -> None:
+    program(folder / "bare", "echo No module named pip >&2; exit 1")
+    done = run(folder, "uv.sh", "pip", "list", PYTHON="./bare")
+    assert done.returncode == 1
+    assert "No module named pip" in done.stderr
+    assert "uv could not be installed with ./bare: install uv" in done.stderr
