@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, Self
 from buildarena_geometry.changes import Change
 from buildarena_geometry.collision import CollisionWorld
 from buildarena_geometry.documents.json_values import json_value
-from buildarena_geometry.documents.log import ActionLog, ActionRecord
+from buildarena_geometry.documents.log import ActionLog, ActionRecord, LoggedState
+from buildarena_geometry.documents.read import read_machine
 from buildarena_geometry.documents.write import machine_document
 from buildarena_geometry.feedback.words import listing
 from buildarena_geometry.measures import bounds, center_of_mass
@@ -81,30 +82,18 @@ class Machine:
         return outcome
 
     @classmethod
-    def restored(
-        cls,
-        *,
-        state: MachineState,
-        available: Mapping[str, Machine],
-        records: Iterable[ActionRecord],
-    ) -> Self:
-        """A machine put together from parts that are known to be sound.
-
-        Args:
-            state: everything it is.
-            available: the machines the state's `available` was taken from.
-            records: how it came to be.
-        """
+    def restored(cls, logged: LoggedState) -> Self:
+        """The machine that a value describes, which is known to be sound."""
         machine = object.__new__(cls)
-        machine._available = dict(available)
-        machine._state = state
-        machine._records = list(records)
+        machine._available = {name: cls.restored(one) for name, one in logged.available.items()}
+        machine._state = logged.state
+        machine._records = list(logged.records)
         machine._world = None  # built from the state when the first action asks for it
         return machine
 
     def copy(self) -> Self:
         """A machine equal to this one, with its log, that goes its own way from here."""
-        return self.restored(state=self._state, available=self._available, records=self._records)
+        return self.restored(self.logged)
 
     def __eq__(self, other: object) -> bool:
         """Whether both are the same machine; how they were built does not matter."""
@@ -129,6 +118,15 @@ class Machine:
     def state(self) -> MachineState:
         """Everything it is at this moment, as a value."""
         return self._state
+
+    @property
+    def logged(self) -> LoggedState:
+        """Everything it is and how it came to be, as a value."""
+        return LoggedState(
+            state=self._state,
+            records=tuple(self._records),
+            available={name: machine.logged for name, machine in self._available.items()},
+        )
 
     @property
     def started(self) -> bool:
@@ -173,8 +171,9 @@ class Machine:
     @property
     def log(self) -> ActionLog:
         """Every action so far, accepted and refused."""
+        logged = self.logged
         return ActionLog(
-            records=tuple(self._records), catalogue=self.catalogue, available=self.available
+            records=logged.records, catalogue=self.catalogue, available=logged.available
         )
 
     @property
@@ -221,10 +220,10 @@ class Machine:
 
     def to_document(self) -> dict[str, Any]:
         """The machine and its log as JSON values; `from_document` reads them back."""
-        return machine_document(self)
+        return machine_document(self.logged)
 
     @classmethod
-    def from_document(cls, document: object, *, catalogue: Catalogue | None = None) -> Machine:
+    def from_document(cls, document: object, *, catalogue: Catalogue | None = None) -> Self:
         """The machine a document describes.
 
         Args:
@@ -234,9 +233,7 @@ class Machine:
         Raises:
             DocumentError: it is not a machine; the message names the entry.
         """
-        from buildarena_geometry.documents.read import read_machine
-
-        return read_machine(document, catalogue=catalogue)
+        return cls.restored(read_machine(document, catalogue=catalogue))
 
     def _propose(self, name: object, arguments: object) -> Change:
         action = ACTIONS.get(name) if isinstance(name, str) else None
@@ -280,7 +277,8 @@ class Machine:
 
 def replay(log: ActionLog) -> Machine:
     """The machine that results from doing a log's actions again, refused ones included."""
-    machine = Machine(catalogue=log.catalogue, available=log.available)
+    available = {name: Machine.restored(one) for name, one in log.available.items()}
+    machine = Machine(catalogue=log.catalogue, available=available)
     for record in log:
         machine.act(record.name, record.arguments)
     return machine

@@ -1,4 +1,4 @@
-"""What was done to a machine, action by action."""
+"""What was done to a machine, action by action, and what came of it."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, overload
 from buildarena_geometry.outcomes import RefusalClass
 
 if TYPE_CHECKING:
-    from buildarena_geometry.machine import Machine
     from buildarena_geometry.modules.module import Catalogue
+    from buildarena_geometry.state import MachineState
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,6 +35,21 @@ class ActionRecord:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class LoggedState:
+    """A machine as a value: what it is, and how it came to be.
+
+    Attributes:
+        state: everything it is.
+        records: accepted and refused actions in order.
+        available: the machines an assembly may be made of, by name.
+    """
+
+    state: MachineState
+    records: tuple[ActionRecord, ...]
+    available: Mapping[str, LoggedState]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ActionLog(Sequence[ActionRecord]):
     """The actions of one machine in order, with all it takes to do them again.
 
@@ -46,7 +61,7 @@ class ActionLog(Sequence[ActionRecord]):
 
     records: tuple[ActionRecord, ...]
     catalogue: Catalogue = field(repr=False)
-    available: Mapping[str, Machine] = field(repr=False, default_factory=dict)
+    available: Mapping[str, LoggedState] = field(repr=False, default_factory=dict)
 
     @overload
     def __getitem__(self, index: int) -> ActionRecord: ...

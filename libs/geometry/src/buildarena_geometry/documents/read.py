@@ -1,4 +1,4 @@
-"""Reads machine documents, and refuses those that are no sound machine."""
+"""Reads machine documents, and refuses those that are not a sound machine."""
 
 from __future__ import annotations
 
@@ -6,12 +6,11 @@ from typing import TYPE_CHECKING
 
 from buildarena_geometry.blocks import Block, Connector, FaceRef, KeyPress
 from buildarena_geometry.collision import CollisionWorld
-from buildarena_geometry.documents.log import ActionRecord
+from buildarena_geometry.documents.log import ActionRecord, LoggedState
 from buildarena_geometry.documents.write import DOCUMENT_VERSION
 from buildarena_geometry.errors import DocumentError
 from buildarena_geometry.feedback.words import listing
 from buildarena_geometry.keys import KEYS
-from buildarena_geometry.machine import Machine
 from buildarena_geometry.modules.catalogue import load_catalogue
 from buildarena_geometry.modules.parameters import LARGEST_NUMBER, LONGEST_TEXT
 from buildarena_geometry.outcomes import RefusalClass
@@ -44,8 +43,8 @@ _CONNECTOR = ("id", "module", "start", "end", "position", "quaternion", "span")
 
 def read_machine(
     document: object, *, catalogue: Catalogue | None = None, where: str = "document"
-) -> Machine:
-    """The machine a document describes.
+) -> LoggedState:
+    """The machine a document describes, with its log.
 
     Args:
         document: JSON values.
@@ -78,8 +77,8 @@ def read_machine(
         next_id=fields["next_id"].integer(least=1),
     )
     _check_whole(state, fields)
-    records = [_record(entry) for entry in fields["log"].items()]
-    return Machine.restored(state=state, available=available, records=records)
+    records = tuple(_record(entry) for entry in fields["log"].items())
+    return LoggedState(state=state, records=records, available=available)
 
 
 def _read_blocks(entries: Reader, catalogue: Catalogue) -> dict[str, Block]:

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from buildarena_geometry.blocks import Block, Connector
-    from buildarena_geometry.machine import Machine
+    from buildarena_geometry.documents.log import LoggedState
 
 DOCUMENT_VERSION = 1
 
 
-def machine_document(machine: Machine) -> dict[str, Any]:
-    """The document of a machine, JSON values throughout.
+def machine_document(machine: LoggedState) -> dict[str, Any]:
+    """The document of a machine with its log, JSON values throughout.
 
     Positions are in units, world frame; quaternions are (w, x, y, z).
     """
@@ -43,7 +43,7 @@ def machine_document(machine: Machine) -> dict[str, Any]:
         "available": {name: machine_document(one) for name, one in machine.available.items()},
         "log": [
             {"name": record.name, "arguments": record.arguments, "reason": record.reason}
-            for record in machine.log
+            for record in machine.records
         ],
     }
 
