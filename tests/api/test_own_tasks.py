@@ -1,4 +1,4 @@
-"""Users' own tasks on the leaderboard and in exports: beside the built-in ones, never mixed in."""
+"""Custom tasks on the leaderboard and in exports: beside the built-in ones, never mixed in."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Users' own tasks over HTTP: uploaded, refused with line and field, versioned, listed."""
+"""Custom tasks over HTTP: uploaded, refused with line and field, versioned, listed."""
 
 from __future__ import annotations
 

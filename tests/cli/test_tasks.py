@@ -116,7 +116,7 @@ def test_a_title_can_not_be_taken_for_markup(url, file) -> None:
 
 @pytest.fixture
 def sweep_of_own(url, context, file) -> str:
-    """A sweep of an own task and a built-in one, ended; the own one has changed since once."""
+    """A sweep of an custom task and a built-in one, ended; the own one has changed since once."""
     printed(url, "task", "add", str(file))
     spec = file.with_name("sweep.yaml")
     spec.write_text(

@@ -1,4 +1,4 @@
-"""Fixtures of the simulation room's tests."""
+"""Fixtures of the simulation package's tests."""
 
 import sys
 from pathlib import Path

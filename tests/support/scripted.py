@@ -8,7 +8,7 @@ from buildarena_worker.session.messages import Reply, Request, ToolCall
 
 
 class Scripted:
-    """A model that says given things in turn, then one thing for ever."""
+    """A model that says given things in turn, then one thing forever."""
 
     def __init__(self, *replies: Reply, last: Reply | None = None) -> None:
         self.replies = list(replies)

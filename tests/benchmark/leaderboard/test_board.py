@@ -8,7 +8,13 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from buildarena_benchmark.leaderboard import BoardQuery, TrackBoard, Trial, duel, summarise
+from buildarena_benchmark.leaderboard import (
+    BoardQuery,
+    TrackBoard,
+    Trial,
+    compare_models,
+    summarise,
+)
 
 START = datetime(2026, 1, 1, tzinfo=UTC)
 ALL = BoardQuery()
@@ -216,7 +222,7 @@ def test_a_board_kept_up_to_date_equals_one_made_anew(steps, rng: random.Random)
 def test_a_duel_pairs_shared_seeds_and_adjusts_for_the_tasks() -> None:
     first = trials("lift-1", "a", 60, 64) + trials("support-1", "a", 30, 64)
     second = trials("lift-1", "b", 20, 64) + trials("support-1", "b", 28, 64)
-    lift, support = duel(first, second).tasks
+    lift, support = compare_models(first, second).tasks
     assert (lift.successes, lift.trials, lift.success.pairs) == ((60, 20), (64, 64), 64)
     assert lift.success_p == pytest.approx(2 * lift.success.p_value)
     assert lift.success_p < 0.001
@@ -227,6 +233,6 @@ def test_a_duel_pairs_shared_seeds_and_adjusts_for_the_tasks() -> None:
 
 def test_a_duel_without_shared_seeds_has_no_test() -> None:
     second = [replace(t, seed=t.seed + 100) for t in trials("lift-1", "b", 3, 9)]
-    (task,) = duel(trials("lift-1", "a", 3, 9), second).tasks
+    (task,) = compare_models(trials("lift-1", "a", 3, 9), second).tasks
     assert (task.success, task.success_p, task.indicator_p) == (None, None, None)
-    assert duel([], second) is None
+    assert compare_models([], second) is None

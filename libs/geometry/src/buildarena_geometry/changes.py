@@ -25,7 +25,7 @@ class Change:
     """
 
     after: MachineState
-    told: Callable[[], str]
+    rendered: Callable[[], str]
     placed: tuple[str, ...] = ()
     removed: tuple[str, ...] = ()
     touched: tuple[str, ...] = ()

@@ -1,8 +1,8 @@
-"""Errors of the simulation room: a machine's fault, a caller's fault and a crash stay apart."""
+"""Errors of the simulation package: a machine's fault, a caller's fault and a crash stay apart."""
 
 
 class SimulationRoomError(Exception):
-    """Base of every error this room raises."""
+    """Base of every error this package raises."""
 
 
 class MachineNotSimulable(SimulationRoomError):  # noqa: N818 - it names the machine's state, as a verdict
@@ -26,4 +26,4 @@ class UnknownEngineError(SimulationRoomError, ValueError):
 
 
 class TrajectoryFormatError(SimulationRoomError, ValueError):
-    """The bytes are no trajectory, or one of a schema this version cannot read."""
+    """The bytes are not a trajectory, or one of a schema this version cannot read."""

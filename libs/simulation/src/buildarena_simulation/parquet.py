@@ -79,13 +79,13 @@ def read_trajectory(data: bytes) -> dict[str, Any]:
     """The fields of the trajectory a file holds.
 
     Raises:
-        TrajectoryFormatError: The bytes are no trajectory of a schema this version reads.
+        TrajectoryFormatError: The bytes are not a trajectory of a schema this version reads.
     """
     try:
         table = pq.read_table(io.BytesIO(data))
         facts = json.loads(table.schema.metadata[_KEY])
     except (pa.ArrowException, KeyError, TypeError, ValueError) as error:
-        raise TrajectoryFormatError(f"these bytes are no trajectory: {error}") from error
+        raise TrajectoryFormatError(f"these bytes are not a trajectory: {error}") from error
     if facts.pop("schema_version") != SCHEMA_VERSION:
         raise TrajectoryFormatError(f"only trajectories of schema {SCHEMA_VERSION} can be read")
     columns = {name: table.column(name).combine_chunks() for name in table.column_names}

@@ -41,10 +41,10 @@ def place(
     return np.array([-middle[0], -middle[1], placement.lowest_center - lowest]), rotation
 
 
-def nudged(position: FloatArray, seed: int) -> FloatArray:
+def jittered(position: FloatArray, seed: int) -> FloatArray:
     """The position moved sideways by up to a hundredth of a unit, at random.
 
-    A result that a nudge changes hangs on luck.
+    A result that such a jitter changes depends on luck.
 
     Args:
         position: (3,) units.

@@ -19,7 +19,7 @@ from buildarena_simulation.engines import ENGINES, create_engine, engine_version
 from buildarena_simulation.engines.base import Engine, World
 from buildarena_simulation.errors import SimulationError, SimulationRoomError
 from buildarena_simulation.machine import bindings_of, structure_of
-from buildarena_simulation.placement import cargo_at_start, nudged, place
+from buildarena_simulation.placement import cargo_at_start, jittered, place
 from buildarena_simulation.recording import Recorder
 from buildarena_simulation.scenario import Scenario
 from buildarena_simulation.structure.clusters import find_clusters
@@ -98,7 +98,7 @@ def simulate_structure(
     """
     position, rotation = place(structure, scenario.placement)
     if seed is not None:
-        position = nudged(position, seed)
+        position = jittered(position, seed)
     world = World(
         structure=structure,
         ground=True,

@@ -129,7 +129,7 @@ class Trajectory:
         """The trajectory a Parquet file holds.
 
         Raises:
-            TrajectoryFormatError: The bytes are no trajectory of a schema this version reads.
+            TrajectoryFormatError: The bytes are not a trajectory of a schema this version reads.
         """
         from buildarena_simulation.parquet import read_trajectory
 

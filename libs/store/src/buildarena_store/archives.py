@@ -51,7 +51,7 @@ ARTIFACT_NAME = re.compile(r"artifacts/([0-9a-f]{64})")
 
 
 class ArchiveError(StoreError):
-    """A file is no archive that can be taken in; nothing of it was stored."""
+    """A file is not an archive that can be imported; nothing of it was stored."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -159,7 +159,7 @@ def read_archive(
                 )
                 return _take_in(archive, connection, str(manifest["sweep"]), owner)
     except (zipfile.BadZipFile, KeyError, ValueError, TypeError, NotImplementedError) as error:
-        raise ArchiveError(f"this is no sound archive of a sweep: {error}") from error
+        raise ArchiveError(f"this is not a sound archive of a sweep: {error}") from error
     except StatementError as error:
         if isinstance(error, OperationalError):
             raise

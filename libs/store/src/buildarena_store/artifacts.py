@@ -67,5 +67,5 @@ class ArtifactStore:
 
 def _path(digest: str) -> str:
     if len(digest) != HASH_LENGTH or not set(digest) <= set("0123456789abcdef"):
-        raise ArtifactMissingError(f"{digest!r} is no artifact hash (64 hex digits)")
+        raise ArtifactMissingError(f"{digest!r} is not an artifact hash (64 hex digits)")
     return f"{digest[:2]}/{digest}"

@@ -140,7 +140,7 @@ class Boards:
         Args:
             track: The track.
             before: Only changes with smaller ids.
-            limit: Rows at the most.
+            limit: Rows at most.
             scored_only: Leave out jobs that ended without a score.
         """
         query = select(*columns_of(BoardChange, board_changes)).where(

@@ -10,7 +10,7 @@ from fastapi_offline import FastAPIOffline
 
 from buildarena_api.events.hub import EventHub
 from buildarena_api.http.access import caller_of
-from buildarena_api.http.limits import Guards
+from buildarena_api.http.limits import BodyLimitMiddleware
 from buildarena_api.http.log import RequestLog
 from buildarena_api.http.problems import add_problem_handlers, problem_responses
 from buildarena_api.http.rate_limits import RateLimits
@@ -49,13 +49,13 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
         context: Connections; they stay the caller's to close.
         registry: The models that jobs can name.
     """
-    sweeper = Reaper(context)
+    reaper = Reaper(context)
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
-        sweeper.start()
+        reaper.start()
         yield
-        sweeper.stop()
+        reaper.stop()
 
     # Its documentation page needs nothing from elsewhere.
     app = FastAPIOffline(
@@ -70,7 +70,7 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
         license_info={"name": "Apache-2.0", "identifier": "Apache-2.0"},
     )
     app.state.metrics = ServiceMetrics(context)
-    app.add_middleware(Guards)
+    app.add_middleware(BodyLimitMiddleware)
     app.add_middleware(RequestLog, metrics=app.state.metrics)
     app.state.context = context
     app.state.hub = EventHub(context)
@@ -83,7 +83,7 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
     )
     add_problem_handlers(app)
     app.include_router(health.router)
-    for room in (
+    for route in (
         verifications,
         sessions,
         events,
@@ -97,7 +97,7 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
         archives,
     ):
         app.include_router(
-            room.router,
+            route.router,
             dependencies=[Depends(caller_of)],
             responses=problem_responses(401, 403, 429),
         )

@@ -177,7 +177,7 @@ def _require(active: ActiveLease) -> None:
 
 
 def _trace(trajectory: Trajectory) -> list[list[float]]:
-    """The tracked body at 1 Hz: the cargo where there is one, else the first block."""
+    """The tracked body at 1 Hz: the cargo where there is one, otherwise the first block."""
     times = trajectory.time_s
     track = trajectory.cargo_position
     if track is None:

@@ -2,7 +2,7 @@
 
 from buildarena_benchmark.leaderboard.board import Board, BoardQuery, TaskBoard, TrackBoard
 from buildarena_benchmark.leaderboard.cells import Cell, summarise
-from buildarena_benchmark.leaderboard.comparisons import Duel, TaskDuel, duel
+from buildarena_benchmark.leaderboard.comparisons import Comparison, TaskComparison, compare_models
 from buildarena_benchmark.leaderboard.latex import cost_table, performance_table, plain_table
 from buildarena_benchmark.leaderboard.overall import OverallRow
 from buildarena_benchmark.leaderboard.published import (
@@ -18,15 +18,15 @@ __all__ = [
     "Board",
     "BoardQuery",
     "Cell",
-    "Duel",
+    "Comparison",
     "OverallRow",
     "PublishedRow",
     "TaskBoard",
-    "TaskDuel",
+    "TaskComparison",
     "TrackBoard",
     "Trial",
+    "compare_models",
     "cost_table",
-    "duel",
     "performance_table",
     "plain_table",
     "published_overall",

@@ -17,7 +17,7 @@ from buildarena_benchmark.statistics import (
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class TaskDuel:
+class TaskComparison:
     """Two models on one task.
 
     Attributes:
@@ -45,15 +45,15 @@ class TaskDuel:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Duel:
+class Comparison:
     """Two models on all tasks that both were tried on."""
 
     first: str
     second: str
-    tasks: Sequence[TaskDuel]
+    tasks: Sequence[TaskComparison]
 
 
-def duel(first: Sequence[Trial], second: Sequence[Trial]) -> Duel | None:
+def compare_models(first: Sequence[Trial], second: Sequence[Trial]) -> Comparison | None:
     """Compares two models; None when one of them has no trial.
 
     Each side has one model configuration; p-values are adjusted by Holm over the tasks.
@@ -62,10 +62,10 @@ def duel(first: Sequence[Trial], second: Sequence[Trial]) -> Duel | None:
         return None
     sides = [_by_task(counted_trials(side)) for side in (first, second)]
     shared = [task for task in sides[0] if task in sides[1]]
-    tasks = [_task_duel(task, sides[0][task], sides[1][task]) for task in sorted(shared)]
+    tasks = [_compare_task(task, sides[0][task], sides[1][task]) for task in sorted(shared)]
     success_p = iter(holm([t.success.p_value for t in tasks if t.success]))
     indicator_p = iter(holm([t.indicator.p_value for t in tasks if t.indicator]))
-    return Duel(
+    return Comparison(
         first=first[0].model,
         second=second[0].model,
         tasks=[
@@ -86,13 +86,13 @@ def _by_task(trials: Iterable[Trial]) -> dict[str, list[Trial]]:
     return found
 
 
-def _task_duel(task: str, first: Sequence[Trial], second: Sequence[Trial]) -> TaskDuel:
+def _compare_task(task: str, first: Sequence[Trial], second: Sequence[Trial]) -> TaskComparison:
     seeds_1, seeds_2 = ({trial.seed: trial for trial in side} for side in (first, second))
     shared = sorted(seeds_1.keys() & seeds_2.keys())
     counts = tuple((sum(t.success for t in side), len(side)) for side in (first, second))
     low, high = difference_interval(counts[0], counts[1])
     pairs = [(seeds_1[seed], seeds_2[seed]) for seed in shared]
-    return TaskDuel(
+    return TaskComparison(
         task=task,
         successes=(counts[0][0], counts[1][0]),
         trials=(counts[0][1], counts[1][1]),

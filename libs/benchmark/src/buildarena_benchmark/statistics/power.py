@@ -37,7 +37,7 @@ def detectable_difference(
         power: Chance of seeing the difference.
 
     Returns:
-        The rise; None when even a rate of 1 could not be told apart.
+        The rise; None when even a rate of 1 would be statistically tied.
     """
     angle = _angle(rate) + _needed(error, power) * math.sqrt(2 / trials)
     return math.sin(angle / 2) ** 2 - rate if angle <= math.pi else None

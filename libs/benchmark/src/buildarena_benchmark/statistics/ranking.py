@@ -1,4 +1,4 @@
-"""Rank aggregation over tasks: who builds best, and who can't be told apart.
+"""Rank aggregation over tasks: who builds best, and who is statistically tied.
 
 On each task a model gets two ranks, one by success rate and one by indicator (ties share the
 mean of their places); its mean rank is the mean of all of them. This is Borda's count, and uses
@@ -26,7 +26,7 @@ class Ranking:
     Attributes:
         mean_rank: (M,) float64, 1 is the best possible.
         rank: (M,) int64: 1 + the number of models that are better beyond chance. Models that
-            can't be told apart from the same betters share a rank.
+            is statistically tied with the same betters share a rank.
         low: (M,) int64, lower end of the bootstrap interval of the place.
         high: (M,) int64, upper end of it.
         better: (M, M) bool: row is better than column beyond chance.

@@ -23,7 +23,7 @@ def _plain(text: str) -> str:
     """Refuses control characters and halves of characters: they steer terminals, break encoders."""
     for character in text:
         if unicodedata.category(character) in {"Cc", "Cs"} and character not in "\n\t":
-            raise ValueError(f"has the character {character!r}, which is no text")
+            raise ValueError(f"has the character {character!r}, which is not text")
     return text
 
 

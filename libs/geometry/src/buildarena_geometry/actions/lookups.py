@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from buildarena_geometry.modules.module import Module
     from buildarena_geometry.state import MachineState, SubStructure
 
-_MOST_NAMED = 12  # a refusal names so many choices and counts the rest
+_MAX_NAMED = 12  # a refusal names so many choices and counts the rest
 
 
 def require_started(state: MachineState) -> None:
@@ -120,7 +120,7 @@ def structure(state: MachineState, letter: str) -> SubStructure:
 def named(choices: Iterable[str]) -> str:
     """The first of some choices, and how many more there are."""
     names = list(choices)
-    more = len(names) - _MOST_NAMED
+    more = len(names) - _MAX_NAMED
     if more <= 0:
         return listing(names)
-    return f"{listing(names[:_MOST_NAMED])} and {more} more"
+    return f"{listing(names[:_MAX_NAMED])} and {more} more"

@@ -78,12 +78,12 @@ def faces(state: MachineState, block: Block) -> str:
     """The faces of a block: where they are, which way they look, what sits on them."""
     if not block.module.faces:
         return "No faces."
-    told = []
+    rendered = []
     for face in block.module.faces:
         place = f"{face.label} {caption(block.face_normal(face.label))}"
         place += f" {point(block.face_center(face.label), 3)}"
-        told.append(place + _use_of_face(state, block, face.label))
-    return f"Faces: {'; '.join(told)}."
+        rendered.append(place + _use_of_face(state, block, face.label))
+    return f"Faces: {'; '.join(rendered)}."
 
 
 def placement(state: MachineState, block: Block) -> str:
@@ -157,18 +157,18 @@ def powered_blocks(state: MachineState) -> str:
 
 def loosened(state: MachineState, moved: Iterable[str]) -> list[str]:
     """Sentences about joints at the moved blocks whose two sides no longer meet."""
-    told = []
+    rendered = []
     for block in (state.blocks[moved_id] for moved_id in moved):
         joints = [state.joint(block), *(state.joint(child) for child in state.children(block))]
         for joint in joints:
             if joint is None or joint.offset <= FLUSH_OFFSET:
                 continue
             verdict = "" if joint.holds else " and no longer holds"
-            told.append(
+            rendered.append(
                 f"Block {joint.part} no longer sits flush on {joint.base}/{joint.face} "
                 f"({number(joint.offset)} apart){verdict}."
             )
-    return told
+    return rendered
 
 
 def _use(block: Block) -> list[str]:

@@ -40,16 +40,16 @@ def run_sequences(
     """
     for sequence in _sequences(Reader(value=content, where="input", error=SequenceError)):
         run, steps = _prepare(sequence, catalogue)
-        told: list[dict[str, Any]] = []
+        rendered: list[dict[str, Any]] = []
         for step in steps:
             outcome = run.act(step)
-            told.append({"ok": outcome.ok, "kind": kind_of(outcome)})
+            rendered.append({"ok": outcome.ok, "kind": kind_of(outcome)})
             if every_state:
-                told[-1]["state"] = run.told_state()
-        if told and not every_state:
-            told[-1]["state"] = run.told_state()
+                rendered[-1]["state"] = run.rendered_state()
+        if rendered and not every_state:
+            rendered[-1]["state"] = run.rendered_state()
         seed = sequence.value.get("seed") if isinstance(sequence.value, dict) else None
-        yield {"seed": seed, "steps": told}
+        yield {"seed": seed, "steps": rendered}
 
 
 def parse(data: bytes) -> object:
@@ -89,7 +89,7 @@ class _Run:
         self._put_in_order(name, arguments, outcome)
         return outcome
 
-    def told_state(self) -> dict[str, Any]:
+    def rendered_state(self) -> dict[str, Any]:
         return state_entry(self.machine.state, self.order)
 
     def _put_in_order(self, name: object, arguments: object, outcome: Outcome) -> None:

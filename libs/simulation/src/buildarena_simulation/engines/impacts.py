@@ -14,10 +14,10 @@ from buildarena_simulation.structure.contacts import ContactForces, mean_contact
 from buildarena_simulation.structure.model import FloatArray
 
 _JOLT: Final = 3.0
-"""A change of velocity faster than this many g is a jolt: more than fall and driving make."""
+"""A change of velocity faster than this many g is a impact: more than fall and driving make."""
 
 
-class JoltWatch:
+class ImpactWatch:
     """Collects the contact readings of one interval.
 
     Args:
@@ -29,34 +29,34 @@ class JoltWatch:
     def __init__(self, step_count: int, *, gravity: float, time_step_s: float) -> None:
         self._count = step_count
         self._limit = _JOLT * gravity * time_step_s
-        self._jolts: list[ContactForces] = []
-        self._ends_in_jolt = False
+        self._impacts: list[ContactForces] = []
+        self._ends_in_impact = False
 
     @property
     def struck(self) -> bool:
-        """Whether there was a jolt."""
-        return bool(self._jolts)
+        """Whether there was a impact."""
+        return bool(self._impacts)
 
-    def is_jolt(self, change: FloatArray) -> bool:
+    def is_impact(self, change: FloatArray) -> bool:
         """Whether the step just made must be read.
 
         Args:
             change: (K, 3) change of velocity of every free body in it, units/s.
         """
-        self._ends_in_jolt = bool(np.abs(change).max() > self._limit)
-        return self._ends_in_jolt
+        self._ends_in_impact = bool(np.abs(change).max() > self._limit)
+        return self._ends_in_impact
 
     def take(self, contacts: ContactForces) -> None:
-        """Keeps the reading of a step that was a jolt."""
-        self._jolts.append(contacts)
+        """Keeps the reading of a step that was a impact."""
+        self._impacts.append(contacts)
 
     def mean(self, read: Callable[[], ContactForces]) -> ContactForces:
-        """The mean over the interval; if it ended in a jolt, its quiet steps are not known of.
+        """The mean over the interval; if it ended in a impact, its quiet steps are not known of.
 
         Args:
             read: Reads the contacts of the last step.
         """
-        readings = [(1.0 / self._count, contacts) for contacts in self._jolts]
-        if not self._ends_in_jolt:
-            readings.append((1.0 - len(self._jolts) / self._count, read()))
+        readings = [(1.0 / self._count, contacts) for contacts in self._impacts]
+        if not self._ends_in_impact:
+            readings.append((1.0 - len(self._impacts) / self._count, read()))
         return mean_contacts(readings)

@@ -10,7 +10,7 @@ _STREAMS = (1, 2)
 
 
 @contextlib.contextmanager
-def silence() -> Iterator[None]:
+def quiet_output() -> Iterator[None]:
     """Nothing printed meanwhile, by Python or C, reaches stdout or stderr."""
     sys.stdout.flush()
     sys.stderr.flush()

@@ -21,7 +21,7 @@ SECURITY_HEADERS = {
 }
 
 
-class Guards:
+class BodyLimitMiddleware:
     """Middleware around the application.
 
     Args:

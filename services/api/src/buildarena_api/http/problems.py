@@ -112,7 +112,7 @@ def add_problem_handlers(app: FastAPI) -> None:
         headers = dict(error.headers) if error.headers else None
         status = error.status_code
         if status == HTTPStatus.BAD_REQUEST:
-            # A body that is no text is as wrong as one that is no JSON, and answered like it.
+            # A body that is not text is as wrong as one that is not JSON, and answered like it.
             status = HTTPStatus.UNPROCESSABLE_ENTITY
         return _answer(status, str(error.detail), headers=headers)
 

@@ -36,7 +36,7 @@ class RateLimits:
             who: The caller.
 
         Returns:
-            None when it may pass, else after how many seconds the next one may. Without the
+            None when it may pass, otherwise after how many seconds the next one may. Without the
             key-value store all requests pass.
         """
         try:

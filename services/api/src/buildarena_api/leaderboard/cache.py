@@ -14,7 +14,7 @@ from buildarena_pipeline.catalog.tasks import TaskCatalog
 from buildarena_store import Boards
 
 KEPT_ANSWERS: Final = 256
-"""Answers in memory at the most; one of a full board is about 200 kB."""
+"""Answers in memory at most; one of a full board is about 200 kB."""
 
 
 class BoardCache:

@@ -22,7 +22,7 @@ class _View(BaseModel):
 class Row(_View):
     """One model configuration on one task. What does not exist is null."""
 
-    rank: int | None = Field(description="Models that can't be told apart share a rank")
+    rank: int | None = Field(description="Models that are statistically tied share a rank")
     rank_low: int | None = Field(description="Lower end of the place's 95 % bootstrap interval")
     rank_high: int | None
     model: str

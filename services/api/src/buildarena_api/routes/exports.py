@@ -190,7 +190,7 @@ def _parquet(rows: Sequence[dict[str, Any]]) -> bytes:
 
 
 def _kind(name: str) -> type:
-    """What a column holds, be it optional or not; text for all that is no plain number."""
+    """What a column holds, be it optional or not; text for all that is not a plain number."""
     fields = {**PublishedView.model_fields, **Row.model_fields}
     annotation = fields[name].annotation if name in fields else str
     choices = get_args(annotation) if get_origin(annotation) is UnionType else (annotation,)
@@ -198,7 +198,7 @@ def _kind(name: str) -> type:
 
 
 def _latex(ranked: RankedBoard) -> str:
-    """Our two tables and the paper's two; tasks of users' own in tables of their own."""
+    """Our two tables and the paper's two; custom tasks in tables of their own."""
     cells = {board.task: [row.cell for row in board.rows] for board in ranked.tasks}
     ours = {task: row for task, row in cells.items() if task in builtin_tasks()}
     own = {task: row for task, row in cells.items() if task not in ours}

@@ -32,7 +32,7 @@ class NewKey(BaseModel):
         Field(min_length=1, max_length=3, description="Each includes those before it"),
     ]
     days: Annotated[
-        int | None, Field(ge=1, le=3650, description="How long it is good; null for ever")
+        int | None, Field(ge=1, le=3650, description="How long it is good; null forever")
     ] = None
     budget: Budget | None = None
 

@@ -14,7 +14,7 @@ from buildarena_api.http.problems import problem_responses
 from buildarena_api.leaderboard.filters import BoardsDep, SelectionDep, unknown
 from buildarena_api.leaderboard.views import Board, ChangePage, ChangeView, board_view
 from buildarena_api.routes import exports
-from buildarena_benchmark.leaderboard import SCORED, BoardQuery, TaskDuel, duel
+from buildarena_benchmark.leaderboard import SCORED, BoardQuery, TaskComparison, compare_models
 from buildarena_store.states import VERIFY_QUEUE
 
 router = APIRouter(prefix="/v1", tags=["leaderboard"])
@@ -123,7 +123,7 @@ def compare(
     second: Annotated[str, Query(description="Another")],
 ) -> Comparison:
     """Tells whether one model is better than another, task by task."""
-    tasks: list[TaskDuel] = []
+    tasks: list[TaskComparison] = []
     if selection.track is not None:
         every = boards.trials(selection.track, selection.query)
         sides = []
@@ -140,7 +140,7 @@ def compare(
             configurations = [trial.configuration for trial in side]
             usual = max(sorted(set(configurations)), key=configurations.count)
             sides.append([trial for trial in side if trial.configuration == usual])
-        found = duel(*sides)
+        found = compare_models(*sides)
         tasks = list(found.tasks) if found else []
     return Comparison(
         track=selection.track,

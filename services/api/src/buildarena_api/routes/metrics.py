@@ -37,7 +37,7 @@ class ServiceMetrics(Collector):
 
     def __init__(self, context: Context) -> None:
         self._context = context
-        self._guard = threading.Lock()
+        self._lock = threading.Lock()
         self._read_at: float | None = None
         self._figures: ServiceFigures | None = None
         self.registry = CollectorRegistry()
@@ -70,7 +70,7 @@ class ServiceMetrics(Collector):
         yield workers
 
     def _fresh(self) -> ServiceFigures:
-        with self._guard:
+        with self._lock:
             now = time.monotonic()
             if self._figures is None or now - (self._read_at or 0.0) > KEPT_FOR_S:
                 self._figures = self._context.store.figures.read()

@@ -1,4 +1,4 @@
-"""Routes of outside agents: open a session, call tools, submit."""
+"""Routes of external agents: open a session, call tools, submit."""
 
 from __future__ import annotations
 
@@ -136,7 +136,7 @@ def submit_session(
 
 
 def _require_own(session_id: str, context: Context, caller: Caller) -> None:
-    """An agent plays its own session only. An unknown one is for the session room to refuse."""
+    """An agent plays its own session only. An unknown one is for the sessions to refuse."""
     if caller.scope == "admin":
         return
     with contextlib.suppress(UnknownIdError):
