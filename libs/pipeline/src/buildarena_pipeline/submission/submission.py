@@ -107,18 +107,17 @@ class Submissions:
         own = [replace(job, owner=owner, payer=sweep.id) for job in new]
         limits = None if spec.budget is None else spec.budget.as_limits()
         store = self._context.store
-        with store.lifecycle.submission() as connection:
-            before = None
+        before, added = None, 0
+        with store.lifecycle.command() if resume else store.lifecycle.submission() as connection:
             if resume:
                 before = store.sweeps.with_jobs(jobs_hash, owner=owner, connection=connection)
-            if before is None:
+            if before is not None:
+                store.lifecycle.ensure_active(before, limits, connection=connection)
+            else:
                 if limits is not None:
                     store.budgets.set(sweep.id, limits, connection=connection)
                 added = store.jobs.add(own, connection=connection)
                 store.sweeps.add(sweep, job_ids, connection=connection)
-        if before is not None:
-            store.lifecycle.ensure_active(before, limits)
-            added = 0
         notify_waiting(self._context, CONSTRUCT_QUEUE)
         return Submitted(
             sweep=store.sweeps.get(before or sweep.id),

@@ -73,19 +73,20 @@ class SweepLifecycle:
                 self._budgets.set(sweep_id, limits, connection=connection)
             self._release(sweep_id, connection)
 
-    def ensure_active(self, sweep_id: str, limits: BudgetLimits | None) -> None:
-        """As `resume`, and gives an active sweep its budget only.
+    def ensure_active(
+        self, sweep_id: str, limits: BudgetLimits | None, *, connection: Connection
+    ) -> None:
+        """As `resume`, in a transaction of `command`; an active sweep just gets its budget.
 
         Raises:
             UnknownIdError: There is no such sweep.
             TransitionError: It is cancelled.
         """
-        with self.command() as connection:
-            if self._state(sweep_id, connection) != SweepState.ACTIVE:
-                self._move(sweep_id, SweepState.ACTIVE, connection)
-            if limits is not None:
-                self._budgets.set(sweep_id, limits, connection=connection)
-            self._release(sweep_id, connection)
+        if self._state(sweep_id, connection) != SweepState.ACTIVE:
+            self._move(sweep_id, SweepState.ACTIVE, connection)
+        if limits is not None:
+            self._budgets.set(sweep_id, limits, connection=connection)
+        self._release(sweep_id, connection)
 
     def cancel(self, sweep_id: str) -> None:
         """Ends the sweep's jobs that have not ended and that no other active sweep wants.

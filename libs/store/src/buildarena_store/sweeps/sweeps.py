@@ -8,7 +8,7 @@ from datetime import datetime
 from decimal import Decimal
 from typing import Any
 
-from sqlalchemy import Connection, func, literal, select, text
+from sqlalchemy import Connection, func, literal, select
 from sqlalchemy.dialects.postgresql import insert
 
 from buildarena_store import events
@@ -125,10 +125,9 @@ class Sweeps:
     def with_jobs(self, jobs_hash: str, *, owner: str | None, connection: Connection) -> str | None:
         """Id of an owner's newest sweep of just these jobs that was not cancelled, if any.
 
-        Until the transaction ends, nobody else gets an answer for the same jobs: whoever finds no
-        sweep can store one, and it stays the only one.
+        In a transaction of `SweepLifecycle.command` the answer holds until its end: whoever finds
+        no sweep can store one, and it stays the only one.
         """
-        connection.execute(_LOCK_JOBS_HASH, {"jobs_hash": jobs_hash})
         query = (
             select(sweeps.c.id)
             .where(
@@ -204,4 +203,3 @@ class Sweeps:
 
 
 _COLUMNS = columns_of(Sweep, sweeps)
-_LOCK_JOBS_HASH = text("SELECT pg_advisory_xact_lock(hashtextextended(:jobs_hash, 0))")
