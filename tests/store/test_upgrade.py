@@ -1,0 +1,120 @@
+"""A database of the version before: it is migrated, and its jobs stay as they were and verify."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from alembic import command
+from sqlalchemy import create_engine, text
+from working import work
+
+from buildarena_pipeline.catalog.models import load_registry
+from buildarena_pipeline.catalog.specs import Budget
+from buildarena_pipeline.runtime.context import Context, open_context
+from buildarena_pipeline.submission.submission import Submissions
+from buildarena_store import ArtifactStore, SweepState
+from buildarena_store.database import Database, alembic_config
+from buildarena_worker.verify import Verifier
+
+BEFORE = Path(__file__).parents[1] / "data" / "store" / "before-states"
+REVISION = "2026_11_21_keys_budgets_tasks"
+ROWS = json.loads((BEFORE / "rows.json").read_text())
+
+
+@pytest.fixture
+def old_database(worker_id: str) -> Iterator[str]:
+    """A database with the schema and the rows of the version before."""
+    server, name = os.environ["TEST_POSTGRES_URL"], f"upgrade_{worker_id}"
+    admin = create_engine(
+        server.replace("postgresql://", "postgresql+psycopg://"), isolation_level="AUTOCOMMIT"
+    )
+    with admin.connect() as connection:
+        connection.execute(text(f"CREATE DATABASE {name}"))
+    url = server.replace("/postgres", f"/{name}")
+    database = Database(url)
+    command.upgrade(alembic_config(database.url), REVISION)
+    with database.transaction() as connection:
+        connection.execute(text("SET session_replication_role = replica"))  # rows as they were
+        for table, rows in ROWS.items():
+            statement = (
+                f"INSERT INTO {table} SELECT * FROM json_populate_recordset(NULL::{table}, :rows)"
+            )
+            connection.execute(text(statement), {"rows": json.dumps(rows)})
+    database.close()
+    yield url
+    with admin.connect() as connection:
+        connection.execute(text(f"DROP DATABASE {name} WITH (FORCE)"))
+    admin.dispose()
+
+
+@pytest.fixture
+def upgraded(old_database: str, settings, tmp_path: Path) -> Iterator[Context]:
+    """The process' connections after the migration, with the artifacts of before."""
+    artifacts = ArtifactStore(tmp_path / "artifacts")
+    for file in (BEFORE / "artifacts").iterdir():
+        assert artifacts.put(file.read_bytes(), "application/json").hash == file.name
+    context = open_context(settings.model_copy(update={"database_url": old_database}))
+    context.store.database.migrate()
+    context.store.database.require_schema()
+    yield replace(context, artifacts=artifacts)
+    context.close()
+
+
+def sweep_id(name: str) -> str:
+    return next(row["id"] for row in ROWS["sweeps"] if row["name"] == name)
+
+
+def test_jobs_keep_their_ids_outcomes_and_figures(upgraded: Context) -> None:
+    jobs = {job.id: job for job in upgraded.store.jobs.page(limit=100)}
+    assert jobs.keys() == {row["id"] for row in ROWS["jobs"]}
+    same = (
+        "task",
+        "task_version",
+        "model_hash",
+        "track",
+        "seed",
+        "outcome",
+        "indicator",
+        "requests",
+    )
+    for row in ROWS["jobs"]:
+        assert {name: getattr(jobs[row["id"]], name) for name in same} == {
+            name: row[name] for name in same
+        }
+        state = "on_hold" if row["state"] == "held" else row["state"]
+        assert jobs[row["id"]].state == state
+
+
+def test_states_and_events_have_their_new_names(upgraded: Context) -> None:
+    states = {s.name: s.state for s in upgraded.store.sweeps.page(limit=10)}
+    assert states == {
+        "finished": SweepState.ACTIVE,
+        "paused": SweepState.PAUSED,
+        "limited": SweepState.BUDGET_EXHAUSTED,
+    }
+    kinds = {event.kind for event in upgraded.store.events.after(0)}
+    assert not kinds & {"held", "limit"}
+    assert {"on_hold", "budget_exhausted"} <= kinds
+
+
+def test_ended_jobs_verify(upgraded: Context) -> None:
+    ended = [job for job in upgraded.store.jobs.page(limit=100) if job.success is not None]
+    assert ended
+    for job in ended:
+        report = Verifier(upgraded).verify(job.id)
+        assert report["ok"], [check for check in report["checks"] if not check["ok"]]
+
+
+def test_stopped_sweeps_go_on(upgraded: Context) -> None:
+    submissions = Submissions(upgraded, load_registry())
+    submissions.resume(sweep_id("paused"), None)
+    submissions.resume(sweep_id("limited"), Budget(max_requests=1000))
+    work(upgraded)
+    for name in ("paused", "limited", "finished"):
+        progress = upgraded.store.sweeps.progress(sweep_id(name))
+        assert progress.done == progress.total, name
