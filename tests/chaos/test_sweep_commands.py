@@ -10,6 +10,7 @@ import threading
 import time
 from collections import Counter, defaultdict
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import httpx
 import pytest
@@ -142,7 +143,8 @@ def work_until(context, ends: float, seed: int) -> None:
 def test_commands_at_once_leave_legal_histories(context) -> None:
     ends = time.monotonic() + SECONDS
     sweeps: list[str] = []
-    with live_api(context) as url:
+    unlimited = context.settings.model_copy(update={"rate_limit": "1000000/minute"})
+    with live_api(replace(context, settings=unlimited)) as url:
         commanders = [Commander(url, seed, sweeps, ends) for seed in range(THREADS)]
         workers = [
             threading.Thread(target=work_until, args=(context, ends, seed))

@@ -41,10 +41,12 @@ def old_database(worker_id: str) -> Iterator[str]:
     with database.transaction() as connection:
         connection.execute(text("SET session_replication_role = replica"))  # rows as they were
         for table, rows in ROWS.items():
-            statement = (
-                f"INSERT INTO {table} SELECT * FROM json_populate_recordset(NULL::{table}, :rows)"
-            )
-            connection.execute(text(statement), {"rows": json.dumps(rows)})
+            given = f"json_populate_recordset(NULL::{table}, :rows)"
+            statement = text(f"INSERT INTO {table} SELECT * FROM {given}")
+            connection.execute(statement, {"rows": json.dumps(rows)})
+        for table in ("events", "board_changes"):
+            sequence = f"setval(pg_get_serial_sequence('{table}', 'id'), max(id))"
+            connection.execute(text(f"SELECT {sequence} FROM {table}"))
     database.close()
     yield url
     with admin.connect() as connection:
