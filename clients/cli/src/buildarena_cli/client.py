@@ -6,19 +6,34 @@ import contextlib
 import os
 import time
 import weakref
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
 
-import httpx
-
+from buildarena_cli.defaults import KEY_VARIABLE
 from buildarena_cli.errors import CommandError
+from buildarena_cli.near import near_field
+
+if TYPE_CHECKING:
+    import httpx
 
 TIMEOUT_S = 60.0
-KEY_VARIABLE = "BUILDARENA_KEY"
-"""The environment variable of the API key: on a command line, others could read it."""
 PATIENCE_S = 60.0
 """How long a watching command puts up with a service that is being restarted."""
+HEALTH = "/v1/health"
+
+
+def at(*parts: str) -> str:
+    """The path of something in the API; its parts can't reach another route.
+
+    Raises:
+        CommandError: A part means a folder to servers, not a name.
+    """
+    for part in parts:
+        if part in {"", ".", ".."}:
+            raise CommandError(f"{part!r} is not a name")
+    return "/v1/" + "/".join(quote(part, safe="") for part in parts)
 
 
 class Client:
@@ -30,6 +45,8 @@ class Client:
     """
 
     def __init__(self, url: str, key: str | None = None) -> None:
+        import httpx
+
         self.url = url.rstrip("/")
         key = key or os.environ.get(KEY_VARIABLE)
         self._http = httpx.Client(
@@ -43,13 +60,26 @@ class Client:
 
     def get(self, path: str, **params: Any) -> Any:
         """The JSON answer to a GET; parameters that are None are left out."""
-        given = {name: value for name, value in params.items() if value is not None}
-        return self._answer("GET", path, params=given).json()
+        return self._answer("GET", path, params=_given(params)).json()
 
     def get_bytes(self, path: str, **params: Any) -> bytes:
         """The bytes of a GET; parameters that are None are left out."""
-        given = {name: value for name, value in params.items() if value is not None}
-        return self._answer("GET", path, params=given or None).content
+        return self._answer("GET", path, params=_given(params) or None).content
+
+    def pages(self, path: str, *, cursor: str | None = None, **params: Any) -> Iterator[Any]:
+        """The answer to a GET of a list, and those of the pages behind it.
+
+        Args:
+            path: The list's.
+            cursor: Where to begin; the first page by default.
+            params: Further parameters; those that are None are left out.
+        """
+        while True:
+            page = self.get(path, cursor=cursor, **params)
+            yield page
+            cursor = page["next_cursor"]
+            if cursor is None:
+                return
 
     def post(self, path: str, body: Mapping[str, Any]) -> Any:
         """The JSON answer to a POST."""
@@ -58,10 +88,10 @@ class Client:
     def download(self, path: str, target: Path) -> None:
         """Writes the answer to a GET into a file, which is there whole or not at all."""
         partial = target.with_name(target.name + ".partial")
-        with self._http.stream("GET", path, timeout=None) as response:
+        with self._sending(), self._http.stream("GET", path, timeout=None) as response:
             if response.is_error:
                 response.read()
-                raise CommandError(_problem(response))
+                raise RefusedError(response)
             with partial.open("wb") as file:
                 for chunk in response.iter_bytes():
                     file.write(chunk)
@@ -93,22 +123,31 @@ class Client:
         self._http.close()
 
     def _answer(self, method: str, path: str, **options: Any) -> httpx.Response:
-        try:
+        with self._sending():
             response = self._http.request(method, path, **options)
-        except httpx.InvalidURL as error:
-            raise CommandError(f"{self.url!r} is no URL: {error}") from error
+        if path == HEALTH:
+            return response
+        if response.status_code == 503:  # noqa: PLR2004 - Service Unavailable
+            raise UnreachableError(_problem(response))
+        if response.status_code == 401:  # noqa: PLR2004 - Unauthorized
+            raise CommandError(f"{_problem(response)}: set {KEY_VARIABLE} to a good one")
+        if response.is_error:
+            raise RefusedError(response)
+        return response
+
+    @contextlib.contextmanager
+    def _sending(self) -> Iterator[None]:
+        import httpx
+
+        try:
+            yield
+        except (httpx.InvalidURL, httpx.UnsupportedProtocol) as error:
+            raise CommandError(f"{self.url!r} is not a URL: {error}") from error
         except httpx.TransportError as error:
             raise UnreachableError(
                 f"no BuildArena answers at {self.url} ({error}): start it with `buildarena up`, "
                 "or name another with --url or BUILDARENA_URL"
             ) from error
-        if response.status_code == httpx.codes.SERVICE_UNAVAILABLE and path != "/v1/health":
-            raise UnreachableError(_problem(response))
-        if response.status_code == httpx.codes.UNAUTHORIZED:
-            raise CommandError(f"{_problem(response)}: set {KEY_VARIABLE} to a good one")
-        if response.is_error and path != "/v1/health":
-            raise RefusedError(response)
-        return response
 
 
 class RefusedError(CommandError):
@@ -131,6 +170,10 @@ class UnreachableError(CommandError):
     """The service does not answer now; it may later."""
 
 
+def _given(params: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in params.items() if value is not None}
+
+
 def _problem(response: httpx.Response) -> str:
     try:
         problem = response.json()
@@ -145,5 +188,6 @@ def _problem(response: httpx.Response) -> str:
         line = f"{error['field']}: {error['message']}"
         if error["choices"]:
             line += f"; choose from {', '.join(error['choices'])}"
+            line += near_field(error["field"], error["message"], error["choices"])
         lines.append(line)
     return "\n".join(lines)

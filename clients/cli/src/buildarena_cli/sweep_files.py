@@ -1,4 +1,4 @@
-"""Sweep files: read with care, overridden by flags, and every mistake told with line and field."""
+"""Sweep files: overridden by flags; every mistake is shown with its line and field."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ from buildarena_benchmark import Fault, SourceError
 from buildarena_benchmark.tasks.sources import Source, path_of, read_source
 from buildarena_cli.client import RefusedError
 from buildarena_cli.errors import CommandError
+from buildarena_cli.near import near_field
 from buildarena_pipeline.catalog.specs import SweepSpec
 
-MOST_BYTES: Final = 2 * 1024 * 1024
+MAX_BYTES: Final = 2 * 1024 * 1024
 """Largest file: room for the 100,000 seeds that a sweep can name."""
 FLAGS: Final[Mapping[str, str]] = {
     "tasks": "--task",
@@ -50,7 +51,7 @@ class SpecFile:
 
     def refusal(self, faults: Sequence[Fault]) -> CommandError:
         """Faults in words, each with its line of the file or the flag that it came from."""
-        return CommandError("\n".join(self._told(fault) for fault in faults))
+        return CommandError("\n".join(self._line(fault) for fault in faults))
 
     def refused(self, error: RefusedError) -> CommandError:
         """What the service says against the content, in words."""
@@ -68,27 +69,28 @@ class SpecFile:
             ]
         )
 
-    def _told(self, fault: Fault) -> str:
+    def _line(self, fault: Fault) -> str:
         top = next(iter(path_of(fault.field)), "")
+        near = near_field(fault.field, fault.message, fault.choices)
         if top not in self.overridden:
-            return fault.told(self.source.origin)
+            return fault.told(self.source.origin) + near
         given = Fault(field=fault.field, message=fault.message, choices=fault.choices)
-        return given.told(FLAGS[str(top)])
+        return given.told(FLAGS[str(top)]) + near
 
 
 def read_fields(file: Path) -> SpecFile:
     """The fields in a YAML file.
 
     Raises:
-        CommandError: It can't be read, or holds something else than a mapping.
+        CommandError: It can't be read, or holds something other than a mapping.
     """
     try:
         text = file.read_text(encoding="utf-8")
-        source = read_source(text, origin=str(file), most_bytes=MOST_BYTES)
+        source = read_source(text, origin=str(file), most_bytes=MAX_BYTES)
     except OSError as error:
         raise CommandError(f"{file}: {error.strerror}") from error
     except UnicodeDecodeError as error:
-        raise CommandError(f"{file}: no UTF-8: {error.reason}") from error
+        raise CommandError(f"{file}: not UTF-8: {error.reason}") from error
     except SourceError as error:
         raise CommandError(str(error)) from error
     if not isinstance(source.content, dict):
@@ -104,7 +106,7 @@ def read_sweep(file: Path, flags: Mapping[str, Any]) -> SpecFile:
         flags: Values by field; None for flags that were not given.
 
     Raises:
-        CommandError: The file, or what the flags make of it, is no sweep.
+        CommandError: The file, or what the flags make of it, is not a sweep.
     """
     given = {name: value for name, value in flags.items() if value is not None}
     sweep = read_fields(file).with_words(given)

@@ -8,9 +8,9 @@ from typing import Any
 
 from buildarena_benchmark.leaderboard import Board, Trial
 from buildarena_cli.client import Client, RefusedError
-from buildarena_cli.output import in_words
 from buildarena_cli.report.document import Block, Grid, Heading, Paragraph
 from buildarena_cli.report.material import Material, ReportTask
+from buildarena_cli.terminal.output import in_words
 
 
 def read_tasks(client: Client, trials: Sequence[Trial]) -> dict[str, ReportTask]:

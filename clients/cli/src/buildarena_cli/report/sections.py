@@ -6,12 +6,12 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 
 from buildarena_benchmark.leaderboard import Board, BoardQuery, Cell, TrackBoard
-from buildarena_cli.output import in_words, number
 from buildarena_cli.report.custom_tasks import own_tasks
 from buildarena_cli.report.document import Block, Grid, Heading, Paragraph, Plot
 from buildarena_cli.report.effort import cost, power, rounds, simulators
 from buildarena_cli.report.material import Material, between, paper_rows, percent
 from buildarena_cli.report.plots import indicator_plot, radar_plot, shares_plot, success_plot
+from buildarena_cli.terminal.output import in_words, number
 
 
 def sections(material: Material) -> list[Block]:

@@ -8,16 +8,16 @@ from datetime import datetime
 from decimal import Decimal
 from typing import Any
 
-from sqlalchemy import Connection, Row, and_, any_, or_, select, update
+from sqlalchemy import Connection, Row, and_, any_, func, or_, select, update
 from sqlalchemy.dialects.postgresql import insert
 
 from buildarena_store import events
 from buildarena_store.accounts.reservations import release
 from buildarena_store.database import Database
 from buildarena_store.errors import UnknownIdError
-from buildarena_store.ids import content_hash
+from buildarena_store.ids import begins_with, content_hash
 from buildarena_store.rows import bound_texts, rows_of
-from buildarena_store.tables import attempts, job_artifacts, jobs, sweep_jobs
+from buildarena_store.tables import artifacts, attempts, job_artifacts, jobs, sweep_jobs
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -125,6 +125,23 @@ class Attempt:
     detail: str | None
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JobFile:
+    """An artifact of a job.
+
+    Attributes:
+        name: Its name in the job, for example ``trajectory-0``.
+        media_type: For example ``application/json``.
+        size: Length in bytes.
+        hash: SHA-256 of the bytes, 64 hex digits.
+    """
+
+    name: str
+    media_type: str
+    size: int
+    hash: str
+
+
 JOB_COLUMNS = [jobs.c[name] for name in Job.__dataclass_fields__]
 
 
@@ -190,14 +207,18 @@ class Jobs:
         limit: int,
         after: tuple[datetime, str] | None = None,
         sweep_id: str | None = None,
+        flag: str | None = None,
+        id_prefix: str | None = None,
         **equals: str | int | None,
     ) -> list[Job]:
         """The newest jobs first, with keyset paging.
 
         Args:
-            limit: Rows at the most.
+            limit: Rows at most.
             after: ``(created_at, id)`` of the last row of the page before.
             sweep_id: Only this sweep's jobs.
+            flag: Only jobs with this flag.
+            id_prefix: Only jobs whose id begins like this.
             equals: Column values to match; None means any.
         """
         query = select(*JOB_COLUMNS)
@@ -208,6 +229,10 @@ class Jobs:
         for name, value in equals.items():
             if value is not None:
                 query = query.where(jobs.c[name] == value)
+        if flag is not None:
+            query = query.where(jobs.c.flags.contains([flag]))
+        if id_prefix is not None:
+            query = query.where(begins_with(jobs.c.id, id_prefix))
         if after is not None:
             created_at, id_ = after
             query = query.where(
@@ -228,6 +253,30 @@ class Jobs:
                 Attempt(**{name: getattr(row, name) for name in Attempt.__dataclass_fields__})
                 for row in connection.execute(query)
             ]
+
+    def distinct(self, column: str) -> list[str]:
+        """The values that jobs have in a column, in their order.
+
+        Args:
+            column: ``task``, ``model``, ``reason``, or ``flags``, whose elements are meant.
+        """
+        value = (
+            func.jsonb_array_elements_text(jobs.c.flags) if column == "flags" else jobs.c[column]
+        )
+        with self._database.statement() as connection:
+            found = connection.execute(select(value).distinct()).scalars()
+            return sorted(text for text in found if text is not None)
+
+    def files(self, job_id: str) -> list[JobFile]:
+        """The job's artifacts, with what is known of their bytes, by name."""
+        query = (
+            select(job_artifacts.c.name, *(artifacts.c[n] for n in ("media_type", "size", "hash")))
+            .join(artifacts, artifacts.c.hash == job_artifacts.c.hash)
+            .where(job_artifacts.c.job_id == job_id)
+            .order_by(job_artifacts.c.name)
+        )
+        with self._database.statement() as connection:
+            return [JobFile(**row._mapping) for row in connection.execute(query)]  # noqa: SLF001 - SQLAlchemy's public name
 
     def artifacts(self, job_id: str) -> dict[str, str]:
         """Hashes of the job's artifacts by name, for example ``machine``."""

@@ -14,6 +14,7 @@ from sqlalchemy.dialects.postgresql import insert
 from buildarena_store import events
 from buildarena_store.database import Database
 from buildarena_store.errors import UnknownIdError
+from buildarena_store.ids import begins_with
 from buildarena_store.rows import bound_texts
 from buildarena_store.tables import jobs, sweep_jobs, sweeps
 
@@ -145,10 +146,18 @@ class Sweeps:
             return None
         return Sweep(**{name: getattr(row, name) for name in Sweep.__dataclass_fields__})
 
-    def page(self, *, limit: int, after: tuple[datetime, str] | None = None) -> list[Sweep]:
-        """The newest sweeps first, with keyset paging as for jobs."""
+    def page(
+        self,
+        *,
+        limit: int,
+        after: tuple[datetime, str] | None = None,
+        id_prefix: str | None = None,
+    ) -> list[Sweep]:
+        """The newest sweeps first, with keyset paging and beginnings of ids as for jobs."""
         columns = [sweeps.c[name] for name in Sweep.__dataclass_fields__]
         query = select(*columns).order_by(sweeps.c.created_at.desc(), sweeps.c.id).limit(limit)
+        if id_prefix is not None:
+            query = query.where(begins_with(sweeps.c.id, id_prefix))
         if after is not None:
             created_at, id_ = after
             query = query.where(

@@ -5,18 +5,9 @@ from __future__ import annotations
 import time
 from typing import Any
 
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
-
-from buildarena_cli.client import Client
+from buildarena_cli.client import Client, at
 from buildarena_cli.errors import DONE, PARTIAL
-from buildarena_cli.output import console
+from buildarena_cli.terminal.output import is_terminal, say
 
 POLL_S = 0.3
 PLAIN_POLL_S = 2.0
@@ -29,7 +20,7 @@ def watch_sweep(client: Client, sweep_id: str) -> dict[str, Any]:
     Returns:
         The sweep as the API shows it then.
     """
-    return _watch_bars(client, sweep_id) if console.is_terminal else _watch_lines(client, sweep_id)
+    return _watch_bars(client, sweep_id) if is_terminal() else _watch_lines(client, sweep_id)
 
 
 def exit_code(sweep: dict[str, Any]) -> int:
@@ -49,21 +40,29 @@ def ended(sweep: dict[str, Any]) -> bool:
 
 
 def _watch_bars(client: Client, sweep_id: str) -> dict[str, Any]:
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
     bars = Progress(
-        TextColumn("{task.description:<24}"),
+        TextColumn("{task.description:<24}", markup=False),
         BarColumn(),
         MofNCompleteColumn(),
         TimeElapsedColumn(),
         TextColumn("left"),
         TimeRemainingColumn(),
-        TextColumn("{task.fields[note]}"),
-        console=console,
+        TextColumn("{task.fields[note]}", markup=False),
     )
     with bars:
         built = bars.add_task("machines built", total=None, note="")
         scored = bars.add_task("jobs scored", total=None, note="")
         while True:
-            sweep: dict[str, Any] = client.get_patiently(f"/v1/sweeps/{sweep_id}")
+            sweep: dict[str, Any] = client.get_patiently(at("sweeps", sweep_id))
             progress = sweep["progress"]
             stages = progress["stages"]
             building = sum(n for name, n in stages.items() if name.startswith("construct"))
@@ -87,7 +86,7 @@ def _watch_bars(client: Client, sweep_id: str) -> dict[str, Any]:
 def _watch_lines(client: Client, sweep_id: str) -> dict[str, Any]:
     shown = ""
     while True:
-        sweep: dict[str, Any] = client.get_patiently(f"/v1/sweeps/{sweep_id}")
+        sweep: dict[str, Any] = client.get_patiently(at("sweeps", sweep_id))
         progress = sweep["progress"]
         line = (
             f"{progress['done']}/{progress['total']} jobs ended, "
@@ -95,7 +94,7 @@ def _watch_lines(client: Client, sweep_id: str) -> dict[str, Any]:
             f"{_counted(progress['outcomes'])}"
         )
         if line != shown:
-            console.print(line, soft_wrap=True)
+            say(line)
             shown = line
         if ended(sweep):
             return sweep
