@@ -8,12 +8,13 @@ import time
 import weakref
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 from buildarena_cli.defaults import KEY_VARIABLE
 from buildarena_cli.errors import CommandError
-from buildarena_cli.near import near_field
+from buildarena_cli.near import QUOTED, did_you_mean, near_field
 
 if TYPE_CHECKING:
     import httpx
@@ -132,7 +133,7 @@ class Client:
         if response.status_code == 401:  # noqa: PLR2004 - Unauthorized
             raise CommandError(f"{_problem(response)}: set {KEY_VARIABLE} to a good one")
         if response.is_error:
-            raise RefusedError(response)
+            raise RefusedError(response, options.get("params"))
         return response
 
     @contextlib.contextmanager
@@ -153,13 +154,17 @@ class Client:
 class RefusedError(CommandError):
     """The service refused a request.
 
+    Args:
+        response: What it answered.
+        sent: The request's parameters: what near words are near to.
+
     Attributes:
         status: The HTTP status.
         errors: Its field errors: ``field``, ``message``, ``line`` and ``choices`` of each.
     """
 
-    def __init__(self, response: httpx.Response) -> None:
-        super().__init__(_problem(response))
+    def __init__(self, response: httpx.Response, sent: Mapping[str, Any] | None = None) -> None:
+        super().__init__(_problem(response, sent or {}))
         self.status = response.status_code
         self.errors: list[dict[str, Any]] = []
         with contextlib.suppress(ValueError, KeyError, TypeError):
@@ -174,7 +179,7 @@ def _given(params: Mapping[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in params.items() if value is not None}
 
 
-def _problem(response: httpx.Response) -> str:
+def _problem(response: httpx.Response, sent: Mapping[str, Any] = MappingProxyType({})) -> str:
     try:
         problem = response.json()
         errors = problem["errors"]
@@ -183,11 +188,13 @@ def _problem(response: httpx.Response) -> str:
         return f"HTTP {response.status_code} from {response.url}"
     if not errors:
         return detail
-    lines = []
-    for error in errors:
-        line = f"{error['field']}: {error['message']}"
-        if error["choices"]:
-            line += f"; choose from {', '.join(error['choices'])}"
-            line += near_field(error["field"], error["message"], error["choices"])
-        lines.append(line)
-    return "\n".join(lines)
+    return "\n".join(_line(error, str(sent.get(error["field"], ""))) for error in errors)
+
+
+def _line(error: Mapping[str, Any], given: str) -> str:
+    line = f"{error['field']}: {error['message']}"
+    if error["choices"]:
+        line += f"; choose from {', '.join(error['choices'])}"
+        return line + near_field(error["field"], error["message"], error["choices"])
+    # What pydantic says of a word that is none of a few.
+    return line + did_you_mean(given, QUOTED.findall(error["message"]))

@@ -163,7 +163,7 @@ def _show(run: Run, folder: Path, health: dict[str, Any], facts: list[ProcessFac
         since = datetime.fromtimestamp(fact.started_at or 0).astimezone()
         rows.append(
             (
-                fact.name,
+                fact.name.replace(" ", "-"),
                 str(fact.pid),
                 number(memory, 0),
                 ", ".join(map(str, fact.ports)),

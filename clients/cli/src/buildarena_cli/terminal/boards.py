@@ -1,19 +1,21 @@
 """Leaderboards on a terminal: one overview, and the details of a task.
 
-The overview has a row for each model and, for each task, success, its interval and the indicator.
-On a narrow terminal the tasks are continued below in further blocks, so that none is left out;
-where not even one task fits beside the models' names, the intervals give way.
+The overview has success, its interval and the indicator of each model on each task. Through a pipe
+there is a row for each model. A terminal gets that, or a row for each task, whichever takes fewer
+blocks: what does not fit beside the names is continued below, so that nothing is left out. Where
+not even one column fits beside the names, the intervals give way.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 from buildarena_cli.terminal.output import (
     NOTHING,
     columns,
     emphasised,
+    harmless,
     in_words,
     is_terminal,
     number,
@@ -44,6 +46,14 @@ OVERALL = columns(
 )
 
 
+class _Row(NamedTuple):
+    """A model of the overview: its rank, its name, and its row of each task."""
+
+    rank: str
+    name: str
+    by_task: Mapping[str, Mapping[str, Any]]
+
+
 def overview(board: Mapping[str, Any], *, published: bool = False) -> None:
     """Prints models x tasks: success with its interval, indicator; and the overall rank.
 
@@ -53,23 +63,26 @@ def overview(board: Mapping[str, Any], *, published: bool = False) -> None:
     """
     ranks = {(row["model"], row["configuration"]): row["rank"] for row in board["overall"]}
     rows: dict[tuple[str, str], dict[str, Any]] = {}
+    baselines = set()
     for task in board["tasks"]:
         for row in task["rows"]:
-            key = (row["model"], row["configuration"])
-            rows.setdefault(key, {"baseline": row["baseline"]})[task["task"]] = row
+            rows.setdefault((row["model"], row["configuration"]), {})[task["task"]] = row
+            if row["baseline"]:
+                baselines.add(row["model"])
     ordered = sorted(rows, key=lambda key: (ranks.get(key) is None, ranks.get(key), key[0]))
-    names = [model + ("*" if rows[(model, conf)]["baseline"] else "") for model, conf in ordered]
-    _print_blocks(
-        [task["task"] for task in board["tasks"]],
+    names = [model + ("*" if model in baselines else "") for model, _ in ordered]
+    tasks = [task["task"] for task in board["tasks"]]
+    _print_matrix(
+        tasks,
         [
-            (_rank(ranks.get(key)), name, rows[key])
+            _Row(_rank(ranks.get(key)), harmless(name), rows[key])
             for key, name in zip(ordered, names, strict=True)
         ],
     )
     if published:
         say()
         say("As published: measured in the game, never ranked with ours")
-        _print_blocks([task["task"] for task in board["tasks"]], _published_rows(board))
+        _print_matrix(tasks, _published_rows(board))
     say()
     for text in _legend(board):
         say(text)
@@ -153,61 +166,84 @@ def _interval(row: Mapping[str, Any]) -> str:
     return NOTHING if low is None else f"{100 * low:.0f}-{100 * high:.0f} %"
 
 
-def _published_rows(board: Mapping[str, Any]) -> list[tuple[str, str, dict[str, Any]]]:
+def _published_rows(board: Mapping[str, Any]) -> list[_Row]:
     rows: dict[str, dict[str, Any]] = {}
     for task in board["tasks"]:
         for row in task["published"]:
             rows.setdefault(row["model"], {})[task["task"]] = row
     ranks = {row["model"]: row["rank"] for row in board["published"]}
     ordered = sorted(rows, key=lambda name: (ranks.get(name) is None, ranks.get(name), name))
-    return [(_rank(ranks.get(name)), name, rows[name]) for name in ordered]
+    return [_Row(_rank(ranks.get(name)), name, rows[name]) for name in ordered]
 
 
-def _print_blocks(tasks: Sequence[str], rows: Sequence[tuple[str, str, dict[str, Any]]]) -> None:
-    blocks = [_task_block(task, rows, intervals=True) for task in tasks]
-    head = _aligned([("#", "model"), *((rank, name) for rank, name, _ in rows)], right=(0,))
+def _print_matrix(tasks: Sequence[str], rows: Sequence[_Row]) -> None:
+    """Prints models x tasks in the way that takes the fewest blocks."""
     room = terminal_width() if is_terminal() else None
-    if room is not None and any(_width([head, block]) > room for block in blocks):
-        blocks = [_task_block(task, rows, intervals=False) for task in tasks]
-    for number_, group in enumerate(_groups(head, blocks, room)):
-        lines = [GAP.join(parts).rstrip() for parts in zip(head, *group, strict=True)]
-        print_lines([*([""] if number_ else []), emphasised(lines[0]), *lines[1:]])
+    for intervals in (True, False):
+        ways = [_by_model(tasks, rows, intervals=intervals)]
+        if room is not None:
+            ways.append(_by_task(tasks, rows, intervals=intervals))
+        fitting = [way for way in ways if room is None or _narrowest(way) <= room]
+        if fitting:
+            break
+    fewest = min((_groups(way, room) for way in fitting or ways), key=len)
+    for place, group in enumerate(fewest):
+        lines = [GAP.join(parts).rstrip() for parts in zip(*group, strict=True)]
+        print_lines([*([""] if place else []), emphasised(lines[0]), *lines[1:]])
 
 
-def _groups(
-    head: list[str], blocks: Sequence[list[str]], room: int | None
-) -> Iterator[list[list[str]]]:
-    """As many tasks beside each other as there is room for; without a terminal, all."""
-    group: list[list[str]] = []
-    for block in blocks:
-        if group and room is not None and _width([head, *group, block]) > room:
-            yield group
-            group = []
-        group.append(block)
-    if group:
-        yield group
+def _by_model(tasks: Sequence[str], rows: Sequence[_Row], *, intervals: bool) -> list[list[str]]:
+    """A row for each model: the column of names, and one of each task."""
+    names = _aligned([("#", "model"), *((row.rank, row.name) for row in rows)], right=(0,))
+    columns_ = [_cells([row.by_task.get(task) for row in rows], intervals) for task in tasks]
+    return [names, *(_column([task], cells) for task, cells in zip(tasks, columns_, strict=True))]
 
 
-def _width(blocks: Sequence[list[str]]) -> int:
-    return sum(width_of(block[0]) for block in blocks) + len(GAP) * (len(blocks) - 1)
+def _by_task(tasks: Sequence[str], rows: Sequence[_Row], *, intervals: bool) -> list[list[str]]:
+    """A row for each task: the column of tasks, and one of each model below its rank."""
+    names = _aligned([(text,) for text in ("model", "#", *tasks)], right=())
+    columns_ = [_cells([row.by_task.get(task) for task in tasks], intervals) for row in rows]
+    return [
+        names,
+        *(_column([row.name, row.rank], cells) for row, cells in zip(rows, columns_, strict=True)),
+    ]
 
 
-def _task_block(
-    task: str, rows: Sequence[tuple[str, str, dict[str, Any]]], *, intervals: bool
-) -> list[str]:
-    """A task's heading and its cell of each row, all equally wide."""
+def _groups(way: Sequence[list[str]], room: int | None) -> list[list[list[str]]]:
+    """The names with as many columns beside them as there is room for, and so on."""
+    names, *others = way
+    groups = [[names]]
+    for column in others:
+        if len(groups[-1]) > 1 and room is not None and _width([*groups[-1], column]) > room:
+            groups.append([names])
+        groups[-1].append(column)
+    return groups
+
+
+def _narrowest(way: Sequence[list[str]]) -> int:
+    return max(_width([way[0], column]) for column in way[1:])
+
+
+def _width(shown: Sequence[list[str]]) -> int:
+    return sum(width_of(column[0]) for column in shown) + len(GAP) * (len(shown) - 1)
+
+
+def _column(headings: Sequence[str], cells: Sequence[str]) -> list[str]:
+    width = max(map(width_of, [*headings, *cells]))
+    return [padded(text, width, right=True) for text in (*headings, *cells)]
+
+
+def _cells(rows: Sequence[Mapping[str, Any] | None], intervals: bool) -> list[str]:
+    """Success, interval and indicator of rows, aligned among themselves."""
     cells = []
-    for _, _, by_task in rows:
-        row = by_task.get(task)
+    for row in rows:
         if row is None:
             cells.append((NOTHING,) * (2 + intervals))
             continue
-        rate = f"{row['successes']}/{row['trials']}"
         middle = (_interval(row),) if intervals else ()
+        rate = f"{row['successes']}/{row['trials']}"
         cells.append((rate, *middle, number(row["indicator_mean"])))
-    lines = _aligned(cells, right=range(2 + intervals))
-    width = max(width_of(line) for line in [task, *lines])
-    return [padded(line, width, right=True) for line in [task, *lines]]
+    return _aligned(cells, right=range(2 + intervals))
 
 
 def _aligned(rows: Sequence[Sequence[str]], right: Sequence[int]) -> list[str]:

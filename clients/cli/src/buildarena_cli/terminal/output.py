@@ -56,12 +56,12 @@ def columns(*names: str, figures: Sequence[str] = (), leaving: Sequence[str] = (
 
 def say(text: str = "") -> None:
     """One or more lines on standard output, whole however wide the terminal is."""
-    _write(sys.stdout, _harmless(text) + "\n")
+    _write(sys.stdout, harmless(text) + "\n")
 
 
 def warn(text: str) -> None:
     """One or more lines on standard error."""
-    _write(sys.stderr, _harmless(text) + "\n")
+    _write(sys.stderr, harmless(text) + "\n")
 
 
 def print_json(value: Any) -> None:
@@ -155,6 +155,15 @@ def _styled() -> bool:
     return is_terminal() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
 
 
+def harmless(text: str) -> str:
+    r"""A text whose control characters are spelled (``\x1b``): names come from strangers."""
+    if text.isprintable():
+        return text
+    return "".join(
+        c if c.isprintable() or c in "\n\t" else c.encode("unicode_escape").decode() for c in text
+    )
+
+
 def _names(shown: Sequence[Column]) -> list[str]:
     return [column.name for column in shown]
 
@@ -182,16 +191,7 @@ def _line(
 
 def _cell(text: str) -> str:
     """A text in one line."""
-    return _harmless(text.replace("\n", " ").replace("\t", " ")) or NOTHING
-
-
-def _harmless(text: str) -> str:
-    r"""A text whose control characters are spelled (``\x1b``): names come from strangers."""
-    if text.isprintable():
-        return text
-    return "".join(
-        c if c.isprintable() or c in "\n\t" else c.encode("unicode_escape").decode() for c in text
-    )
+    return harmless(text.replace("\n", " ").replace("\t", " ")) or NOTHING
 
 
 def _write(stream: TextIO, text: str) -> None:

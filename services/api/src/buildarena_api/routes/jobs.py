@@ -10,7 +10,7 @@ from fastapi import APIRouter, Query, Response
 from buildarena_api.dependencies import ContextDep, IdPrefix, RegistryDep, SubmissionsDep
 from buildarena_api.http import cursors
 from buildarena_api.http.access import CallerDep
-from buildarena_api.http.problems import ProblemError, problem_responses
+from buildarena_api.http.problems import FieldProblem, ProblemError, problem_responses
 from buildarena_api.leaderboard.filters import unknown
 from buildarena_api.routes.transcripts import as_markdown
 from buildarena_api.schemas import (
@@ -102,8 +102,13 @@ def _require_known(
         if value in choices:
             continue
         used = context.jobs.distinct("flags" if name == "flag" else name)
-        if value not in used and (choices or used):
+        if value in used or not (choices or used):
+            continue
+        if choices:
             raise unknown(name, value, list(dict.fromkeys([*choices, *used])))
+        message = f"no job has the {name} {value!r}"
+        problem = FieldProblem(field=name, message=message, choices=used)
+        raise ProblemError(422, f"{name}: {message}", errors=[problem])
 
 
 @router.get("/{job_id}", responses=problem_responses(404, 503))
