@@ -3,36 +3,36 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import time
-import weakref
-from collections.abc import Iterator, Mapping
+from collections.abc import Generator, Iterator, Mapping
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from urllib.parse import quote
 
 from buildarena_cli.defaults import KEY_VARIABLE
 from buildarena_cli.errors import CommandError
 from buildarena_cli.near import QUOTED, did_you_mean, near_field
-
-if TYPE_CHECKING:
-    import httpx
+from buildarena_cli.wire import Failure, Response, Wire
 
 TIMEOUT_S = 60.0
 PATIENCE_S = 60.0
 """How long a watching command puts up with a service that is being restarted."""
 HEALTH = "/v1/health"
+CHUNK_BYTES = 1 << 20
 
 
 def at(*parts: str) -> str:
     """The path of something in the API; its parts can't reach another route.
 
     Raises:
-        CommandError: A part means a folder to servers, not a name.
+        CommandError: A part is not a name.
     """
     for part in parts:
-        if part in {"", ".", ".."}:
+        # A server takes %2F for a slash.
+        if part in {"", ".", ".."} or "/" in part:
             raise CommandError(f"{part!r} is not a name")
     return "/v1/" + "/".join(quote(part, safe="") for part in parts)
 
@@ -46,26 +46,20 @@ class Client:
     """
 
     def __init__(self, url: str, key: str | None = None) -> None:
-        import httpx
-
         self.url = url.rstrip("/")
         key = key or os.environ.get(KEY_VARIABLE)
-        self._http = httpx.Client(
-            base_url=self.url,
-            timeout=TIMEOUT_S,
-            transport=httpx.HTTPTransport(retries=2),
-            headers={"Authorization": f"Bearer {key}"} if key else None,
-        )
-        # Commands let go of their client when they end.
-        weakref.finalize(self, self._http.close)
+        try:
+            self._wire = Wire(self.url, {"Authorization": f"Bearer {key}"} if key else {})
+        except ValueError as error:
+            raise CommandError(f"{self.url!r} with this {KEY_VARIABLE}: {error}") from error
 
     def get(self, path: str, **params: Any) -> Any:
         """The JSON answer to a GET; parameters that are None are left out."""
-        return self._answer("GET", path, params=_given(params)).json()
+        return _document(self._answer("GET", path, params=_given(params)))
 
     def get_bytes(self, path: str, **params: Any) -> bytes:
         """The bytes of a GET; parameters that are None are left out."""
-        return self._answer("GET", path, params=_given(params) or None).content
+        return self._answer("GET", path, params=_given(params)).body
 
     def pages(self, path: str, *, cursor: str | None = None, **params: Any) -> Iterator[Any]:
         """The answer to a GET of a list, and those of the pages behind it.
@@ -84,29 +78,29 @@ class Client:
 
     def post(self, path: str, body: Mapping[str, Any]) -> Any:
         """The JSON answer to a POST."""
-        return self._answer("POST", path, json=dict(body)).json()
+        return self._send_json("POST", path, body)
 
     def download(self, path: str, target: Path) -> None:
         """Writes the answer to a GET into a file, which is there whole or not at all."""
         partial = target.with_name(target.name + ".partial")
-        with self._sending(), self._http.stream("GET", path, timeout=None) as response:
-            if response.is_error:
-                response.read()
-                raise RefusedError(response)
+        with contextlib.closing(self._chunks(path)) as chunks:
+            first = next(chunks)
             with partial.open("wb") as file:
-                for chunk in response.iter_bytes():
+                file.write(first)
+                for chunk in chunks:
                     file.write(chunk)
         partial.replace(target)
 
     def upload(self, path: str, source: Path, media_type: str) -> Any:
         """The JSON answer to a POST of a file."""
         with source.open("rb") as file:
-            headers = {"Content-Type": media_type}
-            return self._answer("POST", path, content=file, headers=headers, timeout=None).json()
+            size = os.fstat(file.fileno()).st_size
+            headers = {"Content-Type": media_type, "Content-Length": str(size)}
+            return _document(self._answer("POST", path, body=file, headers=headers, timeout_s=None))
 
     def put(self, path: str, body: Mapping[str, Any]) -> Any:
         """The JSON answer to a PUT."""
-        return self._answer("PUT", path, json=dict(body)).json()
+        return self._send_json("PUT", path, body)
 
     def get_patiently(self, path: str) -> Any:
         """As get, but waits while the service is unreachable or says 503."""
@@ -119,32 +113,45 @@ class Client:
                     raise
                 time.sleep(0.5)
 
-    def close(self) -> None:
-        """Closes the connections."""
-        self._http.close()
+    def _chunks(self, path: str) -> Generator[bytes, None, None]:
+        """The pieces of an answer; at least one, and all of them or an error."""
+        with self._sending(), self._wire.opened("GET", path, timeout_s=None) as answer:
+            if answer.status != 200:  # noqa: PLR2004 - OK
+                url = self.url + path
+                raise RefusedError(Response(url=url, status=answer.status, body=answer.read()))
+            chunk = answer.read(CHUNK_BYTES)
+            yield chunk
+            while chunk:
+                chunk = answer.read(CHUNK_BYTES)
+                yield chunk
+            if answer.length:
+                raise UnreachableError(f"{self.url} broke off: {answer.length:,} bytes are missing")
 
-    def _answer(self, method: str, path: str, **options: Any) -> httpx.Response:
+    def _send_json(self, method: str, path: str, body: Mapping[str, Any]) -> Any:
+        headers = {"Content-Type": "application/json"}
+        sent = json.dumps(dict(body)).encode()
+        return _document(self._answer(method, path, body=sent, headers=headers))
+
+    def _answer(
+        self, method: str, path: str, *, timeout_s: float | None = TIMEOUT_S, **options: Any
+    ) -> Response:
         with self._sending():
-            response = self._http.request(method, path, **options)
+            response = self._wire.send(method, path, timeout_s=timeout_s, **options)
         if path == HEALTH:
             return response
-        if response.status_code == 503:  # noqa: PLR2004 - Service Unavailable
+        if response.status == 503:  # noqa: PLR2004 - Service Unavailable
             raise UnreachableError(_problem(response))
-        if response.status_code == 401:  # noqa: PLR2004 - Unauthorized
+        if response.status == 401:  # noqa: PLR2004 - Unauthorized
             raise CommandError(f"{_problem(response)}: set {KEY_VARIABLE} to a good one")
-        if response.is_error:
+        if response.failed:
             raise RefusedError(response, options.get("params"))
         return response
 
     @contextlib.contextmanager
     def _sending(self) -> Iterator[None]:
-        import httpx
-
         try:
             yield
-        except (httpx.InvalidURL, httpx.UnsupportedProtocol) as error:
-            raise CommandError(f"{self.url!r} is not a URL: {error}") from error
-        except httpx.TransportError as error:
+        except Failure as error:
             raise UnreachableError(
                 f"no BuildArena answers at {self.url} ({error}): start it with `buildarena up`, "
                 "or name another with --url or BUILDARENA_URL"
@@ -163,9 +170,9 @@ class RefusedError(CommandError):
         errors: Its field errors: ``field``, ``message``, ``line`` and ``choices`` of each.
     """
 
-    def __init__(self, response: httpx.Response, sent: Mapping[str, Any] | None = None) -> None:
+    def __init__(self, response: Response, sent: Mapping[str, Any] | None = None) -> None:
         super().__init__(_problem(response, sent or {}))
-        self.status = response.status_code
+        self.status = response.status
         self.errors: list[dict[str, Any]] = []
         with contextlib.suppress(ValueError, KeyError, TypeError):
             self.errors = list(response.json()["errors"])
@@ -175,17 +182,26 @@ class UnreachableError(CommandError):
     """The service does not answer now; it may later."""
 
 
+def _document(response: Response) -> Any:
+    try:
+        return response.json()
+    except ValueError as error:
+        raise CommandError(
+            f"{response.url} is not BuildArena: it does not answer in JSON"
+        ) from error
+
+
 def _given(params: Mapping[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in params.items() if value is not None}
 
 
-def _problem(response: httpx.Response, sent: Mapping[str, Any] = MappingProxyType({})) -> str:
+def _problem(response: Response, sent: Mapping[str, Any] = MappingProxyType({})) -> str:
     try:
         problem = response.json()
         errors = problem["errors"]
         detail = str(problem["detail"])
     except (ValueError, KeyError, TypeError):
-        return f"HTTP {response.status_code} from {response.url}"
+        return f"HTTP {response.status} from {response.url}"
     if not errors:
         return detail
     return "\n".join(_line(error, str(sent.get(error["field"], ""))) for error in errors)

@@ -9,22 +9,24 @@ QUOTED = re.compile(r"'([^']*)'")
 MAX_WORDS = 3
 LIKENESS = 0.55
 """Least similarity of difflib (0 to 1): finds "seeds" for "seed" and nothing for "xyz"."""
+SPREAD = 0.1
+"""How much less like the word than the nearest one the others may be."""
 
 
 def near_words(word: str, choices: Iterable[str]) -> list[str]:
     """The choices that are spelled most like a word, the nearest first; none when all are far."""
-    from difflib import get_close_matches
+    from difflib import SequenceMatcher
 
-    by_spelling: dict[str, str] = {}
+    matcher = SequenceMatcher(b=word.lower())
+    likeness = {}
     for choice in choices:
-        by_spelling.setdefault(choice.lower(), choice)
-    spelled = word.lower()
-    found = get_close_matches(spelled, by_spelling, n=MAX_WORDS, cutoff=LIKENESS)
-    if len(spelled) > 1:
+        matcher.set_seq1(choice.lower())
         # "expert" is far from "builtin/expert" by its letters, and near all the same.
-        parts = [known for known in by_spelling if spelled in re.split(r"[/:. _-]", known)]
-        found += [known for known in parts if known not in found]
-    return [by_spelling[known] for known in found[:MAX_WORDS] if by_spelling[known] != word]
+        part = len(word) > 1 and word.lower() in re.split(r"[/:. _-]", choice.lower())
+        likeness[choice] = 1.0 if part else matcher.ratio()
+    least = max(LIKENESS, max(likeness.values(), default=0.0) - SPREAD)
+    found = sorted(likeness, key=lambda choice: -likeness[choice])
+    return [choice for choice in found if choice != word and likeness[choice] >= least][:MAX_WORDS]
 
 
 def did_you_mean(word: str, choices: Iterable[str]) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import re
 from pathlib import Path
 from typing import Annotated, Any
@@ -73,8 +72,10 @@ def _chosen(
 
 
 def _fetched(client: Client, job_id: str, file: dict[str, Any], folder: Path) -> Path:
+    from hashlib import sha256
+
     body = client.get_bytes(at("jobs", job_id, "artifacts", file["name"]))
-    if hashlib.sha256(body).hexdigest() != file["hash"]:
+    if sha256(body).hexdigest() != file["hash"]:
         raise CommandError(f"{file['name']} of {job_id} arrived damaged: its hash is another")
     target = folder / file_name(file["name"], file["media_type"])
     partial = target.with_name(target.name + ".partial")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from contextlib import closing
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Any
@@ -62,13 +61,13 @@ def leaderboard(
         "since": None if since is None else f"{since.isoformat()}Z",
         "flagged": flagged or None,
     }
-    with closing(Client(url)) as client:
-        board = client.get("/v1/leaderboard", track=track, **asked)
-        if as_json:
-            print_json(board)
-            return
-        others = [] if track else [name for name in board["tracks"] if name != board["track"]]
-        boards = [board, *(client.get("/v1/leaderboard", track=name, **asked) for name in others)]
+    client = Client(url)
+    board = client.get("/v1/leaderboard", track=track, **asked)
+    if as_json:
+        print_json(board)
+        return
+    others = [] if track else [name for name in board["tracks"] if name != board["track"]]
+    boards = [board, *(client.get("/v1/leaderboard", track=name, **asked) for name in others)]
     filled = [board for board in boards if board["tasks"]]
     if not filled:
         say("No jobs have ended yet.")
@@ -108,10 +107,10 @@ def compare(
 
     Each is a model, or model@configuration; tests are made only where they share seeds.
     """
-    with closing(Client(url)) as client:
-        answer = client.get(
-            "/v1/leaderboard/compare", first=first, second=second, task=task, track=track
-        )
+    client = Client(url)
+    answer = client.get(
+        "/v1/leaderboard/compare", first=first, second=second, task=task, track=track
+    )
     if as_json:
         print_json(answer)
         return
@@ -158,16 +157,16 @@ def export(
     kind = FORMATS.get(out.suffix)
     if kind is None:
         raise CommandError(f"{out}: the name must end in {', '.join(FORMATS)}")
-    with closing(Client(url)) as client:
-        body = client.get_bytes(
-            "/v1/leaderboard/export",
-            format=kind,
-            task=task,
-            level=level,
-            model=model,
-            flagged=flagged or None,
-            track=track,
-        )
+    client = Client(url)
+    body = client.get_bytes(
+        "/v1/leaderboard/export",
+        format=kind,
+        task=task,
+        level=level,
+        model=model,
+        flagged=flagged or None,
+        track=track,
+    )
     try:
         out.write_bytes(body)
     except OSError as error:
@@ -191,17 +190,17 @@ def audit(
     """
     body = {"model": model, "sample": sample, "seed": seed, "tasks": task, "track": track}
     differences: list[dict[str, Any]] = []
-    with closing(Client(url)) as client:
-        accepted = client.post("/v1/leaderboard/verify", body)
-        for id_ in accepted["verifications"]:
-            path = at("verifications", id_)
+    client = Client(url)
+    accepted = client.post("/v1/leaderboard/verify", body)
+    for id_ in accepted["verifications"]:
+        path = at("verifications", id_)
+        check = client.get_patiently(path)
+        while check["state"] != "done":
+            time.sleep(0.3)
             check = client.get_patiently(path)
-            while check["state"] != "done":
-                time.sleep(0.3)
-                check = client.get_patiently(path)
-            if not check["report"]["ok"]:
-                wrong = [entry for entry in check["report"]["checks"] if not entry["ok"]]
-                differences.append({"job_id": check["job_id"], "checks": wrong})
+        if not check["report"]["ok"]:
+            wrong = [entry for entry in check["report"]["checks"] if not entry["ok"]]
+            differences.append({"job_id": check["job_id"], "checks": wrong})
     checked = len(accepted["verifications"])
     if as_json:
         print_json({"scored": accepted["scored"], "checked": checked, "differences": differences})

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -102,6 +101,8 @@ def replay(
     url: UrlOption = DEFAULT_URL,
 ) -> None:
     """Draw a job's trial as a film."""
+    import tempfile
+
     from buildarena_benchmark import parse_task
     from buildarena_simulation import Trajectory
 

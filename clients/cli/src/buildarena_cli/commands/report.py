@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
@@ -51,8 +50,8 @@ def report(
     from buildarena_cli.report.document import write_report
     from buildarena_cli.report.sections import sections
 
-    with closing(Client(url)) as client:
-        material = collect(client, [whole_id(client, "sweep", id_) for id_ in sweeps])
+    client = Client(url)
+    material = collect(client, [whole_id(client, "sweep", id_) for id_ in sweeps])
     try:
         write_report(sections(material), out)
     except OSError as error:

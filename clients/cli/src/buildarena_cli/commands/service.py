@@ -82,7 +82,6 @@ def demo(data: DataOption = None, port: PortOption = None) -> None:
         stack.require_running()
         say()
         overview(client.get("/v1/leaderboard"))
-        client.close()
     peak = stack.peak_memory_bytes / MEBIBYTE
     say()
     say(f"Peak memory of all processes: {peak:,.0f} MiB.")
