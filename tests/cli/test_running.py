@@ -23,7 +23,7 @@ from buildarena_cli.local.service import is_running, log_files, noted_run, runni
 @pytest.fixture
 def data(tmp_path: Path) -> Path:
     for folder in (tmp_path, *tmp_path.parents[:3]):
-        folder.chmod(folder.stat().st_mode | 0o011)  # Postgres runs as nobody under root
+        folder.chmod(folder.stat().st_mode | 0o055)  # Postgres runs as nobody under root
     return tmp_path / "data"
 
 
@@ -57,7 +57,7 @@ def test_the_life_of_a_service_in_the_background(data) -> None:
         assert table.startswith(f"ok: API http://127.0.0.1:{port}")
         again = piped("up", "--detach", *where)
         assert (again.returncode, "another BuildArena runs" in again.stderr) == (1, True)
-        assert "api" in piped("logs", "-n", "1", *where).stdout
+        assert "supervisor  " in piped("logs", "-n", "1", *where).stdout
         wrong = piped("logs", "apu", *where)
         assert (wrong.returncode, "did you mean api?" in wrong.stderr) == (1, True)
 

@@ -47,8 +47,8 @@ def report(
     """
     if out.suffix not in ENDINGS:
         raise CommandError(f"{out}: the name must end in {', '.join(ENDINGS)}")
-    from buildarena_cli.report.document import write_report
     from buildarena_cli.report.sections import sections
+    from buildarena_cli.report.writing import write_report
 
     client = Client(url)
     material = collect(client, [whole_id(client, "sweep", id_) for id_ in sweeps])
