@@ -1,4 +1,4 @@
-"""Where commands look when nothing else is said.
+"""Where commands look by default.
 
 The settings of all processes have the same defaults (a test compares them); loading those takes
 longer than most commands do.

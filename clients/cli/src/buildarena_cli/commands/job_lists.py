@@ -68,7 +68,7 @@ def list_jobs(
         print_json(page)
         return
     print_table(COLUMNS, [_row(job) for job in page["jobs"]])
-    tell_of_more(page)
+    show_cursor(page)
 
 
 def gathered(pages: Any, name: str, *, every: bool) -> dict[str, Any]:
@@ -79,7 +79,7 @@ def gathered(pages: Any, name: str, *, every: bool) -> dict[str, Any]:
     return {name: [entry for page in pages for entry in page[name]], "next_cursor": None}
 
 
-def tell_of_more(page: dict[str, Any]) -> None:
+def show_cursor(page: dict[str, Any]) -> None:
     """Names the next page, if there is one, where a pipe does not take it for a row."""
     if page["next_cursor"] is not None:
         warn(f"more: --after {page['next_cursor']}, or --all")

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from buildarena_cli.client import Client, RefusedError, at
-from buildarena_cli.commands.job_lists import gathered, tell_of_more
+from buildarena_cli.commands.job_lists import gathered, show_cursor
 from buildarena_cli.commands.keys import spent
 from buildarena_cli.errors import CommandError
 from buildarena_cli.ids import whole_id
@@ -132,7 +132,7 @@ def list_sweeps(
         print_json(page)
         return
     print_table(LIST, [_row(sweep) for sweep in page["sweeps"]])
-    tell_of_more(page)
+    show_cursor(page)
 
 
 @app.command("watch")
@@ -269,7 +269,7 @@ def _show(sweep: dict[str, Any], *, as_json: bool) -> None:
     say(f"{progress['requests']:,} model requests, ${progress['cost_usd']:.2f}")
     if sweep["budget"] is not None:
         say(f"budget: {spent(sweep['budget'])}")
-    _tell_of_limit(sweep)
+    _show_limit(sweep)
 
 
 def _show_estimate(estimate: dict[str, Any], *, as_json: bool) -> None:
@@ -294,7 +294,7 @@ def _show_estimate(estimate: dict[str, Any], *, as_json: bool) -> None:
     )
 
 
-def _tell_of_limit(sweep: dict[str, Any]) -> None:
+def _show_limit(sweep: dict[str, Any]) -> None:
     if sweep["state"] == "limit":
         say(
             f"The budget is used up: `buildarena sweep resume {sweep['id']} --max-cost-usd …` "
@@ -305,7 +305,7 @@ def _tell_of_limit(sweep: dict[str, Any]) -> None:
 def _watch(client: Client, sweep_id: str, *, as_json: bool) -> dict[str, Any]:
     if not as_json:
         watched = watch_sweep(client, sweep_id)
-        _tell_of_limit(watched)
+        _show_limit(watched)
         return watched
     while True:
         sweep: dict[str, Any] = client.get_patiently(f"/v1/sweeps/{sweep_id}")

@@ -179,8 +179,12 @@ def _ready(data: Path, process: subprocess.Popen[bytes], log_file: Path, written
     deadline = time.monotonic() + START_WITHIN_S
     while time.monotonic() < deadline:
         if process.poll() is not None:
-            said = log_file.read_bytes()[written:].decode(errors="replace").strip().splitlines()
-            raise CommandError(said[-1] if said else f"it ended at once (see {log_file})")
+            written_since = (
+                log_file.read_bytes()[written:].decode(errors="replace").strip().splitlines()
+            )
+            raise CommandError(
+                written_since[-1] if written_since else f"it ended at once (see {log_file})"
+            )
         run = noted_run(data)
         if run is not None and run.pid == process.pid and run.ready:
             return run

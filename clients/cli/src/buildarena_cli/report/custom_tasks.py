@@ -1,4 +1,4 @@
-"""The tasks of a report, and its section on those that are users' own."""
+"""The tasks of a report, and its section on the custom ones."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from buildarena_cli.terminal.output import in_words
 
 
 def read_tasks(client: Client, trials: Sequence[Trial]) -> dict[str, ReportTask]:
-    """The tasks by name: of a user's own the version that the report is about.
+    """The tasks by name: of a custom task the version that the report is about.
 
     That is the newest one, or one that was tried if the newest was not.
     """
@@ -35,8 +35,8 @@ def read_tasks(client: Client, trials: Sequence[Trial]) -> dict[str, ReportTask]
     return tasks
 
 
-def own_tasks(material: Material, board: Board) -> list[Block]:
-    """What the users' own tasks ask for, and which version of them the figures are of."""
+def custom_tasks(material: Material, board: Board) -> list[Block]:
+    """What the custom tasks ask for, and which version of them the figures are of."""
     rows = []
     for shown in board.tasks:
         task = material.tasks.get(shown.task)

@@ -16,13 +16,15 @@ from urllib.parse import quote
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from buildarena_cli.report.document import Block, Heading, Plot
+from buildarena_cli.report.document import Block, Grid, Heading, Plot
 from buildarena_cli.report.escaping import markdown_cell, markdown_line, typst_string
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 DPI: Final = 130
+LONG_TEXT: Final = 40
+"""Letters of a cell that takes several lines of a page."""
 DIGEST_SALT: Final = "buildarena"
 """Makes the ids inside equal SVG pictures equal."""
 
@@ -98,6 +100,7 @@ def _write_pdf(blocks: Sequence[Block], out: Path) -> None:
     from matplotlib import get_data_path
 
     environment = _environment(typst_string)
+    environment.filters["long_columns"] = _long_columns
     with tempfile.TemporaryDirectory() as folder:
 
         def address(plot: Plot) -> str:
@@ -112,6 +115,14 @@ def _write_pdf(blocks: Sequence[Block], out: Path) -> None:
         # Letters come with Matplotlib; those that it lacks, from the system if that has them.
         fonts = typst.Fonts(font_paths=[Path(get_data_path(), "fonts", "ttf")])
         out.write_bytes(typst.compile(main, root=Path(folder), font_paths=fonts, format="pdf"))
+
+
+def _long_columns(grid: Grid) -> list[bool]:
+    """Which columns hold texts so long that their lines may end within."""
+    return [
+        any(len(row[i]) > LONG_TEXT and " " in row[i] for row in grid.rows)
+        for i in range(len(grid.columns))
+    ]
 
 
 def _sections(blocks: Sequence[Block]) -> list[list[Block]]:

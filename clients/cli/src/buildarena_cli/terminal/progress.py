@@ -48,15 +48,23 @@ def _watch_bars(client: Client, sweep_id: str) -> dict[str, Any]:
         TimeElapsedColumn,
         TimeRemainingColumn,
     )
+    from rich.table import Column
 
+    whole = Column(no_wrap=True, min_width=7)
     bars = Progress(
-        TextColumn("{task.description:<24}", markup=False),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TextColumn("left"),
-        TimeRemainingColumn(),
-        TextColumn("{task.fields[note]}", markup=False),
+        TextColumn("{task.description}", markup=False, table_column=Column(min_width=14)),
+        BarColumn(bar_width=12, table_column=Column(min_width=12)),
+        MofNCompleteColumn(table_column=whole),
+        TimeElapsedColumn(table_column=whole.copy()),
+        TextColumn("left", table_column=Column(min_width=4)),
+        TimeRemainingColumn(table_column=whole.copy()),
+        # What a narrow terminal has no room for is cut here.
+        TextColumn(
+            "{task.fields[note]}",
+            markup=False,
+            table_column=Column(no_wrap=True, overflow="ellipsis", ratio=1),
+        ),
+        expand=True,
     )
     with bars:
         built = bars.add_task("machines built", total=None, note="")
