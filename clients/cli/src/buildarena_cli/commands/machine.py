@@ -18,6 +18,7 @@ from buildarena_cli.machines import (
     read_machine,
     shown_errors,
 )
+from buildarena_cli.near import did_you_mean
 from buildarena_cli.terminal.output import columns, emphasised, print_json, print_table, warn
 
 if TYPE_CHECKING:
@@ -53,6 +54,11 @@ def simulate_command(  # noqa: PLR0917 - the command line passes options by name
     from buildarena_simulation import ENGINES
 
     with shown_errors():
+        if engine is not None and engine not in ENGINES:
+            raise CommandError(
+                f"no engine {engine!r}; there are {', '.join(ENGINES)}"
+                f"{did_you_mean(engine, ENGINES)}"
+            )
         chosen, machine = chosen_task(task), read_machine(file)
         rollout = _simulated(machine, chosen, engine or ENGINES[0], seed)
         if rollout is None:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from buildarena_benchmark.leaderboard import Board, Trial
-from buildarena_cli.client import Client, RefusedError
+from buildarena_cli.client import Client, RefusedError, at
 from buildarena_cli.report.document import Block, Grid, Heading, Paragraph
 from buildarena_cli.report.material import Material, ReportTask
 from buildarena_cli.terminal.output import in_words
@@ -29,7 +29,7 @@ def read_tasks(client: Client, trials: Sequence[Trial]) -> dict[str, ReportTask]
             version = _reported(tried[name], entry)
             # A version that is gone is reported as the newest one.
             with contextlib.suppress(RefusedError):
-                entry = client.get(f"/v1/tasks/{name}", version=version)
+                entry = client.get(at("tasks", name), version=version)
         if entry is not None:
             tasks[name] = _task(entry)
     return tasks
