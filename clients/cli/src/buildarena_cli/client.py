@@ -48,10 +48,12 @@ class Client:
     def __init__(self, url: str, key: str | None = None) -> None:
         self.url = url.rstrip("/")
         key = key or os.environ.get(KEY_VARIABLE)
+        if key and not (key.isascii() and key.isprintable()):
+            raise CommandError(f"{KEY_VARIABLE} is not a key: keys are printable ASCII")
         try:
             self._wire = Wire(self.url, {"Authorization": f"Bearer {key}"} if key else {})
         except ValueError as error:
-            raise CommandError(f"{self.url!r} with this {KEY_VARIABLE}: {error}") from error
+            raise CommandError(f"{self.url!r} is not the URL of an API: {error}") from error
 
     def get(self, path: str, **params: Any) -> Any:
         """The JSON answer to a GET; parameters that are None are left out."""

@@ -308,7 +308,7 @@ def _watch(client: Client, sweep_id: str, *, as_json: bool) -> dict[str, Any]:
         _show_limit(watched)
         return watched
     while True:
-        sweep: dict[str, Any] = client.get_patiently(f"/v1/sweeps/{sweep_id}")
+        sweep: dict[str, Any] = client.get_patiently(at("sweeps", sweep_id))
         if ended(sweep):
             print_json(sweep)
             return sweep
