@@ -126,10 +126,11 @@ def _long_columns(grid: Grid) -> list[bool]:
 
 
 def _sections(blocks: Sequence[Block]) -> list[list[Block]]:
-    """The blocks below each heading of level 1 or 2, the heading included."""
+    """The blocks in groups that lie on pages of one direction; only tables need broad ones."""
     found: list[list[Block]] = []
     for block in blocks:
-        if isinstance(block, Heading) or not found:
+        before = type(found[-1][-1]) if found else None
+        if isinstance(block, Heading) or not found or {before, type(block)} == {Plot, Grid}:
             found.append([])
         found[-1].append(block)
     return found
