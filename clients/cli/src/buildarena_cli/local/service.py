@@ -155,7 +155,8 @@ def stop(data: Path) -> bool:
         pass
     except PermissionError as error:
         raise CommandError(f"process {run.pid} belongs to somebody else") from error
-    while is_running(data):
+    # The lock goes a moment before its process does.
+    while is_running(data) or _lives(run.pid):
         if time.monotonic() > deadline:
             raise CommandError(
                 f"process {run.pid} has not ended within {STOP_WITHIN_S:.0f} s: "
@@ -190,6 +191,14 @@ def _ready(data: Path, process: subprocess.Popen[bytes], log_file: Path, written
             return run
         time.sleep(POLL_S)
     raise CommandError(f"not ready within {START_WITHIN_S:.0f} s (see {log_file})")
+
+
+def _lives(pid: int) -> bool:
+    """Whether a process still runs; one that nobody waited for is over."""
+    try:
+        return bool(psutil.Process(pid).status() != psutil.STATUS_ZOMBIE)
+    except psutil.NoSuchProcess:
+        return False
 
 
 def _facts(name: str, pid: int) -> ProcessFacts:
