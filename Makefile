@@ -28,13 +28,18 @@ up: $(STAMP) ## The whole service on this machine until Ctrl-C
 	@$(BIN)/buildarena up
 
 test: check ## Lints, types, import rules and all tests
+	@echo "== 5/5 tests, $(WORKERS) at once (left out: make chaos, peer and bench-*)"
 	@$(BIN)/pytest -n $(WORKERS) --dist loadgroup
 
 check: $(STAMP) ## Lints, types and import rules alone
+	@echo "== 1/5 format"
 	@$(BIN)/ruff format --check --quiet $(CODE)
+	@echo "== 2/5 lint"
 	@$(BIN)/ruff check --quiet $(CODE)
+	@echo "== 3/5 types"
 	@$(BIN)/mypy --no-error-summary $(addsuffix /src,$(PACKAGES)) migrations/env.py
-	@$(BIN)/lint-imports --no-cache | tail -n 3
+	@echo "== 4/5 import rules"
+	@set -o pipefail; $(BIN)/lint-imports --no-cache | tail -n 3
 
 clean: ## Removes the environment, caches and local data
 	rm -rf $(VENV) $(VENV)-uv .buildarena .mypy_cache .ruff_cache .pytest_cache .hypothesis

@@ -65,8 +65,9 @@ def _look_with_the_command_line(url: str, sweep_id: str, job_id: str) -> None:
     verified = run_cli(url, "job", "verify", job_id)
     assert verified.returncode == 0, verified.stdout
     assert "Every figure is the same." in verified.stdout
-    unknown = run_cli(url, "job", "show", "job_x")
-    assert (unknown.returncode, unknown.stderr.strip()) == (1, "there is no job 'job_x'")
+    nobodys = "job_00000000000000000000"
+    unknown = run_cli(url, "job", "show", nobodys)
+    assert (unknown.returncode, unknown.stderr.strip()) == (1, f"there is no job {nobodys!r}")
 
 
 def test_the_expert_succeeds_and_the_other_baselines_do_not(undisturbed) -> None:

@@ -3,22 +3,38 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import time
-import weakref
-from collections.abc import Mapping
+from collections.abc import Generator, Iterator, Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
+from urllib.parse import quote
 
-import httpx
-
+from buildarena_cli.defaults import KEY_VARIABLE
 from buildarena_cli.errors import CommandError
+from buildarena_cli.near import QUOTED, did_you_mean, near_field
+from buildarena_cli.wire import Failure, Response, Wire
 
 TIMEOUT_S = 60.0
-KEY_VARIABLE = "BUILDARENA_KEY"
-"""The environment variable of the API key: on a command line, others could read it."""
 PATIENCE_S = 60.0
 """How long a watching command puts up with a service that is being restarted."""
+HEALTH = "/v1/health"
+CHUNK_BYTES = 1 << 20
+
+
+def at(*parts: str) -> str:
+    """The path of something in the API; its parts can't reach another route.
+
+    Raises:
+        CommandError: A part is not a name.
+    """
+    for part in parts:
+        # A server takes %2F for a slash.
+        if part in {"", ".", ".."} or "/" in part:
+            raise CommandError(f"{part!r} is not a name")
+    return "/v1/" + "/".join(quote(part, safe="") for part in parts)
 
 
 class Client:
@@ -32,50 +48,61 @@ class Client:
     def __init__(self, url: str, key: str | None = None) -> None:
         self.url = url.rstrip("/")
         key = key or os.environ.get(KEY_VARIABLE)
-        self._http = httpx.Client(
-            base_url=self.url,
-            timeout=TIMEOUT_S,
-            transport=httpx.HTTPTransport(retries=2),
-            headers={"Authorization": f"Bearer {key}"} if key else None,
-        )
-        # Commands let go of their client when they end.
-        weakref.finalize(self, self._http.close)
+        if key and not (key.isascii() and key.isprintable()):
+            raise CommandError(f"{KEY_VARIABLE} is not a key: keys are printable ASCII")
+        try:
+            self._wire = Wire(self.url, {"Authorization": f"Bearer {key}"} if key else {})
+        except ValueError as error:
+            raise CommandError(f"{self.url!r} is not the URL of an API: {error}") from error
 
     def get(self, path: str, **params: Any) -> Any:
         """The JSON answer to a GET; parameters that are None are left out."""
-        given = {name: value for name, value in params.items() if value is not None}
-        return self._answer("GET", path, params=given).json()
+        return _document(self._answer("GET", path, params=_given(params)))
 
     def get_bytes(self, path: str, **params: Any) -> bytes:
         """The bytes of a GET; parameters that are None are left out."""
-        given = {name: value for name, value in params.items() if value is not None}
-        return self._answer("GET", path, params=given or None).content
+        return self._answer("GET", path, params=_given(params)).body
+
+    def pages(self, path: str, *, cursor: str | None = None, **params: Any) -> Iterator[Any]:
+        """The answer to a GET of a list, and those of the pages behind it.
+
+        Args:
+            path: The list's.
+            cursor: Where to begin; the first page by default.
+            params: Further parameters; those that are None are left out.
+        """
+        while True:
+            page = self.get(path, cursor=cursor, **params)
+            yield page
+            cursor = page["next_cursor"]
+            if cursor is None:
+                return
 
     def post(self, path: str, body: Mapping[str, Any]) -> Any:
         """The JSON answer to a POST."""
-        return self._answer("POST", path, json=dict(body)).json()
+        return self._send_json("POST", path, body)
 
     def download(self, path: str, target: Path) -> None:
         """Writes the answer to a GET into a file, which is there whole or not at all."""
         partial = target.with_name(target.name + ".partial")
-        with self._http.stream("GET", path, timeout=None) as response:
-            if response.is_error:
-                response.read()
-                raise CommandError(_problem(response))
+        with contextlib.closing(self._chunks(path)) as chunks:
+            first = next(chunks)
             with partial.open("wb") as file:
-                for chunk in response.iter_bytes():
+                file.write(first)
+                for chunk in chunks:
                     file.write(chunk)
         partial.replace(target)
 
     def upload(self, path: str, source: Path, media_type: str) -> Any:
         """The JSON answer to a POST of a file."""
         with source.open("rb") as file:
-            headers = {"Content-Type": media_type}
-            return self._answer("POST", path, content=file, headers=headers, timeout=None).json()
+            size = os.fstat(file.fileno()).st_size
+            headers = {"Content-Type": media_type, "Content-Length": str(size)}
+            return _document(self._answer("POST", path, body=file, headers=headers, timeout_s=None))
 
     def put(self, path: str, body: Mapping[str, Any]) -> Any:
         """The JSON answer to a PUT."""
-        return self._answer("PUT", path, json=dict(body)).json()
+        return self._send_json("PUT", path, body)
 
     def get_patiently(self, path: str) -> Any:
         """As get, but waits while the service is unreachable or says 503."""
@@ -88,40 +115,66 @@ class Client:
                     raise
                 time.sleep(0.5)
 
-    def close(self) -> None:
-        """Closes the connections."""
-        self._http.close()
+    def _chunks(self, path: str) -> Generator[bytes, None, None]:
+        """The pieces of an answer; at least one, and all of them or an error."""
+        with self._sending(), self._wire.opened("GET", path, timeout_s=None) as answer:
+            if answer.status != 200:  # noqa: PLR2004 - OK
+                url = self.url + path
+                raise RefusedError(Response(url=url, status=answer.status, body=answer.read()))
+            chunk = answer.read(CHUNK_BYTES)
+            yield chunk
+            while chunk:
+                chunk = answer.read(CHUNK_BYTES)
+                yield chunk
+            if answer.length:
+                raise UnreachableError(f"{self.url} broke off: {answer.length:,} bytes are missing")
 
-    def _answer(self, method: str, path: str, **options: Any) -> httpx.Response:
+    def _send_json(self, method: str, path: str, body: Mapping[str, Any]) -> Any:
+        headers = {"Content-Type": "application/json"}
+        sent = json.dumps(dict(body)).encode()
+        return _document(self._answer(method, path, body=sent, headers=headers))
+
+    def _answer(
+        self, method: str, path: str, *, timeout_s: float | None = TIMEOUT_S, **options: Any
+    ) -> Response:
+        with self._sending():
+            response = self._wire.send(method, path, timeout_s=timeout_s, **options)
+        if path == HEALTH:
+            return response
+        if response.status == 503:  # noqa: PLR2004 - Service Unavailable
+            raise UnreachableError(_problem(response))
+        if response.status == 401:  # noqa: PLR2004 - Unauthorized
+            raise CommandError(f"{_problem(response)}: set {KEY_VARIABLE} to a good one")
+        if response.failed:
+            raise RefusedError(response, options.get("params"))
+        return response
+
+    @contextlib.contextmanager
+    def _sending(self) -> Iterator[None]:
         try:
-            response = self._http.request(method, path, **options)
-        except httpx.InvalidURL as error:
-            raise CommandError(f"{self.url!r} is no URL: {error}") from error
-        except httpx.TransportError as error:
+            yield
+        except Failure as error:
             raise UnreachableError(
                 f"no BuildArena answers at {self.url} ({error}): start it with `buildarena up`, "
                 "or name another with --url or BUILDARENA_URL"
             ) from error
-        if response.status_code == httpx.codes.SERVICE_UNAVAILABLE and path != "/v1/health":
-            raise UnreachableError(_problem(response))
-        if response.status_code == httpx.codes.UNAUTHORIZED:
-            raise CommandError(f"{_problem(response)}: set {KEY_VARIABLE} to a good one")
-        if response.is_error and path != "/v1/health":
-            raise RefusedError(response)
-        return response
 
 
 class RefusedError(CommandError):
     """The service refused a request.
+
+    Args:
+        response: What it answered.
+        sent: The request's parameters: what near words are near to.
 
     Attributes:
         status: The HTTP status.
         errors: Its field errors: ``field``, ``message``, ``line`` and ``choices`` of each.
     """
 
-    def __init__(self, response: httpx.Response) -> None:
-        super().__init__(_problem(response))
-        self.status = response.status_code
+    def __init__(self, response: Response, sent: Mapping[str, Any] | None = None) -> None:
+        super().__init__(_problem(response, sent or {}))
+        self.status = response.status
         self.errors: list[dict[str, Any]] = []
         with contextlib.suppress(ValueError, KeyError, TypeError):
             self.errors = list(response.json()["errors"])
@@ -131,19 +184,35 @@ class UnreachableError(CommandError):
     """The service does not answer now; it may later."""
 
 
-def _problem(response: httpx.Response) -> str:
+def _document(response: Response) -> Any:
+    try:
+        return response.json()
+    except ValueError as error:
+        raise CommandError(
+            f"{response.url} is not BuildArena: it does not answer in JSON"
+        ) from error
+
+
+def _given(params: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in params.items() if value is not None}
+
+
+def _problem(response: Response, sent: Mapping[str, Any] = MappingProxyType({})) -> str:
     try:
         problem = response.json()
         errors = problem["errors"]
         detail = str(problem["detail"])
     except (ValueError, KeyError, TypeError):
-        return f"HTTP {response.status_code} from {response.url}"
+        return f"HTTP {response.status} from {response.url}"
     if not errors:
         return detail
-    lines = []
-    for error in errors:
-        line = f"{error['field']}: {error['message']}"
-        if error["choices"]:
-            line += f"; choose from {', '.join(error['choices'])}"
-        lines.append(line)
-    return "\n".join(lines)
+    return "\n".join(_line(error, str(sent.get(error["field"], ""))) for error in errors)
+
+
+def _line(error: Mapping[str, Any], given: str) -> str:
+    line = f"{error['field']}: {error['message']}"
+    if error["choices"]:
+        line += f"; choose from {', '.join(error['choices'])}"
+        return line + near_field(error["field"], error["message"], error["choices"])
+    # What pydantic says of a word that is none of a few.
+    return line + did_you_mean(given, QUOTED.findall(error["message"]))

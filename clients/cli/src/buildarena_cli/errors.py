@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-DONE, FAILED, PARTIAL = 0, 1, 3
-"""Exit codes: all done; an error; done, but some jobs errored or were cancelled. Wrong words: 2."""
+DONE, FAILED, USAGE, PARTIAL = 0, 1, 2, 3
+"""Exit codes: all done; an error; a usage error; done, but some jobs errored or were cancelled."""
 
 
 class CommandError(Exception):

@@ -15,7 +15,7 @@ from mcp import types
 from mcp.server import Server, ServerRequestContext
 from mcp.server.stdio import stdio_server
 
-from buildarena_cli.client import Client
+from buildarena_cli.client import Client, at
 from buildarena_cli.errors import CommandError
 from buildarena_geometry import tool_definitions
 
@@ -131,7 +131,7 @@ def _object(properties: Mapping[str, Any], required: list[str]) -> dict[str, Any
 def _act(client: Client, tool: str, given: dict[str, Any]) -> types.CallToolResult:
     session, machine = given.pop("session"), given.pop("machine", "main")
     body = {"tool": tool, "arguments": given, "machine": machine}
-    done = client.post(f"/v1/sessions/{session}/calls", body)
+    done = client.post(at("sessions", str(session), "calls"), body)
     return _result(done["feedback"], failed=not done["ok"])
 
 
@@ -143,10 +143,10 @@ def _manage(client: Client, tool: str, given: Arguments) -> types.CallToolResult
         opened = client.post("/v1/sessions", given)
         return _result(f"session: {opened['id']}\n\n{opened['statement']}")
     if tool == "submit":
-        job = client.post(f"/v1/sessions/{given['session']}/submit", {})
+        job = client.post(at("sessions", str(given["session"]), "submit"), {})
         return _result(_ended(job))
     if tool == "get_result":
-        return _result(_ended(client.get(f"/v1/jobs/{given['session']}")))
+        return _result(_ended(client.get(at("jobs", str(given["session"])))))
     return _result(f"there is no tool {tool!r}", failed=True)
 
 

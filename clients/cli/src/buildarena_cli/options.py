@@ -2,16 +2,26 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from buildarena_pipeline.runtime.settings import DEFAULT_PORT
+from buildarena_cli.defaults import DEFAULT_URL
+from buildarena_cli.terminal.completion import (
+    complete_job,
+    complete_key,
+    complete_model,
+    complete_sweep,
+    complete_task,
+)
 
-DEFAULT_URL = f"http://127.0.0.1:{DEFAULT_PORT}"
+__all__ = ["DEFAULT_URL"]
 
 UrlOption = Annotated[str, typer.Option("--url", envvar="BUILDARENA_URL", help="Where the API is.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON for programs.")]
+DataOption = Annotated[Path | None, typer.Option("--data", help="Folder of databases and logs.")]
+PortOption = Annotated[int | None, typer.Option("--port", help="Port of the API.")]
 MaxCostOption = Annotated[
     float | None, typer.Option("--max-cost-usd", help="Budget in US dollars.", min=0)
 ]
@@ -21,6 +31,34 @@ MaxTokensOption = Annotated[
 MaxRequestsOption = Annotated[
     int | None, typer.Option("--max-requests", help="Budget in model requests.", min=1)
 ]
+
+JobId = Annotated[
+    str,
+    typer.Argument(help="Id of the job, or how it begins.", autocompletion=complete_job),
+]
+SweepId = Annotated[
+    str,
+    typer.Argument(help="Id of the sweep, or how it begins.", autocompletion=complete_sweep),
+]
+KeyId = Annotated[
+    str,
+    typer.Argument(help="Id of the key, or how it begins.", autocompletion=complete_key),
+]
+TaskName = Annotated[str, typer.Argument(help="Task name.", autocompletion=complete_task)]
+ModelName = Annotated[str, typer.Argument(help="Model name.", autocompletion=complete_model)]
+TasksOption = Annotated[
+    list[str] | None,
+    typer.Option("--task", help="Only these tasks.", autocompletion=complete_task),
+]
+ModelsOption = Annotated[
+    list[str] | None,
+    typer.Option("--model", help="Only these models.", autocompletion=complete_model),
+]
+TrackOption = Annotated[str | None, typer.Option("--track", help="Track; default: the first.")]
+AfterOption = Annotated[
+    str | None, typer.Option("--after", help="Where the page before ended: its cursor.")
+]
+AllOption = Annotated[bool, typer.Option("--all", help="Every page.")]
 
 
 def budget_of(

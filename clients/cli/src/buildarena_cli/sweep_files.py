@@ -1,4 +1,4 @@
-"""Sweep files: read with care, overridden by flags, and every mistake told with line and field."""
+"""Sweep files: overridden by flags; every mistake is shown with its line and field."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from buildarena_benchmark import SourceError, ValidationIssue
 from buildarena_benchmark.tasks.sources import Source, path_of, read_source
 from buildarena_cli.client import RefusedError
 from buildarena_cli.errors import CommandError
+from buildarena_cli.near import near_field
 from buildarena_pipeline.catalog.specs import SweepSpec
 
 MAX_BYTES: Final = 2 * 1024 * 1024
@@ -70,17 +71,18 @@ class SpecFile:
 
     def _line(self, issue: ValidationIssue) -> str:
         top = next(iter(path_of(issue.path)), "")
+        near = near_field(issue.path, issue.message, issue.choices)
         if top not in self.overridden:
-            return issue.describe(self.source.origin)
+            return issue.describe(self.source.origin) + near
         given = ValidationIssue(path=issue.path, message=issue.message, choices=issue.choices)
-        return given.describe(FLAGS[str(top)])
+        return given.describe(FLAGS[str(top)]) + near
 
 
 def read_fields(file: Path) -> SpecFile:
     """The fields in a YAML file.
 
     Raises:
-        CommandError: It can't be read, or holds something else than a mapping.
+        CommandError: It can't be read, or holds something other than a mapping.
     """
     try:
         text = file.read_text(encoding="utf-8")
@@ -88,7 +90,7 @@ def read_fields(file: Path) -> SpecFile:
     except OSError as error:
         raise CommandError(f"{file}: {error.strerror}") from error
     except UnicodeDecodeError as error:
-        raise CommandError(f"{file}: no UTF-8: {error.reason}") from error
+        raise CommandError(f"{file}: not UTF-8: {error.reason}") from error
     except SourceError as error:
         raise CommandError(str(error)) from error
     if not isinstance(source.content, dict):
@@ -104,7 +106,7 @@ def read_sweep(file: Path, flags: Mapping[str, Any]) -> SpecFile:
         flags: Values by field; None for flags that were not given.
 
     Raises:
-        CommandError: The file, or what the flags make of it, is no sweep.
+        CommandError: The file, or what the flags make of it, is not a sweep.
     """
     given = {name: value for name, value in flags.items() if value is not None}
     sweep = read_fields(file).with_words(given)

@@ -7,6 +7,8 @@ import json
 import secrets
 from typing import Any
 
+from sqlalchemy import ColumnElement, and_
+
 
 def canonical_json(value: Any) -> str:
     """One spelling per value: sorted keys, no spaces; equal values give equal texts."""
@@ -21,3 +23,15 @@ def content_hash(value: Any) -> str:
 def new_id(prefix: str) -> str:
     """A new identifier, ``prefix_`` and 80 random bits: short to read, never met twice."""
     return f"{prefix}_{secrets.token_hex(10)}"
+
+
+def begins_with(column: ColumnElement[str], prefix: str) -> ColumnElement[bool]:
+    """The condition that an id begins with a prefix: a range, which the key's index serves.
+
+    Ids go on in hexadecimal digits, which every collation sorts before "g".
+
+    Args:
+        column: The ids.
+        prefix: ``kind_`` and some hexadecimal digits.
+    """
+    return and_(column >= prefix, column < prefix + "g", column.startswith(prefix, autoescape=True))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import Depends, Request
+from fastapi import Depends, Query, Request
 
 from buildarena_pipeline.agents.sessions import ExternalSessions
 from buildarena_pipeline.catalog.models import ModelRegistry
@@ -38,3 +38,9 @@ def _external(request: Request) -> ExternalSessions:
 
 ExternalDep = Annotated[ExternalSessions, Depends(_external)]
 SubmissionsDep = Annotated[Submissions, Depends(_submissions)]
+IdPrefix = Annotated[
+    str | None,
+    Query(
+        pattern=r"^[a-z]+_[0-9a-f]*$", max_length=40, description="Only ids that begin like this"
+    ),
+]

@@ -106,6 +106,15 @@ class JobDetail(JobView):
     artifacts: dict[str, str] = Field(description="SHA-256 of each artifact by name")
 
 
+class JobFileView(_Answer):
+    """An artifact of a job."""
+
+    name: str = Field(examples=["trajectory-0"])
+    media_type: str = Field(examples=["application/vnd.apache.parquet"])
+    size: int = Field(description="Bytes")
+    hash: str = Field(description="SHA-256 of the bytes")
+
+
 class JobPage(_Answer):
     """Some jobs, newest first."""
 

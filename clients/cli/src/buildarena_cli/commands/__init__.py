@@ -1,1 +1,48 @@
-"""The commands, one module for each group."""
+"""The commands, a module for each group, and the table by which they are found."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """Where a command is.
+
+    Attributes:
+        module: The module of this package that has it.
+        attribute: The function, or the group, in that module.
+        help: The first sentence of its help; a test compares them.
+    """
+
+    module: str
+    attribute: str
+    help: str
+
+
+COMMANDS: Final[Mapping[str, Entry]] = {
+    "demo": Entry(
+        "service", "demo", "Start everything, run one small sweep, show who builds best, and stop."
+    ),
+    "up": Entry("service", "up", "Start the whole service on this machine."),
+    "down": Entry("running", "down", "Stop the service that runs on the data folder."),
+    "status": Entry("running", "status", "Show what of the service runs on the data folder."),
+    "logs": Entry("running", "logs", "Print the logs of the service's processes."),
+    "doctor": Entry("running", "doctor", "Show what is wrong with the service and what to do."),
+    "sweep": Entry("sweeps", "app", "Submit and watch sweeps."),
+    "job": Entry("jobs", "app", "Submit and look at jobs."),
+    "leaderboard": Entry("leaderboard", "leaderboard", "Show who builds best on each track."),
+    "compare": Entry("leaderboard", "compare", "Show whether one model is better than another."),
+    "report": Entry("report", "report", "Write a report of sweeps: tables and plots."),
+    "export": Entry("leaderboard", "export", "Write the leaderboard to a file."),
+    "audit": Entry("leaderboard", "audit", "Replay and simulate a model's results again."),
+    "task": Entry("tasks", "app", "Look at tasks, and add your own."),
+    "model": Entry("models", "app", "Look at models."),
+    "machine": Entry("machine", "app", "Simulate and draw machines on this computer."),
+    "key": Entry("keys", "app", "Make, list and revoke API keys."),
+    "mcp": Entry("mcp", "mcp", "Let agents that speak the Model Context Protocol build."),
+    "worker": Entry("worker", "app", "Run workers by themselves."),
+    "migrate": Entry("worker", "migrate", "Bring the database to this program's schema."),
+}

@@ -5,26 +5,29 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 import typer
-from rich.table import Table
 
-from buildarena_cli.client import Client
+from buildarena_cli.client import Client, at
+from buildarena_cli.ids import whole_id
+from buildarena_cli.lazy import new_group
 from buildarena_cli.options import (
     DEFAULT_URL,
     JsonOption,
+    KeyId,
     MaxCostOption,
     MaxRequestsOption,
     MaxTokensOption,
     UrlOption,
     budget_of,
 )
-from buildarena_cli.output import console, number, print_json
+from buildarena_cli.terminal.output import columns, number, print_json, print_table, say
 
-app = typer.Typer(
-    help="Make, list and revoke API keys. Needs a key with the scope admin in BUILDARENA_KEY.",
-    no_args_is_help=True,
+app = new_group(
+    "Make, list and revoke API keys. Needs a key with the scope admin in BUILDARENA_KEY."
 )
-
-KeyId = Annotated[str, typer.Argument(help="Id of the key.")]
+COLUMNS = columns(
+    *("key", "name", "scopes", "used", "state", "spent"),
+    leaving=("used", "scopes", "spent", "state", "name"),
+)
 
 
 @app.command("create")
@@ -34,7 +37,7 @@ def create_key(
     scope: Annotated[
         list[str], typer.Option(help="read, submit or admin; each includes those before it.")
     ] = ["submit"],  # noqa: B006 - typer only reads it
-    days: Annotated[int | None, typer.Option(help="How long it is good; for ever without.")] = None,
+    days: Annotated[int | None, typer.Option(help="How long it is good; forever without.")] = None,
     max_cost_usd: MaxCostOption = None,
     max_tokens: MaxTokensOption = None,
     max_requests: MaxRequestsOption = None,
@@ -48,8 +51,8 @@ def create_key(
     if as_json:
         print_json(made)
         return
-    console.print(f"{made['id']}  {made['name']}  {', '.join(made['scopes'])}")
-    console.print(f"export BUILDARENA_KEY={made['secret']}", soft_wrap=True)
+    say(f"{made['id']}  {made['name']}  {', '.join(made['scopes'])}")
+    say(f"export BUILDARENA_KEY={made['secret']}")
 
 
 @app.command("list")
@@ -59,33 +62,18 @@ def list_keys(*, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) -> N
     if as_json:
         print_json(found)
         return
-    table = Table()
-    for column in ("key", "name", "scopes", "used", "state", "spent"):
-        table.add_column(column, overflow="fold")
-    for key in found:
-        used = key["used_at"]
-        state = "revoked" if key["revoked_at"] else "good"
-        if key["expires_at"] and not key["revoked_at"]:
-            state = f"until {key['expires_at'][:10]}"
-        table.add_row(
-            key["id"],
-            key["name"],
-            ", ".join(key["scopes"]),
-            "-" if used is None else used[:16].replace("T", " "),
-            state,
-            spent(key["budget"]),
-        )
-    console.print(table)
+    print_table(COLUMNS, [_row(key) for key in found])
 
 
 @app.command("revoke")
 def revoke_key(key_id: KeyId, *, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) -> None:
     """End a key at once; what was submitted with it goes on."""
-    key = Client(url).post(f"/v1/keys/{key_id}/revoke", {})
+    client = Client(url)
+    key = client.post(at("keys", whole_id(client, "key", key_id), "revoke"), {})
     if as_json:
         print_json(key)
     else:
-        console.print(f"{key['id']} ({key['name']}) is revoked")
+        say(f"{key['id']} ({key['name']}) is revoked")
 
 
 @app.command("budget")
@@ -100,11 +88,12 @@ def set_budget(
 ) -> None:
     """Set what all jobs of a key may spend in all; what is not named has no limit."""
     budget = budget_of(max_cost_usd, max_tokens, max_requests) or {}
-    key = Client(url).put(f"/v1/keys/{key_id}/budget", budget)
+    client = Client(url)
+    key = client.put(at("keys", whole_id(client, "key", key_id), "budget"), budget)
     if as_json:
         print_json(key)
     else:
-        console.print(f"{key['id']} ({key['name']}): {spent(key['budget'])}")
+        say(f"{key['id']} ({key['name']}): {spent(key['budget'])}")
 
 
 def spent(budget: dict[str, Any] | None) -> str:
@@ -121,3 +110,18 @@ def spent(budget: dict[str, Any] | None) -> str:
         if most is not None:
             parts.append(f"{budget[f'spent_{name}']:,} of {most:,} {name}")
     return ", ".join(parts) or "no limit"
+
+
+def _row(key: dict[str, Any]) -> list[str]:
+    used = key["used_at"]
+    state = "revoked" if key["revoked_at"] else "good"
+    if key["expires_at"] and not key["revoked_at"]:
+        state = f"until {key['expires_at'][:10]}"
+    return [
+        key["id"],
+        key["name"],
+        ", ".join(key["scopes"]),
+        "" if used is None else used[:16].replace("T", " "),
+        state,
+        spent(key["budget"]),
+    ]

@@ -2,54 +2,34 @@
 
 from __future__ import annotations
 
-import contextlib
-import json
-import sys
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.markup import escape
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
-from rich.table import Table
 
-from buildarena_benchmark import (
-    Score,
-    Task,
-    TaskError,
-    builtin_tasks,
-    failed_score,
-    load_task,
-    score,
+from buildarena_cli.commands.machine_files import check, export
+from buildarena_cli.errors import CommandError
+from buildarena_cli.lazy import new_group
+from buildarena_cli.machines import (
+    MachineFile,
+    chosen_task,
+    film,
+    progress_bar,
+    read_machine,
+    shown_errors,
 )
-from buildarena_cli.errors import FAILED, CommandError
-from buildarena_cli.output import console, error_console, print_json
-from buildarena_geometry import GeometryError, Machine
-from buildarena_simulation import (
-    ENGINES,
-    MachineNotSimulable,
-    SimulationRoomError,
-    Trajectory,
-    TrajectoryFormatError,
-    simulate,
-)
+from buildarena_cli.near import did_you_mean
+from buildarena_cli.terminal.output import columns, emphasised, print_json, print_table, warn
 
-app = typer.Typer(no_args_is_help=True, help="Simulate and draw machines on this computer.")
+if TYPE_CHECKING:
+    from buildarena_benchmark import Score, Task
+    from buildarena_geometry import Machine
+    from buildarena_simulation import Trajectory
 
-_KNOWN = (
-    CommandError,
-    GeometryError,
-    TaskError,
-    TrajectoryFormatError,
-    SimulationRoomError,
-    OSError,
-    ValueError,
-)
+app = new_group("Simulate and draw machines on this computer.")
+app.command("check")(check)
+app.command("export")(export)
 
-MachineFile = Annotated[
-    Path, typer.Argument(help="A machine document or an action log, JSON; - reads standard input.")
-]
 TaskName = Annotated[str, typer.Option("--task", help="A built-in task's name, or a task file.")]
 
 
@@ -57,7 +37,7 @@ TaskName = Annotated[str, typer.Option("--task", help="A built-in task's name, o
 def simulate_command(  # noqa: PLR0917 - the command line passes options by name
     file: MachineFile,
     task: TaskName,
-    engine: Annotated[str, typer.Option(help=f"One of {', '.join(ENGINES)}.")] = ENGINES[0],
+    engine: Annotated[str | None, typer.Option(help="pybullet or mujoco.")] = None,
     seed: Annotated[
         int | None, typer.Option(help="Nudge the start a hair, to see whether a result is luck.")
     ] = None,
@@ -70,9 +50,17 @@ def simulate_command(  # noqa: PLR0917 - the command line passes options by name
     as_json: Annotated[bool, typer.Option("--json", help="Print the score as JSON.")] = False,
 ) -> None:
     """Put a machine through a task's trial and score it."""
-    with told_errors():
+    from buildarena_benchmark import failed_score, score
+    from buildarena_simulation import ENGINES
+
+    with shown_errors():
+        if engine is not None and engine not in ENGINES:
+            raise CommandError(
+                f"no engine {engine!r}; there are {', '.join(ENGINES)}"
+                f"{did_you_mean(engine, ENGINES)}"
+            )
         chosen, machine = chosen_task(task), read_machine(file)
-        rollout = _simulated(machine, chosen, engine, seed)
+        rollout = _simulated(machine, chosen, engine or ENGINES[0], seed)
         if rollout is None:
             result = failed_score(chosen, machine)
         else:
@@ -84,7 +72,7 @@ def simulate_command(  # noqa: PLR0917 - the command line passes options by name
         if as_json:
             print_json(_report(chosen, result, rollout))
         else:
-            console.print(_table(chosen, result, rollout))
+            _print_score(chosen, result, rollout)
 
 
 @app.command("render")
@@ -95,7 +83,9 @@ def render_command(
     video: Annotated[Path, typer.Option(help="The film (.mp4, .gif) or pictures (.png) to write.")],
 ) -> None:
     """Draw a trial that was simulated before."""
-    with told_errors():
+    from buildarena_simulation import Trajectory
+
+    with shown_errors():
         chosen, machine = chosen_task(task), read_machine(file)
         rollout = Trajectory.from_parquet(trajectory.read_bytes())
         missing = [block for block in rollout.block_ids if block not in machine.blocks]
@@ -104,65 +94,10 @@ def render_command(
         film(machine, chosen, rollout, video)
 
 
-def read_machine(file: Path) -> Machine:
-    """The machine of a file.
-
-    Args:
-        file: A machine document; a list of actions ({"op", "params"} or {"name", "arguments"});
-            or an object with such a list under "actions" or "steps" and, for an assembly, the
-            lists of its sub-structures by name under "sub_structures" or "sub_machines".
-
-    Raises:
-        CommandError: The file cannot be read or is none of these.
-        DocumentError: The document is wrong.
-    """
-    try:
-        text = sys.stdin.read() if str(file) == "-" else file.read_text(encoding="utf-8")
-        content = json.loads(text)
-    except (OSError, ValueError, RecursionError) as error:
-        raise CommandError(f"{file}: no JSON can be read there: {error}") from error
-    if isinstance(content, dict) and "blocks" in content:
-        return Machine.from_document(content)
-    if isinstance(content, list):
-        content = {"actions": content}
-    actions = content.get("actions", content.get("steps")) if isinstance(content, dict) else None
-    if not isinstance(actions, list):
-        raise CommandError(f"{file}: neither a machine document nor an action log")
-    parts = content.get("sub_structures", content.get("sub_machines")) or {}
-    if not isinstance(parts, dict):
-        raise CommandError(f"{file}: sub_structures is an object of action logs by name")
-    built = {name: _built(log, {}, f"{file}, {name}") for name, log in parts.items()}
-    return _built(actions, built, str(file))
-
-
-def _built(actions: Any, available: dict[str, Machine], where: str) -> Machine:
-    """The machine a log builds; refused actions change nothing, as when they were made."""
-    if not isinstance(actions, list) or not all(isinstance(action, dict) for action in actions):
-        raise CommandError(f"{where}: an action log is a list of objects")
-    machine = Machine(available=available) if available else Machine()
-    for action in actions:
-        name = action.get("op", action.get("name"))
-        machine.act(name, action.get("params", action.get("arguments")))
-    return machine
-
-
-def chosen_task(name: str) -> Task:
-    """A built-in task, or the one in a file.
-
-    Raises:
-        CommandError: There is neither.
-        TaskError: The file is wrong.
-    """
-    known = builtin_tasks()
-    if name in known:
-        return known[name]
-    if Path(name).exists():
-        return load_task(Path(name))
-    raise CommandError(f"no task {name!r}; there are {', '.join(known)}, or name a task file")
-
-
 def _simulated(machine: Machine, task: Task, engine: str, seed: int | None) -> Trajectory | None:
-    with _progress() as bar:
+    from buildarena_simulation import MachineNotSimulable, simulate
+
+    with progress_bar() as bar:
         row = bar.add_task(f"simulating on {engine}", total=1.0)
         try:
             return simulate(
@@ -173,34 +108,8 @@ def _simulated(machine: Machine, task: Task, engine: str, seed: int | None) -> T
                 on_progress=lambda done: bar.update(row, completed=done),
             )
         except MachineNotSimulable as failure:
-            error_console.print(f"not simulated: {failure.reason}")
+            warn(f"not simulated: {failure.reason}")
             return None
-
-
-def film(machine: Machine, task: Task, rollout: Trajectory, video: Path) -> None:
-    """Draws a trial into a film or pictures."""
-    from buildarena_simulation.render.film import write_film
-
-    with _progress() as bar:
-        row = bar.add_task(f"drawing {video.name}", total=1.0)
-        write_film(
-            machine,
-            task.scenario,
-            rollout,
-            video,
-            on_progress=lambda done: bar.update(row, completed=done),
-        )
-
-
-def _progress() -> Progress:
-    return Progress(
-        TextColumn("{task.description:<24}"),
-        BarColumn(),
-        TaskProgressColumn(),
-        TimeElapsedColumn(),
-        console=error_console,
-        transient=True,
-    )
 
 
 def _report(task: Task, result: Score, rollout: Trajectory | None) -> dict[str, Any]:
@@ -223,27 +132,13 @@ def _report(task: Task, result: Score, rollout: Trajectory | None) -> dict[str, 
     }
 
 
-def _table(task: Task, result: Score, rollout: Trajectory | None) -> Table:
+def _print_score(task: Task, result: Score, rollout: Trajectory | None) -> None:
     engine = f" on {rollout.engine} {rollout.engine_version}" if rollout else ""
-    table = Table(title=escape(f"{task.title}{engine}"), title_justify="left", show_header=False)
-    table.add_row("verdict", "success" if result.success else "failure")
     unit = "" if task.indicator.unit == "1" else f" {task.indicator.unit}"
-    table.add_row(task.indicator.name, f"{result.indicator:,.2f}{unit}")
-    if result.flags:
-        table.add_row("flags", ", ".join(result.flags))
-    for name, value in result.metrics.items():
-        table.add_row(name, "-" if value is None else str(value))
-    return table
-
-
-@contextlib.contextmanager
-def told_errors() -> Iterator[None]:
-    """Turns the rooms' errors into one message and an exit code."""
-    try:
-        yield
-    except ImportError as error:
-        error_console.print("error: pictures need `pip install buildarena-simulation[video]`")
-        raise typer.Exit(FAILED) from error
-    except _KNOWN as error:
-        error_console.print(f"error: {error}", markup=False, soft_wrap=True)
-        raise typer.Exit(FAILED) from error
+    rows = [
+        ("verdict", "success" if result.success else "failure"),
+        (task.indicator.name, f"{result.indicator:,.2f}{unit}"),
+        *([("flags", ", ".join(result.flags))] if result.flags else []),
+        *((name, "" if value is None else str(value)) for name, value in result.metrics.items()),
+    ]
+    print_table(columns("figure", "value"), rows, title=emphasised(f"{task.title}{engine}"))

@@ -2,27 +2,26 @@
 
 from __future__ import annotations
 
-import tempfile
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from buildarena_benchmark import broken_constraint, parse_task
-from buildarena_cli.client import Client
-from buildarena_cli.commands.machine import (
+from buildarena_cli.client import Client, at
+from buildarena_cli.errors import DONE, FAILED, CommandError
+from buildarena_cli.ids import whole_id
+from buildarena_cli.machines import (
     MachineFile,
     chosen_task,
     film,
     read_machine,
-    told_errors,
+    shown_errors,
 )
-from buildarena_cli.errors import DONE, FAILED, CommandError
-from buildarena_cli.options import DEFAULT_URL, JsonOption, UrlOption
-from buildarena_cli.output import console, print_json
-from buildarena_geometry import Machine
-from buildarena_geometry.export import machine_glb, machine_svg
-from buildarena_simulation import Trajectory
+from buildarena_cli.options import DEFAULT_URL, JobId, JsonOption, UrlOption
+from buildarena_cli.terminal.output import print_json, say
+
+if TYPE_CHECKING:
+    from buildarena_geometry import Machine
 
 FORMATS = (".glb", ".svg", ".json")
 
@@ -35,8 +34,10 @@ def check(
     *,
     as_json: JsonOption = False,
 ) -> None:
-    """Tell whether a machine is sound and what it is made of; exit code 1 when it is not."""
-    with told_errors():
+    """Check whether a machine is sound and what it is made of; exit code 1 when it is not."""
+    from buildarena_benchmark import broken_constraint
+
+    with shown_errors():
         machine = read_machine(file)
         chosen = None if task is None else chosen_task(task)
         broken = None if chosen is None else broken_constraint(chosen, machine)
@@ -62,12 +63,12 @@ def _facts(machine: Machine) -> dict[str, Any]:
 
 def _print_facts(found: dict[str, Any]) -> None:
     size = " x ".join(f"{length:.2f}" for length in found["size"])
-    console.print(f"{found['parts']} parts, mass {found['mass']:.2f}, cost {found['cost']}")
-    console.print(f"{size} units east x north x up")
+    say(f"{found['parts']} parts, mass {found['mass']:.2f}, cost {found['cost']}")
+    say(f"{size} units east x north x up")
     for problem in found["problems"]:
-        console.print(problem, markup=False, soft_wrap=True)
+        say(problem)
     if not found["problems"]:
-        console.print("The machine is sound.")
+        say("The machine is sound.")
 
 
 def export(
@@ -75,7 +76,9 @@ def export(
     out: Annotated[Path, typer.Option(help=f"File to write: {', '.join(FORMATS)}.")],
 ) -> None:
     """Write a machine as a 3D model (.glb), a drawing (.svg) or a machine document (.json)."""
-    with told_errors():
+    from buildarena_geometry.export import machine_glb, machine_svg
+
+    with shown_errors():
         machine = read_machine(file)
         if out.suffix == ".glb":
             out.write_bytes(machine_glb(machine))
@@ -87,28 +90,34 @@ def export(
             out.write_bytes(machine_bytes(machine))
         else:
             raise CommandError(f"{out}: {out.suffix or 'no'} ending; use {', '.join(FORMATS)}")
-    console.print(str(out), soft_wrap=True)
+    say(str(out))
 
 
 def replay(
-    job_id: Annotated[str, typer.Argument(help="Id of the job.")],
+    job_id: JobId,
     *,
     out: Annotated[Path, typer.Option(help="The film (.mp4, .gif) or pictures (.png) to write.")],
     number: Annotated[int, typer.Option(help="Which of the job's rollouts.", min=0)] = 0,
     url: UrlOption = DEFAULT_URL,
 ) -> None:
     """Draw a job's trial as a film."""
+    import tempfile
+
+    from buildarena_benchmark import parse_task
+    from buildarena_simulation import Trajectory
+
     client = Client(url)
-    job = client.get(f"/v1/jobs/{job_id}")
-    task = client.get(f"/v1/tasks/{job['task']}", version=job["task_version"])
-    recorded = client.get_bytes(f"/v1/jobs/{job_id}/trajectory", number=number)
-    document = client.get_bytes(f"/v1/jobs/{job_id}/machine")
-    with told_errors(), tempfile.TemporaryDirectory() as folder:
+    whole = whole_id(client, "job", job_id)
+    job = client.get(at("jobs", whole))
+    task = client.get(at("tasks", job["task"]), version=job["task_version"])
+    recorded = client.get_bytes(at("jobs", whole, "trajectory"), number=number)
+    document = client.get_bytes(at("jobs", whole, "machine"))
+    with shown_errors(), tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "machine.json"
         file.write_bytes(document)
         rollout = Trajectory.from_parquet(recorded)
         film(read_machine(file), parse_task(_text(task), origin=job["task"]), rollout, out)
-    console.print(str(out), soft_wrap=True)
+    say(str(out))
 
 
 def _text(task: dict[str, Any]) -> str:

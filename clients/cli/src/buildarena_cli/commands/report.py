@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import closing
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from buildarena_benchmark.leaderboard import Trial
-from buildarena_cli.client import Client
+from buildarena_cli.client import Client, at
 from buildarena_cli.errors import CommandError
+from buildarena_cli.ids import whole_id
 from buildarena_cli.options import DEFAULT_URL, UrlOption
-from buildarena_cli.output import console
-from buildarena_simulation import ENGINES
+from buildarena_cli.terminal.completion import complete_sweep
+from buildarena_cli.terminal.output import say
+
+if TYPE_CHECKING:
+    from buildarena_benchmark.leaderboard import Trial
 
 ENDINGS = (".html", ".md", ".pdf")
 PLAIN: Final[Mapping[str, Any]] = {
     "workflow": "five-role",
-    "simulator": ENGINES[0],
     "prompts": "default",
     "one_shot": False,
     "closed_loop": None,
@@ -30,24 +31,31 @@ PLAIN_DECODING: Final[Mapping[str, Any]] = {"temperature": 0.5, "top_p": 0.7}
 
 def report(
     sweeps: Annotated[
-        list[str], typer.Argument(help="Ids of sweeps; several are set side by side.")
+        list[str],
+        typer.Argument(
+            help="Ids of sweeps, or how they begin; several are set side by side.",
+            autocompletion=complete_sweep,
+        ),
     ],
     out: Annotated[Path, typer.Option("--out", help="File: .html, .md or .pdf.")],
     url: UrlOption = DEFAULT_URL,
 ) -> None:
-    """Write a report of sweeps: tables and plots that stand beside the paper's."""
+    """Write a report of sweeps: tables and plots.
+
+    They stand beside the paper's figures.
+    """
     if out.suffix not in ENDINGS:
         raise CommandError(f"{out}: the name must end in {', '.join(ENDINGS)}")
-    from buildarena_cli.report.document import write_report
     from buildarena_cli.report.sections import sections
+    from buildarena_cli.report.writing import write_report
 
-    with closing(Client(url)) as client:
-        material = collect(client, sweeps)
+    client = Client(url)
+    material = collect(client, [whole_id(client, "sweep", id_) for id_ in sweeps])
     try:
         write_report(sections(material), out)
     except OSError as error:
         raise CommandError(f"{out} can't be written: {error.strerror}") from error
-    console.print(f"{out}: {len(material.trials):,} jobs", soft_wrap=True)
+    say(f"{out}: {len(material.trials):,} jobs")
 
 
 def collect(client: Client, ids: Sequence[str]) -> Any:
@@ -59,7 +67,7 @@ def collect(client: Client, ids: Sequence[str]) -> Any:
     from buildarena_cli.report.custom_tasks import read_tasks
     from buildarena_cli.report.material import Material
 
-    found = [client.get(f"/v1/sweeps/{id_}") for id_ in dict.fromkeys(ids)]
+    found = [client.get(at("sweeps", id_)) for id_ in dict.fromkeys(ids)]
     variants = {sweep["id"]: variant(sweep["spec"]) for sweep in found}
     several = len(set(variants.values())) > 1
     registry = {entry["name"]: entry["model"] for entry in client.get("/v1/models")}
@@ -69,7 +77,7 @@ def collect(client: Client, ids: Sequence[str]) -> Any:
     verdicts: dict[tuple[str, str], dict[str, tuple[bool, float]]] = {}
     for sweep in found:
         named = variants[sweep["id"]] or "main"
-        for result in client.get(f"/v1/sweeps/{sweep['id']}/results"):
+        for result in client.get(at("sweeps", sweep["id"], "results")):
             row = f"{result['model']} ({named})" if several else result["model"]
             # The paper's main table is of the main experiment alone.
             if not variants[sweep["id"]]:
@@ -93,10 +101,13 @@ def collect(client: Client, ids: Sequence[str]) -> Any:
 
 def variant(spec: Mapping[str, Any]) -> str:
     """What of a sweep differs from the paper's main experiment; "" for nothing."""
-    given = {name: spec.get(name, plain) for name, plain in PLAIN.items()}
+    from buildarena_simulation import ENGINES
+
+    main = {"simulator": ENGINES[0], **PLAIN}
+    given = {name: spec.get(name, plain) for name, plain in main.items()}
     loop = given["closed_loop"]
     parts = [
-        given[name] for name in ("workflow", "simulator", "prompts") if given[name] != PLAIN[name]
+        given[name] for name in ("workflow", "simulator", "prompts") if given[name] != main[name]
     ]
     if given["one_shot"]:
         parts.append("one-shot")
@@ -116,6 +127,8 @@ def variant(spec: Mapping[str, Any]) -> str:
 
 
 def _trial(result: Mapping[str, Any], row: str) -> Trial:
+    from buildarena_benchmark.leaderboard import Trial
+
     values = {name: result[name] for name in Trial.__dataclass_fields__ if name in result}
     values |= {"model": row, "flags": tuple(result["flags"])}
     if row != result["model"]:

@@ -1,27 +1,21 @@
-"""The commands that run the service on this machine: up, demo, migrate."""
+"""The commands that run the service on this machine: up, demo."""
 
 from __future__ import annotations
 
-import os
 import shutil
 import signal
-import sys
 import threading
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from pydantic import ValidationError
 
-from buildarena_cli.client import Client
 from buildarena_cli.errors import CommandError
-from buildarena_cli.local.stack import Stack
-from buildarena_cli.output import console, leaderboard_tables
-from buildarena_cli.progress import exit_code, watch_sweep
-from buildarena_pipeline.catalog.tracks import SIMULATORS
-from buildarena_pipeline.runtime.settings import Settings
-from buildarena_store import Database
-from buildarena_store.states import CONSTRUCT_QUEUE, simulate_queue
+from buildarena_cli.options import DataOption, PortOption
+from buildarena_cli.terminal.output import say
+
+if TYPE_CHECKING:
+    from buildarena_pipeline.runtime.settings import Settings
 
 DEMO_SWEEP = {
     "name": "demo",
@@ -35,38 +29,52 @@ DEMO_SWEEP = {
 }
 MEBIBYTE = 1024 * 1024
 
-DataOption = Annotated[Path | None, typer.Option("--data", help="Folder of databases and logs.")]
-PortOption = Annotated[int | None, typer.Option("--port", help="Port of the API.")]
-
 
 def up(
     data: DataOption = None,
     port: PortOption = None,
     *,
+    detach: Annotated[
+        bool, typer.Option("--detach", help="Return when it is up; `buildarena down` stops it.")
+    ] = False,
     keys: Annotated[
         bool, typer.Option("--keys", help="Ask for API keys; the operator's is kept in DATA.")
     ] = False,
 ) -> None:
-    """Start the whole service on this machine and keep it up until Ctrl-C."""
+    """Start the whole service on this machine.
+
+    It stays up until Ctrl-C, or in the background with --detach.
+    """
     settings = _settings(data, port, require_keys=keys or None)
+    if detach:
+        _detach(settings, keys=keys)
+        return
+    from buildarena_cli.local.stack import Stack
+
     stopping = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stopping.set())
     _tell_simulators()
     with Stack(settings, tell=_tell) as stack:
-        console.print(f"API {stack.url}  ·  docs {stack.url}/docs  ·  logs {stack.logs}")
-        console.print("Ctrl-C stops it.")
+        say(f"API {stack.url}  ·  docs {stack.url}/docs  ·  logs {stack.logs}")
+        say("Ctrl-C stops it.")
         while not stopping.wait(0.5):
             stack.require_running()
         _tell("stopping")
 
 
 def demo(data: DataOption = None, port: PortOption = None) -> None:
-    """Start everything, run one small sweep, show the leaderboard, and stop everything."""
+    """Start everything, run one small sweep, show who builds best, and stop."""
+    from buildarena_cli.client import Client
+    from buildarena_cli.local.service import is_running
+    from buildarena_cli.local.stack import Stack
+    from buildarena_cli.terminal.boards import overview
+    from buildarena_cli.terminal.progress import exit_code, watch_sweep
+
     settings = _settings(data, port)
     settings = settings.model_copy(update={"data": settings.data / "demo"})
     _interrupt_on_terminate()
-    if not (settings.data / "lock").exists() or _unlocked(settings):
+    if not is_running(settings.data):
         shutil.rmtree(settings.data, ignore_errors=True)
     _tell_simulators()
     with Stack(settings, tell=_tell) as stack:
@@ -74,50 +82,44 @@ def demo(data: DataOption = None, port: PortOption = None) -> None:
         sweep_id = client.post("/v1/sweeps", DEMO_SWEEP)["id"]
         sweep = watch_sweep(client, sweep_id)
         stack.require_running()
-        for table in leaderboard_tables(client.get("/v1/leaderboard")):
-            console.print(table)
-        client.close()
+        say()
+        overview(client.get("/v1/leaderboard"))
     peak = stack.peak_memory_bytes / MEBIBYTE
-    console.print(f"Peak memory of all processes: {peak:,.0f} MiB.")
-    console.print(f"Results are kept in {settings.data.absolute()}.")
-    console.print(
+    say()
+    say(f"Peak memory of all processes: {peak:,.0f} MiB.")
+    say(f"Results are kept in {settings.data.absolute()}.")
+    say(
         f"See them again with `buildarena up --data {settings.data}`: "
         f"API docs are then at {stack.url}/docs."
     )
     raise typer.Exit(exit_code(sweep))
 
 
-def start_worker(
-    queue: Annotated[
-        str, typer.Argument(help="construct, or simulate.ENGINE, such as simulate.mujoco.")
-    ],
-) -> None:
-    """Serve a queue from this process, with the servers that BUILDARENA_* name, until Ctrl-C."""
-    programs = {
-        CONSTRUCT_QUEUE: ["buildarena_worker"],
-        **{
-            simulate_queue(engine): ["buildarena_simworker", "--engine", engine]
-            for engine in SIMULATORS
-        },
-    }
-    if queue not in programs:
-        raise CommandError(f"there is no queue {queue!r}; choose from {', '.join(programs)}")
-    # The worker takes this process' place, so that signals reach it.
-    os.execv(sys.executable, [sys.executable, "-m", *programs[queue]])  # noqa: S606 - no shell
+def _detach(settings: Settings, *, keys: bool) -> None:
+    from buildarena_cli.local.service import is_running, start
 
-
-def migrate() -> None:
-    """Bring the database named by BUILDARENA_DATABASE_URL to this program's schema."""
+    data = settings.data.absolute()
+    if is_running(data):
+        raise CommandError(
+            f"another BuildArena runs on the data folder {data}: see `buildarena status`, "
+            "or choose another folder with --data or BUILDARENA_DATA"
+        )
     try:
-        url = Settings().required_database_url()
-    except ValueError as error:
-        raise CommandError(str(error)) from error
-    database = Database(url)
-    console.print(f"schema {database.migrate()}")
-    database.close()
+        run = start(data, ["--port", str(settings.port), *(["--keys"] if keys else [])])
+    except OSError as error:
+        raise CommandError(
+            f"the data folder {data} can't be written ({error.strerror}): "
+            "choose another with --data or BUILDARENA_DATA"
+        ) from error
+    say(f"API {run.url}  ·  docs {run.url}/docs  ·  pid {run.pid}  ·  logs {data / 'logs'}")
+    say("`buildarena down` stops it.")
 
 
 def _settings(data: Path | None, port: int | None, *, require_keys: bool | None = None) -> Settings:
+    from pydantic import ValidationError
+
+    from buildarena_pipeline.runtime.settings import Settings
+
     given: dict[str, Any] = {"data": data, "port": port, "require_keys": require_keys}
     try:
         return Settings(**{name: value for name, value in given.items() if value is not None})
@@ -129,17 +131,6 @@ def _settings(data: Path | None, port: int | None, *, require_keys: bool | None 
         ) from error
 
 
-def _unlocked(settings: Settings) -> bool:
-    import fcntl
-
-    try:
-        with (settings.data / "lock").open("w") as lock:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        return False
-    return True
-
-
 def _interrupt_on_terminate() -> None:
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
@@ -148,9 +139,11 @@ def _interrupt_on_terminate() -> None:
 
 
 def _tell_simulators() -> None:
+    from buildarena_pipeline.catalog.tracks import SIMULATORS
+
     if "pybullet" not in SIMULATORS:
         _tell("PyBullet is not installed: machines are simulated with MuJoCo alone")
 
 
 def _tell(line: str) -> None:
-    console.print(f"· {line}")
+    say(f"· {line}")

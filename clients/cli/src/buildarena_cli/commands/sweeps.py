@@ -7,27 +7,42 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.table import Table
 
-from buildarena_cli.client import Client, RefusedError
+from buildarena_cli.client import Client, RefusedError, at
+from buildarena_cli.commands.job_lists import gathered, show_cursor
 from buildarena_cli.commands.keys import spent
 from buildarena_cli.errors import CommandError
+from buildarena_cli.ids import whole_id
+from buildarena_cli.lazy import new_group
 from buildarena_cli.options import (
     DEFAULT_URL,
+    AfterOption,
+    AllOption,
     JsonOption,
     MaxCostOption,
     MaxRequestsOption,
     MaxTokensOption,
+    SweepId,
     UrlOption,
     budget_of,
 )
-from buildarena_cli.output import console, number, print_json
-from buildarena_cli.progress import ended, exit_code, watch_sweep
-from buildarena_cli.sweep_files import read_sweep, sweep_schema
+from buildarena_cli.terminal.completion import complete_model, complete_task
+from buildarena_cli.terminal.output import columns, number, print_json, print_table, say
+from buildarena_cli.terminal.progress import ended, exit_code, watch_sweep
 
-app = typer.Typer(help="Submit and watch sweeps.", no_args_is_help=True)
+app = new_group("Submit and watch sweeps.")
 
-SweepId = Annotated[str, typer.Argument(help="Id of the sweep.")]
+MAX_LIMIT = 100
+LIST = columns(
+    *("sweep", "name", "state", "ended", "jobs", "outcomes", "USD", "created"),
+    figures=("ended", "jobs", "USD"),
+    leaving=("created", "outcomes", "USD", "name", "jobs", "ended", "state"),
+)
+ESTIMATE = columns(
+    *("model", "jobs", "requests", "tokens in", "tokens out", "USD"),
+    figures=("jobs", "requests", "tokens in", "tokens out", "USD"),
+    leaving=("tokens in", "tokens out", "requests", "jobs"),
+)
 
 
 @app.command("run")
@@ -39,10 +54,16 @@ def run_sweep(
     ] = False,
     detach: Annotated[bool, typer.Option("--detach", help="Submit and do not wait.")] = False,
     task: Annotated[
-        list[str] | None, typer.Option("--task", help="In the place of the file's tasks.")
+        list[str] | None,
+        typer.Option(
+            "--task", help="In the place of the file's tasks.", autocompletion=complete_task
+        ),
     ] = None,
     model: Annotated[
-        list[str] | None, typer.Option("--model", help="In the place of the file's models.")
+        list[str] | None,
+        typer.Option(
+            "--model", help="In the place of the file's models.", autocompletion=complete_model
+        ),
     ] = None,
     samples: Annotated[
         int | None, typer.Option("--samples", help="In the place of the file's samples or seeds.")
@@ -57,7 +78,9 @@ def run_sweep(
     url: UrlOption = DEFAULT_URL,
     as_json: JsonOption = False,
 ) -> None:
-    """Submit a sweep and watch it. Running the same file again takes it up where it was."""
+    """Submit a sweep and watch it; running the same file again resumes it."""
+    from buildarena_cli.sweep_files import read_sweep
+
     if samples is not None and seed:
         raise typer.BadParameter("give either --samples or --seed, not both")
     flags = {
@@ -77,7 +100,7 @@ def run_sweep(
         raise sweep.refused(error) from error
     if not as_json:
         news = "resumed" if accepted["resumed"] else f"{accepted['added']} of them new"
-        console.print(f"{accepted['id']}: {accepted['jobs']} jobs, {news}")
+        say(f"{accepted['id']}: {accepted['jobs']} jobs, {news}")
     if detach:
         if as_json:
             print_json(accepted)
@@ -88,22 +111,52 @@ def run_sweep(
 @app.command("schema")
 def print_schema() -> None:
     """Print the JSON schema of sweep files, for editors; docs/sweep.schema.json holds it."""
+    from buildarena_cli.sweep_files import sweep_schema
+
     print_json(sweep_schema())
+
+
+@app.command("list")
+def list_sweeps(
+    *,
+    limit: Annotated[int, typer.Option(help="Rows at most.", min=1, max=MAX_LIMIT)] = 20,
+    after: AfterOption = None,
+    every: AllOption = False,
+    url: UrlOption = DEFAULT_URL,
+    as_json: JsonOption = False,
+) -> None:
+    """List sweeps, newest first."""
+    pages = Client(url).pages("/v1/sweeps", cursor=after, limit=MAX_LIMIT if every else limit)
+    page = gathered(pages, "sweeps", every=every)
+    if as_json:
+        print_json(page)
+        return
+    print_table(LIST, [_row(sweep) for sweep in page["sweeps"]])
+    show_cursor(page)
+
+
+@app.command("watch")
+def watch(sweep_id: SweepId, *, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) -> None:
+    """Watch a sweep until every job has ended; exit code 3 when some errored."""
+    client = Client(url)
+    whole = whole_id(client, "sweep", sweep_id)
+    raise typer.Exit(exit_code(_watch(client, whole, as_json=as_json)))
 
 
 @app.command("status")
 def show_sweep(
     sweep_id: SweepId,
     *,
-    watch: Annotated[bool, typer.Option("--watch", help="Wait until every job has ended.")] = False,
+    wait: Annotated[bool, typer.Option("--watch", help="As `sweep watch`.")] = False,
     url: UrlOption = DEFAULT_URL,
     as_json: JsonOption = False,
 ) -> None:
     """Show how far a sweep is."""
     client = Client(url)
-    if watch:
-        raise typer.Exit(exit_code(_watch(client, sweep_id, as_json=as_json)))
-    _show(client.get(f"/v1/sweeps/{sweep_id}"), as_json=as_json)
+    whole = whole_id(client, "sweep", sweep_id)
+    if wait:
+        raise typer.Exit(exit_code(_watch(client, whole, as_json=as_json)))
+    _show(client.get(at("sweeps", whole)), as_json=as_json)
 
 
 @app.command("pause")
@@ -111,7 +164,7 @@ def pause_sweep(
     sweep_id: SweepId, *, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False
 ) -> None:
     """Hold a sweep's waiting jobs; jobs that have begun go on to their end."""
-    _show(Client(url).post(f"/v1/sweeps/{sweep_id}/pause", {}), as_json=as_json)
+    _change(url, sweep_id, "pause", as_json=as_json)
 
 
 @app.command("resume")
@@ -127,7 +180,7 @@ def resume_sweep(
     """Let a sweep go on that was paused, or that used up its budget and now gets more."""
     budget = budget_of(max_cost_usd, max_tokens, max_requests)
     body = {"budget": budget}
-    _show(Client(url).post(f"/v1/sweeps/{sweep_id}/resume", body), as_json=as_json)
+    _change(url, sweep_id, "resume", body, as_json=as_json)
 
 
 @app.command("retry")
@@ -135,7 +188,7 @@ def retry_sweep(
     sweep_id: SweepId, *, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False
 ) -> None:
     """Queue a sweep's errored jobs again where they failed; scored ones are never redone."""
-    _show(Client(url).post(f"/v1/sweeps/{sweep_id}/retry", {}), as_json=as_json)
+    _change(url, sweep_id, "retry", as_json=as_json)
 
 
 @app.command("cancel")
@@ -143,7 +196,7 @@ def cancel_sweep(
     sweep_id: SweepId, *, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False
 ) -> None:
     """End a sweep's jobs that have not ended and that no other sweep wants."""
-    _show(Client(url).post(f"/v1/sweeps/{sweep_id}/cancel", {}), as_json=as_json)
+    _change(url, sweep_id, "cancel", as_json=as_json)
 
 
 @app.command("export")
@@ -154,12 +207,14 @@ def export_sweep(
     url: UrlOption = DEFAULT_URL,
 ) -> None:
     """Write a whole sweep, artifacts included, into one ZIP file."""
-    target = out or Path(f"{sweep_id}.zip")
+    client = Client(url)
+    whole = whole_id(client, "sweep", sweep_id)
+    target = out or Path(f"{whole}.zip")
     try:
-        Client(url).download(f"/v1/sweeps/{sweep_id}/archive", target)
+        client.download(at("sweeps", whole, "archive"), target)
     except OSError as error:
         raise CommandError(f"{target}: {error.strerror}") from error
-    console.print(f"{target}: {target.stat().st_size:,} bytes")
+    say(f"{target}: {target.stat().st_size:,} bytes")
 
 
 @app.command("import")
@@ -177,7 +232,29 @@ def import_sweep(
     if as_json:
         print_json(done)
     else:
-        console.print(f"{done['sweep_id']}: {done['jobs']} jobs, {done['added']} of them new")
+        say(f"{done['sweep_id']}: {done['jobs']} jobs, {done['added']} of them new")
+
+
+def _row(sweep: dict[str, Any]) -> list[str]:
+    progress = sweep["progress"]
+    return [
+        sweep["id"],
+        sweep["name"],
+        sweep["state"],
+        f"{progress['done']:,}",
+        f"{progress['total']:,}",
+        ", ".join(f"{n:,} {name}" for name, n in sorted(progress["outcomes"].items())),
+        number(progress["cost_usd"], 2),
+        sweep["created_at"][:16].replace("T", " "),
+    ]
+
+
+def _change(
+    url: str, sweep_id: str, verb: str, body: dict[str, Any] | None = None, *, as_json: bool
+) -> None:
+    client = Client(url)
+    path = at("sweeps", whole_id(client, "sweep", sweep_id), verb)
+    _show(client.post(path, body or {}), as_json=as_json)
 
 
 def _show(sweep: dict[str, Any], *, as_json: bool) -> None:
@@ -185,57 +262,53 @@ def _show(sweep: dict[str, Any], *, as_json: bool) -> None:
         print_json(sweep)
         return
     progress = sweep["progress"]
-    console.print(f"{sweep['id']} {sweep['name']!r}: {sweep['state']}")
-    console.print(f"{progress['done']} of {progress['total']} jobs ended")
+    say(f"{sweep['id']} {sweep['name']!r}: {sweep['state']}")
+    say(f"{progress['done']} of {progress['total']} jobs ended")
     for name, count in {**progress["stages"], **progress["outcomes"]}.items():
-        console.print(f"  {count:>6}  {name}")
-    console.print(f"{progress['requests']:,} model requests, ${progress['cost_usd']:.2f}")
+        say(f"  {count:>6}  {name}")
+    say(f"{progress['requests']:,} model requests, ${progress['cost_usd']:.2f}")
     if sweep["budget"] is not None:
-        console.print(f"budget: {spent(sweep['budget'])}")
-    _tell_of_limit(sweep)
+        say(f"budget: {spent(sweep['budget'])}")
+    _show_limit(sweep)
 
 
 def _show_estimate(estimate: dict[str, Any], *, as_json: bool) -> None:
     if as_json:
         print_json(estimate)
         return
-    table = Table(
+    print_table(
+        ESTIMATE,
+        [
+            (
+                model["model"],
+                f"{model['jobs']:,}",
+                number(model["requests"], 0),
+                number(model["input_tokens"], 0),
+                number(model["output_tokens"], 0),
+                number(model["cost_usd"], 2),
+            )
+            for model in estimate["models"]
+        ],
         title=f"{estimate['jobs']:,} jobs, about ${estimate['cost_usd']:,.2f}",
-        caption="From the mean figures that the paper reports; models without a known price: -",
-        title_justify="left",
-        caption_justify="left",
+        notes=["From the mean figures that the paper reports; models without a known price: -"],
     )
-    table.add_column("model")
-    for name in ("jobs", "requests", "tokens in", "tokens out", "USD"):
-        table.add_column(name, justify="right")
-    for model in estimate["models"]:
-        table.add_row(
-            model["model"],
-            f"{model['jobs']:,}",
-            number(model["requests"], 0),
-            number(model["input_tokens"], 0),
-            number(model["output_tokens"], 0),
-            number(model["cost_usd"], 2),
-        )
-    console.print(table)
 
 
-def _tell_of_limit(sweep: dict[str, Any]) -> None:
+def _show_limit(sweep: dict[str, Any]) -> None:
     if sweep["state"] == "budget_exhausted":
-        console.print(
+        say(
             f"The budget is used up: `buildarena sweep resume {sweep['id']} --max-cost-usd …` "
-            "gives it more.",
-            soft_wrap=True,
+            "gives it more."
         )
 
 
 def _watch(client: Client, sweep_id: str, *, as_json: bool) -> dict[str, Any]:
     if not as_json:
         watched = watch_sweep(client, sweep_id)
-        _tell_of_limit(watched)
+        _show_limit(watched)
         return watched
     while True:
-        sweep: dict[str, Any] = client.get_patiently(f"/v1/sweeps/{sweep_id}")
+        sweep: dict[str, Any] = client.get_patiently(at("sweeps", sweep_id))
         if ended(sweep):
             print_json(sweep)
             return sweep

@@ -11,7 +11,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import IO, Any, Self
 
@@ -25,6 +25,8 @@ from buildarena_cli.local import (
     ManagedProcess,
     Supervisor,
 )
+from buildarena_cli.local.programs import programs
+from buildarena_cli.local.service import LOCK, READY, RUN
 from buildarena_pipeline.catalog.tracks import SIMULATORS
 from buildarena_pipeline.errors import StartupError
 from buildarena_pipeline.runtime.processes import die_with_parent, tree_memory_bytes
@@ -34,6 +36,8 @@ from buildarena_store.accounts.keys import new_secret
 
 READY_WITHIN_S = 60.0
 MEMORY_EVERY_S = 0.5
+LOCK_TRIES = 5
+LOCK_AGAIN_S = 0.05
 
 
 class Stack:
@@ -64,6 +68,10 @@ class Stack:
         self._tell = tell
         self._simulators = simulators
         self._lock: IO[str] | None = None
+        self._ready = False
+        self._memory_thread = threading.Thread(
+            target=self._watch_memory, name="memory", daemon=True
+        )
         self._stopped = threading.Event()
 
     def __enter__(self) -> Self:
@@ -88,6 +96,8 @@ class Stack:
     def stop(self) -> None:
         """Stops everything that was started."""
         self._stopped.set()
+        if self._memory_thread.is_alive():
+            self._memory_thread.join()
         self.supervisor.stop()
         if self._lock is not None:
             self._write_run()
@@ -111,33 +121,26 @@ class Stack:
         database = Database(environment["BUILDARENA_DATABASE_URL"])
         database.migrate()
         database.close()
-        programs = {
-            "api": ["buildarena_api"],
-            "construct worker": ["buildarena_worker"],
-            **{
-                f"{engine} worker": ["buildarena_simworker", "--engine", engine]
-                for engine in self._simulators
-            },
-        }
-        for name, module in programs.items():
-            self._tell(f"starting the {name}")
-            self._launch_program(name, module, environment)
+        for program in programs(self._simulators):
+            self._tell(f"starting the {program.name}")
+            self._launch_program(program.name, program.words, environment)
         self.supervisor.watch()
-        threading.Thread(target=self._watch_memory, name="memory", daemon=True).start()
+        self._memory_thread.start()
         self._wait_until_healthy()
+        self._ready = True
 
     def _take_folder(self) -> None:
         data = self.settings.data.absolute()
         try:
             self.logs.mkdir(parents=True, exist_ok=True)
-            lock = (data / "lock").open("w")
+            lock = (data / LOCK).open("w")
         except OSError as error:
             raise CommandError(
                 f"the data folder {data} can't be written ({error.strerror}): "
                 "choose another with --data or BUILDARENA_DATA"
             ) from error
         try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            _locked(lock)
         except OSError as error:
             lock.close()
             raise CommandError(
@@ -145,6 +148,7 @@ class Stack:
                 "or choose another folder with --data or BUILDARENA_DATA"
             ) from error
         self._lock = lock
+        self._write_run()
 
     def _start_servers(self) -> dict[str, str]:
         settings, data = self.settings, self.settings.data.absolute()
@@ -195,7 +199,9 @@ class Stack:
             ManagedProcess(name=server.name, start=server.start, stop=server.stop)
         )
 
-    def _launch_program(self, name: str, module: list[str], environment: dict[str, str]) -> None:
+    def _launch_program(
+        self, name: str, module: Sequence[str], environment: dict[str, str]
+    ) -> None:
         log_file = self.logs / f"{name.replace(' ', '-')}.log"
 
         def start() -> subprocess.Popen[bytes]:
@@ -243,12 +249,28 @@ class Stack:
         run: dict[str, Any] = {
             "url": self.url,
             "pid": os.getpid(),
+            "state": READY if self._ready else "starting",
+            "processes": {
+                managed.name: managed.process.pid
+                for managed in tuple(self.supervisor.managed)
+                if managed.process is not None
+            },
             "peak_memory_bytes": self.peak_memory_bytes,
         }
-        target = self.settings.data.absolute() / "run.json"
+        target = self.settings.data.absolute() / RUN
         partial = target.with_suffix(".partial")
         partial.write_text(json.dumps(run))
         partial.replace(target)
+
+
+def _locked(lock: IO[str]) -> None:
+    """Takes the lock; whoever only looks whether it is taken has it for a moment."""
+    for _ in range(LOCK_TRIES - 1):
+        with contextlib.suppress(OSError):
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return
+        time.sleep(LOCK_AGAIN_S)
+    fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
 def _concerns(check: str, served: set[str]) -> bool:

@@ -1,4 +1,4 @@
-"""The tasks of a report, and its section on those that are users' own."""
+"""The tasks of a report, and its section on the custom ones."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from buildarena_benchmark.leaderboard import Board, Trial
-from buildarena_cli.client import Client, RefusedError
-from buildarena_cli.output import in_words
+from buildarena_cli.client import Client, RefusedError, at
 from buildarena_cli.report.document import Block, Grid, Heading, Paragraph
 from buildarena_cli.report.material import Material, ReportTask
+from buildarena_cli.terminal.output import in_words
 
 
 def read_tasks(client: Client, trials: Sequence[Trial]) -> dict[str, ReportTask]:
-    """The tasks by name: of a user's own the version that the report is about.
+    """The tasks by name: of a custom task the version that the report is about.
 
     That is the newest one, or one that was tried if the newest was not.
     """
@@ -29,14 +29,14 @@ def read_tasks(client: Client, trials: Sequence[Trial]) -> dict[str, ReportTask]
             version = _reported(tried[name], entry)
             # A version that is gone is reported as the newest one.
             with contextlib.suppress(RefusedError):
-                entry = client.get(f"/v1/tasks/{name}", version=version)
+                entry = client.get(at("tasks", name), version=version)
         if entry is not None:
             tasks[name] = _task(entry)
     return tasks
 
 
-def own_tasks(material: Material, board: Board) -> list[Block]:
-    """What the users' own tasks ask for, and which version of them the figures are of."""
+def custom_tasks(material: Material, board: Board) -> list[Block]:
+    """What the custom tasks ask for, and which version of them the figures are of."""
     rows = []
     for shown in board.tasks:
         task = material.tasks.get(shown.task)

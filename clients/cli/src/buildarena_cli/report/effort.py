@@ -9,10 +9,10 @@ import numpy as np
 
 from buildarena_benchmark.leaderboard import Cell
 from buildarena_benchmark.statistics import agreement, detectable_difference, token_bins
-from buildarena_cli.output import number
 from buildarena_cli.report.document import Block, Grid, Heading, Paragraph, Plot
 from buildarena_cli.report.material import Material, paper_rows, percent
 from buildarena_cli.report.plots import cost_plot, rounds_plot
+from buildarena_cli.terminal.output import number
 
 SAMPLES = 64
 """The paper's samples of each model on each task."""

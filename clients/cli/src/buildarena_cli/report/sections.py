@@ -6,12 +6,12 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 
 from buildarena_benchmark.leaderboard import Board, BoardQuery, Cell, TrackBoard
-from buildarena_cli.output import in_words, number
-from buildarena_cli.report.custom_tasks import own_tasks
+from buildarena_cli.report.custom_tasks import custom_tasks
 from buildarena_cli.report.document import Block, Grid, Heading, Paragraph, Plot
 from buildarena_cli.report.effort import cost, power, rounds, simulators
 from buildarena_cli.report.material import Material, between, paper_rows, percent
 from buildarena_cli.report.plots import indicator_plot, radar_plot, shares_plot, success_plot
+from buildarena_cli.terminal.output import in_words, number
 
 
 def sections(material: Material) -> list[Block]:
@@ -30,7 +30,7 @@ def sections(material: Material) -> list[Block]:
     cells = {task.task: [row.cell for row in task.rows] for task in board.tasks}
     return [
         *blocks,
-        *own_tasks(material, board),
+        *custom_tasks(material, board),
         *_overall(board),
         *_performance(board, cells, material),
         *_dimensions(board),
@@ -74,8 +74,8 @@ def _overall(board: Board) -> list[Block]:
     return [
         Heading(text="Ranking"),
         Grid(
-            caption="By mean rank over tasks, of success rate and indicator. Models that can't "
-            "be told apart share a rank",
+            caption="By mean rank over tasks, of success rate and indicator. Statistically tied "
+            "models share a rank",
             columns=columns,
             rows=rows,
         ),

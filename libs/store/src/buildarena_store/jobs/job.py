@@ -105,4 +105,21 @@ class Job:
     finished_at: datetime | None
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JobFile:
+    """An artifact of a job.
+
+    Attributes:
+        name: Its name in the job, for example ``trajectory-0``.
+        media_type: For example ``application/json``.
+        size: Length in bytes.
+        hash: SHA-256 of the bytes, 64 hex digits.
+    """
+
+    name: str
+    media_type: str
+    size: int
+    hash: str
+
+
 JOB_COLUMNS = columns_of(Job, jobs)

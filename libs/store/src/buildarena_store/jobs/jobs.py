@@ -6,18 +6,19 @@ from collections.abc import Sequence
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import Connection, and_, any_, or_, select, update
+from sqlalchemy import Connection, and_, any_, func, or_, select, update
 from sqlalchemy.dialects.postgresql import insert
 
 from buildarena_store import events
 from buildarena_store.database import Database
 from buildarena_store.errors import UnknownIdError
+from buildarena_store.ids import begins_with
 from buildarena_store.jobs.attempts import Attempt, Ending, end_attempts
-from buildarena_store.jobs.job import JOB_COLUMNS, Job, NewJob
+from buildarena_store.jobs.job import JOB_COLUMNS, Job, JobFile, NewJob
 from buildarena_store.jobs.transitions import REOPENED, transition
 from buildarena_store.rows import bound_texts, columns_of, rows_of, value_of
 from buildarena_store.states import CONSTRUCT_QUEUE, AttemptResult, JobState, Outcome, Stage
-from buildarena_store.tables import attempts, job_artifacts, jobs, sweep_jobs
+from buildarena_store.tables import artifacts, attempts, job_artifacts, jobs, sweep_jobs
 
 
 class Jobs:
@@ -78,6 +79,8 @@ class Jobs:
         limit: int,
         after: tuple[datetime, str] | None = None,
         sweep_id: str | None = None,
+        flag: str | None = None,
+        id_prefix: str | None = None,
         **equals: str | int | None,
     ) -> list[Job]:
         """The newest jobs first, with keyset paging.
@@ -86,6 +89,8 @@ class Jobs:
             limit: Rows at most.
             after: ``(created_at, id)`` of the last row of the page before.
             sweep_id: Only this sweep's jobs.
+            flag: Only jobs with this flag.
+            id_prefix: Only jobs whose id begins like this.
             equals: Column values to match; None means any.
         """
         query = select(*JOB_COLUMNS)
@@ -96,6 +101,10 @@ class Jobs:
         for name, value in equals.items():
             if value is not None:
                 query = query.where(jobs.c[name] == value)
+        if flag is not None:
+            query = query.where(jobs.c.flags.contains([flag]))
+        if id_prefix is not None:
+            query = query.where(begins_with(jobs.c.id, id_prefix))
         if after is not None:
             created_at, id_ = after
             query = query.where(
@@ -117,6 +126,30 @@ class Jobs:
         )
         with self._database.statement() as connection:
             return [value_of(Attempt, row) for row in connection.execute(query)]
+
+    def distinct(self, column: str) -> list[str]:
+        """The values that jobs have in a column, in their order.
+
+        Args:
+            column: ``task``, ``model``, ``reason``, or ``flags``, whose elements are meant.
+        """
+        value = (
+            func.jsonb_array_elements_text(jobs.c.flags) if column == "flags" else jobs.c[column]
+        )
+        with self._database.statement() as connection:
+            found = connection.execute(select(value).distinct()).scalars()
+            return sorted(text for text in found if text is not None)
+
+    def files(self, job_id: str) -> list[JobFile]:
+        """The job's artifacts, with what is known of their bytes, by name."""
+        query = (
+            select(job_artifacts.c.name, *(artifacts.c[n] for n in ("media_type", "size", "hash")))
+            .join(artifacts, artifacts.c.hash == job_artifacts.c.hash)
+            .where(job_artifacts.c.job_id == job_id)
+            .order_by(job_artifacts.c.name)
+        )
+        with self._database.statement() as connection:
+            return [value_of(JobFile, row) for row in connection.execute(query)]
 
     def artifacts(self, job_id: str) -> dict[str, str]:
         """Hashes of the job's artifacts by name, for example ``machine``."""

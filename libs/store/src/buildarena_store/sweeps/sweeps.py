@@ -14,6 +14,7 @@ from sqlalchemy.dialects.postgresql import insert
 from buildarena_store import events
 from buildarena_store.database import Database
 from buildarena_store.errors import UnknownIdError
+from buildarena_store.ids import begins_with
 from buildarena_store.rows import bound_texts, columns_of, value_of
 from buildarena_store.states import JobState, SweepState
 from buildarena_store.tables import jobs, sweep_jobs, sweeps
@@ -146,9 +147,17 @@ class Sweeps:
             row = connection.execute(select(*_COLUMNS).where(condition)).first()
         return None if row is None else value_of(Sweep, row)
 
-    def page(self, *, limit: int, after: tuple[datetime, str] | None = None) -> list[Sweep]:
-        """The newest sweeps first, with keyset paging as for jobs."""
+    def page(
+        self,
+        *,
+        limit: int,
+        after: tuple[datetime, str] | None = None,
+        id_prefix: str | None = None,
+    ) -> list[Sweep]:
+        """The newest sweeps first, with keyset paging and beginnings of ids as for jobs."""
         query = select(*_COLUMNS).order_by(sweeps.c.created_at.desc(), sweeps.c.id).limit(limit)
+        if id_prefix is not None:
+            query = query.where(begins_with(sweeps.c.id, id_prefix))
         if after is not None:
             created_at, id_ = after
             query = query.where(

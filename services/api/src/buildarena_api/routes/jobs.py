@@ -2,17 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query, Response
 
-from buildarena_api.dependencies import ContextDep, SubmissionsDep
+from buildarena_api.dependencies import ContextDep, IdPrefix, RegistryDep, SubmissionsDep
 from buildarena_api.http import cursors
 from buildarena_api.http.access import CallerDep
 from buildarena_api.http.problems import ProblemError, problem_responses
+from buildarena_api.leaderboard.filters import unknown
 from buildarena_api.routes.transcripts import as_markdown
-from buildarena_api.schemas import AnyJobState, AttemptView, JobDetail, JobPage, JobView
+from buildarena_api.schemas import (
+    AnyJobState,
+    AnyOutcome,
+    AttemptView,
+    JobDetail,
+    JobFileView,
+    JobPage,
+    JobView,
+)
+from buildarena_benchmark import ValidationIssue
+from buildarena_pipeline.catalog.models import ModelRegistry
 from buildarena_pipeline.catalog.specs import JobSpec
+from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.notify import notify_waiting
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
@@ -37,16 +50,20 @@ def submit_job(
 @router.get("", responses=problem_responses(404, 422, 503))
 def list_jobs(
     context: ContextDep,
+    registry: RegistryDep,
     *,
     sweep: Annotated[str | None, Query(description="Only this sweep's jobs")] = None,
     task: Annotated[str | None, Query()] = None,
     model: Annotated[str | None, Query()] = None,
     state: Annotated[AnyJobState | None, Query()] = None,
-    outcome: Annotated[str | None, Query()] = None,
+    outcome: Annotated[AnyOutcome | None, Query()] = None,
+    reason: Annotated[str | None, Query(description="Class of the failure")] = None,
+    flag: Annotated[str | None, Query(description="Only jobs with this flag")] = None,
+    id_prefix: IdPrefix = None,
     cursor: Annotated[str | None, Query(max_length=500)] = None,
     limit: Annotated[int, Query(ge=1, le=1000)] = 100,
 ) -> JobPage:
-    """Lists jobs, newest first."""
+    """Lists jobs, newest first. A value that no job can have is refused with the choices."""
     if sweep is not None:
         context.store.sweeps.get(sweep)
     found = context.store.jobs.page(
@@ -57,12 +74,43 @@ def list_jobs(
         model=model,
         state=state,
         outcome=outcome,
+        reason=reason,
+        flag=flag,
+        id_prefix=id_prefix,
     )
+    if not found:
+        _require_known(
+            context, registry, {"task": task, "model": model, "reason": reason, "flag": flag}
+        )
     more = len(found) == limit
     return JobPage(
         jobs=[JobView.of(job) for job in found],
         next_cursor=cursors.encode(found[-1].created_at, found[-1].id) if more else None,
     )
+
+
+def _require_known(
+    context: Context, registry: ModelRegistry, given: Mapping[str, str | None]
+) -> None:
+    """Refuses values that are in no job, and in nothing that a job could be submitted with."""
+    known = {
+        "task": lambda: list(context.tasks.newest()),
+        "model": lambda: list(registry.models),
+    }
+    for name, value in given.items():
+        if value is None:
+            continue
+        choices = known.get(name, list)()
+        if value in choices:
+            continue
+        used = context.store.jobs.distinct("flags" if name == "flag" else name)
+        if value in used or not (choices or used):
+            continue
+        if choices:
+            raise unknown(name, value, list(dict.fromkeys([*choices, *used])))
+        message = f"no job has the {name} {value!r}"
+        problem = ValidationIssue(path=name, message=message, choices=tuple(used))
+        raise ProblemError(422, f"{name}: {message}", errors=[problem])
 
 
 @router.get("/{job_id}", responses=problem_responses(404, 503))
@@ -100,6 +148,34 @@ def retry_job(job_id: str, context: ContextDep, caller: CallerDep) -> JobView:
         raise ProblemError(409, f"only errored jobs are retried; job {job_id} is {state}")
     notify_waiting(context, job.queue)
     return JobView.of(context.store.jobs.get(job_id))
+
+
+@router.get("/{job_id}/artifacts", responses=problem_responses(404, 503))
+def list_artifacts(job_id: str, context: ContextDep) -> list[JobFileView]:
+    """Lists all artifacts of a job, by name."""
+    context.store.jobs.get(job_id)
+    return [JobFileView.model_validate(file) for file in context.store.jobs.files(job_id)]
+
+
+@router.get(
+    "/{job_id}/artifacts/{name}",
+    responses={
+        200: {"content": {kind: {} for kind in sorted({*ARTIFACT_TYPES.values()})}},
+        **problem_responses(404, 503),
+    },
+    response_class=Response,
+)
+def get_artifact_by_name(job_id: str, name: str, context: ContextDep) -> Response:
+    """An artifact of a job; its ETag is the SHA-256 of its bytes."""
+    context.store.jobs.get(job_id)
+    found = [file for file in context.store.jobs.files(job_id) if file.name == name]
+    if not found:
+        raise ProblemError(404, f"job {job_id} has no {name!r}")
+    return Response(
+        context.artifacts.get(found[0].hash),
+        media_type=found[0].media_type,
+        headers={"ETag": f'"{found[0].hash}"'},
+    )
 
 
 @router.get(

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Header, Query, Response
 from pydantic import BaseModel, ConfigDict
 from sqlalchemy.exc import IntegrityError
 
-from buildarena_api.dependencies import ContextDep, SubmissionsDep
+from buildarena_api.dependencies import ContextDep, IdPrefix, SubmissionsDep
 from buildarena_api.http import cursors
 from buildarena_api.http.access import Caller, CallerDep
 from buildarena_api.http.problems import ProblemError, problem_responses
@@ -155,10 +155,13 @@ def list_sweeps(
     context: ContextDep,
     cursor: Annotated[str | None, Query(max_length=500)] = None,
     limit: Annotated[int, Query(ge=1, le=100)] = 20,
+    id_prefix: IdPrefix = None,
 ) -> SweepPage:
     """Lists sweeps, newest first."""
     found = context.store.sweeps.page(
-        limit=limit, after=None if cursor is None else cursors.decode(cursor)
+        limit=limit,
+        after=None if cursor is None else cursors.decode(cursor),
+        id_prefix=id_prefix,
     )
     more = len(found) == limit
     return SweepPage(

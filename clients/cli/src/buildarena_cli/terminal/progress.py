@@ -5,18 +5,9 @@ from __future__ import annotations
 import time
 from typing import Any
 
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
-
-from buildarena_cli.client import Client
+from buildarena_cli.client import Client, at
 from buildarena_cli.errors import DONE, PARTIAL
-from buildarena_cli.output import console
+from buildarena_cli.terminal.output import is_terminal, say
 
 POLL_S = 0.3
 PLAIN_POLL_S = 2.0
@@ -29,7 +20,7 @@ def watch_sweep(client: Client, sweep_id: str) -> dict[str, Any]:
     Returns:
         The sweep as the API shows it then.
     """
-    return _watch_bars(client, sweep_id) if console.is_terminal else _watch_lines(client, sweep_id)
+    return _watch_bars(client, sweep_id) if is_terminal() else _watch_lines(client, sweep_id)
 
 
 def exit_code(sweep: dict[str, Any]) -> int:
@@ -49,21 +40,37 @@ def ended(sweep: dict[str, Any]) -> bool:
 
 
 def _watch_bars(client: Client, sweep_id: str) -> dict[str, Any]:
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+    from rich.table import Column
+
+    whole = Column(no_wrap=True, min_width=7)
     bars = Progress(
-        TextColumn("{task.description:<24}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TextColumn("left"),
-        TimeRemainingColumn(),
-        TextColumn("{task.fields[note]}"),
-        console=console,
+        TextColumn("{task.description}", markup=False, table_column=Column(min_width=14)),
+        BarColumn(bar_width=12, table_column=Column(min_width=12)),
+        MofNCompleteColumn(table_column=whole),
+        TimeElapsedColumn(table_column=whole.copy()),
+        TextColumn("left", table_column=Column(min_width=4)),
+        TimeRemainingColumn(table_column=whole.copy()),
+        # What a narrow terminal has no room for is cut here.
+        TextColumn(
+            "{task.fields[note]}",
+            markup=False,
+            table_column=Column(no_wrap=True, overflow="ellipsis", ratio=1),
+        ),
+        expand=True,
     )
     with bars:
         built = bars.add_task("machines built", total=None, note="")
         scored = bars.add_task("jobs scored", total=None, note="")
         while True:
-            sweep: dict[str, Any] = client.get_patiently(f"/v1/sweeps/{sweep_id}")
+            sweep: dict[str, Any] = client.get_patiently(at("sweeps", sweep_id))
             progress = sweep["progress"]
             stages = progress["stages"]
             building = sum(n for name, n in stages.items() if name.startswith("construct"))
@@ -87,7 +94,7 @@ def _watch_bars(client: Client, sweep_id: str) -> dict[str, Any]:
 def _watch_lines(client: Client, sweep_id: str) -> dict[str, Any]:
     shown = ""
     while True:
-        sweep: dict[str, Any] = client.get_patiently(f"/v1/sweeps/{sweep_id}")
+        sweep: dict[str, Any] = client.get_patiently(at("sweeps", sweep_id))
         progress = sweep["progress"]
         line = (
             f"{progress['done']}/{progress['total']} jobs ended, "
@@ -95,7 +102,7 @@ def _watch_lines(client: Client, sweep_id: str) -> dict[str, Any]:
             f"{_counted(progress['outcomes'])}"
         )
         if line != shown:
-            console.print(line, soft_wrap=True)
+            say(line)
             shown = line
         if ended(sweep):
             return sweep

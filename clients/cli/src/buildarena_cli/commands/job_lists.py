@@ -1,0 +1,99 @@
+"""`buildarena job list`: jobs by what they are and how they ended."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import typer
+
+from buildarena_cli.client import Client
+from buildarena_cli.ids import whole_id
+from buildarena_cli.options import (
+    DEFAULT_URL,
+    AfterOption,
+    AllOption,
+    JsonOption,
+    UrlOption,
+)
+from buildarena_cli.terminal.completion import complete_model, complete_sweep, complete_task
+from buildarena_cli.terminal.output import columns, number, print_json, print_table, warn
+
+MAX_LIMIT = 1000
+COLUMNS = columns(
+    *("job", "task", "model", "seed", "state", "reason", "flags", "indicator", "created"),
+    figures=("seed", "indicator"),
+    leaving=("created", "flags", "reason", "seed", "indicator", "model", "task", "state"),
+)
+
+
+def list_jobs(
+    *,
+    sweep: Annotated[
+        str | None, typer.Option(help="Only this sweep's.", autocompletion=complete_sweep)
+    ] = None,
+    task: Annotated[
+        str | None, typer.Option(help="Only this task's.", autocompletion=complete_task)
+    ] = None,
+    model: Annotated[
+        str | None, typer.Option(help="Only this model's.", autocompletion=complete_model)
+    ] = None,
+    state: Annotated[str | None, typer.Option(help="Only in this state.")] = None,
+    outcome: Annotated[
+        str | None, typer.Option(help="Only this outcome; errored shows the dead letters.")
+    ] = None,
+    reason: Annotated[str | None, typer.Option(help="Only this reason of failure.")] = None,
+    flag: Annotated[str | None, typer.Option(help="Only with this flag.")] = None,
+    limit: Annotated[int, typer.Option(help="Rows at most.", min=1, max=MAX_LIMIT)] = 50,
+    after: AfterOption = None,
+    every: AllOption = False,
+    url: UrlOption = DEFAULT_URL,
+    as_json: JsonOption = False,
+) -> None:
+    """List jobs, newest first."""
+    client = Client(url)
+    pages = client.pages(
+        "/v1/jobs",
+        cursor=after,
+        sweep=None if sweep is None else whole_id(client, "sweep", sweep),
+        task=task,
+        model=model,
+        state=state,
+        outcome=outcome,
+        reason=reason,
+        flag=flag,
+        limit=MAX_LIMIT if every else limit,
+    )
+    page = gathered(pages, "jobs", every=every)
+    if as_json:
+        print_json(page)
+        return
+    print_table(COLUMNS, [_row(job) for job in page["jobs"]])
+    show_cursor(page)
+
+
+def gathered(pages: Any, name: str, *, every: bool) -> dict[str, Any]:
+    """One page of what is listed under a name, or all pages as one."""
+    if not every:
+        first: dict[str, Any] = next(pages)
+        return first
+    return {name: [entry for page in pages for entry in page[name]], "next_cursor": None}
+
+
+def show_cursor(page: dict[str, Any]) -> None:
+    """Names the next page, if there is one, where a pipe does not take it for a row."""
+    if page["next_cursor"] is not None:
+        warn(f"more: --after {page['next_cursor']}, or --all")
+
+
+def _row(job: dict[str, Any]) -> list[str]:
+    return [
+        job["id"],
+        job["task"],
+        job["model"],
+        str(job["seed"]),
+        job["outcome"] or f"{job['stage']} {job['state']}",
+        job["reason"] or "",
+        ", ".join(job["flags"] or ()),
+        number(job["indicator"], 2),
+        job["created_at"][:16].replace("T", " "),
+    ]

@@ -1,0 +1,33 @@
+"""`buildarena mcp`: the tools of this service for agents that speak the Model Context Protocol."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from buildarena_cli.client import Client
+from buildarena_cli.options import DEFAULT_URL, UrlOption
+
+
+def mcp(
+    url: UrlOption = DEFAULT_URL,
+    http: Annotated[
+        int | None, typer.Option("--http", help="Serve streamable HTTP on this loopback port.")
+    ] = None,
+) -> None:
+    """Let agents that speak the Model Context Protocol build.
+
+    Their machines are simulated and scored like all others, on a track of their own.
+    """
+    import asyncio
+
+    from buildarena_cli.mcp_server import make_server, serve_stdio
+
+    if http is None:
+        asyncio.run(serve_stdio(Client(url)))
+        return
+    import uvicorn
+
+    server = make_server(Client(url)).streamable_http_app()
+    uvicorn.run(server, host="127.0.0.1", port=http, log_level="warning")

@@ -1,0 +1,221 @@
+"""The commands that look at a service and stop it: status, logs, doctor, down."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections import deque
+from dataclasses import asdict
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from buildarena_cli.defaults import data_folder
+from buildarena_cli.errors import FAILED, CommandError
+from buildarena_cli.near import did_you_mean
+from buildarena_cli.options import DEFAULT_URL, DataOption, JsonOption, UrlOption
+from buildarena_cli.terminal.output import columns, number, print_json, print_table, say
+
+if TYPE_CHECKING:
+    from buildarena_cli.local.service import ProcessFacts, Run
+
+MEBIBYTE = 1024 * 1024
+FOLLOW_EVERY_S = 0.2
+PROCESSES = columns(
+    *("process", "pid", "MiB", "ports", "since"),
+    figures=("pid", "MiB"),
+    leaving=("since", "ports", "MiB"),
+)
+
+
+def down(data: DataOption = None) -> None:
+    """Stop the service that runs on the data folder."""
+    from buildarena_cli.local.service import stop
+
+    folder = data_folder(data)
+    say("stopped" if stop(folder) else f"nothing runs on {folder.absolute()}")
+
+
+def status(data: DataOption = None, *, as_json: JsonOption = False) -> None:
+    """Show what of the service runs on the data folder.
+
+    The exit code is 0 when everything is healthy, and 1 otherwise.
+    """
+    from buildarena_cli.local.service import noted_run, process_facts, running
+
+    folder = data_folder(data).absolute()
+    run = running(folder)
+    if run is None:
+        last = noted_run(folder)
+        if as_json:
+            print_json({"running": False, "data": str(folder)})
+        else:
+            before = f"; the last run was process {last.pid}" if last else ""
+            say(f"nothing runs on {folder}{before}")
+        raise typer.Exit(FAILED)
+    health, facts = _health(run), process_facts(run)
+    healthy = health["status"] == "ok" and all(fact.started_at is not None for fact in facts)
+    if as_json:
+        processes = [asdict(fact) for fact in facts]
+        shown = {"running": True, "data": str(folder), "url": run.url, "pid": run.pid}
+        print_json({**shown, "healthy": healthy, "processes": processes, "health": health})
+    else:
+        _show(run, folder, health, facts)
+    if not healthy:
+        raise typer.Exit(FAILED)
+
+
+def complete_process(ctx: typer.Context, incomplete: str) -> list[str]:
+    """Processes that have a log."""
+    from buildarena_cli.local.service import log_files
+
+    given = ctx.params.get("data")
+    folder = data_folder(Path(given) if given else None)
+    return [name for name in log_files(folder) if name.startswith(incomplete)]
+
+
+def logs(
+    process: Annotated[
+        str | None,
+        typer.Argument(help="Which process; default: all.", autocompletion=complete_process),
+    ] = None,
+    *,
+    follow: Annotated[
+        bool, typer.Option("--follow", "-f", help="Go on until Ctrl-C with what is written.")
+    ] = False,
+    lines: Annotated[int, typer.Option("--lines", "-n", help="Of each log at most.", min=0)] = 50,
+    data: DataOption = None,
+) -> None:
+    """Print the logs of the service's processes."""
+    from buildarena_cli.local.service import log_files
+
+    folder = data_folder(data)
+    files = log_files(folder)
+    if not files:
+        raise CommandError(f"there are no logs in {folder.absolute() / 'logs'}")
+    if process is not None:
+        name = process.replace(" ", "-")
+        if name not in files:
+            raise CommandError(
+                f"there is no process {process!r}; choose from {', '.join(files)}"
+                f"{did_you_mean(name, files)}"
+            )
+        files = {name: files[name]}
+    width = max(map(len, files)) if len(files) > 1 else 0
+    places = {}
+    for name, file in files.items():
+        places[name] = _print_end(file, lines, f"{name:<{width}}  " if width else "")
+    while follow:
+        time.sleep(FOLLOW_EVERY_S)
+        for name, file in files.items():
+            places[name] = _print_new(file, places[name], f"{name:<{width}}  " if width else "")
+
+
+def doctor(url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) -> None:
+    """Show what is wrong with the service and what to do.
+
+    The exit code is 1 when anything is wrong.
+    """
+    from buildarena_cli.client import HEALTH, Client
+
+    client = Client(url)
+    health: dict[str, Any] = client.get(HEALTH)
+    peak = _peak_memory_bytes(client.url)
+    if as_json:
+        print_json({**health, "peak_memory_bytes": peak})
+    else:
+        say(f"BuildArena at {client.url}: {health['status']}")
+        rows = [
+            ("ok" if check["ok"] else "!!", check["name"], check["detail"])
+            for check in health["checks"]
+        ]
+        if peak is not None:
+            shown = f"{peak / MEBIBYTE:,.0f} MiB at the peak, all processes"
+            rows.append(("ok", "memory", shown))
+        print_table(columns("is", "check", "finding"), rows)
+        for check in health["checks"]:
+            if check["advice"]:
+                say(f"{check['name']}: {check['advice']}")
+    if health["status"] != "ok":
+        raise typer.Exit(FAILED)
+
+
+def _health(run: Run) -> dict[str, Any]:
+    from buildarena_cli.client import HEALTH, Client, UnreachableError
+
+    try:
+        health: dict[str, Any] = Client(run.url).get(HEALTH)
+    except UnreachableError:
+        advice = "`buildarena logs api` says why" if run.ready else "it is starting"
+        api = {"name": "API", "ok": False, "detail": "does not answer", "advice": advice}
+        return {"status": "down", "checks": [api]}
+    return health
+
+
+def _show(run: Run, folder: Path, health: dict[str, Any], facts: list[ProcessFacts]) -> None:
+    say(f"{health['status']}: API {run.url}, data {folder}")
+    rows = []
+    for fact in facts:
+        gone = fact.started_at is None
+        memory = None if fact.memory_bytes is None else fact.memory_bytes / MEBIBYTE
+        since = datetime.fromtimestamp(fact.started_at or 0).astimezone()
+        rows.append(
+            (
+                fact.name.replace(" ", "-"),
+                str(fact.pid),
+                number(memory, 0),
+                ", ".join(map(str, fact.ports)),
+                "gone" if gone else f"{since:%Y-%m-%d %H:%M:%S}",
+            )
+        )
+    print_table(PROCESSES, rows)
+    for check in health["checks"]:
+        if not check["ok"]:
+            say(f"!!  {check['name']}: {check['detail']} {check['advice']}".rstrip())
+
+
+def _print_end(file: Path, lines: int, prefix: str) -> int:
+    """Prints a log's last lines; the place behind them."""
+    with file.open("rb") as log:
+        for line in deque(log, maxlen=lines):
+            _print_line(line, prefix)
+        return log.tell()
+
+
+def _print_new(file: Path, place: int, prefix: str) -> int:
+    """Prints the whole lines behind a place; the place behind them."""
+    try:
+        with file.open("rb") as log:
+            size = log.seek(0, 2)
+            log.seek(place if place <= size else 0)
+            for line in log:
+                if not line.endswith(b"\n"):
+                    return log.tell() - len(line)
+                _print_line(line, prefix)
+            return log.tell()
+    except FileNotFoundError:
+        return 0
+
+
+def _print_line(line: bytes, prefix: str) -> None:
+    say(prefix + line.decode(errors="replace").rstrip("\n"))
+
+
+def _peak_memory_bytes(url: str) -> int | None:
+    """The peak that the local stack at this URL noted, if it is one of this folder's."""
+    data = data_folder(None)
+    for run in (data / "run.json", data / "demo" / "run.json"):
+        noted = _read(run)
+        if noted.get("url") == url:
+            return int(noted["peak_memory_bytes"])
+    return None
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        noted: dict[str, Any] = json.loads(path.read_text())
+    except (OSError, ValueError):
+        return {}
+    return noted

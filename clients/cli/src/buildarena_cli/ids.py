@@ -1,0 +1,71 @@
+"""Ids on the command line: checked before they become part of a path; a unique prefix will do."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any, Final
+
+from buildarena_cli.errors import CommandError
+from buildarena_cli.near import did_you_mean
+
+if TYPE_CHECKING:
+    from buildarena_cli.client import Client
+
+DIGITS: Final = 20
+"""Hex digits of a whole id."""
+KINDS: Final = ("job", "sweep", "key")
+MAX_CANDIDATES: Final = 10
+LISTED: Final = {"job": "jobs", "sweep": "sweeps"}
+"""Kinds that the API lists by ``id_prefix``; of keys it lists all."""
+
+
+def whole_id(client: Client, kind: str, given: str) -> str:
+    """The id that a word of the command line stands for.
+
+    Args:
+        client: The API, asked when the word is no whole id.
+        kind: One of KINDS.
+        given: An id, or the beginning of one, with or without ``kind_``.
+
+    Raises:
+        CommandError: It is no id of this kind, or nothing or more than one thing begins like it.
+    """
+    prefix = checked_prefix(kind, given)
+    if len(prefix) == len(kind) + 1 + DIGITS:
+        return prefix
+    found = candidates(client, kind, prefix)
+    if not found:
+        raise CommandError(f"no {kind}'s id begins with {prefix!r}")
+    if len(found) > 1:
+        more = " …" if len(found) > MAX_CANDIDATES else ""
+        shown = ", ".join(found[:MAX_CANDIDATES])
+        raise CommandError(f"several {kind}s' ids begin with {prefix!r}: {shown}{more}")
+    return found[0]
+
+
+def checked_prefix(kind: str, given: str) -> str:
+    """The beginning of an id, with its ``kind_``.
+
+    Raises:
+        CommandError: No id of this kind begins like that.
+    """
+    match = re.fullmatch(rf"(?:{kind}_)?([0-9a-f]{{1,{DIGITS}}})", given)
+    if match is None:
+        wrong = given.partition("_")[0]
+        hint = did_you_mean(wrong, KINDS) if "_" in given and wrong not in KINDS else ""
+        raise CommandError(
+            f"{given!r} is not the id of a {kind} (such as {kind}_{'0a1b2c3d4e5f60718293'}, "
+            f"or how it begins){hint}"
+        )
+    return f"{kind}_{match[1]}"
+
+
+def candidates(client: Client, kind: str, prefix: str) -> list[str]:
+    """Ids that begin with a prefix: all up to MAX_CANDIDATES, one more when there are more."""
+    limit = MAX_CANDIDATES + 1
+    if kind in LISTED:
+        name = LISTED[kind]
+        entries: list[Any] = client.get(f"/v1/{name}", id_prefix=prefix, limit=limit)[name]
+    else:
+        entries = client.get(f"/v1/{kind}s")
+    return [entry["id"] for entry in entries if entry["id"].startswith(prefix)][:limit]

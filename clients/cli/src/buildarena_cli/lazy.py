@@ -1,0 +1,117 @@
+"""Groups of commands that are loaded when they are named.
+
+Loading every command takes half a second and more; help and completion need their names and first
+sentences only, which stand in `buildarena_cli.commands.COMMANDS`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, MutableMapping
+from importlib import import_module
+from typing import Any
+
+import typer
+from typer.core import TyperGroup
+from typer.main import get_command, get_group
+
+from buildarena_cli.commands import COMMANDS, Entry
+from buildarena_cli.near import near_words
+
+MAX_WIDTH = 100
+"""Columns of help texts on wide terminals."""
+CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": MAX_WIDTH}
+
+
+class NearGroup(TyperGroup):
+    """A group whose refusal of an unknown command names the near ones."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """The command that the first word names; click's signature."""
+        self.suggest_commands = False
+        try:
+            return super().resolve_command(ctx, args)
+        except Exception as error:
+            near = near_words(args[0], self.commands)
+            if near and getattr(error, "message", "").startswith("No such command"):
+                error.message = (  # type: ignore[attr-defined]
+                    f"No such command {args[0]!r}; did you mean {' or '.join(near)}?"
+                )
+            raise
+
+
+class LazyGroup(NearGroup):
+    """The group of all commands."""
+
+    def __init__(self, **attributes: Any) -> None:
+        super().__init__(**attributes)
+        self.commands = _Commands(COMMANDS)
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:  # noqa: ARG002 - click's
+        """Writes the commands' names and first sentences, without loading them."""
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, entry.help) for name, entry in COMMANDS.items()])
+
+    def shell_complete(self, ctx: Any, incomplete: str) -> list[Any]:
+        """What the shell offers for the first word."""
+        from typer.core import CompletionItem  # type: ignore[attr-defined] # typer has no other
+
+        if incomplete.startswith("-"):
+            return super(TyperGroup, self).shell_complete(ctx, incomplete)
+        return [
+            CompletionItem(name, help=entry.help)
+            for name, entry in COMMANDS.items()
+            if name.startswith(incomplete)
+        ]
+
+
+class _Commands(MutableMapping[str, Any]):
+    """The commands by name; one is loaded when it is asked for."""
+
+    def __init__(self, entries: Mapping[str, Entry]) -> None:
+        self._entries = entries
+        self._loaded: dict[str, Any] = {}
+
+    def __getitem__(self, name: str) -> Any:
+        if name not in self._loaded:
+            self._loaded[name] = _load(name, self._entries[name])
+        return self._loaded[name]
+
+    def __setitem__(self, name: str, command: Any) -> None:
+        self._loaded[name] = command
+
+    def __delitem__(self, name: str) -> None:
+        del self._loaded[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._entries)
+
+    def __len__(self) -> int:
+        return len(self._entries)
+
+
+def new_group(text: str) -> typer.Typer:
+    """An empty group of commands.
+
+    Args:
+        text: What they are for.
+    """
+    return typer.Typer(
+        help=text,
+        no_args_is_help=True,
+        cls=NearGroup,
+        rich_markup_mode=None,
+        add_completion=False,
+        pretty_exceptions_enable=False,
+        context_settings=CONTEXT,
+    )
+
+
+def _load(name: str, entry: Entry) -> Any:
+    found = getattr(import_module(f"buildarena_cli.commands.{entry.module}"), entry.attribute)
+    if isinstance(found, typer.Typer):
+        group = get_group(found)
+        group.name = name
+        return group
+    alone = typer.Typer(rich_markup_mode=None, add_completion=False, pretty_exceptions_enable=False)
+    alone.command(name, context_settings=CONTEXT)(found)
+    return get_command(alone)

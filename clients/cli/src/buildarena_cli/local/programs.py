@@ -1,0 +1,44 @@
+"""The programs that a service consists of, beside its servers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from buildarena_pipeline.catalog.tracks import SIMULATORS
+from buildarena_store.states import CONSTRUCT_QUEUE, simulate_queue
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Program:
+    """A program of the service.
+
+    Attributes:
+        name: What people call it.
+        words: Its module and arguments, for ``python -m``.
+        queue: The queue whose jobs it does; None for the API.
+    """
+
+    name: str
+    words: Sequence[str]
+    queue: str | None = None
+
+
+def programs(simulators: Sequence[str] = SIMULATORS) -> list[Program]:
+    """All programs in the order in which they are started.
+
+    Args:
+        simulators: Simulators to have a worker for.
+    """
+    return [
+        Program(name="api", words=["buildarena_api"]),
+        Program(name="construct worker", words=["buildarena_worker"], queue=CONSTRUCT_QUEUE),
+        *(
+            Program(
+                name=f"{simulator} worker",
+                words=["buildarena_simworker", "--engine", simulator],
+                queue=simulate_queue(simulator),
+            )
+            for simulator in simulators
+        ),
+    ]

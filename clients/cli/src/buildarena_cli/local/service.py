@@ -1,0 +1,227 @@
+"""The service that runs on a data folder: found, started in the background, stopped, looked at.
+
+Whoever runs on a folder holds a lock on its file ``lock`` and notes in ``run.json`` what it is. The
+lock goes with its process however that ends; a note without a lock is of a run that is over.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import psutil
+
+from buildarena_cli.errors import CommandError
+
+LOCK: Final = "lock"
+RUN: Final = "run.json"
+SUPERVISOR: Final = "supervisor"
+READY: Final = "ready"
+START_WITHIN_S: Final = 120.0
+STOP_WITHIN_S: Final = 60.0
+POLL_S: Final = 0.1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Run:
+    """What a run noted of itself.
+
+    Attributes:
+        url: Where its API is.
+        pid: The process that started all others.
+        ready: Whether everything answered once.
+        processes: Process ids by name.
+        peak_memory_bytes: Of all processes together.
+    """
+
+    url: str
+    pid: int
+    ready: bool
+    processes: Mapping[str, int]
+    peak_memory_bytes: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ProcessFacts:
+    """What the system knows of a process; None when it is gone, or belongs to somebody else.
+
+    Attributes:
+        name: What it does.
+        pid: Its id.
+        memory_bytes: Of it and its children.
+        started_at: Seconds since 1970.
+        ports: TCP ports it listens on.
+    """
+
+    name: str
+    pid: int
+    memory_bytes: int | None
+    started_at: float | None
+    ports: Sequence[int]
+
+
+def is_running(data: Path) -> bool:
+    """Whether a service runs on a data folder, whatever its note says."""
+    try:
+        with (data / LOCK).open("rb") as lock:
+            fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    except BlockingIOError:
+        return True
+    except OSError as error:
+        raise CommandError(f"{data / LOCK} can't be read: {error.strerror}") from error
+    return False
+
+
+def noted_run(data: Path) -> Run | None:
+    """What the last run on a data folder noted, be it over or not."""
+    try:
+        noted: dict[str, Any] = json.loads((data / RUN).read_text())
+        return Run(
+            url=noted["url"],
+            pid=noted["pid"],
+            ready=noted["state"] == READY,
+            processes=noted["processes"],
+            peak_memory_bytes=noted["peak_memory_bytes"],
+        )
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
+def running(data: Path) -> Run | None:
+    """The run that goes on on a data folder, if any."""
+    return noted_run(data) if is_running(data) else None
+
+
+def start(data: Path, words: Sequence[str]) -> Run:
+    """Starts a service that outlives this process, and waits until everything answers.
+
+    Args:
+        data: Its data folder.
+        words: Options of `buildarena up`.
+
+    Raises:
+        CommandError: It did not start; the message is its own.
+    """
+    log_file = data.absolute() / "logs" / f"{SUPERVISOR}.log"
+    log_file.parent.mkdir(parents=True, exist_ok=True)
+    with log_file.open("ab") as log:
+        written = log.tell()
+        process = subprocess.Popen(
+            [sys.executable, "-m", "buildarena_cli", "up", "--data", str(data), *words],
+            stdin=subprocess.DEVNULL,
+            stdout=log,
+            stderr=subprocess.STDOUT,
+            # A session of its own: closing the terminal does not reach it.
+            start_new_session=True,
+        )
+    try:
+        return _ready(data, process, log_file, written)
+    except BaseException:
+        process.terminate()
+        process.wait()
+        raise
+
+
+def stop(data: Path) -> bool:
+    """Stops the service of a data folder and waits until it is gone.
+
+    Returns:
+        Whether one ran.
+
+    Raises:
+        CommandError: It belongs to somebody else, or does not end.
+    """
+    deadline = time.monotonic() + STOP_WITHIN_S
+    if not is_running(data):
+        return False
+    run = noted_run(data)
+    if run is None:
+        raise CommandError(f"{data / RUN} does not say which process runs there")
+    try:
+        os.kill(run.pid, signal.SIGTERM)
+    except ProcessLookupError:
+        pass
+    except PermissionError as error:
+        raise CommandError(f"process {run.pid} belongs to somebody else") from error
+    # The lock goes a moment before its process does.
+    while is_running(data) or _lives(run.pid):
+        if time.monotonic() > deadline:
+            raise CommandError(
+                f"process {run.pid} has not ended within {STOP_WITHIN_S:.0f} s: "
+                f"see {data.absolute() / 'logs'}"
+            )
+        time.sleep(POLL_S)
+    return True
+
+
+def process_facts(run: Run) -> list[ProcessFacts]:
+    """What the system knows of a run's processes, the supervisor first."""
+    return [_facts(SUPERVISOR, run.pid), *(_facts(n, pid) for n, pid in run.processes.items())]
+
+
+def log_files(data: Path) -> dict[str, Path]:
+    """Logs by the name of their process."""
+    return {file.stem: file for file in sorted((data.absolute() / "logs").glob("*.log"))}
+
+
+def _ready(data: Path, process: subprocess.Popen[bytes], log_file: Path, written: int) -> Run:
+    deadline = time.monotonic() + START_WITHIN_S
+    while time.monotonic() < deadline:
+        if process.poll() is not None:
+            written_since = (
+                log_file.read_bytes()[written:].decode(errors="replace").strip().splitlines()
+            )
+            raise CommandError(
+                written_since[-1] if written_since else f"it ended at once (see {log_file})"
+            )
+        run = noted_run(data)
+        if run is not None and run.pid == process.pid and run.ready:
+            return run
+        time.sleep(POLL_S)
+    raise CommandError(f"not ready within {START_WITHIN_S:.0f} s (see {log_file})")
+
+
+def _lives(pid: int) -> bool:
+    """Whether a process still runs; one that nobody waited for is over."""
+    try:
+        return bool(psutil.Process(pid).status() != psutil.STATUS_ZOMBIE)
+    except psutil.NoSuchProcess:
+        return False
+
+
+def _facts(name: str, pid: int) -> ProcessFacts:
+    memory, started, ports = None, None, set()
+    with contextlib.suppress(psutil.Error):
+        process = psutil.Process(pid)
+        started = process.create_time()
+        # The supervisor's children have rows of their own.
+        members = [process] if name == SUPERVISOR else [process, *process.children(recursive=True)]
+        memory = sum(_memory_bytes(member) for member in members)
+        for member in members:
+            with contextlib.suppress(psutil.Error):
+                listening = member.net_connections("tcp")
+                ports |= {c.laddr.port for c in listening if c.status == psutil.CONN_LISTEN}
+    return ProcessFacts(
+        name=name, pid=pid, memory_bytes=memory, started_at=started, ports=sorted(ports)
+    )
+
+
+def _memory_bytes(process: psutil.Process) -> int:
+    """Its share of memory: pages that several processes use are divided among them."""
+    with contextlib.suppress(psutil.Error, AttributeError):
+        return int(process.memory_full_info().pss)
+    with contextlib.suppress(psutil.Error):
+        return int(process.memory_info().rss)
+    return 0

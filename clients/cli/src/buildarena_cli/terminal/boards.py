@@ -1,0 +1,270 @@
+"""Leaderboards on a terminal: one overview, and the details of a task.
+
+The overview has success, its interval and the indicator of each model on each task. Through a pipe
+there is a row for each model. A terminal gets that, or a row for each task, whichever takes fewer
+blocks: what does not fit beside the names is continued below, so that nothing is left out. Where
+not even one column fits beside the names, the intervals give way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+from buildarena_cli.terminal.output import (
+    NOTHING,
+    columns,
+    emphasised,
+    harmless,
+    in_words,
+    is_terminal,
+    number,
+    padded,
+    print_lines,
+    print_table,
+    say,
+    terminal_width,
+    width_of,
+)
+
+GAP = "   "
+FIGURES = ("success", "95 %", "indicator", "parts", "requests", "tokens", "USD")
+DETAILS = columns(
+    *("#", "model", *FIGURES),
+    figures=("#", *FIGURES),
+    leaving=("requests", "parts", "tokens", "USD", "95 %", "indicator"),
+)
+PUBLISHED = columns(
+    *("model", *FIGURES[:-1]),
+    figures=FIGURES,
+    leaving=("requests", "parts", "tokens", "95 %", "indicator"),
+)
+OVERALL = columns(
+    *("#", "model", "place", "mean rank", "success", "USD", "front"),
+    figures=("#", "place", "mean rank", "success", "USD"),
+    leaving=("front", "USD", "mean rank", "place", "success"),
+)
+
+
+class _Row(NamedTuple):
+    """A model of the overview: its rank, its name, and its row of each task."""
+
+    rank: str
+    name: str
+    by_task: Mapping[str, Mapping[str, Any]]
+
+
+def overview(board: Mapping[str, Any], *, published: bool = False) -> None:
+    """Prints models x tasks: success with its interval, indicator; and the overall rank.
+
+    Args:
+        board: The API's answer.
+        published: Whether the paper's figures stand below ours.
+    """
+    ranks = {(row["model"], row["configuration"]): row["rank"] for row in board["overall"]}
+    rows: dict[tuple[str, str], dict[str, Any]] = {}
+    baselines = set()
+    for task in board["tasks"]:
+        for row in task["rows"]:
+            rows.setdefault((row["model"], row["configuration"]), {})[task["task"]] = row
+            if row["baseline"]:
+                baselines.add(row["model"])
+    ordered = sorted(rows, key=lambda key: (ranks.get(key) is None, ranks.get(key), key[0]))
+    names = [model + ("*" if model in baselines else "") for model, _ in ordered]
+    tasks = [task["task"] for task in board["tasks"]]
+    _print_matrix(
+        tasks,
+        [
+            _Row(_rank(ranks.get(key)), harmless(name), rows[key])
+            for key, name in zip(ordered, names, strict=True)
+        ],
+    )
+    if published:
+        say()
+        say("As published: measured in the game, never ranked with ours")
+        _print_matrix(tasks, _published_rows(board))
+    say()
+    for text in _legend(board):
+        say(text)
+
+
+def task_table(task: Mapping[str, Any]) -> None:
+    """Prints all models on one task."""
+    print_table(
+        DETAILS,
+        [
+            (
+                _rank(row["rank"]),
+                row["model"] + ("*" if row["baseline"] else ""),
+                *_figures(row),
+                number(row["cost_usd_mean"], 2),
+            )
+            for row in task["rows"]
+        ],
+        title=emphasised(f"{task['task']}: {in_words(task['indicator'], task['unit'])}"),
+        notes=[
+            "* baseline; # is shared by statistically tied models",
+            "95 % is the Wilson interval of the success rate",
+        ],
+    )
+
+
+def published_table(task: Mapping[str, Any]) -> None:
+    """Prints the paper's figures of one task."""
+    print_table(
+        PUBLISHED,
+        [(row["model"], *_figures(row)) for row in task["published"]],
+        title=f"{task['task']}, as published: measured in the game, never ranked with ours",
+    )
+
+
+def overall_table(board: Mapping[str, Any]) -> None:
+    """Prints the ranking over all tasks."""
+    rows = []
+    for row in board["overall"]:
+        rate, ranked = row["success_rate_mean"], row["rank"] is not None
+        rows.append(
+            (
+                _rank(row["rank"]),
+                row["model"] + ("*" if row["baseline"] else ""),
+                f"{row['rank_low']}-{row['rank_high']}" if ranked else "",
+                number(row["mean_rank"], 2),
+                "" if rate is None else f"{100 * rate:.1f} %",
+                number(row["cost_usd_mean"], 2),
+                "+" if row["pareto"] else "",
+            )
+        )
+    print_table(
+        OVERALL,
+        rows,
+        title=emphasised("All tasks together"),
+        notes=[
+            "# is shared by statistically tied models; place: its 95 % interval",
+            "+ no other model is both better and cheaper",
+            "custom tasks count when asked for",
+        ],
+    )
+
+
+def _figures(row: Mapping[str, Any]) -> tuple[str, ...]:
+    return (
+        f"{row['successes']}/{row['trials']}",
+        _interval(row),
+        number(row["indicator_mean"]),
+        number(row.get("parts_mean")),
+        number(row["requests_mean"], 0),
+        number(row["output_tokens_mean"], 0),
+    )
+
+
+def _rank(rank: int | None) -> str:
+    return NOTHING if rank is None else str(rank)
+
+
+def _interval(row: Mapping[str, Any]) -> str:
+    low, high = row["success_low"], row["success_high"]
+    return NOTHING if low is None else f"{100 * low:.0f}-{100 * high:.0f} %"
+
+
+def _published_rows(board: Mapping[str, Any]) -> list[_Row]:
+    rows: dict[str, dict[str, Any]] = {}
+    for task in board["tasks"]:
+        for row in task["published"]:
+            rows.setdefault(row["model"], {})[task["task"]] = row
+    ranks = {row["model"]: row["rank"] for row in board["published"]}
+    ordered = sorted(rows, key=lambda name: (ranks.get(name) is None, ranks.get(name), name))
+    return [_Row(_rank(ranks.get(name)), name, rows[name]) for name in ordered]
+
+
+def _print_matrix(tasks: Sequence[str], rows: Sequence[_Row]) -> None:
+    """Prints models x tasks in the way that takes the fewest blocks."""
+    room = terminal_width() if is_terminal() else None
+    for intervals in (True, False):
+        ways = [_by_model(tasks, rows, intervals=intervals)]
+        if room is not None:
+            ways.append(_by_task(tasks, rows, intervals=intervals))
+        fitting = [way for way in ways if room is None or _narrowest(way) <= room]
+        if fitting:
+            break
+    fewest = min((_groups(way, room) for way in fitting or ways), key=len)
+    for place, group in enumerate(fewest):
+        lines = [GAP.join(parts).rstrip() for parts in zip(*group, strict=True)]
+        print_lines([*([""] if place else []), emphasised(lines[0]), *lines[1:]])
+
+
+def _by_model(tasks: Sequence[str], rows: Sequence[_Row], *, intervals: bool) -> list[list[str]]:
+    """A row for each model: the column of names, and one of each task."""
+    names = _aligned([("#", "model"), *((row.rank, row.name) for row in rows)], right=(0,))
+    columns_ = [_cells([row.by_task.get(task) for row in rows], intervals) for task in tasks]
+    return [names, *(_column([task], cells) for task, cells in zip(tasks, columns_, strict=True))]
+
+
+def _by_task(tasks: Sequence[str], rows: Sequence[_Row], *, intervals: bool) -> list[list[str]]:
+    """A row for each task: the column of tasks, and one of each model below its rank."""
+    names = _aligned([(text,) for text in ("model", "#", *tasks)], right=())
+    columns_ = [_cells([row.by_task.get(task) for task in tasks], intervals) for row in rows]
+    return [
+        names,
+        *(_column([row.name, row.rank], cells) for row, cells in zip(rows, columns_, strict=True)),
+    ]
+
+
+def _groups(way: Sequence[list[str]], room: int | None) -> list[list[list[str]]]:
+    """The names with as many columns beside them as there is room for, and so on."""
+    names, *others = way
+    groups = [[names]]
+    for column in others:
+        if len(groups[-1]) > 1 and room is not None and _width([*groups[-1], column]) > room:
+            groups.append([names])
+        groups[-1].append(column)
+    return groups
+
+
+def _narrowest(way: Sequence[list[str]]) -> int:
+    return max(_width([way[0], column]) for column in way[1:])
+
+
+def _width(shown: Sequence[list[str]]) -> int:
+    return sum(width_of(column[0]) for column in shown) + len(GAP) * (len(shown) - 1)
+
+
+def _column(headings: Sequence[str], cells: Sequence[str]) -> list[str]:
+    width = max(map(width_of, [*headings, *cells]))
+    return [padded(text, width, right=True) for text in (*headings, *cells)]
+
+
+def _cells(rows: Sequence[Mapping[str, Any] | None], intervals: bool) -> list[str]:
+    """Success, interval and indicator of rows, aligned among themselves."""
+    cells = []
+    for row in rows:
+        if row is None:
+            cells.append((NOTHING,) * (2 + intervals))
+            continue
+        middle = (_interval(row),) if intervals else ()
+        rate = f"{row['successes']}/{row['trials']}"
+        cells.append((rate, *middle, number(row["indicator_mean"])))
+    return _aligned(cells, right=range(2 + intervals))
+
+
+def _aligned(rows: Sequence[Sequence[str]], right: Sequence[int]) -> list[str]:
+    widths = [max(map(width_of, column)) for column in zip(*rows, strict=True)]
+    return [
+        "  ".join(
+            padded(cell, width, right=i in right)
+            for i, (cell, width) in enumerate(zip(row, widths, strict=True))
+        )
+        for row in rows
+    ]
+
+
+def _legend(board: Mapping[str, Any]) -> list[str]:
+    """What the figures are: the indicators by tasks, and the marks."""
+    indicators: dict[str, list[str]] = {}
+    for task in board["tasks"]:
+        name = in_words(task["indicator"], task["unit"])
+        indicators.setdefault(name, []).append(task["task"])
+    return [
+        "Successes of jobs, the rate's 95 % Wilson interval, and the mean indicator:",
+        *(f"  {', '.join(tasks)}: {name}" for name, tasks in indicators.items()),
+        "* baseline; # is the overall rank, shared by statistically tied models",
+    ]

@@ -1,0 +1,151 @@
+"""A service in the background: started, looked at, killed, started again and stopped."""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import signal
+import subprocess
+import threading
+from pathlib import Path
+
+import psutil
+import pytest
+from running import wait_until
+from terminals import BUILDARENA, piped
+
+from buildarena_cli.commands.running import _print_new
+from buildarena_cli.local import free_port
+from buildarena_cli.local.service import is_running, log_files, noted_run, running
+
+
+@pytest.fixture
+def data(tmp_path: Path) -> Path:
+    for folder in (tmp_path, *tmp_path.parents[:3]):
+        folder.chmod(folder.stat().st_mode | 0o055)  # Postgres runs as nobody under root
+    return tmp_path / "data"
+
+
+def gone(pids: list[int]) -> bool:
+    return not any(
+        psutil.pid_exists(pid) and psutil.Process(pid).status() != psutil.STATUS_ZOMBIE
+        for pid in pids
+    )
+
+
+@pytest.mark.timeout(240)
+def test_the_life_of_a_service_in_the_background(data) -> None:
+    where, port = ("--data", str(data)), str(free_port())
+    before = piped("status", *where)
+    assert (before.returncode, before.stdout) == (1, f"nothing runs on {data}\n")
+    up = piped("up", "--detach", "--port", port, *where)
+    try:
+        assert up.returncode == 0, up.stderr
+        run = running(data)
+        assert run is not None
+        assert f"API http://127.0.0.1:{port}" in up.stdout
+        assert f"pid {run.pid}" in up.stdout
+        assert os.getsid(run.pid) == run.pid != os.getsid(0)
+        shown = json.loads(piped("status", "--json", *where).stdout)
+        assert shown["healthy"] is True
+        names = {process["name"] for process in shown["processes"]}
+        assert {"supervisor", "postgres", "valkey", "api", "construct worker"} <= names
+        (api,) = (p for p in shown["processes"] if p["name"] == "api")
+        assert api["ports"] == [int(port)]
+        table = piped("status", *where).stdout
+        assert table.startswith(f"ok: API http://127.0.0.1:{port}")
+        again = piped("up", "--detach", *where)
+        assert (again.returncode, "another BuildArena runs" in again.stderr) == (1, True)
+        assert "supervisor  " in piped("logs", "-n", "1", *where).stdout
+        wrong = piped("logs", "apu", *where)
+        assert (wrong.returncode, "did you mean api?" in wrong.stderr) == (1, True)
+
+        pids = [process["pid"] for process in shown["processes"]]
+        os.kill(run.pid, signal.SIGKILL)
+        wait_until(lambda: gone(pids), 30, "children end with their parent")
+        after = piped("status", *where)
+        assert (after.returncode, f"process {run.pid}" in after.stdout) == (1, True)
+        over = piped("down", *where)
+        assert (over.returncode, over.stdout) == (0, f"nothing runs on {data}\n")
+
+        assert piped("up", "--detach", "--port", port, *where).returncode == 0
+        assert piped("status", *where).returncode == 0
+    finally:
+        last, down = noted_run(data), piped("down", *where)
+    assert (down.returncode, down.stdout) == (0, "stopped\n")
+    assert last is not None
+    assert gone([last.pid, *last.processes.values()])
+    assert not is_running(data)
+
+
+def test_a_service_that_does_not_start_says_why(data, tmp_path) -> None:
+    import socket
+
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = str(taken.getsockname()[1])
+        done = piped("up", "--detach", "--port", port, "--data", str(data))
+    assert done.returncode == 1
+    assert "choose another port with --port" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+    (tmp_path / "file").touch()
+    done = piped("up", "--detach", "--data", str(tmp_path / "file" / "data"))
+    assert (done.returncode, "choose another with --data" in done.stderr) == (1, True)
+
+
+def test_a_note_without_a_lock_is_of_a_run_that_is_over(tmp_path) -> None:
+    note = {
+        "url": "http://127.0.0.1:1",
+        "pid": os.getpid(),
+        "state": "ready",
+        "processes": {},
+        "peak_memory_bytes": 1,
+    }
+    (tmp_path / "run.json").write_text(json.dumps(note))
+    assert running(tmp_path) is None
+    with (tmp_path / "lock").open("w") as lock:
+        assert not is_running(tmp_path)
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        assert running(tmp_path) == noted_run(tmp_path) is not None
+        status = piped("status", "--data", str(tmp_path))
+        assert (status.returncode, "does not answer" in status.stdout) == (1, True)
+    (tmp_path / "run.json").write_text("{")
+    assert noted_run(tmp_path) is None
+
+
+def test_logs_are_followed(tmp_path) -> None:
+    (tmp_path / "logs").mkdir()
+    for name in ("api", "mujoco-worker"):
+        (tmp_path / "logs" / f"{name}.log").write_text("".join(f"{name} {n}\n" for n in range(9)))
+    assert list(log_files(tmp_path)) == ["api", "mujoco-worker"]
+    shown = piped("logs", "mujoco worker", "-n", "2", "--data", str(tmp_path)).stdout
+    assert shown == "mujoco-worker 7\nmujoco-worker 8\n"
+    process = subprocess.Popen(
+        [BUILDARENA, "logs", "-f", "-n", "1", "--data", str(tmp_path)],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    stopping = threading.Timer(60, process.kill)
+    stopping.start()
+    assert process.stdout is not None
+    lines = [process.stdout.readline() for _ in range(2)]
+    assert lines == ["api            api 8\n", "mujoco-worker  mujoco-worker 8\n"]
+    with (tmp_path / "logs" / "api.log").open("a") as log:
+        log.write("new\nhalf")
+    assert process.stdout.readline() == "api            new\n"
+    process.send_signal(signal.SIGINT)
+    assert process.wait() == 130
+    process.stdout.close()
+    stopping.cancel()
+    assert "there are no logs" in piped("logs", "--data", str(tmp_path / "other")).stderr
+
+
+def test_a_log_that_was_cut_is_read_from_its_beginning(tmp_path, capsys) -> None:
+    log = tmp_path / "a.log"
+    log.write_text("one\ntwo\n")
+    place = _print_new(log, 0, "")
+    log.write_text("new\n")
+    assert _print_new(log, place, "") == 4
+    assert capsys.readouterr().out == "one\ntwo\nnew\n"

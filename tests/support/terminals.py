@@ -1,0 +1,53 @@
+"""Commands on a terminal of a given width, and through a pipe."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import pty
+import struct
+import subprocess
+import sys
+import termios
+from pathlib import Path
+
+BUILDARENA = str(Path(sys.executable).parent / "buildarena")
+
+
+def piped(*words: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    """Runs a command whose output is a pipe."""
+    return subprocess.run(
+        [BUILDARENA, *words],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+        env=_environment(environment),
+    )
+
+
+def on_terminal(width: int, *words: str, **environment: str) -> tuple[int, str]:
+    """Runs a command on a terminal of so many columns; its exit code and all that it shows."""
+    master, slave = pty.openpty()
+    fcntl.ioctl(slave, termios.TIOCSWINSZ, struct.pack("HHHH", 50, width, 0, 0))
+    process = subprocess.Popen(
+        [BUILDARENA, *words],
+        stdin=slave,
+        stdout=slave,
+        stderr=slave,
+        env=_environment({"TERM": "xterm-256color", **environment}),
+    )
+    os.close(slave)
+    shown = b""
+    try:
+        while chunk := os.read(master, 65536):
+            shown += chunk
+    except OSError:
+        pass  # Linux says so when the other end is closed
+    os.close(master)
+    return process.wait(), shown.decode().replace("\r\n", "\n")
+
+
+def _environment(given: dict[str, str]) -> dict[str, str]:
+    kept = {k: v for k, v in os.environ.items() if k not in {"COLUMNS", "LINES", "NO_COLOR"}}
+    return {**kept, **given}
