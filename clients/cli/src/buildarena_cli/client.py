@@ -9,13 +9,15 @@ import time
 from collections.abc import Generator, Iterator, Mapping
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 from buildarena_cli.defaults import KEY_VARIABLE
 from buildarena_cli.errors import CommandError
 from buildarena_cli.near import QUOTED, did_you_mean, near_field
-from buildarena_cli.wire import Failure, Response, Wire
+
+if TYPE_CHECKING:
+    from buildarena_cli.wire import Response
 
 TIMEOUT_S = 60.0
 PATIENCE_S = 60.0
@@ -46,6 +48,10 @@ class Client:
     """
 
     def __init__(self, url: str, key: str | None = None) -> None:
+        # Help and completion load this module, and send nothing by it.
+        from buildarena_cli.wire import Failure, Wire
+
+        self._failure = Failure
         self.url = url.rstrip("/")
         key = key or os.environ.get(KEY_VARIABLE)
         if key and not (key.isascii() and key.isprintable()):
@@ -119,8 +125,7 @@ class Client:
         """The pieces of an answer; at least one, and all of them or an error."""
         with self._sending(), self._wire.opened("GET", path, timeout_s=None) as answer:
             if answer.status != 200:  # noqa: PLR2004 - OK
-                url = self.url + path
-                raise RefusedError(Response(url=url, status=answer.status, body=answer.read()))
+                raise RefusedError(self._wire.read(path, answer))
             chunk = answer.read(CHUNK_BYTES)
             yield chunk
             while chunk:
@@ -153,7 +158,7 @@ class Client:
     def _sending(self) -> Iterator[None]:
         try:
             yield
-        except Failure as error:
+        except self._failure as error:
             raise UnreachableError(
                 f"no BuildArena answers at {self.url} ({error}): start it with `buildarena up`, "
                 "or name another with --url or BUILDARENA_URL"

@@ -74,8 +74,12 @@ class Wire:
         with self.opened(
             method, path + query, body=body, headers=headers, timeout_s=timeout_s
         ) as answer:
-            url = f"{self._parts.scheme}://{self._parts.netloc}{path}{query}"
-            return Response(url=url, status=answer.status, body=answer.read())
+            return self.read(path + query, answer)
+
+    def read(self, path: str, answer: HTTPResponse) -> Response:
+        """The rest of an answer."""
+        url = f"{self._parts.scheme}://{self._parts.netloc}{path}"
+        return Response(url=url, status=answer.status, body=answer.read())
 
     @contextmanager
     def opened(
