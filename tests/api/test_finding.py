@@ -21,7 +21,7 @@ def ids(api) -> list[str]:
 def ended(ids, context) -> str:
     """A job that failed with a reason, two flags and two files."""
     assert ids
-    lease = context.leases.claim("construct", owner="w")
+    lease = context.store.leases.claim("construct", owner="w")
     kept = {
         name: context.artifacts.put(data, "application/json")
         for name, data in (("machine", b"{}"), ("notes", b"[]"))
@@ -33,9 +33,9 @@ def ended(ids, context) -> str:
         reason="too_weak",
         flags=("unstable", "odd"),
     )
-    with context.database.transaction() as connection:
-        context.results.attach(lease.job.id, kept, connection=connection)
-        context.results.finish(lease, score, connection=connection)
+    with context.store.database.transaction() as connection:
+        context.store.results.attach(lease.job.id, kept, connection=connection)
+        context.store.results.finish(lease, score, connection=connection)
     return str(lease.job.id)
 
 

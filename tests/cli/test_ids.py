@@ -35,7 +35,7 @@ def sweep(submissions) -> str:
 @pytest.fixture
 def ids(sweep, context) -> list[str]:
     assert sweep
-    return sorted(job.id for job in context.jobs.page(limit=100))
+    return sorted(job.id for job in context.store.jobs.page(limit=100))
 
 
 def unique_prefix(ids: list[str], wanted: str) -> str:
@@ -127,7 +127,7 @@ def test_shells_are_offered_nothing_when_no_api_answers(url) -> None:
 
 
 def test_jobs_are_filtered_by_how_they_ended(url, ids, context) -> None:
-    lease = context.leases.claim("construct", owner="w")
+    lease = context.store.leases.claim("construct", owner="w")
     score = JobScore(
         outcome="unsuccessful",
         success=False,
@@ -136,8 +136,8 @@ def test_jobs_are_filtered_by_how_they_ended(url, ids, context) -> None:
         reason="too_weak",
         flags=("unstable", "odd"),
     )
-    with context.database.transaction() as connection:
-        context.results.finish(lease, score, connection=connection)
+    with context.store.database.transaction() as connection:
+        context.store.results.finish(lease, score, connection=connection)
     found = lease.job.id
     for words in (
         ["--reason", "too_weak"],
@@ -183,13 +183,13 @@ def test_pages_follow_each_other(url, ids) -> None:
 def made(context, sweep) -> tuple[str, dict[str, bytes]]:
     """A job with three files."""
     assert sweep
-    lease = context.leases.claim("construct", owner="w")
+    lease = context.store.leases.claim("construct", owner="w")
     files = {"machine": b"{}", "transcript": b"[]", "trajectory-0": b"PAR1"}
     kept = {name: context.artifacts.put(data, JSON) for name, data in files.items()}
     score = JobScore(outcome="unsuccessful", success=False, indicator=0.0, metrics={})
-    with context.database.transaction() as connection:
-        context.results.attach(lease.job.id, kept, connection=connection)
-        context.results.finish(lease, score, connection=connection)
+    with context.store.database.transaction() as connection:
+        context.store.results.attach(lease.job.id, kept, connection=connection)
+        context.store.results.finish(lease, score, connection=connection)
     return lease.job.id, files
 
 

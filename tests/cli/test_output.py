@@ -31,7 +31,7 @@ def url(context, submissions):
 @pytest.fixture
 def ids(url, context) -> list[str]:
     assert url
-    return [job.id for job in context.jobs.page(limit=100)]
+    return [job.id for job in context.store.jobs.page(limit=100)]
 
 
 def test_a_pipe_gets_one_whole_line_for_each_row(url, ids) -> None:
@@ -92,7 +92,7 @@ def test_wide_letters_keep_columns_aligned(capsys) -> None:
 
 def test_a_sweep_is_listed_with_its_progress(url, context) -> None:
     head, row = printed(url, "sweep", "list").splitlines()
-    (sweep,) = context.sweeps.page(limit=2)
+    (sweep,) = context.store.sweeps.page(limit=2)
     assert head.split() == ["sweep", "name", "state", "ended", "jobs", "outcomes", "USD", "created"]
     assert row.split("  ")[0] == sweep.id
     assert "a sweep with a long name" in row

@@ -31,9 +31,9 @@ def exit_code(sweep: dict[str, Any]) -> int:
 
 
 def ended(sweep: dict[str, Any]) -> bool:
-    """Whether nothing more will happen: every job has ended, or all others are held."""
+    """Whether nothing more will happen: every job has ended, or all others are on hold."""
     progress = sweep["progress"]
-    moving = [name for name in progress["stages"] if not name.endswith(" held")]
+    moving = [name for name in progress["stages"] if not name.endswith(" on_hold")]
     return not moving and (
         progress["done"] == progress["total"] or sweep["state"] in {"budget_exhausted", "paused"}
     )
