@@ -28,11 +28,13 @@ from buildarena_cli.output import console, error_console, print_json
 from buildarena_geometry import GeometryError, Machine
 from buildarena_simulation import (
     ENGINES,
+    BuildarenaSimulationError,
     MachineNotSimulable,
-    SimulationRoomError,
     Trajectory,
     TrajectoryFormatError,
+    read_trajectory,
     simulate,
+    write_trajectory,
 )
 
 app = typer.Typer(no_args_is_help=True, help="Simulate and draw machines on this computer.")
@@ -42,7 +44,7 @@ _KNOWN = (
     GeometryError,
     TaskError,
     TrajectoryFormatError,
-    SimulationRoomError,
+    BuildarenaSimulationError,
     OSError,
     ValueError,
 )
@@ -78,7 +80,7 @@ def simulate_command(  # noqa: PLR0917 - the command line passes options by name
         else:
             result = score(chosen, machine, rollout)
             if trajectory is not None:
-                trajectory.write_bytes(rollout.to_parquet())
+                trajectory.write_bytes(write_trajectory(rollout))
             if video is not None:
                 film(machine, chosen, rollout, video)
         if as_json:
@@ -97,7 +99,7 @@ def render_command(
     """Draw a trial that was simulated before."""
     with told_errors():
         chosen, machine = chosen_task(task), read_machine(file)
-        rollout = Trajectory.from_parquet(trajectory.read_bytes())
+        rollout = read_trajectory(trajectory.read_bytes())
         missing = [block for block in rollout.block_ids if block not in machine.blocks]
         if missing:
             raise CommandError(f"{trajectory}: block {missing[0]} is not in {file}")

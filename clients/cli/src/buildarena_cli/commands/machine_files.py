@@ -22,7 +22,7 @@ from buildarena_cli.options import DEFAULT_URL, JsonOption, UrlOption
 from buildarena_cli.output import console, print_json
 from buildarena_geometry import Machine
 from buildarena_geometry.export import machine_glb, machine_svg
-from buildarena_simulation import Trajectory
+from buildarena_simulation import read_trajectory
 
 FORMATS = (".glb", ".svg", ".json")
 
@@ -106,7 +106,7 @@ def replay(
     with told_errors(), tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "machine.json"
         file.write_bytes(document)
-        rollout = Trajectory.from_parquet(recorded)
+        rollout = read_trajectory(recorded)
         film(read_machine(file), parse_task(_text(task), origin=job["task"]), rollout, out)
     console.print(str(out), soft_wrap=True)
 
