@@ -216,7 +216,7 @@ def _check_use(module: Module, fields: Fields) -> None:
         if fields.has(name) and module.kind in _WITHOUT_PHYSICS:
             fields[name].fail(f"no {name}: a {module.kind} does nothing by itself")
     if fields.has("physics") and module.kind in _WITHOUT_PHYSICS:
-        fields["physics"].fail(f"no physics: a {module.kind} is no body of its own")
+        fields["physics"].fail(f"no physics: a {module.kind} is not a body of its own")
     if fields.has("link") and module.kind != "connector":
         fields["link"].fail(f"no link: a {module.kind} is not a connector")
     if fields.has("thrust") and module.pointing is None:
