@@ -62,6 +62,80 @@ def test_the_file_is_yaml_and_json_alike_and_fits_its_schema():
     jsonschema.validate(BASIC, SCHEMA)
 
 
+def test_what_a_module_does_stands_in_its_entry():
+    basic = load_catalogue()
+    wheel, cannon, torch = (basic[name] for name in ("Powered Wheel", "Water Cannon", "Torch"))
+    assert (wheel.motor.speed_rpm, wheel.motor.lag_per_s, wheel.motor.torque) == (100, 16, 20)
+    assert wheel.motor.speed == pytest.approx(10.471975512)
+    assert (cannon.thrust.cold, cannon.thrust.heated, cannon.thrust.along) == (1.6, 13.76, 0)
+    assert [(ball.along, ball.radius) for ball in cannon.thrust.spheres] == [
+        (-0.25, 0.5),
+        (0.5, 0.5),
+    ]
+    assert [(flame.along, flame.radius) for flame in torch.flames] == [(1, 0.3)]
+    seats = {name: module.physics.seat for name, module in basic.items() if module.physics}
+    assert seats == {
+        "Starting Block": "attachment",
+        "Small Wooden Block": "attachment",
+        "Powered Wheel": "axle",
+        "Water Cannon": "mount",
+        "Torch": "mount",
+    }
+    assert [name for name, module in basic.items() if module.grabs] == ["Small Wooden Block"]
+    assert [name for name, module in basic.items() if module.link == "rope"] == ["Winch"]
+
+
+def test_what_models_are_told_of_a_module_agrees_with_what_it_does():
+    basic = load_catalogue()
+    wheel, cannon, torch = (basic[name] for name in ("Powered Wheel", "Water Cannon", "Torch"))
+    assert f"turns at {wheel.motor.speed_rpm:g} rpm" in wheel.description
+    assert f"carries a mass of {cannon.thrust.cold:g}." in cannon.description
+    assert f"({cannon.thrust.heated:g})" in cannon.description
+    flame = torch.flames[0]
+    assert f"radius {flame.radius:g} whose centre lies {flame.along:g} ahead" in torch.description
+    heights = [
+        (ball.along - ball.radius, ball.along + ball.radius) for ball in cannon.thrust.spheres
+    ]
+    ends = {mark.name: mark.along for mark in cannon.landmarks}
+    assert (min(heights)[0], max(heights)[1]) == (ends["inlet"], ends["outlet"])
+
+
+@pytest.mark.parametrize("name", ["Small Wooden Block", "Powered Wheel", "Water Cannon", "Torch"])
+def test_a_file_without_them_gives_a_module_what_its_kind_does(tmp_path, name):
+    new = {"motor", "thrust", "physics", "grabs"}
+    entry = next(module for module in BASIC["modules"] if module["name"] == name)
+    entry = {key: copy.deepcopy(value) for key, value in entry.items() if key not in new}
+    entry["name"] = "Spare"
+    for mark in entry["landmarks"]:
+        mark.pop("heats", None)
+    catalogue = load_catalogue(write(tmp_path, entry))
+    spare, basic = catalogue["Spare"], catalogue[name]
+    assert (spare.motor, spare.thrust) == (basic.motor, basic.thrust)
+    assert (spare.physics, spare.flames) == (basic.physics, basic.flames)
+    assert not spare.grabs
+
+
+def test_a_connector_that_does_not_say_so_is_rigid(tmp_path):
+    strut = {**BASIC["modules"][5], "name": "Strut"}
+    del strut["link"]
+    rope = {**strut, "name": "Rope", "link": "rope"}
+    catalogue = load_catalogue(write(tmp_path, strut, rope))
+    assert [catalogue[name].link for name in ("Strut", "Rope")] == ["rigid", "rope"]
+
+
+def test_a_users_module_says_what_it_does_itself(tmp_path):
+    wheel = copy.deepcopy(BASIC["modules"][2])
+    wheel |= {"name": "Slow Wheel", "motor": {**wheel["motor"], "speed_rpm": 30}}
+    wheel["motor"]["forward_sense"] = "counterclockwise"
+    catalogue = load_catalogue(write(tmp_path, wheel))
+    assert catalogue["Slow Wheel"].motor.speed_rpm == 30
+    machine = Machine(catalogue=catalogue)
+    machine.act("start")
+    attach = {"base_block": "1", "face": "A", "new_block": "Slow Wheel"}
+    assert "forward rolls it <South>" in machine.act("attach_block_to", attach).text
+    assert "forward rolls it <North>" in machine.act("flip_spin", {"block_id": "2"}).text
+
+
 def test_a_users_file_adds_modules_that_can_be_built_with(tmp_path):
     catalogue = load_catalogue(write(tmp_path, CRATE))
     assert catalogue.attachable[-1] == "Crate"
@@ -96,6 +170,13 @@ def edit(**fields):
 
 
 FACE = CRATE["faces"][0]
+_, WOOD, WHEEL, CANNON, TORCH, BRACE, _, CARGO = BASIC["modules"]
+
+
+def other(module, **fields):
+    return {**copy.deepcopy(module), "name": "Other", **fields}
+
+
 BROKEN = [
     (edit(name=3), "name: expected a text"),
     (edit(kind="engine"), r"modules\[0\] \(Crate\).kind: expected one of start, block"),
@@ -111,6 +192,20 @@ BROKEN = [
     (edit(besiege={"id": -1, "data": []}), "besiege.id: expected a whole number of at least 0"),
     (edit(besiege={"id": 1, "data": [{"type": "x", "key": "y", "value": []}]}), "value: expected"),
     ({key: value for key, value in CRATE.items() if key != "mass"}, "mass is missing"),
+    (edit(grabs="yes"), "grabs: expected true or false"),
+    (edit(physics={"seat": "glue"}), "physics: mass_at is missing"),
+    (edit(physics={**WOOD["physics"], "seat": "glue"}), "seat: expected one of attachment, axle"),
+    (
+        edit(physics={**WOOD["physics"], "friction": -1}),
+        "friction: expected a number of at least 0",
+    ),
+    (
+        edit(landmarks=[{"name": "fire", "along": 1, "heats": True}]),
+        "radius: it is missing; a flame",
+    ),
+    (other(BRACE, link="spring"), "link: expected one of rigid, rope"),
+    (other(WHEEL, motor={**WHEEL["motor"], "torque": 0}), "torque: expected a number above 0"),
+    (other(CANNON, thrust={**CANNON["thrust"], "spheres": [{"along": 1}]}), "radius is missing"),
 ]
 SENSELESS = [
     (edit(faces=[{**FACE, "normal": [0, 0, 2]}]), "a direction, three numbers with length 1"),
@@ -122,6 +217,16 @@ SENSELESS = [
     (edit(colliders=[]), "a block needs a size and colliders"),
     (edit(name="Torch"), "a module of this name exists already"),
     (edit(kind="start", name="Core"), "a catalogue has one starting block"),
+    (other(WHEEL, actions=["spin"]), "forward: expected one of spin, found 'spinning_forward'"),
+    (other(CANNON, actions=[]), "action: expected one of "),
+    (other(CANNON, pointing=None, landmarks=[]), "thrust: expected no thrust: it acts along"),
+    (
+        other(BRACE, physics=WOOD["physics"]),
+        "physics: expected no physics: a connector is not a body",
+    ),
+    (other(CARGO, thrust=CANNON["thrust"]), "action: expected one of "),
+    (edit(link="rope"), "link: expected no link: a block is not a connector"),
+    (edit(physics=WHEEL["physics"]), "a motor needs the seat axle, and the seat axle a motor"),
 ]
 
 

@@ -339,7 +339,7 @@ def test_directions_are_told_by_compass_and_pitch(direction, told):
     ],
 )
 def test_wheels_tell_what_their_forward_key_does(axle, flipped, told):
-    assert rolling(axle, flipped=flipped) == told
+    assert rolling(axle, clockwise=not flipped) == told
 
 
 @pytest.mark.parametrize(

@@ -13,10 +13,11 @@ from buildarena_benchmark import Task, failed_score, score
 from buildarena_geometry import DocumentError, Machine
 from buildarena_simulation import (
     MachineNotSimulable,
-    Trajectory,
     UnknownEngineError,
+    read_trajectory,
     rollout,
     simulate,
+    write_trajectory,
 )
 from buildarena_simulation.constants import MAX_PARTS
 from buildarena_simulation.engines import create_engine
@@ -105,7 +106,7 @@ def test_a_rollout_that_blows_up_is_told_and_never_a_success(
     trajectory = simulate(machine, scenario, engine)
     assert np.isfinite(trajectory.positions[:10]).all()
     assert not np.isfinite(trajectory.positions[-1]).any()
-    result = score(task, machine, Trajectory.from_parquet(trajectory.to_parquet()))
+    result = score(task, machine, read_trajectory(write_trajectory(trajectory)))
     assert not result.success
     assert "unstable" in result.flags
     assert all(value == value for value in result.metrics.values())  # noqa: PLR0124 - no NaN

@@ -18,16 +18,9 @@ from tests.simulation.reference_designs import (
     rocket,
 )
 
-from buildarena_geometry import Machine
+from buildarena_geometry import Machine, load_catalogue
 from buildarena_simulation import Scenario, Trajectory, simulate
-from buildarena_simulation.constants import (
-    COLLISION_MARGIN,
-    FRICTION_BLOCK,
-    GRAVITY,
-    HEATED_THRUST,
-    LINEAR_DRAG,
-    WHEEL_SPEED,
-)
+from buildarena_simulation.constants import COLLISION_MARGIN, GRAVITY
 from buildarena_simulation.scenario import (
     Cargo,
     Control,
@@ -35,6 +28,11 @@ from buildarena_simulation.scenario import (
     TerrainBox,
     gap_terrain,
 )
+
+BLOCK = load_catalogue()["Small Wooden Block"].physics
+FRICTION_BLOCK, LINEAR_DRAG = BLOCK.friction, BLOCK.linear_drag
+HEATED_THRUST = load_catalogue()["Water Cannon"].thrust.heated
+WHEEL_SPEED = load_catalogue()["Powered Wheel"].motor.speed
 
 
 def _lone_block() -> Machine:

@@ -18,12 +18,14 @@ from tests.simulation.reference_designs import (
 )
 
 from buildarena_benchmark import Task
-from buildarena_geometry import KeyPress, Machine
+from buildarena_geometry import KeyPress, Machine, load_catalogue
 from buildarena_simulation import Scenario, simulate
-from buildarena_simulation.constants import WHEEL_LAG_RATE, WHEEL_SPEED
 from buildarena_simulation.control import heated_cannons, plan_schedule
 from buildarena_simulation.machine import bindings_of, structure_of
 from buildarena_simulation.scenario import Control, SpanPlacement
+
+MOTOR = load_catalogue()["Powered Wheel"].motor
+WHEEL_SPEED, WHEEL_LAG_RATE = MOTOR.speed, MOTOR.lag_per_s
 
 
 def _press(key: str, time: float, hold_for: float) -> KeyPress:

@@ -8,11 +8,11 @@ from pathlib import Path
 PROGRAM = """
 import hashlib, sys
 from buildarena_benchmark import builtin_tasks
-from buildarena_simulation import simulate
+from buildarena_simulation import simulate, write_trajectory
 from tests.simulation.references import load_machine
 task = builtin_tasks()[sys.argv[3]]
 scenario = task.scenario.model_copy(update={"duration_s": 2.6})
-data = simulate(load_machine(sys.argv[2]), scenario, sys.argv[1]).to_parquet()
+data = write_trajectory(simulate(load_machine(sys.argv[2]), scenario, sys.argv[1]))
 print(hashlib.sha256(data).hexdigest())
 """
 ROOT = Path(__file__).parents[2]

@@ -11,7 +11,7 @@ from tests.simulation.references import DATA
 from typer.testing import CliRunner
 
 from buildarena_cli.commands.machine import app
-from buildarena_simulation import Trajectory
+from buildarena_simulation import read_trajectory
 
 SHORT_TASK = """\
 name: short-bridge
@@ -72,7 +72,7 @@ def test_a_film_shows_the_trial(run, tmp_path: Path, kind: str) -> None:
     file = str(DATA / "beam.json")
     done = run("simulate", file, "--engine", "mujoco", "--trajectory", str(data))
     assert done.exit_code == 0, done.output
-    assert len(Trajectory.from_parquet(data.read_bytes()).time_s) == 26
+    assert len(read_trajectory(data.read_bytes()).time_s) == 26
     done = run("render", file, "--trajectory", str(data), "--video", str(video))
     assert done.exit_code == 0, done.output
     if kind == "mp4":
@@ -102,7 +102,7 @@ def test_a_seed_nudges_the_start(run, tmp_path: Path) -> None:
             str(data),
             *more,
         )
-        starts.append(tuple(Trajectory.from_parquet(data.read_bytes()).positions[0, 0]))
+        starts.append(tuple(read_trajectory(data.read_bytes()).positions[0, 0]))
     assert len(set(starts)) == 3
     assert all(abs(x) <= 0.01 and abs(y) <= 0.01 for x, y, _ in starts)
 

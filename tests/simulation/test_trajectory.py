@@ -12,7 +12,9 @@ from buildarena_simulation import (
     Trajectory,
     TrajectoryFormatError,
     engine_version,
+    read_trajectory,
     simulate,
+    write_trajectory,
 )
 from buildarena_simulation.engines.base import rotation_of
 
@@ -31,10 +33,10 @@ def test_a_file_gives_back_the_trajectory(tasks: dict[str, Task]) -> None:
     scenario = tasks["lift-1"].scenario.model_copy(update={"duration_s": 1.0})
     engine = simulate(replayed(rocket()), scenario, "mujoco")
     for trajectory in (bridge, engine):
-        data = trajectory.to_parquet()
-        assert _equal(Trajectory.from_parquet(data), trajectory)
-        assert Trajectory.from_parquet(data).to_parquet() == data
-    assert len(bridge.to_parquet()) < 250_000  # 51 blocks, 17 s, most of it falling debris
+        data = write_trajectory(trajectory)
+        assert _equal(read_trajectory(data), trajectory)
+        assert write_trajectory(read_trajectory(data)) == data
+    assert len(write_trajectory(bridge)) < 250_000  # 51 blocks, 17 s, most of it falling debris
 
 
 def test_a_trajectory_tells_where_it_is_from(engine: str, tasks: dict[str, Task]) -> None:
@@ -84,4 +86,4 @@ def test_arrays_are_read_only(tasks: dict[str, Task]) -> None:
 @pytest.mark.parametrize("data", [b"", b"PAR1", b"not a parquet file at all" * 10])
 def test_other_bytes_are_refused(data: bytes) -> None:
     with pytest.raises(TrajectoryFormatError):
-        Trajectory.from_parquet(data)
+        read_trajectory(data)

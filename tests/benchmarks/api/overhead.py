@@ -19,7 +19,7 @@ from player import Player
 from running import running_stack
 
 from buildarena_benchmark import load_task, score
-from buildarena_simulation import simulate
+from buildarena_simulation import simulate, write_trajectory
 
 HERE = Path(__file__).parent
 TASK, WORKFLOW, MODEL, ENGINE = HERE / "one-block.yaml", "one-block", "builtin/idle", "mujoco"
@@ -93,7 +93,7 @@ def _alone() -> tuple[float, float]:
     def try_out(_: int) -> None:
         trajectory = simulate(suspended.machine, task.scenario, engine=ENGINE)
         score(task, suspended.machine, trajectory)
-        trajectory.to_parquet()
+        write_trajectory(trajectory)
 
     return _timed(build), _timed(try_out)
 

@@ -128,10 +128,10 @@ def shown_errors() -> Iterator[None]:
     """Turns the errors of the libraries into one message and an exit code."""
     from buildarena_benchmark import TaskError
     from buildarena_geometry import GeometryError
-    from buildarena_simulation import SimulationRoomError, TrajectoryFormatError
+    from buildarena_simulation import BuildarenaSimulationError, TrajectoryFormatError
 
     known = (
-        *(CommandError, GeometryError, TaskError, TrajectoryFormatError, SimulationRoomError),
+        *(CommandError, GeometryError, TaskError, TrajectoryFormatError, BuildarenaSimulationError),
         *(OSError, ValueError),
     )
     try:

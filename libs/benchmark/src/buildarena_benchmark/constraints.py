@@ -29,7 +29,7 @@ def broken_constraint(task: Task, machine: Machine) -> tuple[str, str] | None:
     used = Counter(block.module.name for block in machine.blocks.values())
     used.update(connector.module.name for connector in machine.connectors.values())
     if constraints.modules is not None:
-        foreign = set(used) - {*constraints.modules, "Starting Block"}
+        foreign = set(used) - {*constraints.modules, machine.catalogue.start.name}
         if foreign:
             return "constraint_violated", f"{min(foreign)} is not among the task's modules"
     for name, least in constraints.min_modules.items():

@@ -76,6 +76,12 @@ class Block:
         """Away from the face the block sits on, world frame, unit length; a wheel's axle."""
         return self.world_from_block.direction((0.0, 0.0, 1.0))
 
+    @property
+    def forward_is_clockwise(self) -> bool:
+        """Whether its motor turns it clockwise, seen from outside, when it runs forward."""
+        motor = self.module.motor
+        return motor is not None and (motor.forward_sense == "clockwise") != self.flipped
+
     def world_from_face(self, label: str) -> Pose:
         """The frame of one of its faces: origin at the face's centre, +z outwards.
 

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any, Self
 
 from buildarena_geometry.changes import Change
 from buildarena_geometry.collision import CollisionWorld
-from buildarena_geometry.documents.json_values import json_value
 from buildarena_geometry.documents.log import ActionLog, ActionRecord, LoggedState
 from buildarena_geometry.documents.read import read_machine
 from buildarena_geometry.documents.write import machine_document
 from buildarena_geometry.feedback.words import listing
+from buildarena_geometry.json_values import json_value
 from buildarena_geometry.measures import bounds, center_of_mass
 from buildarena_geometry.modules.catalogue import load_catalogue
 from buildarena_geometry.modules.parameters import LARGEST_NUMBER, RefusalError, shown

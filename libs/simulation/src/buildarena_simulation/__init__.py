@@ -5,12 +5,13 @@ Importing this package loads no engine, no pyarrow and no scipy; `simulate` does
 
 from buildarena_simulation.engines import ENGINES, engine_version
 from buildarena_simulation.errors import (
+    BuildarenaSimulationError,
     MachineNotSimulable,
     SimulationError,
-    SimulationRoomError,
     TrajectoryFormatError,
     UnknownEngineError,
 )
+from buildarena_simulation.parquet import read_trajectory, write_trajectory
 from buildarena_simulation.rollout import SIMULATION_VERSION, simulate
 from buildarena_simulation.scenario import Scenario
 from buildarena_simulation.trajectory import Break, JointPeak, Trajectory
@@ -19,14 +20,16 @@ __all__ = [
     "ENGINES",
     "SIMULATION_VERSION",
     "Break",
+    "BuildarenaSimulationError",
     "JointPeak",
     "MachineNotSimulable",
     "Scenario",
     "SimulationError",
-    "SimulationRoomError",
     "Trajectory",
     "TrajectoryFormatError",
     "UnknownEngineError",
     "engine_version",
+    "read_trajectory",
     "simulate",
+    "write_trajectory",
 ]

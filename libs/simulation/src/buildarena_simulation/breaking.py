@@ -133,7 +133,7 @@ class BreakingModel:
             c = clusters.cluster_of[cannons]
             turn = motion.rotation[c]
             blocks.append(cannons)
-            points.append(motion.position[c] + turned(turn, structure.shown[cannons]))
+            points.append(motion.position[c] + turned(turn, structure.thrust_points))
             sprays = turned(turn, structure.directions[cannons])
             forces.append(-thrusts[:, None] * sprays)
         if len(structure.ropes):

@@ -1,11 +1,12 @@
-"""Constants of the game, with where each comes from.
+"""Constants of the world and the model, with where each comes from.
+
+What belongs to a type of module (thrust, flame, motor, friction, drag) stands in the module file.
 
 Lengths are in units (the edge of a small block), masses in mass units, times in seconds. Forces
 of joints are in mass·g (the weight of one mass unit is 1), moments in mass·g·unit, so that they do
 not depend on the value of g. `docs/physics.md` explains the calibration.
 """
 
-import math
 from dataclasses import dataclass
 from enum import StrEnum
 from types import MappingProxyType
@@ -17,48 +18,11 @@ GRAVITY: Final = 32.81
 SAMPLE_RATE_HZ: Final = 25
 """Rate at which poses are recorded. Source: the paper, "Simulation Details"."""
 
-WHEEL_SPEED: Final = 100.0 * 2.0 * math.pi / 60.0
-"""Driven speed of a powered wheel, rad/s. Source: the paper, "Basic Modules" (100 rpm)."""
-
-WHEEL_LAG_RATE: Final = 16.0
-"""Rate of the first-order lag of a wheel's target speed, 1/s. Source: public modding notes."""
-
-WHEEL_TORQUE: Final = 20.0
-"""Torque limit of a wheel's motor, mass·g·unit. Fitted: the game's value is not public."""
-
-COLD_THRUST: Final = 1.6
-"""Recoil of a cannon that sprays cold water, mass·g. Source: the paper, "Basic Modules"."""
-
-HEATED_THRUST: Final = 1.6 * 8.6
-"""Recoil of a heated cannon, mass·g. Source: the paper, "Basic Modules" (x 8.6)."""
-
-FLAME_RADIUS: Final = 0.3
-"""Radius of a torch's flame, units. Source: the paper, "Basic Modules"."""
-
-FLAME_DISTANCE: Final = 1.0
-"""Distance from a torch's centre to its flame's centre, units. Source: as above."""
-
-CANNON_BULB_OFFSETS: Final = (-0.25, 0.5)
-"""Centres of the two spheres of a cannon's peanut shape along its pointing direction, units.
-
-With radius 0.5 they span inlet (-0.75) to outlet (+1.0) and leave a waist of radius 0.33. Fitted
-to the paper's remark that the body is narrower in the middle, so that a small flame there misses.
-"""
-
-CANNON_BULB_RADIUS: Final = 0.5
-"""Radius of the two spheres of a cannon's peanut shape, units."""
-
 COLLISION_MARGIN: Final = 0.02
 """How much smaller a collision box's half-extents are than the block's, units.
 
 Fitted: full-size decks wedge between terrain walls with thousands of newtons.
 """
-
-ANGULAR_DRAG: Final = 0.05
-"""Angular drag of a free-standing piece, 1/s. Source: public modding notes."""
-
-LINEAR_DRAG: Final = 0.2
-"""Linear drag of a free-standing piece, 1/s. Source: public modding notes."""
 
 MAX_SPIN: Final = 30.0
 """Fastest spin of a free piece, rad/s; wheels on their axles may spin faster.
@@ -70,12 +34,6 @@ from gaining energy.
 FRICTION_TERRAIN: Final = 1.0
 """Neutral, so that a contact with terrain or cargo takes the other body's coefficient."""
 
-FRICTION_BLOCK: Final = 0.7
-"""Friction coefficient of blocks. Fitted: cargo stays on a deck that wheels can accelerate."""
-
-FRICTION_WHEEL: Final = 0.6
-"""Friction coefficient of powered wheels. Source: public modding notes."""
-
 LOAD_FILTER_S: Final = 0.16
 """Time constant of the low-pass filter on block wrenches, s. Fitted at g = 32.81."""
 
@@ -84,7 +42,10 @@ MAX_PARTS: Final = 2000
 
 
 class JointKind(StrEnum):
-    """How two blocks are held together; each kind has its own strength."""
+    """How two blocks are held together; each kind has its own strength.
+
+    A module's seat is an attachment, a mount or an axle.
+    """
 
     ATTACHMENT = "attachment"
     FAR_JOINT = "far_joint"

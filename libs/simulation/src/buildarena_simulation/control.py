@@ -7,17 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from buildarena_simulation.constants import (
-    CANNON_BULB_OFFSETS,
-    CANNON_BULB_RADIUS,
-    COLD_THRUST,
-    FLAME_DISTANCE,
-    FLAME_RADIUS,
-    GRAVITY,
-    HEATED_THRUST,
-    WHEEL_LAG_RATE,
-    WHEEL_SPEED,
-)
+from buildarena_simulation.constants import GRAVITY
 from buildarena_simulation.scenario import Control
 from buildarena_simulation.structure.model import BoolArray, FloatArray, Structure
 
@@ -95,16 +85,24 @@ def plan_schedule(
         return result
 
     wheel_speeds = np.zeros((step_count, len(structure.wheels)))
+    lags = np.zeros(len(structure.wheels))
     for w, block in enumerate(structure.wheels):
-        forward = held(block, "spinning_forward").astype(np.float64)
-        backward = held(block, "spinning_backward").astype(np.float64)
-        # An unflipped wheel rolls forward turning clockwise seen along its outward axis.
-        sign = 1.0 if structure.parts[block].flipped else -1.0
-        wheel_speeds[:, w] = sign * WHEEL_SPEED * (forward - backward)
+        part = structure.parts[block]
+        motor = part.module.motor
+        if motor is None:
+            continue
+        forward = held(block, motor.forward).astype(np.float64)
+        backward = held(block, motor.backward).astype(np.float64)
+        # Clockwise seen from outside is against the outward axis.
+        sign = -1.0 if part.forward_is_clockwise else 1.0
+        wheel_speeds[:, w] = sign * motor.speed * (forward - backward)
+        lags[w] = motor.lag_per_s
     firing = np.zeros((step_count, len(structure.cannons)), dtype=bool)
     for c, block in enumerate(structure.cannons):
-        firing[:, c] = held(block, "hold_to_fire")
-    return Schedule(wheel_speeds=_lagged(wheel_speeds, time_step_s), firing=firing)
+        thrust = structure.parts[block].module.thrust
+        if thrust is not None:
+            firing[:, c] = held(block, thrust.action)
+    return Schedule(wheel_speeds=_lagged(wheel_speeds, lags, time_step_s), firing=firing)
 
 
 def effective_presses(bindings: Bindings, keys: Sequence[KeyHold]) -> int:
@@ -121,33 +119,40 @@ def effective_presses(bindings: Bindings, keys: Sequence[KeyHold]) -> int:
 def heated_cannons(structure: Structure, shown: FloatArray, directions: FloatArray) -> BoolArray:
     """Which cannons a flame touches, (C,).
 
-    A cannon's body is two spheres in a row, so it is narrower in the middle; a flame heats it if
-    the two bodies touch: its centre lies within the flame's radius of either sphere's surface.
+    A cannon's body is spheres in a row, so it is narrower between them; a flame heats it if the
+    two touch: the flame's centre lies within its radius of a sphere's surface.
 
     Args:
         structure: The machine.
         shown: (N, 3) centres of the blocks, world frame, units.
         directions: (N, 3) where cannons spray and torches flame, world frame.
     """
-    cannons, torches = structure.cannons, structure.torches
-    if not len(cannons) or not len(torches):
-        return np.zeros(len(cannons), dtype=bool)
-    flames = shown[torches] + FLAME_DISTANCE * directions[torches]
-    heated = np.zeros(len(cannons), dtype=bool)
-    for offset in CANNON_BULB_OFFSETS:
-        bulbs = shown[cannons] + offset * directions[cannons]
-        distance = np.linalg.norm(bulbs[:, None] - flames[None], axis=2) - CANNON_BULB_RADIUS
-        heated |= (distance <= FLAME_RADIUS + 1e-9).any(axis=1)
-    return heated
+    flames, bodies = structure.flames, structure.heat_bodies
+    if not len(bodies) or not len(flames):
+        return np.zeros(len(structure.cannons), dtype=bool)
+    fires, targets = flames.centers(shown, directions), bodies.centers(shown, directions)
+    distance = np.linalg.norm(targets[:, None] - fires[None], axis=2) - bodies.radius[:, None]
+    touched = (distance <= flames.radius + 1e-9).any(axis=1)
+    heated = np.zeros(len(structure), dtype=bool)
+    heated[bodies.block[touched]] = True
+    return np.asarray(heated[structure.cannons])
 
 
-def recoil(firing: BoolArray, heated: BoolArray) -> FloatArray:
-    """Recoil of each cannon, (C,), mass·unit/s²."""
-    return np.asarray(np.where(heated, HEATED_THRUST, COLD_THRUST) * firing * GRAVITY)
+def recoil(structure: Structure, firing: BoolArray, heated: BoolArray) -> FloatArray:
+    """Recoil of each cannon, (C,), mass·unit/s².
+
+    Args:
+        structure: The machine.
+        firing: (C,) whether each cannon's key is held.
+        heated: (C,) whether a flame touches it.
+    """
+    thrusts = np.where(heated, structure.heated_thrusts, structure.cold_thrusts)
+    return np.asarray(thrusts * firing * GRAVITY)
 
 
-def _lagged(targets: FloatArray, time_step_s: float) -> FloatArray:
-    blend = 1.0 - math.exp(-WHEEL_LAG_RATE * time_step_s)
+def _lagged(targets: FloatArray, lags: FloatArray, time_step_s: float) -> FloatArray:
+    """Speeds that follow their targets, (S, W), by first-order lags of the rates (W,), 1/s."""
+    blend = np.array([1.0 - math.exp(-lag * time_step_s) for lag in lags])
     speeds = np.zeros_like(targets)
     if not targets.any():
         return speeds

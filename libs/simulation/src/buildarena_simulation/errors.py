@@ -1,11 +1,11 @@
 """Errors of the simulation package: a machine's fault, a caller's fault and a crash stay apart."""
 
 
-class SimulationRoomError(Exception):
+class BuildarenaSimulationError(Exception):
     """Base of every error this package raises."""
 
 
-class MachineNotSimulable(SimulationRoomError):  # noqa: N818 - it names the machine's state, as a verdict
+class MachineNotSimulable(BuildarenaSimulationError):  # noqa: N818 - it names the machine's state, as a verdict
     """The machine itself cannot be simulated, so its trial fails and is scored so.
 
     Args:
@@ -17,13 +17,13 @@ class MachineNotSimulable(SimulationRoomError):  # noqa: N818 - it names the mac
         self.reason = reason
 
 
-class SimulationError(SimulationRoomError):
+class SimulationError(BuildarenaSimulationError):
     """The simulator failed; the trial is never scored and may be tried again."""
 
 
-class UnknownEngineError(SimulationRoomError, ValueError):
+class UnknownEngineError(BuildarenaSimulationError, ValueError):
     """No engine has the name asked for; the message lists the valid names."""
 
 
-class TrajectoryFormatError(SimulationRoomError, ValueError):
+class TrajectoryFormatError(BuildarenaSimulationError, ValueError):
     """The bytes are not a trajectory, or one of a schema this version cannot read."""

@@ -12,7 +12,6 @@ from buildarena_simulation.structure.build import Link, Rope, build_structure
 from buildarena_simulation.structure.model import (
     FloatArray,
     Part,
-    Role,
     Shape,
     ShapeKind,
     Structure,
@@ -21,9 +20,6 @@ from buildarena_simulation.structure.model import (
 if TYPE_CHECKING:
     from buildarena_geometry import Block, Joint, Machine
     from buildarena_geometry.modules.module import Solid
-
-_SMALL_WOODEN_BLOCK = 15
-"""Besiege's id of the one module whose far end grabs what it touches."""
 
 
 def structure_of(machine: "Machine") -> Structure:
@@ -46,12 +42,12 @@ def structure_of(machine: "Machine") -> Structure:
     parts = [_part(block) for block in machine.blocks.values()]
     index = {part.id: i for i, part in enumerate(parts)}
     links = [_link(joint, index, parts) for joint in machine.joints if joint.holds]
-    ropes, brace_mass = [], 0.0
+    ropes = []
     for connector in machine.connectors.values():
         first, second = index[connector.start[0]], index[connector.end[0]]
         start, end = np.array(connector.start_point), np.array(connector.end_point)
         name = f"{connector.module.name} {connector.id}"
-        if connector.module.name == "Winch":
+        if connector.module.link == "rope":
             ropes.append(
                 Rope(
                     name=name,
@@ -63,7 +59,6 @@ def structure_of(machine: "Machine") -> Structure:
                 )
             )
         else:
-            brace_mass = connector.module.mass
             links.append(
                 Link(
                     name=name,
@@ -72,9 +67,10 @@ def structure_of(machine: "Machine") -> Structure:
                     kind=JointKind.BRACE,
                     start=start,
                     end=end,
+                    mass=connector.module.mass,
                 )
             )
-    return build_structure(parts, links, ropes, brace_mass=brace_mass)
+    return build_structure(parts, links, ropes)
 
 
 def bindings_of(machine: "Machine") -> Bindings:
@@ -88,24 +84,25 @@ def _part(block: "Block") -> Part:
     shapes = tuple(_shape(solid, np.array(pose.position), rotation) for solid in module.body)
     if not shapes:
         raise MachineNotSimulable(f"block {block.id}: the module {module.name} has no body")
-    role = Role(module.kind)
+    physics = module.physics
+    if physics is None:
+        raise MachineNotSimulable(f"block {block.id}: the module {module.name} has no physics")
     shown = np.array(block.center)
     direction = None
-    if role is Role.WHEEL:
+    if physics.seat == "axle":
         direction = rotation[:, 2]
     elif block.pointing is not None:
         direction = np.array(block.pointing)
     return Part(
         id=block.id,
-        role=role,
-        mass=module.mass,
-        center=shapes[0].center if role is Role.WHEEL else shown,
+        module=module,
+        physics=physics,
+        center=shapes[0].center if physics.mass_at == "body" else shown,
         shown=shown,
         rotation=rotation,
         shapes=shapes,
         direction=direction,
-        flipped=block.flipped,
-        grabs=module.besiege_id == _SMALL_WOODEN_BLOCK,
+        forward_is_clockwise=block.forward_is_clockwise,
     )
 
 
@@ -129,18 +126,12 @@ def _shape(solid: "Solid", position: FloatArray, rotation: FloatArray) -> Shape:
 
 def _link(joint: "Joint", index: dict[str, int], parts: list[Part]) -> Link:
     base, part = index[joint.base], index[joint.part]
-    role = parts[part].role
-    kind = JointKind.ATTACHMENT
-    if role is Role.WHEEL:
-        kind = JointKind.AXLE
-    elif role in (Role.CANNON, Role.TORCH):
-        kind = JointKind.MOUNT
     point = np.array(joint.point)
     return Link(
         name=f"{joint.base}-{joint.part}",
         first=base,
         second=part,
-        kind=kind,
+        kind=JointKind(parts[part].physics.seat),
         start=point,
         end=point,
     )

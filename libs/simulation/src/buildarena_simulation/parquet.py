@@ -8,15 +8,16 @@ is not a series (ids, joint peaks, breaks, settings) is JSON in the schema's met
 import io
 import json
 from dataclasses import asdict
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from buildarena_simulation.errors import TrajectoryFormatError
 from buildarena_simulation.trajectory import Break, JointPeak, Trajectory
+
+if TYPE_CHECKING:
+    import pyarrow as pa
 
 SCHEMA_VERSION: Final = 1
 _KEY: Final = b"buildarena.trajectory"
@@ -25,6 +26,9 @@ _COMPRESSION_LEVEL: Final = 6
 
 def write_trajectory(trajectory: Trajectory) -> bytes:
     """The bytes of a trajectory's file; equal trajectories give equal bytes."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
     count = len(trajectory.time_s)
     columns: dict[str, pa.Array] = {
         "time_s": pa.array(trajectory.time_s),
@@ -75,12 +79,15 @@ def write_trajectory(trajectory: Trajectory) -> bytes:
     return out.getvalue()
 
 
-def read_trajectory(data: bytes) -> dict[str, Any]:
-    """The fields of the trajectory a file holds.
+def read_trajectory(data: bytes) -> Trajectory:
+    """The trajectory a file holds.
 
     Raises:
         TrajectoryFormatError: The bytes are not a trajectory of a schema this version reads.
     """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
     try:
         table = pq.read_table(io.BytesIO(data))
         facts = json.loads(table.schema.metadata[_KEY])
@@ -106,15 +113,17 @@ def read_trajectory(data: bytes) -> dict[str, Any]:
         joint_peaks=tuple(JointPeak(**peak) for peak in facts["joint_peaks"]),
         breaks=tuple(Break(**event) for event in facts["breaks"]),
     )
-    return dict(facts)
+    return Trajectory(**facts)
 
 
-def _rows(matrix: NDArray[Any]) -> pa.Array:
+def _rows(matrix: NDArray[Any]) -> "pa.Array":
+    import pyarrow as pa
+
     values = pa.array(np.ascontiguousarray(matrix).reshape(-1))
     offsets = np.arange(len(matrix) + 1, dtype=np.int32) * matrix.shape[1]
     return pa.ListArray.from_arrays(pa.array(offsets), values)
 
 
-def _matrix(column: pa.ListArray, count: int) -> NDArray[Any]:
+def _matrix(column: "pa.ListArray", count: int) -> NDArray[Any]:
     values = column.flatten().to_numpy(zero_copy_only=False)
     return np.ascontiguousarray(values.reshape(count, -1))

@@ -4,7 +4,7 @@ import numpy as np
 
 from buildarena_simulation.engines.base import CargoBox
 from buildarena_simulation.scenario import Cargo, GroundPlacement, SpanPlacement
-from buildarena_simulation.structure.model import FloatArray, Role, Structure
+from buildarena_simulation.structure.model import FloatArray, Structure
 
 _CLEARANCE = 0.005
 """Height of the lowest point above the ground at the start, units: touching, not overlapping."""
@@ -29,7 +29,7 @@ def place(
     bounds = structure.bounds()
     if isinstance(placement, GroundPlacement):
         start = next(
-            (part.shown for part in structure.parts if part.role is Role.START),
+            (part.shown for part in structure.parts if part.module.kind == "start"),
             structure.shown[0],
         )
         return np.array([-start[0], -start[1], _CLEARANCE - bounds[0, 2]]), np.eye(3)

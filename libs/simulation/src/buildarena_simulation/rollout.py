@@ -17,7 +17,7 @@ from buildarena_simulation.control import (
 )
 from buildarena_simulation.engines import ENGINES, create_engine, engine_version
 from buildarena_simulation.engines.base import Engine, World
-from buildarena_simulation.errors import SimulationError, SimulationRoomError
+from buildarena_simulation.errors import BuildarenaSimulationError, SimulationError
 from buildarena_simulation.machine import bindings_of, structure_of
 from buildarena_simulation.placement import cargo_at_start, jittered, place
 from buildarena_simulation.recording import Recorder
@@ -123,7 +123,7 @@ def simulate_structure(
                 "scenario": hashlib.sha256(scenario.model_dump_json().encode()).hexdigest()[:16],
             },
         )
-    except SimulationRoomError:
+    except BuildarenaSimulationError:
         raise
     except Exception as error:
         raise SimulationError(f"{engine} failed: {error}") from error
@@ -188,7 +188,7 @@ class _Trial:
         mass = cargo.mass_at(time_s) if cargo else None
         if mass is not None:
             engine.set_cargo_mass(mass)
-        thrusts = recoil(firing, self.recorder.heated_now)
+        thrusts = recoil(self._structure, firing, self.recorder.heated_now)
         engine.advance(wheel_speeds, thrusts)
         motion = engine.motion()
         if not (np.isfinite(motion.position).all() and np.isfinite(motion.rotation).all()):

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from typing import Final, Self
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -117,23 +117,6 @@ class Trajectory:
             value = getattr(self, field.name)
             if isinstance(value, np.ndarray):
                 value.setflags(write=False)
-
-    def to_parquet(self) -> bytes:
-        """The trajectory as a Parquet file (zstd, byte-stream split)."""
-        from buildarena_simulation.parquet import write_trajectory
-
-        return write_trajectory(self)
-
-    @classmethod
-    def from_parquet(cls, data: bytes) -> Self:
-        """The trajectory a Parquet file holds.
-
-        Raises:
-            TrajectoryFormatError: The bytes are not a trajectory of a schema this version reads.
-        """
-        from buildarena_simulation.parquet import read_trajectory
-
-        return cls(**read_trajectory(data))
 
 
 def rounded_positions(positions: NDArray[np.float64]) -> NDArray[np.float32]:

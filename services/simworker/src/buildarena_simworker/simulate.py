@@ -21,6 +21,7 @@ from buildarena_simulation import (
     Trajectory,
     engine_version,
     simulate,
+    write_trajectory,
 )
 from buildarena_store import (
     ArtifactInfo,
@@ -110,7 +111,7 @@ class SimulateHandler:
             )
         except SimulationError as error:
             raise TransientError(str(error), reason="simulator_fault", delay_s=2.0) from error
-        kept = self._context.artifacts.put(trajectory.to_parquet(), PARQUET)
+        kept = self._context.artifacts.put(write_trajectory(trajectory), PARQUET)
         return _Done(
             score=score(task, machine, trajectory),
             trajectory=kept,

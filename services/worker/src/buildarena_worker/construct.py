@@ -12,7 +12,7 @@ from buildarena_pipeline.runtime.active_lease import ActiveLease
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.machine_documents import machine_bytes
 from buildarena_pipeline.runtime.scoring import failure_score, rollout_score, task_of
-from buildarena_simulation import Trajectory
+from buildarena_simulation import read_trajectory
 from buildarena_store import (
     Job,
     JobScore,
@@ -70,9 +70,7 @@ class ConstructHandler:
             append=lambda entry: self._append(lease, entry),
             still_held=lambda: not active.lost,
             limits=job.limits,
-            load_trajectory=lambda digest: Trajectory.from_parquet(
-                self._context.artifacts.get(digest)
-            ),
+            load_trajectory=lambda digest: read_trajectory(self._context.artifacts.get(digest)),
             reserve=guard,
             waiting=self._gate.released,
         )

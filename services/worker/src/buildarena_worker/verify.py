@@ -23,7 +23,13 @@ from buildarena_pipeline.errors import PermanentError
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.machine_documents import machine_bytes
 from buildarena_pipeline.runtime.scoring import best_rollout, task_of
-from buildarena_simulation import SIMULATION_VERSION, MachineNotSimulable, Trajectory, simulate
+from buildarena_simulation import (
+    SIMULATION_VERSION,
+    MachineNotSimulable,
+    read_trajectory,
+    simulate,
+    write_trajectory,
+)
 from buildarena_store import ExternalCall, Job, RolloutRecord, Usage
 from buildarena_worker.construct import loop_of, pack_of
 from buildarena_worker.errors import (
@@ -134,9 +140,7 @@ class Verifier:
             append=lambda _: None,
             still_held=lambda: True,
             limits=job.limits,
-            load_trajectory=lambda digest: Trajectory.from_parquet(
-                self._context.artifacts.get(digest)
-            ),
+            load_trajectory=lambda digest: read_trajectory(self._context.artifacts.get(digest)),
         )
         io.machines = []
         session = Session(
@@ -175,7 +179,7 @@ class Verifier:
         except MachineNotSimulable:
             again, digest = failed_score(task, machine), None
         else:
-            again, digest = score(task, machine, trajectory), _hash(trajectory.to_parquet())
+            again, digest = score(task, machine, trajectory), _hash(write_trajectory(trajectory))
         checks.append(_compare(f"{name}: trajectory", record.trajectory_hash, digest))
         for field in ("success", "indicator", "metrics", "flags"):
             kept = _plain(getattr(record, field))

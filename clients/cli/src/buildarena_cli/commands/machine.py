@@ -51,7 +51,7 @@ def simulate_command(  # noqa: PLR0917 - the command line passes options by name
 ) -> None:
     """Put a machine through a task's trial and score it."""
     from buildarena_benchmark import failed_score, score
-    from buildarena_simulation import ENGINES
+    from buildarena_simulation import ENGINES, write_trajectory
 
     with shown_errors():
         if engine is not None and engine not in ENGINES:
@@ -66,7 +66,7 @@ def simulate_command(  # noqa: PLR0917 - the command line passes options by name
         else:
             result = score(chosen, machine, rollout)
             if trajectory is not None:
-                trajectory.write_bytes(rollout.to_parquet())
+                trajectory.write_bytes(write_trajectory(rollout))
             if video is not None:
                 film(machine, chosen, rollout, video)
         if as_json:
@@ -83,11 +83,11 @@ def render_command(
     video: Annotated[Path, typer.Option(help="The film (.mp4, .gif) or pictures (.png) to write.")],
 ) -> None:
     """Draw a trial that was simulated before."""
-    from buildarena_simulation import Trajectory
+    from buildarena_simulation import read_trajectory
 
     with shown_errors():
         chosen, machine = chosen_task(task), read_machine(file)
-        rollout = Trajectory.from_parquet(trajectory.read_bytes())
+        rollout = read_trajectory(trajectory.read_bytes())
         missing = [block for block in rollout.block_ids if block not in machine.blocks]
         if missing:
             raise CommandError(f"{trajectory}: block {missing[0]} is not in {file}")

@@ -104,7 +104,7 @@ def replay(
     import tempfile
 
     from buildarena_benchmark import parse_task
-    from buildarena_simulation import Trajectory
+    from buildarena_simulation import read_trajectory
 
     client = Client(url)
     whole = whole_id(client, "job", job_id)
@@ -115,7 +115,7 @@ def replay(
     with shown_errors(), tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "machine.json"
         file.write_bytes(document)
-        rollout = Trajectory.from_parquet(recorded)
+        rollout = read_trajectory(recorded)
         film(read_machine(file), parse_task(_text(task), origin=job["task"]), rollout, out)
     say(str(out))
 

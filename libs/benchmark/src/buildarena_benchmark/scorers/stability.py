@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from buildarena_benchmark.scorers.series import speeds
-from buildarena_simulation.constants import GRAVITY, HEATED_THRUST, WHEEL_SPEED
+from buildarena_simulation.constants import GRAVITY
 
 if TYPE_CHECKING:
     from buildarena_geometry import Machine
@@ -44,10 +44,11 @@ def _limits(machine: "Machine", trajectory: "Trajectory", positions: np.ndarray)
     """Greatest plausible speed in each step, (T - 1, 1), units/s."""
     top = np.maximum.accumulate(positions[:, :, 2].max(axis=1))[1:]
     fall = np.sqrt(2.0 * GRAVITY * np.maximum(top, 0.0))
-    cannon_masses = [b.module.mass for b in machine.blocks.values() if b.module.kind == "cannon"]
+    modules = {block.module.name: block.module for block in machine.blocks.values()}.values()
     # A cannon torn off flies fastest: it pushes nothing but itself.
-    push = HEATED_THRUST / min(cannon_masses) * GRAVITY if cannon_masses else 0.0
-    has_wheels = any(b.module.kind == "wheel" for b in machine.blocks.values())
+    pushes = (module.thrust.heated / module.mass for module in modules if module.thrust)
+    push = max(pushes, default=0.0) * GRAVITY
+    spin = max((module.motor.speed for module in modules if module.motor), default=0.0)
     extent = positions[0].max(axis=0) - positions[0].min(axis=0)
-    rim = WHEEL_SPEED * (float(np.linalg.norm(extent)) + 2.0) if has_wheels else 0.0
+    rim = spin * (float(np.linalg.norm(extent)) + 2.0)
     return np.asarray(_MARGIN * (fall + push * trajectory.time_s[1:] + rim) + _SLACK)[:, None]

@@ -42,7 +42,7 @@ def judge(scoring: TransportScoring, machine: "Machine", trajectory: "Trajectory
     Source: the paper, section "Evaluation"; thresholds as in the published evaluation.
     """
     path = _subject_path(scoring, machine, trajectory)
-    wheels = [b.id for b in machine.blocks.values() if b.module.kind == "wheel"]
+    wheels = [b.id for b in machine.blocks.values() if b.module.spins]
     if path is None or not _is_driven(machine, trajectory):
         return Verdict(
             success=False, indicator=0.0, metrics={"wheels": len(wheels), "driven": False}

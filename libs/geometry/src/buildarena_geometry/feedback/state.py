@@ -173,7 +173,8 @@ def loosened(state: MachineState, moved: Iterable[str]) -> list[str]:
 
 def _use(block: Block) -> list[str]:
     if block.module.spins:
-        return [rolling(block.axis_xyz, flipped=block.flipped) + _flipped(block)]
+        forward = rolling(block.axis_xyz, clockwise=block.forward_is_clockwise)
+        return [forward + _flipped(block)]
     towards = block.pointing_xyz
     if towards is None:
         return []

@@ -66,23 +66,23 @@ def counted(amount: int, word: str) -> str:
     return f"{amount} {word}" if amount == 1 else f"{amount} {word}s"
 
 
-def rolling(axle: Vector, *, flipped: bool) -> str:
+def rolling(axle: Vector, *, clockwise: bool) -> str:
     """What a wheel does while its forward key is held.
 
     Args:
         axle: outward normal of the wheel's outer face, world frame, unit length.
-        flipped: whether its spin is reversed.
+        clockwise: whether it then turns clockwise seen from outside.
 
     Returns:
         The way it rolls and its camber, or, where it lies too flat to roll, the way it spins.
     """
     tilt = math.degrees(math.asin(max(-1.0, min(1.0, axle[2]))))
     if abs(tilt) >= ROLLING_TILT_DEG:
-        # It turns about -axle, so seen from above an unflipped wheel facing up goes clockwise.
-        sense = "clockwise" if (axle[2] > 0) != flipped else "counterclockwise"
+        # From above, a wheel that faces up is seen from outside.
+        sense = "clockwise" if (axle[2] > 0) == clockwise else "counterclockwise"
         return f"too flat to roll, forward spins it {sense} seen from above"
     x, y, _ = cross(axle, DOWN)
-    sign = (-1.0 if flipped else 1.0) / math.hypot(x, y)
+    sign = (1.0 if clockwise else -1.0) / math.hypot(x, y)
     camber = "" if abs(tilt) < AXIS_TOLERANCE_DEG else f", camber {number(tilt, 1)}°"
     return f"forward rolls it {caption((x * sign, y * sign, 0.0))}{camber}"
 

@@ -4,11 +4,16 @@ The library's own file, `modules.yaml`, is written in the subset of YAML that is
 reading it takes the standard library alone. A user's file may be JSON, or any YAML where PyYAML is
 installed.
 `modules.schema.json` describes the format for editors.
+
+What a module does (its physics, motor, thrust and flames) may be left out of a user's file: it is
+then what the first basic module of the same kind does.
 """
 
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import cache
 from importlib import resources
 from pathlib import Path
@@ -17,23 +22,51 @@ from typing import cast
 from buildarena_geometry.errors import CatalogueError
 from buildarena_geometry.modules.module import (
     KINDS,
+    LINKS,
+    MASS_PLACES,
+    SEATS,
+    SENSES,
     Box,
     Catalogue,
     Cylinder,
     Face,
     Kind,
     Landmark,
+    Link,
+    MassPlace,
     Module,
+    Motor,
+    Physics,
+    Seat,
+    Sense,
     Solid,
+    Sphere,
+    Thrust,
 )
 from buildarena_geometry.poses import Pose
-from buildarena_geometry.reading import Reader
+from buildarena_geometry.reading import Fields, Reader
 from buildarena_geometry.rotations import ORIGIN, dot, from_axes
 
 CATALOGUE_VERSION = 1
 _REQUIRED = ("name", "kind", "mass", "cost", "size", "description", "besiege")
-_OPTIONAL = ("center", "faces", "colliders", "body", "pointing", "landmarks", "actions")
+_SHAPE = ("center", "faces", "colliders", "body", "pointing", "landmarks")
+_USE = ("actions", "motor", "thrust", "physics", "grabs", "link")
+_OPTIONAL = (*_SHAPE, *_USE)
+_MOTOR = ("speed_rpm", "lag_per_s", "torque", "forward", "backward", "forward_sense")
+_THRUST = ("action", "along", "cold", "heated", "spheres")
+_PHYSICS = ("seat", "mass_at", "structural", "friction", "linear_drag", "angular_drag")
+_WITHOUT_PHYSICS = ("connector", "cargo")
 _PERPENDICULAR = 1e-6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Usual:
+    """What modules of a kind do unless they say otherwise; fields as in `Module`."""
+
+    motor: Motor | None = None
+    thrust: Thrust | None = None
+    physics: Physics | None = None
+    flames: tuple[Sphere, ...] = ()
 
 
 def load_catalogue(*files: str | Path) -> Catalogue:
@@ -50,7 +83,7 @@ def load_catalogue(*files: str | Path) -> Catalogue:
     """
     modules = basic_modules()
     for file in files:
-        modules = (*modules, *_read_file(Path(file)))
+        modules = (*modules, *_read_file(Path(file), basic_modules()))
     names: set[str] = set()
     for module in modules:
         if module.name in names:
@@ -69,12 +102,15 @@ def basic_modules() -> tuple[Module, ...]:
     return read_modules(json.loads(text), where="modules.yaml")
 
 
-def read_modules(content: object, *, where: str) -> tuple[Module, ...]:
+def read_modules(
+    content: object, *, where: str, basic: tuple[Module, ...] = ()
+) -> tuple[Module, ...]:
     """The modules of a parsed module file.
 
     Args:
         content: what the file holds, as JSON values.
         where: what messages call the file.
+        basic: modules that say what those of their kind do where the file leaves it out.
 
     Raises:
         CatalogueError: the content breaks the format.
@@ -84,10 +120,19 @@ def read_modules(content: object, *, where: str) -> tuple[Module, ...]:
     )
     if fields["version"].integer() != CATALOGUE_VERSION:
         fields["version"].fail(f"version {CATALOGUE_VERSION}")
-    return tuple(_module(entry) for entry in fields["modules"].items())
+    usual_of = {
+        module.kind: _Usual(
+            motor=module.motor,
+            thrust=module.thrust,
+            physics=module.physics,
+            flames=module.flames,
+        )
+        for module in reversed(basic)
+    }
+    return tuple(_module(entry, usual_of) for entry in fields["modules"].items())
 
 
-def _read_file(file: Path) -> tuple[Module, ...]:
+def _read_file(file: Path, basic: tuple[Module, ...]) -> tuple[Module, ...]:
     try:
         text = file.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
@@ -96,7 +141,7 @@ def _read_file(file: Path) -> tuple[Module, ...]:
         content = json.loads(text)
     except json.JSONDecodeError:
         content = _parse_yaml(text, file)
-    return read_modules(content, where=file.name)
+    return read_modules(content, where=file.name, basic=basic)
 
 
 def _parse_yaml(text: str, file: Path) -> object:
@@ -113,13 +158,16 @@ def _parse_yaml(text: str, file: Path) -> object:
     return content
 
 
-def _module(entry: Reader) -> Module:
+def _module(entry: Reader, usual_of: Mapping[Kind, _Usual]) -> Module:
     fields = entry.fields(required=_REQUIRED, optional=_OPTIONAL)
     name = fields["name"].text(longest=60)
     entry = Reader(value=entry.value, where=f"{entry.where} ({name})", error=entry.error)
     fields = entry.fields(required=_REQUIRED, optional=_OPTIONAL)
     kind = cast("Kind", fields["kind"].choice(KINDS))
     besiege = fields["besiege"].fields(required=("id", "data"))
+    usual = usual_of.get(kind, _Usual())
+    landmarks = tuple(map(_landmark, fields.items("landmarks")))
+    actions = tuple(action.text(longest=60) for action in fields.items("actions"))
     module = Module(
         name=name,
         besiege_id=besiege["id"].integer(least=0),
@@ -132,12 +180,19 @@ def _module(entry: Reader) -> Module:
         colliders=tuple(map(_solid, fields.items("colliders"))),
         body=tuple(map(_solid, fields.items("body"))),
         pointing=fields["pointing"].direction() if fields.has("pointing") else None,
-        landmarks=tuple(map(_landmark, fields.items("landmarks"))),
-        actions=tuple(action.text(longest=60) for action in fields.items("actions")),
+        landmarks=landmarks,
+        flames=_flames(landmarks) or usual.flames,
+        actions=actions,
+        motor=_motor(fields["motor"], actions) if fields.has("motor") else usual.motor,
+        thrust=_thrust(fields["thrust"], actions) if fields.has("thrust") else usual.thrust,
+        physics=_physics(fields["physics"]) if fields.has("physics") else usual.physics,
+        grabs=fields["grabs"].truth() if "grabs" in fields else False,
+        link=cast("Link", fields["link"].choice(LINKS)) if fields.has("link") else "rigid",
         description=fields["description"].text(),
         besiege_data=tuple(map(_besiege_entry, besiege["data"].items())),
     )
     _check_sense(module, entry)
+    _check_use(module, fields)
     return module
 
 
@@ -153,6 +208,23 @@ def _check_sense(module: Module, entry: Reader) -> None:
         raise CatalogueError(f"{entry.where}: a connector has neither faces nor colliders")
     if module.kind != "connector" and (module.size is None or not module.colliders):
         raise CatalogueError(f"{entry.where}: a {module.kind} needs a size and colliders")
+
+
+def _check_use(module: Module, fields: Fields) -> None:
+    """Refuses what a module of this form cannot do."""
+    for name in ("motor", "thrust"):
+        if fields.has(name) and module.kind in _WITHOUT_PHYSICS:
+            fields[name].fail(f"no {name}: a {module.kind} does nothing by itself")
+    if fields.has("physics") and module.kind in _WITHOUT_PHYSICS:
+        fields["physics"].fail(f"no physics: a {module.kind} is not a body of its own")
+    if fields.has("link") and module.kind != "connector":
+        fields["link"].fail(f"no link: a {module.kind} is not a connector")
+    if fields.has("thrust") and module.pointing is None:
+        fields["thrust"].fail("no thrust: it acts along `pointing`, which is missing")
+    seat = None if module.physics is None else module.physics.seat
+    if (module.motor is not None) != (seat == "axle"):
+        place = fields.reader.where
+        raise CatalogueError(f"{place}: a motor needs the seat axle, and the seat axle a motor")
 
 
 def _face(entry: Reader) -> Face:
@@ -179,10 +251,68 @@ def _solid(entry: Reader) -> Solid:
 
 
 def _landmark(entry: Reader) -> Landmark:
-    fields = entry.fields(required=("name", "along"), optional=("radius",))
+    fields = entry.fields(required=("name", "along"), optional=("radius", "heats"))
     radius = fields["radius"].number(above=0) if "radius" in fields else None
+    heats = fields["heats"].truth() if "heats" in fields else False
+    if heats and radius is None:
+        raise CatalogueError(f"{entry.where}.radius: it is missing; a flame is a sphere")
     name = fields["name"].text(longest=60)
-    return Landmark(name=name, along=fields["along"].number(), radius=radius)
+    return Landmark(name=name, along=fields["along"].number(), radius=radius, heats=heats)
+
+
+def _flames(landmarks: tuple[Landmark, ...]) -> tuple[Sphere, ...]:
+    return tuple(
+        Sphere(along=mark.along, radius=mark.radius)
+        for mark in landmarks
+        if mark.heats and mark.radius is not None
+    )
+
+
+def _sphere(entry: Reader) -> Sphere:
+    fields = entry.fields(required=("along", "radius"))
+    return Sphere(along=fields["along"].number(), radius=fields["radius"].number(above=0))
+
+
+def _motor(entry: Reader, actions: tuple[str, ...]) -> Motor:
+    fields = entry.fields(required=_MOTOR, optional=("origin",))
+    return Motor(
+        speed_rpm=fields["speed_rpm"].number(above=0),
+        lag_per_s=fields["lag_per_s"].number(above=0),
+        torque=fields["torque"].number(above=0),
+        forward=fields["forward"].choice(actions),
+        backward=fields["backward"].choice(actions),
+        forward_sense=cast("Sense", fields["forward_sense"].choice(SENSES)),
+        origin=_origin(fields),
+    )
+
+
+def _thrust(entry: Reader, actions: tuple[str, ...]) -> Thrust:
+    fields = entry.fields(required=_THRUST, optional=("origin",))
+    return Thrust(
+        action=fields["action"].choice(actions),
+        along=fields["along"].number(),
+        cold=fields["cold"].number(least=0),
+        heated=fields["heated"].number(least=0),
+        spheres=tuple(map(_sphere, fields["spheres"].items())),
+        origin=_origin(fields),
+    )
+
+
+def _physics(entry: Reader) -> Physics:
+    fields = entry.fields(required=_PHYSICS, optional=("origin",))
+    return Physics(
+        seat=cast("Seat", fields["seat"].choice(SEATS)),
+        mass_at=cast("MassPlace", fields["mass_at"].choice(MASS_PLACES)),
+        structural=fields["structural"].truth(),
+        friction=fields["friction"].number(least=0),
+        linear_drag=fields["linear_drag"].number(least=0),
+        angular_drag=fields["angular_drag"].number(least=0),
+        origin=_origin(fields),
+    )
+
+
+def _origin(fields: Fields) -> str:
+    return fields["origin"].text() if "origin" in fields else ""
 
 
 def _besiege_entry(entry: Reader) -> tuple[str, str, str | int | float | bool]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Literal, get_args
@@ -12,6 +13,14 @@ from buildarena_geometry.rotations import ORIGIN, Vector, distance, from_axes
 Kind = Literal["start", "block", "wheel", "cannon", "torch", "connector", "cargo"]
 KINDS: tuple[str, ...] = get_args(Kind)
 ATTACHABLE_KINDS = ("block", "wheel", "cannon", "torch")
+Seat = Literal["attachment", "axle", "mount"]
+SEATS: tuple[str, ...] = get_args(Seat)
+MassPlace = Literal["center", "body"]
+MASS_PLACES: tuple[str, ...] = get_args(MassPlace)
+Link = Literal["rigid", "rope"]
+LINKS: tuple[str, ...] = get_args(Link)
+Sense = Literal["clockwise", "counterclockwise"]
+SENSES: tuple[str, ...] = get_args(Sense)
 FLUSH_TOLERANCE = 1e-6  # units; faces nearer than this are the same place
 
 
@@ -106,11 +115,103 @@ class Landmark:
         name: what it is.
         along: how far it lies from the block's centre in the pointing direction, units.
         radius: of the sphere it stands for, units; None for a mere point.
+        heats: whether it is a flame, a sphere that heats what it touches.
     """
 
     name: str
     along: float
     radius: float | None = None
+    heats: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sphere:
+    """A sphere on the line through a block's centre in the pointing direction.
+
+    Attributes:
+        along: how far its centre lies from the block's centre in the pointing direction, units.
+        radius: units.
+    """
+
+    along: float
+    radius: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Motor:
+    """What turns a wheel about its axle while a key is held; without a key it brakes.
+
+    Attributes:
+        speed_rpm: how fast it turns, revolutions per minute.
+        lag_per_s: rate of the first-order lag with which its target speed follows the keys, 1/s.
+        torque: its limit, mass·g·unit.
+        forward: the action that turns it forward.
+        backward: the action that turns it backward.
+        forward_sense: which way forward is, seen from outside against its axle, until its spin is
+            flipped.
+        origin: where the figures come from.
+    """
+
+    speed_rpm: float
+    lag_per_s: float
+    torque: float
+    forward: str
+    backward: str
+    forward_sense: Sense
+    origin: str = ""
+
+    @property
+    def speed(self) -> float:
+        """How fast it turns, rad/s."""
+        return self.speed_rpm * 2.0 * math.pi / 60.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Thrust:
+    """What pushes a cannon against the way it points while its key is held.
+
+    Attributes:
+        action: the action that fires it.
+        along: how far the point the push acts on lies from the block's centre in the pointing
+            direction, units.
+        cold: the push without a flame, mass·g.
+        heated: the push while a flame touches one of the spheres, mass·g.
+        spheres: the body that a flame must touch.
+        origin: where the figures come from.
+    """
+
+    action: str
+    along: float
+    cold: float
+    heated: float
+    spheres: tuple[Sphere, ...]
+    origin: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Physics:
+    """How a block behaves as a body, whatever simulates it.
+
+    Attributes:
+        seat: what holds it to the face it sits on: an ordinary attachment, an axle it turns on, or
+            a mount that practically never breaks.
+        mass_at: where its mass lies: at the point shown as its position, or in the middle of its
+            body.
+        structural: whether it is part of the frame that bears loads: what a far end can grab, and
+            what rests on ground and terrain.
+        friction: its coefficient of friction.
+        linear_drag: share of its velocity it loses, 1/s.
+        angular_drag: share of its spin it loses, 1/s.
+        origin: where the figures come from.
+    """
+
+    seat: Seat = "attachment"
+    mass_at: MassPlace = "center"
+    structural: bool = True
+    friction: float = 0.0
+    linear_drag: float = 0.0
+    angular_drag: float = 0.0
+    origin: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -135,7 +236,13 @@ class Module:
         body: the solids people see.
         pointing: (3,) the way a cannon or torch points; None for the others.
         landmarks: further points along the pointing direction.
+        flames: spheres of fire, which heat what they touch.
         actions: what its keys can make it do.
+        motor: what turns it on its axle; None for blocks that do not turn.
+        thrust: what pushes it; None for blocks that do not push.
+        physics: how it behaves as a body; None for connectors and cargo, which a task describes.
+        grabs: whether its far end, opposite to the face it sits on, holds what it touches.
+        link: what a connector is: a rigid strut, or a rope that pulls and never pushes.
         description: what models are told about it.
         besiege_data: further entries of its block in Besiege's machine files: type, key, value.
     """
@@ -152,7 +259,13 @@ class Module:
     body: tuple[Solid, ...] = ()
     pointing: Vector | None = None
     landmarks: tuple[Landmark, ...] = ()
+    flames: tuple[Sphere, ...] = ()
     actions: tuple[str, ...] = ()
+    motor: Motor | None = None
+    thrust: Thrust | None = None
+    physics: Physics | None = None
+    grabs: bool = False
+    link: Link = "rigid"
     description: str = ""
     besiege_data: tuple[tuple[str, str, str | int | float | bool], ...] = ()
     face_of_label: Mapping[str, Face] = field(init=False, repr=False, compare=False)
@@ -173,7 +286,7 @@ class Module:
     @property
     def spins(self) -> bool:
         """Whether it has a spin that can be flipped."""
-        return self.kind == "wheel"
+        return self.motor is not None
 
 
 class Catalogue(Mapping[str, Module]):

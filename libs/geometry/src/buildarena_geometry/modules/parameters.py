@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Any, TypeGuard
 
-from buildarena_geometry.documents.json_values import LARGEST_INTEGER, is_storable
+from buildarena_geometry.json_values import LARGEST_INTEGER, is_storable
 from buildarena_geometry.keys import KEYS
 from buildarena_geometry.outcomes import Cause
 from buildarena_geometry.rotations import Vector

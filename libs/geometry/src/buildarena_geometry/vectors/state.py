@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from buildarena_geometry.besiege import besiege_point, besiege_rotation, besiege_span
 from buildarena_geometry.outcomes import Cause, Refused
 from buildarena_geometry.rotations import scaled
+from buildarena_geometry.vectors.besiege import besiege_point, besiege_rotation, besiege_span
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -83,7 +83,7 @@ def _block_entry(state: MachineState, block: Block) -> dict[str, Any]:
         entry["pointing"] = list(block.pointing_xyz)
     if block.module.spins:
         # Seen in Besiege's left-handed components the spin's sense is the other way round.
-        entry["spin"] = list(scaled(block.axis_xyz, -1.0 if block.flipped else 1.0))
+        entry["spin"] = list(scaled(block.axis_xyz, 1.0 if block.forward_is_clockwise else -1.0))
     if block.module.actions:
         entry["keys"] = {action: list(keys) for action, keys in block.bindings.items()}
     return entry

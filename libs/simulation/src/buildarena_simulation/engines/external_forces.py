@@ -30,7 +30,7 @@ def thrust_forces(
         block = structure.cannons[cannon]
         c = int(clusters.cluster_of[block])
         to_body = axes[c].T
-        arm = to_body @ (structure.shown[block] - clusters.center_of_mass[c])
+        arm = to_body @ (structure.thrust_points[cannon] - clusters.center_of_mass[c])
         force = -thrusts[cannon] * (to_body @ structure.directions[block])
         found.append((c, (force.tolist(), arm.tolist())))
     return found

@@ -11,15 +11,10 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from buildarena_simulation.constants import (
-    COLLISION_MARGIN,
-    FRICTION_BLOCK,
-    FRICTION_TERRAIN,
-    FRICTION_WHEEL,
-)
+from buildarena_simulation.constants import COLLISION_MARGIN, FRICTION_TERRAIN
 from buildarena_simulation.engines.base import World, quaternion_of
 from buildarena_simulation.structure.clusters import Clusters
-from buildarena_simulation.structure.model import FloatArray, Role, Shape, ShapeKind, Structure
+from buildarena_simulation.structure.model import FloatArray, Shape, ShapeKind, Structure
 from buildarena_simulation.structure.motion import Motion
 
 _TERRAIN_PRIORITY, _CARGO_PRIORITY, _BLOCK_PRIORITY, _WHEEL_PRIORITY = 0, 1, 2, 3
@@ -36,8 +31,7 @@ class MjcfSettings:
         solimp: Impedance of contacts.
         impratio: Stiffness of friction over that of normal forces.
         iterations: Most iterations of the solver.
-        wheel_torque: Torque limit of a wheel's motor, mass·unit²/s².
-        servo_gain: Torque of a wheel's motor per rad/s off its target.
+        servo_slip: How far off its target a wheel's motor reaches its torque limit, rad/s.
     """
 
     time_step_s: float
@@ -45,8 +39,7 @@ class MjcfSettings:
     solimp: Sequence[float]
     impratio: float
     iterations: int
-    wheel_torque: float
-    servo_gain: float
+    servo_slip: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -111,7 +104,7 @@ def mjcf_of(world: World, state: MjcfState, settings: MjcfSettings) -> str:
         *_ropes(world.structure, state),
         "</tendon>",
         "<actuator>",
-        *_actuators(world.structure, state, settings),
+        *_actuators(world, state, settings),
         "</actuator>",
         "</mujoco>",
     ]
@@ -197,7 +190,6 @@ def _body(structure: Structure, state: MjcfState, c: int) -> Iterator[str]:
 
 def _block(structure: Structure, state: MjcfState, c: int, block: int) -> Iterator[str]:
     part = structure.parts[block]
-    wheel = part.role is Role.WHEEL
     turns = [state.axes[c].T @ shape.rotation for shape in part.shapes]
     quaternions = quaternion_of(np.array(turns))
     for k, shape in enumerate(part.shapes):
@@ -209,11 +201,12 @@ def _block(structure: Structure, state: MjcfState, c: int, block: int) -> Iterat
             size=size,
             pos=state.in_body(c, shape.center),
             quat=quaternions[k],
-            friction=_friction(FRICTION_WHEEL if wheel else FRICTION_BLOCK),
-            priority=_WHEEL_PRIORITY if wheel else _BLOCK_PRIORITY,
+            friction=_friction(part.physics.friction),
+            priority=_WHEEL_PRIORITY if part.is_wheel else _BLOCK_PRIORITY,
         )
-    if part.role is Role.CANNON:
-        yield _tag("site", name=f"cannon {block}", pos=state.in_body(c, structure.shown[block]))
+    for cannon in np.flatnonzero(structure.cannons == block):
+        place = state.in_body(c, structure.thrust_points[cannon])
+        yield _tag("site", name=f"cannon {block}", pos=place)
 
 
 def _form(shape: Shape) -> tuple[str, FloatArray]:
@@ -253,14 +246,16 @@ def _ropes(structure: Structure, state: MjcfState) -> Iterator[str]:
         yield "</spatial>"
 
 
-def _actuators(structure: Structure, state: MjcfState, settings: MjcfSettings) -> Iterator[str]:
+def _actuators(world: World, state: MjcfState, settings: MjcfSettings) -> Iterator[str]:
+    structure = world.structure
     for c in np.flatnonzero(state.clusters.parent >= 0):
+        torque = structure.torques[state.clusters.wheel[c]] * world.gravity
         yield _tag(
             "velocity",
             name=f"hinge {c}",
             joint=f"hinge {c}",
-            kv=settings.servo_gain,
-            forcerange=(-settings.wheel_torque, settings.wheel_torque),
+            kv=torque / settings.servo_slip,
+            forcerange=(-torque, torque),
         )
     for i in structure.cannons:
         recoil = state.axes[state.clusters.cluster_of[i]].T @ -structure.directions[i]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from buildarena_simulation.constants import MAX_SPIN, WHEEL_TORQUE
+from buildarena_simulation.constants import MAX_SPIN
 from buildarena_simulation.engines.base import CargoPose, World, principal_frames
 from buildarena_simulation.engines.hinges import hinge_rate
 from buildarena_simulation.engines.impacts import ImpactWatch
@@ -45,15 +45,13 @@ class MujocoEngine:
     def __init__(self, world: World) -> None:
         self._world = world
         self._structure = world.structure
-        torque = WHEEL_TORQUE * world.gravity
         self._mjcf = MjcfSettings(
             time_step_s=_TIME_STEP_S,
             solref=_SOLREF,
             solimp=_SOLIMP,
             impratio=_IMPRATIO,
             iterations=_ITERATIONS,
-            wheel_torque=torque,
-            servo_gain=torque / _SERVO_SLIP,
+            servo_slip=_SERVO_SLIP,
         )
         self._rope_alive = np.ones(len(world.structure.ropes), dtype=bool)
         self._cargo_mass = world.cargo.mass if world.cargo else 0.0

@@ -12,7 +12,7 @@ import numpy as np
 from buildarena_simulation.engines.base import CargoPose, World, rotation_of
 from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.contacts import ContactForces
-from buildarena_simulation.structure.model import FloatArray, IntArray, Role, ShapeKind
+from buildarena_simulation.structure.model import FloatArray, IntArray, ShapeKind
 from buildarena_simulation.structure.motion import Motion
 from buildarena_simulation.structure.vectors import turned
 
@@ -30,7 +30,7 @@ class NearContacts:
     """Finds the blocks of a world that all but touch terrain, ground or cargo.
 
     Args:
-        world: Terrain, ground and the machine; blocks other than boxes are left out.
+        world: Terrain, ground and the machine; of its blocks, structural boxes count.
     """
 
     def __init__(self, world: World) -> None:
@@ -38,7 +38,7 @@ class NearContacts:
         boxes = [
             i
             for i, part in enumerate(parts)
-            if part.role in (Role.START, Role.BLOCK) and part.shapes[0].kind is ShapeKind.BOX
+            if part.physics.structural and part.shapes[0].kind is ShapeKind.BOX
         ]
         shapes = [parts[i].shapes[0] for i in boxes]
         self._block = np.array(boxes, dtype=np.int64)

@@ -18,13 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from buildarena_simulation.constants import (
-    FRICTION_BLOCK,
-    FRICTION_TERRAIN,
-    FRICTION_WHEEL,
-    MAX_SPIN,
-    WHEEL_TORQUE,
-)
+from buildarena_simulation.constants import FRICTION_TERRAIN, MAX_SPIN
 from buildarena_simulation.engines.base import (
     CargoPose,
     World,
@@ -43,7 +37,7 @@ from buildarena_simulation.engines.ropes import rope_forces
 from buildarena_simulation.engines.urdf import urdf_of
 from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.contacts import ContactForces
-from buildarena_simulation.structure.model import FloatArray, IntArray, Role
+from buildarena_simulation.structure.model import FloatArray, IntArray
 from buildarena_simulation.structure.motion import Motion
 
 # It greets when it is imported, on streams where our own output may be JSON.
@@ -74,7 +68,6 @@ class PyBulletEngine:
     def __init__(self, world: World) -> None:
         self._world = world
         self._structure = world.structure
-        self._torque = WHEEL_TORQUE * world.gravity
         self._rope_alive = np.ones(len(world.structure.ropes), dtype=bool)
         self._tensions = np.zeros(len(world.structure.ropes))
         self._place_of_wheel = {int(i): w for w, i in enumerate(world.structure.wheels)}
@@ -240,8 +233,7 @@ class PyBulletEngine:
         velocity, spin = motion.velocity[root].tolist(), motion.spin[root].tolist()
         pybullet.resetBaseVelocity(body, velocity, spin, **self._client)
         for link, c in enumerate(inside):
-            round_ = any(structure.parts[i].role is Role.WHEEL for i in clusters.blocks[c])
-            self._set_friction(body, link - 1, FRICTION_WHEEL if round_ else FRICTION_BLOCK)
+            self._set_friction(body, link - 1, self._friction_of(c))
             if link:
                 rate = hinge_rate(structure, clusters, motion, c)
                 pybullet.resetJointState(body, link - 1, 0.0, rate, **self._client)
@@ -252,7 +244,14 @@ class PyBulletEngine:
             inside=inside,
             wheel_signs=np.where(clusters.wheel_is_outer[hinged], 1.0, -1.0),
             wheel_places=np.array(places, dtype=np.int64),
+            wheel_torques=structure.torques[clusters.wheel[hinged]] * self._world.gravity,
         )
+
+    def _friction_of(self, c: int) -> float:
+        """Friction of a cluster: a link has one coefficient, that of its wheels if it has any."""
+        parts = [self._structure.parts[i] for i in self._clusters.blocks[c]]
+        deciding = next((part for part in parts if part.is_wheel), parts[0])
+        return float(deciding.physics.friction)
 
     def _load(self, inside: tuple[int, ...], motion: Motion) -> int:
         """The body of a piece, put where its root is."""
@@ -305,7 +304,7 @@ class PyBulletEngine:
                     range(count),
                     pybullet.VELOCITY_CONTROL,
                     targetVelocities=(speeds[piece.wheel_places] * piece.wheel_signs).tolist(),
-                    forces=[self._torque] * count,
+                    forces=piece.wheel_torques.tolist(),
                     **self._client,
                 )
 
@@ -400,9 +399,11 @@ class _Piece:
         inside: Its clusters, the root first.
         wheel_signs: Per hinge, -1 where the link turned is not the wheel's but its mount's.
         wheel_places: Per hinge, which wheel of the structure it is.
+        wheel_torques: Per hinge, torque limit of its motor, mass·unit²/s².
     """
 
     body: int
     inside: tuple[int, ...]
     wheel_signs: FloatArray
     wheel_places: IntArray
+    wheel_torques: FloatArray

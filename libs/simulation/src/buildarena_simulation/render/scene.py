@@ -6,10 +6,9 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from buildarena_simulation.constants import FLAME_DISTANCE, FLAME_RADIUS
 from buildarena_simulation.engines.base import rotation_of
 from buildarena_simulation.machine import structure_of
-from buildarena_simulation.structure.model import FloatArray, Role, Shape, ShapeKind
+from buildarena_simulation.structure.model import FloatArray, Shape, ShapeKind
 
 if TYPE_CHECKING:
     from buildarena_geometry import Machine
@@ -18,12 +17,12 @@ if TYPE_CHECKING:
 
 Color = tuple[int, int, int]
 
-_COLORS: Final[dict[Role, Color]] = {
-    Role.START: (196, 78, 66),
-    Role.BLOCK: (205, 164, 108),
-    Role.WHEEL: (82, 84, 92),
-    Role.CANNON: (86, 132, 178),
-    Role.TORCH: (140, 96, 60),
+_COLORS: Final[dict[str, Color]] = {
+    "start": (196, 78, 66),
+    "block": (205, 164, 108),
+    "wheel": (82, 84, 92),
+    "cannon": (86, 132, 178),
+    "torch": (140, 96, 60),
 }
 _HEATED: Final[Color] = (230, 120, 50)
 _CARGO: Final[Color] = (120, 124, 132)
@@ -102,7 +101,7 @@ class Scene:
                 if k is not None
             ]
             if len(local) == 2:  # noqa: PLR2004 - both ends are tracked
-                color = _WINCH if connector.module.name == "Winch" else _BRACE
+                color = _WINCH if connector.module.link == "rope" else _BRACE
                 self._braces.append((local, broken[0] if broken else np.inf, color))
 
     @property
@@ -130,7 +129,7 @@ class Scene:
         positions = trajectory.positions[sample].astype(np.float64)
         turns = rotation_of(trajectory.quaternions[sample].astype(np.float64))
         for part, k in self._parts:
-            color = _COLORS[part.role]
+            color = _COLORS[part.module.kind]
             cannon = self._heated.get(part.id)
             if cannon is not None and trajectory.heated[sample, cannon]:
                 color = _HEATED
@@ -138,9 +137,12 @@ class Scene:
             for shape in part.shapes:
                 center = positions[k] + world_from_machine @ (shape.center - part.shown)
                 picture.faces.extend(_faces(shape, center, world_from_machine, color))
-            if part.role is Role.TORCH and part.direction is not None:
-                flame = positions[k] + FLAME_DISTANCE * (world_from_machine @ part.direction)
-                picture.balls.append((flame, FLAME_RADIUS, _FLAME))
+            if part.direction is not None:
+                towards = world_from_machine @ part.direction
+                picture.balls.extend(
+                    (positions[k] + flame.along * towards, flame.radius, _FLAME)
+                    for flame in part.module.flames
+                )
         for ends, until, color in self._braces:
             if trajectory.time_s[sample] < until:
                 line = np.array([positions[k] + turns[k] @ local for k, local in ends])

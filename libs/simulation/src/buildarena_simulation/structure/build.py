@@ -1,27 +1,22 @@
 """From parts and joints to the arrays of a `Structure`: masses, members, far joints."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
-from buildarena_simulation.constants import (
-    ANGULAR_DRAG,
-    JOINT_STRENGTH,
-    LINEAR_DRAG,
-    ROPE_STRENGTH,
-    JointKind,
-)
+from buildarena_geometry.modules.module import Sphere
+from buildarena_simulation.constants import JOINT_STRENGTH, ROPE_STRENGTH, JointKind
 from buildarena_simulation.structure.model import (
     JOINT_KINDS,
     FloatArray,
     IntArray,
     Members,
     Part,
-    Role,
     Ropes,
     ShapeKind,
+    Spheres,
     Structure,
 )
 
@@ -48,6 +43,7 @@ class Link:
         kind: What kind of joint it is.
         start: (3,) where it leaves the first block, machine frame, units.
         end: (3,) where it reaches the second block; equals `start` unless it is a brace.
+        mass: Its own mass, half of which the block at each end carries, mass units.
     """
 
     name: str
@@ -56,6 +52,7 @@ class Link:
     kind: JointKind
     start: FloatArray
     end: FloatArray
+    mass: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,7 +68,7 @@ class Rope:
 
 
 def build_structure(
-    parts: Sequence[Part], links: Sequence[Link], ropes: Sequence[Rope], *, brace_mass: float
+    parts: Sequence[Part], links: Sequence[Link], ropes: Sequence[Rope]
 ) -> Structure:
     """The structure of a machine; far joints are found here.
 
@@ -79,7 +76,6 @@ def build_structure(
         parts: The blocks, in creation order.
         links: Attachments, axles and braces.
         ropes: Winches.
-        brace_mass: Mass of one brace; half of it is carried by the block at each end.
 
     Returns:
         The structure, in the frame the parts are given in.
@@ -87,8 +83,8 @@ def build_structure(
     lumps: list[list[tuple[float, FloatArray]]] = [[] for _ in parts]
     for link in links:
         if link.kind is JointKind.BRACE:
-            lumps[link.first].append((brace_mass / 2, link.start))
-            lumps[link.second].append((brace_mass / 2, link.end))
+            lumps[link.first].append((link.mass / 2, link.start))
+            lumps[link.second].append((link.mass / 2, link.end))
     for rope in ropes:
         lumps[rope.first].append((rope.mass / 2, rope.start))
         lumps[rope.second].append((rope.mass / 2, rope.end))
@@ -96,24 +92,38 @@ def build_structure(
     directions = np.array(
         [np.zeros(3) if part.direction is None else part.direction for part in parts]
     )
+    shown = np.array([part.shown for part in parts])
+    motors = [part.module.motor for part in parts]
+    thrusts = [(i, part.module.thrust) for i, part in enumerate(parts) if part.module.thrust]
+    cannons = _indices(i for i, _ in thrusts)
+    along = np.array([thrust.along for _, thrust in thrusts])
     return Structure(
         parts=tuple(parts),
         positions=np.array([part.center for part in parts]),
-        shown=np.array([part.shown for part in parts]),
+        shown=shown,
         rotations=np.array([part.rotation for part in parts]),
         masses=np.array([mass for mass, _, _ in lumped]),
         centers_of_mass=np.array([center for _, center, _ in lumped]),
         inertias=np.array([inertia for _, _, inertia in lumped]),
         members=_members(parts, [*links, *_far_joints(parts, links)]),
         ropes=_ropes(ropes),
-        wheels=_indices(parts, Role.WHEEL),
-        cannons=_indices(parts, Role.CANNON),
-        torches=_indices(parts, Role.TORCH),
+        wheels=_indices(i for i, part in enumerate(parts) if part.is_wheel),
+        cannons=cannons,
+        torches=_indices(i for i, part in enumerate(parts) if part.module.flames),
         directions=directions,
-        linear_drag=LINEAR_DRAG
-        * np.array([part.mass / mass for part, (mass, _, _) in zip(parts, lumped, strict=True)]),
-        angular_drag=ANGULAR_DRAG
-        * np.array([0.0 if part.role is Role.WHEEL else 1.0 for part in parts]),
+        torques=np.array([motor.torque if motor else 0.0 for motor in motors]),
+        thrust_points=shown[cannons] + along[:, None] * directions[cannons],
+        cold_thrusts=np.array([thrust.cold for _, thrust in thrusts]),
+        heated_thrusts=np.array([thrust.heated for _, thrust in thrusts]),
+        heat_bodies=_spheres((i, sphere) for i, thrust in thrusts for sphere in thrust.spheres),
+        flames=_spheres((i, flame) for i, part in enumerate(parts) for flame in part.module.flames),
+        linear_drag=np.array(
+            [
+                part.physics.linear_drag * (part.mass / mass)
+                for part, (mass, _, _) in zip(parts, lumped, strict=True)
+            ]
+        ),
+        angular_drag=np.array([part.physics.angular_drag for part in parts]),
     )
 
 
@@ -126,8 +136,17 @@ def axis_frame(direction: FloatArray) -> FloatArray:
     return np.column_stack([first, second, np.cross(first, second)])
 
 
-def _indices(parts: Sequence[Part], role: Role) -> IntArray:
-    return np.array([i for i, part in enumerate(parts) if part.role is role], dtype=np.int64)
+def _indices(blocks: Iterable[int]) -> IntArray:
+    return np.array(list(blocks), dtype=np.int64)
+
+
+def _spheres(of_blocks: Iterable[tuple[int, Sphere]]) -> Spheres:
+    rows = list(of_blocks)
+    return Spheres(
+        block=_indices(block for block, _ in rows),
+        along=np.array([sphere.along for _, sphere in rows]),
+        radius=np.array([sphere.radius for _, sphere in rows]),
+    )
 
 
 def _lump(
@@ -166,7 +185,7 @@ def _point_inertia(mass: float, r: FloatArray) -> FloatArray:
 
 
 def _far_joints(parts: Sequence[Part], links: Sequence[Link]) -> list[Link]:
-    """Joints where a small block's far face lies flush on another block.
+    """Joints where the far face of a block that grabs lies flush on another block.
 
     Source: public modding notes: small wooden blocks have a second joint at the far end that grabs
     what it touches.
@@ -174,7 +193,7 @@ def _far_joints(parts: Sequence[Part], links: Sequence[Link]) -> list[Link]:
     joined = {
         frozenset((link.first, link.second)) for link in links if link.kind is not JointKind.BRACE
     }
-    holders = [i for i, part in enumerate(parts) if part.role in (Role.START, Role.BLOCK)]
+    holders = [i for i, part in enumerate(parts) if part.physics.structural]
     if not holders:
         return []
     bodies = [parts[i].shapes[0] for i in holders]
@@ -183,7 +202,7 @@ def _far_joints(parts: Sequence[Part], links: Sequence[Link]) -> list[Link]:
     halves = np.array([body.half_extents for body in bodies])
     found = []
     for i, part in enumerate(parts):
-        if not part.grabs:
+        if not part.module.grabs:
             continue
         outward = part.rotation[:, 2]
         tip = part.shapes[0].center + part.shapes[0].half_extents[2] * outward

@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from buildarena_geometry.modules.module import Module, Physics
 from buildarena_simulation.constants import JointKind
 
 FloatArray = NDArray[np.float64]
@@ -15,16 +16,6 @@ IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
 JOINT_KINDS: Final = tuple(JointKind)
-
-
-class Role(StrEnum):
-    """What a block does in the simulation."""
-
-    START = "start"
-    BLOCK = "block"
-    WHEEL = "wheel"
-    CANNON = "cannon"
-    TORCH = "torch"
 
 
 class ShapeKind(StrEnum):
@@ -71,28 +62,64 @@ class Part:
 
     Attributes:
         id: The block's id in its machine.
-        role: What it does.
-        mass: Its mass without connectors, mass units.
+        module: What it is and does.
+        physics: How it behaves as a body.
         center: (3,) its centre of mass, machine frame, units.
         shown: (3,) the point shown to models as its position, machine frame, units.
         rotation: (3, 3) machine_from_block.
         shapes: Its collision shapes.
         direction: (3,) unit vector, machine frame: a cannon's spray, a torch's flame, a wheel's
             outward axis; None for the others.
-        flipped: Whether a wheel's spin is flipped.
-        grabs: Whether its far end grabs what it touches.
+        forward_is_clockwise: Whether its motor turns it clockwise, seen from outside, when it runs
+            forward.
     """
 
     id: str
-    role: Role
-    mass: float
+    module: Module
+    physics: Physics
     center: FloatArray
     shown: FloatArray
     rotation: FloatArray
     shapes: tuple[Shape, ...]
     direction: FloatArray | None = None
-    flipped: bool = False
-    grabs: bool = False
+    forward_is_clockwise: bool = False
+
+    @property
+    def mass(self) -> float:
+        """Its mass without connectors, mass units."""
+        return self.module.mass
+
+    @property
+    def is_wheel(self) -> bool:
+        """Whether it turns on the face it sits on."""
+        return self.physics.seat == "axle"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Spheres:
+    """Spheres that blocks carry along their directions, such as flames; K of them.
+
+    Attributes:
+        block: (K,) the block each belongs to.
+        along: (K,) how far its centre lies from the block's shown centre in its direction, units.
+        radius: (K,) units.
+    """
+
+    block: IntArray
+    along: FloatArray
+    radius: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.block)
+
+    def centers(self, shown: FloatArray, directions: FloatArray) -> FloatArray:
+        """Their centres, (K, 3), in the frame of the arguments, units.
+
+        Args:
+            shown: (N, 3) the points shown to models as the blocks' positions.
+            directions: (N, 3) unit vectors as in `Part.direction`.
+        """
+        return np.asarray(shown[self.block] + self.along[:, None] * directions[self.block])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -170,8 +197,14 @@ class Structure:
         cannons: (C,) indices of the cannons.
         torches: (J,) indices of the torches.
         directions: (N, 3) unit vectors as in `Part.direction`, zero where there is none.
+        torques: (N,) torque limit of each block's motor, mass·g·unit; 0 where there is none.
+        thrust_points: (C, 3) where each cannon's push acts, machine frame, units.
+        cold_thrusts: (C,) push of each cannon without a flame, mass·g.
+        heated_thrusts: (C,) push of each cannon that a flame touches, mass·g.
+        heat_bodies: What a flame must touch to heat a cannon.
+        flames: The torches' flames.
         linear_drag: (N,) 1/s; connectors have none.
-        angular_drag: (N,) 1/s; wheels have none.
+        angular_drag: (N,) 1/s.
     """
 
     parts: tuple[Part, ...]
@@ -187,6 +220,12 @@ class Structure:
     cannons: IntArray
     torches: IntArray
     directions: FloatArray
+    torques: FloatArray
+    thrust_points: FloatArray
+    cold_thrusts: FloatArray
+    heated_thrusts: FloatArray
+    heat_bodies: Spheres
+    flames: Spheres
     linear_drag: FloatArray
     angular_drag: FloatArray
 

@@ -12,7 +12,7 @@ import pytest
 
 from buildarena_geometry.vectors.sequences import run_sequences
 
-DATA = Path(__file__).parents[1] / "data" / "geometry"
+DATA = Path(__file__).parents[2] / "data" / "geometry"
 POSITION_TOLERANCE = 1.5e-6  # units: what the paper measured against Besiege
 ORIENTATION_TOLERANCE_DEG = 2.5e-5  # likewise
 NUMBER_TOLERANCE = 1e-6  # of the vectors themselves

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-SCRIPTS = Path(__file__).parents[2] / "mk"
+SCRIPTS = Path(__file__).parents[3] / "mk"
 REST = "numpy==2.0 \\\n    --hash=a\nscipy==1.0\n"
 LOCK = REST.replace("scipy", "pybullet==3.2.7 ; a \\\n    --hash=b \\\n    --hash=c\nscipy")
 UV = """#!/bin/sh
