@@ -12,6 +12,7 @@ from buildarena_api.events.hub import EventHub
 from buildarena_api.http.access import caller_of
 from buildarena_api.http.limits import BodyLimitMiddleware
 from buildarena_api.http.log import RequestLog
+from buildarena_api.http.metrics import ServiceMetrics
 from buildarena_api.http.problems import add_problem_handlers, problem_responses
 from buildarena_api.http.rate_limits import RateLimits
 from buildarena_api.leaderboard.cache import BoardCache
@@ -29,7 +30,6 @@ from buildarena_api.routes import (
     tasks,
     verifications,
 )
-from buildarena_api.routes.metrics import ServiceMetrics
 from buildarena_pipeline import __version__
 from buildarena_pipeline.agents.sessions import ExternalSessions
 from buildarena_pipeline.catalog.models import ModelRegistry
@@ -70,7 +70,7 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
         license_info={"name": "Apache-2.0", "identifier": "Apache-2.0"},
     )
     app.state.metrics = ServiceMetrics(context)
-    app.add_middleware(BodyLimitMiddleware)
+    app.add_middleware(BodyLimitMiddleware, unlimited={archives.IMPORT_PATH})
     app.add_middleware(RequestLog, metrics=app.state.metrics)
     app.state.context = context
     app.state.hub = EventHub(context)

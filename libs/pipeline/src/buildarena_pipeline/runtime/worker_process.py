@@ -1,4 +1,4 @@
-"""A worker process: a Celery worker whose messages run a stage handler."""
+"""A worker process: each message of its queues runs a stage handler."""
 
 from __future__ import annotations
 
@@ -13,11 +13,9 @@ from datetime import UTC, datetime
 from typing import Any
 
 import structlog
-from celery.signals import worker_process_init, worker_process_shutdown, worker_ready
 from sqlalchemy.exc import OperationalError
 
-from buildarena_pipeline.broker.queues import PROCESS_NEXT
-from buildarena_pipeline.broker.watchdog import ConsumerWatchdog
+from buildarena_pipeline.broker.consumer import FORKING_POOL, Callbacks, consume
 from buildarena_pipeline.errors import StartupError
 from buildarena_pipeline.runtime.active_lease import LeaseKeeper
 from buildarena_pipeline.runtime.context import Context, open_context
@@ -106,15 +104,15 @@ def run_worker(spec: WorkerSpec, settings: Settings) -> None:
     set_up_logs(settings.log_level)
     context = _checked_context(settings)
     runtimes: dict[int, _Runtime] = {}
-    forks = spec.pool == "prefork"
+    reaper = Reaper(context)
 
-    def start_runtime(**_: Any) -> None:
-        if forks:
+    def start() -> None:
+        if spec.pool == FORKING_POOL:
             die_with_parent(signal.SIGKILL)
         runtimes[os.getpid()] = runtime = _Runtime(spec, settings)
         runtime.start()
 
-    def stop_runtime(**_: Any) -> None:
+    def stop() -> None:
         runtime = runtimes.pop(os.getpid(), None)
         if runtime is not None:
             runtime.stop()
@@ -126,40 +124,19 @@ def run_worker(spec: WorkerSpec, settings: Settings) -> None:
         else:
             runtime.runner.process_next(queue, job_id)
 
-    app = context.queues.app
-    app.task(name=PROCESS_NEXT)(process_next)
-    reaper = Reaper(context)
-    watchdog = ConsumerWatchdog(context.queues, spec.queues)
-
-    def begin(sender: Any, **_: Any) -> None:
-        reaper.start()
-        watchdog.start(sender)
-
-    worker_ready.connect(begin, weak=False)
-    if forks:
-        worker_process_init.connect(start_runtime, weak=False)
-        worker_process_shutdown.connect(stop_runtime, weak=False)
-    else:
-        start_runtime()
-    worker = app.Worker(
-        queues=list(spec.queues),
-        pool=spec.pool,
-        concurrency=spec.concurrency,
-        without_gossip=True,
-        without_mingle=True,
-        without_heartbeat=True,
-        loglevel="WARNING",
-        quiet=True,
-    )
+    callbacks = Callbacks(process_next=process_next, start=start, stop=stop, ready=reaper.start)
     try:
-        worker.start()
+        code = consume(
+            context.queues,
+            spec.queues,
+            pool=spec.pool,
+            concurrency=spec.concurrency,
+            callbacks=callbacks,
+        )
     finally:
-        watchdog.stop()
         reaper.stop()
-        if not forks:
-            stop_runtime()
         context.close()
-    sys.exit(worker.exitcode or 0)
+    sys.exit(code)
 
 
 def _checked_context(settings: Settings) -> Context:

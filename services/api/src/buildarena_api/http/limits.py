@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Collection
 from http import HTTPStatus
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from buildarena_api.http.problems import PROBLEM_JSON
-from buildarena_api.routes.archives import IMPORT_PATH
 
 MAX_BYTES = 4 * 1024 * 1024
 """Largest request body: a sweep of 100,000 seeds has less than a megabyte."""
@@ -26,11 +26,15 @@ class BodyLimitMiddleware:
 
     Args:
         app: The application.
+        unlimited: Paths of routes that read their bodies in pieces, and bound them.
         max_bytes: Largest request body accepted.
     """
 
-    def __init__(self, app: ASGIApp, max_bytes: int = MAX_BYTES) -> None:
+    def __init__(
+        self, app: ASGIApp, *, unlimited: Collection[str] = (), max_bytes: int = MAX_BYTES
+    ) -> None:
         self._app = app
+        self._unlimited = frozenset(unlimited)
         self._max_bytes = max_bytes
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -39,8 +43,7 @@ class BodyLimitMiddleware:
             await self._app(scope, receive, send)
             return
         safe_send = _with_headers(send)
-        if scope["path"] == IMPORT_PATH:
-            # Read in pieces by its route, after it has asked who sends it.
+        if scope["path"] in self._unlimited:
             await self._app(scope, receive, safe_send)
             return
         length = Headers(scope=scope).get("content-length")

@@ -10,7 +10,7 @@ import structlog
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from buildarena_api.routes.metrics import ServiceMetrics
+from buildarena_api.http.metrics import ServiceMetrics
 from buildarena_pipeline.runtime.tracing import span
 
 REQUEST_ID = "X-Request-ID"

@@ -1,0 +1,86 @@
+"""The consumer: a Celery worker that calls a function for each message of its queues."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from celery.signals import worker_process_init, worker_process_shutdown, worker_ready
+
+from buildarena_pipeline.broker.queues import PROCESS_NEXT, Queues
+from buildarena_pipeline.broker.watchdog import ConsumerWatchdog
+
+FORKING_POOL = "prefork"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Callbacks:
+    """What a consumer calls.
+
+    Attributes:
+        process_next: For each message, with its queue and job id.
+        start: At the start of each process that works on messages.
+        stop: At its end.
+        ready: Once, when messages are received.
+    """
+
+    process_next: Callable[[str, str], None]
+    start: Callable[[], None]
+    stop: Callable[[], None]
+    ready: Callable[[], None]
+
+
+def consume(
+    queues: Queues, names: Sequence[str], *, pool: str, concurrency: int, callbacks: Callbacks
+) -> int:
+    """Serves queues until the process is asked to stop.
+
+    Args:
+        queues: The broker.
+        names: The queues to serve.
+        pool: Celery pool: ``threads``, ``prefork`` or ``solo``.
+        concurrency: Messages at once.
+        callbacks: What is called; `start` and `stop` run in each child of a forking pool.
+
+    Returns:
+        The process' exit code.
+    """
+    app = queues.app
+    app.task(name=PROCESS_NEXT)(callbacks.process_next)
+    watchdog = ConsumerWatchdog(queues, names)
+    forks = pool == FORKING_POOL
+
+    def ready(sender: Any, **_: Any) -> None:
+        callbacks.ready()
+        watchdog.start(sender)
+
+    def start(**_: Any) -> None:
+        callbacks.start()
+
+    def stop(**_: Any) -> None:
+        callbacks.stop()
+
+    worker_ready.connect(ready, weak=False)
+    if forks:
+        worker_process_init.connect(start, weak=False)
+        worker_process_shutdown.connect(stop, weak=False)
+    else:
+        callbacks.start()
+    worker = app.Worker(
+        queues=list(names),
+        pool=pool,
+        concurrency=concurrency,
+        without_gossip=True,
+        without_mingle=True,
+        without_heartbeat=True,
+        loglevel="WARNING",
+        quiet=True,
+    )
+    try:
+        worker.start()
+    finally:
+        watchdog.stop()
+        if not forks:
+            callbacks.stop()
+    return int(worker.exitcode or 0)

@@ -1,0 +1,149 @@
+"""Metrics for Prometheus: the service's from the database, the API's own from here."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterable
+from typing import Final
+
+from prometheus_client import CollectorRegistry, Histogram
+from prometheus_client.core import (
+    CounterMetricFamily,
+    GaugeMetricFamily,
+    HistogramMetricFamily,
+    Metric,
+)
+from prometheus_client.process_collector import ProcessCollector
+from prometheus_client.registry import Collector
+
+from buildarena_pipeline.runtime.context import Context
+from buildarena_store import STAGE_SECONDS, Outcome, ServiceFigures
+
+KEPT_FOR_S: Final = 10.0
+"""Several scrapes within this time share one reading of the database."""
+
+
+class ServiceMetrics(Collector):
+    """The API's registry: its own requests, its process, and the service's figures.
+
+    Args:
+        context: The process' connections.
+    """
+
+    def __init__(self, context: Context) -> None:
+        self._context = context
+        self._lock = threading.Lock()
+        self._read_at: float | None = None
+        self._figures: ServiceFigures | None = None
+        self.registry = CollectorRegistry()
+        ProcessCollector(registry=self.registry)
+        self.http_seconds = Histogram(
+            "buildarena_http_request_seconds",
+            "Time to the end of an answer, by route, method and status.",
+            ["route", "method", "status"],
+            registry=self.registry,
+        )
+        self.registry.register(self)
+
+    def describe(self) -> Iterable[Metric]:
+        """Nothing in advance: registering must not read the database."""
+        return ()
+
+    def collect(self) -> Iterable[Metric]:
+        """The service's figures as metrics."""
+        figures = self._fresh()
+        yield from _job_metrics(figures)
+        yield from _queue_metrics(figures)
+        yield from _model_metrics(figures)
+        yield _stage_metric(figures)
+        workers = GaugeMetricFamily(
+            "buildarena_workers", "Worker processes alive, by kind.", labels=["kind"]
+        )
+        alive = [worker.kind for worker in self._context.store.workers.all() if worker.alive]
+        for kind in sorted(set(alive)):
+            workers.add_metric([kind], alive.count(kind))
+        yield workers
+
+    def _fresh(self) -> ServiceFigures:
+        with self._lock:
+            now = time.monotonic()
+            if self._figures is None or now - (self._read_at or 0.0) > KEPT_FOR_S:
+                self._figures = self._context.store.figures.read()
+                self._read_at = now
+            return self._figures
+
+
+def _job_metrics(figures: ServiceFigures) -> Iterable[Metric]:
+    jobs = GaugeMetricFamily(
+        "buildarena_jobs",
+        "Jobs by state, stage and outcome.",
+        labels=["state", "stage", "outcome"],
+    )
+    errors = GaugeMetricFamily(
+        "buildarena_errored_jobs", "Jobs that ended as errored, by class.", labels=["reason"]
+    )
+    counts: dict[tuple[str, str, str], int] = {}
+    for count in figures.jobs:
+        key = (count.state, count.stage, count.outcome)
+        counts[key] = counts.get(key, 0) + count.jobs
+    for key, number in counts.items():
+        jobs.add_metric(list(key), number)
+    reasons: dict[str, int] = {}
+    for count in figures.jobs:
+        if count.outcome == Outcome.ERRORED:
+            reasons[count.reason] = reasons.get(count.reason, 0) + count.jobs
+    for reason, number in reasons.items():
+        errors.add_metric([reason], number)
+    sweeps = GaugeMetricFamily("buildarena_sweeps", "Sweeps by state.", labels=["state"])
+    for state, number in figures.sweeps.items():
+        sweeps.add_metric([state], number)
+    return jobs, errors, sweeps
+
+
+def _queue_metrics(figures: ServiceFigures) -> Iterable[Metric]:
+    depth = GaugeMetricFamily("buildarena_queue_jobs", "Jobs that wait.", labels=["queue"])
+    oldest = GaugeMetricFamily(
+        "buildarena_queue_oldest_seconds",
+        "How long the longest waiting job has waited.",
+        labels=["queue"],
+    )
+    for queue in figures.queues:
+        depth.add_metric([queue.queue], queue.jobs)
+        oldest.add_metric([queue.queue], queue.oldest_s)
+    return depth, oldest
+
+
+def _model_metrics(figures: ServiceFigures) -> Iterable[Metric]:
+    requests = CounterMetricFamily(
+        "buildarena_model_requests", "Model requests answered.", labels=["model"]
+    )
+    tokens = CounterMetricFamily(
+        "buildarena_model_tokens", "Tokens, by direction.", labels=["model", "direction"]
+    )
+    cost = CounterMetricFamily(
+        "buildarena_model_cost_usd", "US dollars spent on model requests.", labels=["model"]
+    )
+    for use in figures.models:
+        requests.add_metric([use.model], use.requests)
+        tokens.add_metric([use.model, "input"], use.input_tokens)
+        tokens.add_metric([use.model, "output"], use.output_tokens)
+        cost.add_metric([use.model], use.cost_usd)
+    return requests, tokens, cost
+
+
+def _stage_metric(figures: ServiceFigures) -> Metric:
+    stages = HistogramMetricFamily(
+        "buildarena_stage_seconds",
+        "How long attempts took, by stage and how they ended.",
+        labels=["stage", "result"],
+    )
+    bounds = [*(str(float(bound)) for bound in STAGE_SECONDS), "+Inf"]
+    for times in figures.stages:
+        buckets = []
+        total = 0
+        for bound, count in zip(bounds, times.counts, strict=True):
+            total += count
+            buckets.append((bound, float(total)))
+        stages.add_metric([times.stage, times.result], buckets, sum_value=times.total_s)
+    return stages
