@@ -220,7 +220,10 @@ SENSELESS = [
     (other(WHEEL, actions=["spin"]), "forward: expected one of spin, found 'spinning_forward'"),
     (other(CANNON, actions=[]), "action: expected one of "),
     (other(CANNON, pointing=None, landmarks=[]), "thrust: expected no thrust: it acts along"),
-    (other(BRACE, physics=WOOD["physics"]), "physics: expected no physics: a connector is not a body"),
+    (
+        other(BRACE, physics=WOOD["physics"]),
+        "physics: expected no physics: a connector is not",
+    ),
     (other(CARGO, thrust=CANNON["thrust"]), "action: expected one of "),
     (edit(link="rope"), "link: expected no link: a block is not a connector"),
     (edit(physics=WHEEL["physics"]), "a motor needs the seat axle, and the seat axle a motor"),

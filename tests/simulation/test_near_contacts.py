@@ -1,4 +1,4 @@
-"""Blocks a hair apart take part in the sharing of a patch."""
+"""Blocks with a small gap take part in the sharing of a patch."""
 
 import numpy as np
 from tests.simulation.reference_designs import beam, replayed

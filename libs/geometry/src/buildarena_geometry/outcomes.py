@@ -97,21 +97,21 @@ class Accepted:
         changed: ids of the blocks and connectors that are new, different or gone.
     """
 
-    __slots__ = ("_tell", "_text", "changed")
+    __slots__ = ("_render", "_text", "changed")
 
     ok: Literal[True] = True
 
-    def __init__(self, *, changed: tuple[str, ...], tell: Callable[[], str]) -> None:
-        """Keeps how to tell the feedback: wording it costs more than the action."""
+    def __init__(self, *, changed: tuple[str, ...], render: Callable[[], str]) -> None:
+        """Keeps how to render the feedback: wording it costs more than the action."""
         self.changed = changed
-        self._tell = tell
+        self._render = render
         self._text: str | None = None
 
     @property
     def text(self) -> str:
         """What a model reads, about the machine as it was when the action ended."""
         if self._text is None:
-            self._text = self._tell()
+            self._text = self._render()
         return self._text
 
     def __repr__(self) -> str:

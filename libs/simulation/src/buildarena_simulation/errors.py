@@ -1,8 +1,8 @@
-"""Errors of the simulation room: a machine's fault, a caller's fault and a crash stay apart."""
+"""Errors of buildarena_simulation: a machine's fault, a caller's fault and a crash stay apart."""
 
 
 class BuildarenaSimulationError(Exception):
-    """Base of every error this room raises."""
+    """Base of every error this package raises."""
 
 
 class MachineNotSimulable(BuildarenaSimulationError):  # noqa: N818 - it names the machine's state, as a verdict
@@ -26,4 +26,4 @@ class UnknownEngineError(BuildarenaSimulationError, ValueError):
 
 
 class TrajectoryFormatError(BuildarenaSimulationError, ValueError):
-    """The bytes are no trajectory, or one of a schema this version cannot read."""
+    """The bytes are not a trajectory, or one of a schema this version cannot read."""

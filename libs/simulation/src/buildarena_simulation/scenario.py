@@ -133,7 +133,7 @@ class Scenario(_Document):
         samples = self.duration_s * SAMPLE_RATE_HZ
         if not math.isclose(samples, round(samples), abs_tol=1e-9):
             raise ValueError(
-                f"duration_s {self.duration_s} is no multiple of {1 / SAMPLE_RATE_HZ} s"
+                f"duration_s {self.duration_s} is not a multiple of {1 / SAMPLE_RATE_HZ} s"
             )
         return self
 

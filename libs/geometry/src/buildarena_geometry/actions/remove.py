@@ -38,7 +38,7 @@ def reset(state: MachineState) -> Change:
     return Change(
         after=after,
         removed=(*state.blocks, *state.connectors),
-        told=lambda: "Everything is removed; ids start at 1 again.",
+        render=lambda: "Everything is removed; ids start at 1 again.",
     )
 
 
@@ -67,18 +67,20 @@ def without(state: MachineState, gone: list[Block]) -> tuple[MachineState, tuple
     return replace(state, blocks=blocks, occupants=occupants, connectors=connectors), links
 
 
-def told_removal(after: MachineState, links: tuple[str, ...]) -> list[str]:
+def removal_sentences(after: MachineState, links: tuple[str, ...]) -> list[str]:
     """Sentences about the connectors a removal took along and the blocks that hang in the air."""
-    told = []
+    sentences = []
     if links:
-        told.append(f"Connectors that ended on it went too: {listing(links)}.")
-    told.extend(words.detached(after, after.joints()))
-    return told
+        sentences.append(f"Connectors that ended on it went too: {listing(links)}.")
+    sentences.extend(words.detached(after, after.joints()))
+    return sentences
 
 
 def _removal(after: MachineState, gone: Block | Connector, links: tuple[str, ...]) -> Change:
     return Change(
         after=after,
         removed=(gone.id, *links),
-        told=lambda: " ".join([f"Removed {words.title(gone)}.", *told_removal(after, links)]),
+        render=lambda: " ".join(
+            [f"Removed {words.title(gone)}.", *removal_sentences(after, links)]
+        ),
     )

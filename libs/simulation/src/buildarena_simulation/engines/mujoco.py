@@ -9,7 +9,7 @@ import numpy as np
 from buildarena_simulation.constants import MAX_SPIN
 from buildarena_simulation.engines.base import CargoPose, World, principal_frames
 from buildarena_simulation.engines.hinges import hinge_rate
-from buildarena_simulation.engines.impacts import JoltWatch
+from buildarena_simulation.engines.impacts import ImpactWatch
 from buildarena_simulation.engines.mjcf import MjcfSettings, MjcfState, mjcf_of
 from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.contacts import ContactForces
@@ -123,18 +123,20 @@ class MujocoEngine:
         """See `Engine`."""
         model, data, at = self._model, self._data, self._addresses
         data.ctrl[at.thrust_actuators] = thrusts
-        jolts = JoltWatch(len(wheel_speeds), gravity=self._world.gravity, time_step_s=_TIME_STEP_S)
+        impacts = ImpactWatch(
+            len(wheel_speeds), gravity=self._world.gravity, time_step_s=_TIME_STEP_S
+        )
         velocity = data.qvel[at.free_dofs]
         for row in wheel_speeds:
             if len(at.hinge_wheels):
                 data.ctrl[at.hinge_actuators] = row[at.hinge_wheels] * at.hinge_signs
             mujoco.mj_step(model, data)
             before, velocity = velocity, data.qvel[at.free_dofs]
-            if jolts.is_jolt(velocity - before):
-                jolts.take(self._read_contacts())
+            if impacts.is_impact(velocity - before):
+                impacts.take(self._read_contacts())
         self._limit_spin()
         self._keep_cargo_state()
-        self._jolts = jolts
+        self._impacts = impacts
         self._tensions = self._read_tensions()
         # A step leaves the kinematics of its beginning behind; bring them up to its end.
         mujoco.mj_kinematics(model, data)
@@ -143,12 +145,12 @@ class MujocoEngine:
 
     def contacts(self) -> ContactForces:
         """See `Engine`."""
-        return self._jolts.mean(self._read_contacts)
+        return self._impacts.mean(self._read_contacts)
 
     @property
     def struck(self) -> bool:
         """See `Engine`."""
-        return self._jolts.struck
+        return self._impacts.struck
 
     def rope_tensions(self) -> FloatArray:
         """See `Engine`."""
@@ -187,7 +189,7 @@ class MujocoEngine:
         self._dof_invweight_times_mass = model.dof_invweight0[:6] * mass
 
     def _set_drag(self, moments: FloatArray) -> None:
-        """Damping of each piece's free joint: Unity's v *= 1 - drag·dt, told as a force."""
+        """Damping of each piece's free joint: Unity's v *= 1 - drag·dt, as a force."""
         model, clusters = self._model, self._clusters
         for piece in clusters.pieces:
             root, inside = piece[0], list(piece)

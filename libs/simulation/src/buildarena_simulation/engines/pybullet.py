@@ -30,9 +30,9 @@ from buildarena_simulation.engines.bullet_contacts import WORLD, read_contacts
 from buildarena_simulation.engines.closest_points import shape_table
 from buildarena_simulation.engines.external_forces import Force, drag_forces, thrust_forces
 from buildarena_simulation.engines.hinges import hinge_frames, hinge_rate
-from buildarena_simulation.engines.impacts import JoltWatch
+from buildarena_simulation.engines.impacts import ImpactWatch
 from buildarena_simulation.engines.near_contacts import NearContacts
-from buildarena_simulation.engines.quiet_output import silence
+from buildarena_simulation.engines.quiet_output import quiet_output
 from buildarena_simulation.engines.ropes import rope_forces
 from buildarena_simulation.engines.urdf import urdf_of
 from buildarena_simulation.structure.clusters import Clusters
@@ -41,7 +41,7 @@ from buildarena_simulation.structure.model import FloatArray, IntArray
 from buildarena_simulation.structure.motion import Motion
 
 # It greets when it is imported, on streams where our own output may be JSON.
-with silence():
+with quiet_output():
     import pybullet
 
 _TIME_STEP_S = 1 / 250
@@ -132,7 +132,9 @@ class PyBulletEngine:
         """See `Engine`."""
         pushes = thrust_forces(self._structure, self._clusters, self._axes, thrusts)
         drags = drag_forces(self._clusters, self._motion, self._axes, self._moments)
-        jolts = JoltWatch(len(wheel_speeds), gravity=self._world.gravity, time_step_s=_TIME_STEP_S)
+        impacts = ImpactWatch(
+            len(wheel_speeds), gravity=self._world.gravity, time_step_s=_TIME_STEP_S
+        )
         velocity = self._free_velocities()
         driven: FloatArray | None = None
         for row in wheel_speeds:
@@ -142,21 +144,21 @@ class PyBulletEngine:
             self._push(pushes, drags)
             pybullet.stepSimulation(**self._client)
             before, velocity = velocity, self._free_velocities()
-            if jolts.is_jolt(velocity - before):
+            if impacts.is_impact(velocity - before):
                 self._motion = self._read_motion()
-                jolts.take(self._read_contacts())
+                impacts.take(self._read_contacts())
         self._motion = self._read_motion()
         self._limit_spin()
-        self._jolts = jolts
+        self._impacts = impacts
 
     def contacts(self) -> ContactForces:
         """See `Engine`."""
-        return self._jolts.mean(self._read_contacts)
+        return self._impacts.mean(self._read_contacts)
 
     @property
     def struck(self) -> bool:
         """See `Engine`."""
-        return self._jolts.struck
+        return self._impacts.struck
 
     def rope_tensions(self) -> FloatArray:
         """See `Engine`."""

@@ -10,8 +10,8 @@ _STREAMS = (1, 2)
 
 
 @contextlib.contextmanager
-def silence() -> Iterator[None]:
-    """Nothing printed meanwhile, by Python or C, reaches stdout or stderr."""
+def quiet_output() -> Iterator[None]:
+    """While it lasts, nothing that Python or C prints reaches stdout or stderr."""
     sys.stdout.flush()
     sys.stderr.flush()
     kept = [os.dup(stream) for stream in _STREAMS]
