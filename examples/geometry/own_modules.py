@@ -1,4 +1,7 @@
-"""Builds with a module of one's own: a long beam, described in a file."""
+"""Builds with a module of one's own: a long beam, described in a file.
+
+The entry says nothing about physics, so that of the first basic block applies.
+"""
 
 from __future__ import annotations
 

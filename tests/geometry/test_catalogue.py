@@ -222,7 +222,7 @@ SENSELESS = [
     (other(CANNON, pointing=None, landmarks=[]), "thrust: expected no thrust: it acts along"),
     (
         other(BRACE, physics=WOOD["physics"]),
-        "physics: expected no physics: a connector is not a body",
+        "physics: expected no physics: a connector is not",
     ),
     (other(CARGO, thrust=CANNON["thrust"]), "action: expected one of "),
     (edit(link="rope"), "link: expected no link: a block is not a connector"),

@@ -1,4 +1,4 @@
-"""Fixtures of the simulation package's tests."""
+"""Fixtures of the simulation tests."""
 
 import sys
 from pathlib import Path

@@ -12,8 +12,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
 
-from tests.simulation import reference_designs as designs
-from tests.simulation.reference_designs import EAST, SIDES, WEST, Actions, replayed
+from tests.simulation import designs
+from tests.simulation.designs import EAST, SIDES, WEST, Actions, replayed
 
 from buildarena_benchmark import builtin_tasks, score
 from buildarena_geometry import Machine

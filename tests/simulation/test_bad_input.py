@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from tests.simulation.reference_designs import EAST, Draft, beam, replayed, rocket
+from tests.simulation.designs import EAST, Draft, beam, replayed, rocket
 
 from buildarena_benchmark import Task, failed_score, score
 from buildarena_geometry import DocumentError, Machine

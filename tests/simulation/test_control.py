@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from tests.simulation.reference_designs import (
+from tests.simulation.designs import (
     DOWN,
     EAST,
     NORTH,

@@ -1,6 +1,6 @@
 """Rockets: heat, thrust, balance."""
 
-from tests.simulation.reference_designs import (
+from tests.simulation.designs import (
     EAST,
     WEST,
     Actions,

@@ -6,7 +6,7 @@ from pathlib import Path
 import av
 import pytest
 from PIL import Image
-from tests.simulation.reference_designs import beam, replayed
+from tests.simulation.designs import beam, replayed
 from tests.simulation.references import DATA
 from typer.testing import CliRunner
 

@@ -1,7 +1,7 @@
-"""Blocks a hair apart take part in the sharing of a patch."""
+"""Blocks with a small gap take part in the sharing of a patch."""
 
 import numpy as np
-from tests.simulation.reference_designs import beam, replayed
+from tests.simulation.designs import beam, replayed
 
 from buildarena_simulation.engines.base import CargoBox, CargoPose, World
 from buildarena_simulation.engines.near_contacts import NearContacts

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.simulation.reference_designs import (
+from tests.simulation.designs import (
     DOWN,
     EAST,
     NORTH,

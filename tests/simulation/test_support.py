@@ -3,7 +3,7 @@
 import itertools
 
 import pytest
-from tests.simulation.reference_designs import (
+from tests.simulation.designs import (
     EAST,
     Actions,
     beam,

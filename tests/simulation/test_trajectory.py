@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from tests.simulation.reference_designs import car, one_shot_bridge, replayed, rocket
+from tests.simulation.designs import car, one_shot_bridge, replayed, rocket
 
 from buildarena_benchmark import Task
 from buildarena_simulation import (

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from tests.simulation.reference_designs import Actions, car, replayed, stool
+from tests.simulation.designs import Actions, car, replayed, stool
 
 from buildarena_benchmark import Score, Task, score
 from buildarena_simulation import Trajectory, simulate

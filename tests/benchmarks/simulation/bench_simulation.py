@@ -18,7 +18,7 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[3]))
 
-from tests.simulation.reference_designs import beam, deck, lattice, replayed
+from tests.simulation.designs import beam, deck, lattice, replayed
 from tests.simulation.references import REFERENCES, outcome
 
 from buildarena_benchmark import builtin_tasks, score

@@ -26,7 +26,7 @@ def replay(capsys):
         code = main(["replay", *map(str, arguments)])
         out = capsys.readouterr()
         return SimpleNamespace(
-            code=code, told=[json.loads(line) for line in out.out.splitlines()], error=out.err
+            code=code, results=[json.loads(line) for line in out.out.splitlines()], error=out.err
         )
 
     return run
@@ -35,39 +35,39 @@ def replay(capsys):
 def test_every_step_tells_verdict_kind_and_state(tmp_path, replay):
     file = tmp_path / "one.json"
     file.write_text(json.dumps({"seed": 7, "steps": STEPS}))
-    (told,) = replay(file).told
-    assert told["seed"] == 7
-    assert [step["kind"] for step in told["steps"]] == ["ok", "ok", "face_occupied"]
-    assert [step["ok"] for step in told["steps"]] == [True, True, False]
-    assert [step["state"]["n"] for step in told["steps"]] == [1, 2, 2]
+    (results,) = replay(file).results
+    assert results["seed"] == 7
+    assert [step["kind"] for step in results["steps"]] == ["ok", "ok", "face_occupied"]
+    assert [step["ok"] for step in results["steps"]] == [True, True, False]
+    assert [step["state"]["n"] for step in results["steps"]] == [1, 2, 2]
 
 
 def test_the_last_state_alone_can_be_asked_for(tmp_path, replay):
     file = tmp_path / "one.json"
     file.write_text(json.dumps([{"seed": 7, "steps": STEPS}]))
-    (told,) = replay(file, "--states", "last").told
-    assert ["state" in step for step in told["steps"]] == [False, False, True]
+    (results,) = replay(file, "--states", "last").results
+    assert ["state" in step for step in results["steps"]] == [False, False, True]
 
 
 def test_a_bare_list_of_actions_is_one_sequence(tmp_path, replay):
     file = tmp_path / "bare.json"
     file.write_text(json.dumps(STEPS))
-    (told,) = replay(file).told
-    assert told["seed"] is None
-    assert len(told["steps"]) == 3
+    (results,) = replay(file).results
+    assert results["seed"] is None
+    assert len(results["steps"]) == 3
 
 
 def test_compressed_files_and_many_sequences_are_read(tmp_path, replay):
     file = tmp_path / "many.json.gz"
     sequences = [{"seed": seed, "steps": STEPS} for seed in (1, 2)]
     file.write_bytes(gzip.compress(json.dumps(sequences).encode()))
-    assert [told["seed"] for told in replay(file).told] == [1, 2]
+    assert [results["seed"] for results in replay(file).results] == [1, 2]
 
 
 def test_standard_input_is_read_plain_and_compressed(monkeypatch, replay):
     for data in (json.dumps(STEPS).encode(), gzip.compress(json.dumps(STEPS).encode())):
         monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(data)))
-        assert len(replay("-").told[0]["steps"]) == 3
+        assert len(replay("-").results[0]["steps"]) == 3
 
 
 def test_sub_machines_are_built_before_the_assembly(tmp_path, replay):
@@ -78,8 +78,8 @@ def test_sub_machines_are_built_before_the_assembly(tmp_path, replay):
     }
     file = tmp_path / "assembly.json"
     file.write_text(json.dumps([sequence]))
-    (told,) = replay(file).told
-    assert [block["id"] for block in told["steps"][0]["state"]["blocks"]] == ["A_1", "A_2"]
+    (results,) = replay(file).results
+    assert [block["id"] for block in results["steps"][0]["state"]["blocks"]] == ["A_1", "A_2"]
 
 
 @pytest.mark.parametrize(

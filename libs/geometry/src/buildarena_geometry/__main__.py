@@ -22,7 +22,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         arguments: its arguments; the process's own if left out.
 
     Returns:
-        The exit code: 0 done, 1 the input is not a sequence, 2 usage error.
+        The exit code: 0 done, 1 the input is not a sequence, 2 wrong usage.
     """
     parser = argparse.ArgumentParser(prog="python -m buildarena_geometry")
     commands = parser.add_subparsers(dest="command", required=True)
@@ -32,8 +32,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     try:
         content = parse(_read(options.file))
-        for rendered in run_sequences(content, every_state=options.states == "all"):
-            print(json.dumps(rendered, allow_nan=False))  # noqa: T201  the command's output
+        for result in run_sequences(content, every_state=options.states == "all"):
+            print(json.dumps(result, allow_nan=False))  # noqa: T201  the command's output
     except (GeometryError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)  # noqa: T201  the command's message
         return 1

@@ -1,4 +1,4 @@
-"""What an action proposes: the next state, and what has to be checked and told about it."""
+"""What an action proposes: the next state, and what must be checked and reported."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Change:
 
     Attributes:
         after: the next state.
-        told: puts the feedback into words.
+        render: puts the feedback into words.
         placed: ids of blocks that are new or have moved: as one rigid body, not against each other.
         removed: ids of blocks and connectors that are gone.
         touched: ids of other parts that changed without moving.
@@ -25,7 +25,7 @@ class Change:
     """
 
     after: MachineState
-    rendered: Callable[[], str]
+    render: Callable[[], str]
     placed: tuple[str, ...] = ()
     removed: tuple[str, ...] = ()
     touched: tuple[str, ...] = ()

@@ -23,7 +23,7 @@ _ALL_CONTACTS = 1_000_000  # FCL's broadphase stops at so many contacts: more th
 class CollisionWorld:
     """The solids of a machine's blocks in FCL's dynamic tree of bounding boxes.
 
-    It is told of every block that is placed, moved or removed, so that a question costs what the
+    Every block that is placed, moved or removed is entered here, so that a question costs what the
     moved blocks' surroundings cost and not what the machine costs.
     """
 

@@ -255,7 +255,7 @@ class Machine:
         world.place(placed)
         self._state = change.after
         changed = (*change.placed, *change.touched, *change.removed)
-        return Accepted(changed=changed, render=change.rendered)
+        return Accepted(changed=changed, render=change.render)
 
     def _collision_world(self) -> CollisionWorld:
         if self._world is None:
@@ -297,11 +297,11 @@ def _require_reach(blocks: Iterable[Block]) -> None:
 def _overlap(change: Change, pairs: list[tuple[str, str]]) -> RefusalError:
     others = list(dict.fromkeys(other for _, other in pairs))
     if len(change.placed) == 1:
-        rendered = f"{change.attempt} would overlap {_blocks(change.after, others)}."
+        text = f"{change.attempt} would overlap {_blocks(change.after, others)}."
     else:
         named = "; ".join(f"{mine} and {other}" for mine, other in pairs)
-        rendered = f"{change.attempt} would make blocks overlap: {named}."
-    return RefusalError(Cause.OVERLAP, rendered, tuple(pairs))
+        text = f"{change.attempt} would make blocks overlap: {named}."
+    return RefusalError(Cause.OVERLAP, text, tuple(pairs))
 
 
 def _blocks(state: MachineState, ids: list[str]) -> str:

@@ -102,7 +102,7 @@ class Accepted:
     ok: Literal[True] = True
 
     def __init__(self, *, changed: tuple[str, ...], render: Callable[[], str]) -> None:
-        """Keeps how to tell the feedback: wording it costs more than the action."""
+        """Keeps how to render the feedback: wording it costs more than the action."""
         self.changed = changed
         self._render = render
         self._text: str | None = None

@@ -1,7 +1,7 @@
 """The action space: each action as a tool for models, and how its arguments are read.
 
-Names, descriptions and schemas come from the actions' signatures and docstrings, so they cannot say
-anything else than what the actions do.
+Names, descriptions and schemas come from the actions' signatures and docstrings, so they always
+agree with what the actions do.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Action:
     """An action the dispatcher can carry out.
 
     Attributes:
-        definition: what models are told.
+        definition: what models are given.
         propose: makes the change from a state and the arguments, or raises RefusalError.
         readers: how each argument is read.
         required: the arguments without a default.
@@ -110,7 +110,7 @@ def tool_definitions(groups: Iterable[str] = GROUPS) -> tuple[ToolDefinition, ..
 def _action(propose: Callable[..., Change], group: str) -> Action:
     signature = inspect.signature(propose)
     hints = get_type_hints(propose, include_extras=True)
-    description, rendered = _parse_docstring(inspect.getdoc(propose) or "")
+    description, about = _parse_docstring(inspect.getdoc(propose) or "")
     arguments = [name for name in signature.parameters if name != "state"]
     readers = {name: _parameter(hints[name]) for name in arguments}
     required = tuple(
@@ -119,7 +119,7 @@ def _action(propose: Callable[..., Change], group: str) -> Action:
     schema: JsonSchema = {
         "type": "object",
         "properties": {
-            name: {**readers[name].schema, "description": rendered[name]} for name in arguments
+            name: {**readers[name].schema, "description": about[name]} for name in arguments
         },
         "required": list(required),
         "additionalProperties": False,
@@ -143,14 +143,14 @@ def _parameter(hint: object) -> Parameter:
 def _parse_docstring(text: str) -> tuple[str, dict[str, str]]:
     """The description and the arguments' texts of a Google style docstring, each on one line."""
     head, _, rest = text.partition("Args:\n")
-    rendered: dict[str, str] = {}
+    about: dict[str, str] = {}
     for line in inspect.cleandoc(rest).splitlines():
         if line.startswith(" "):
-            rendered[list(rendered)[-1]] += " " + line.strip()
+            about[list(about)[-1]] += " " + line.strip()
         else:
             name, _, words = line.partition(": ")
-            rendered[name] = words
-    return " ".join(head.split()), rendered
+            about[name] = words
+    return " ".join(head.split()), about
 
 
 ACTIONS: Mapping[str, Action] = {

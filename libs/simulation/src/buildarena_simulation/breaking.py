@@ -72,7 +72,7 @@ class BreakingModel:
         tensions = engine.rope_tensions()
         contacts = self._sharing.shared(engine.contacts())
         forces = self._all_forces(contacts, thrusts, tensions)
-        # A blow is told of for one interval only, whatever was left out before.
+        # An impact is reported for one interval only, whatever was left out before.
         seen_s = self._interval_s if engine.struck else self._unseen_s
         loads = self._loads.evaluate(forces, self.motion, elapsed_s=self._unseen_s, seen_s=seen_s)
         self._unseen_s = 0.0

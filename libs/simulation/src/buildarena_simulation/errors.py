@@ -1,4 +1,4 @@
-"""Errors of the simulation package: a machine's fault, a caller's fault and a crash stay apart."""
+"""Errors of buildarena_simulation: a machine's fault, a caller's fault and a crash stay apart."""
 
 
 class BuildarenaSimulationError(Exception):

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from buildarena_geometry.actions.lookups import named, structure
 from buildarena_geometry.actions.motions import turn_about, turned
-from buildarena_geometry.actions.remove import rendered_removal, without
+from buildarena_geometry.actions.remove import removal_sentences, without
 from buildarena_geometry.blocks import Block, Connector, FaceRef
 from buildarena_geometry.changes import Change
 from buildarena_geometry.feedback import state as words
@@ -62,7 +62,7 @@ def add_machine(
         placed=tuple(block.id for block in blocks),
         touched=tuple(link.id for link in links),
         attempt=f"Machine {machine_id}",
-        rendered=lambda: _rendered(after, letter, f"Added {machine_id} as sub-structure {letter}."),
+        render=lambda: _rendered(after, letter, f"Added {machine_id} as sub-structure {letter}."),
     )
 
 
@@ -105,8 +105,8 @@ def remove_machine(state: MachineState, machine_index: Name) -> Change:
     return Change(
         after=after,
         removed=(*(block.id for block in gone), *links),
-        rendered=lambda: " ".join(
-            [f"Removed sub-structure {found.letter}.", *rendered_removal(after, links)]
+        render=lambda: " ".join(
+            [f"Removed sub-structure {found.letter}.", *removal_sentences(after, links)]
         ),
     )
 
@@ -125,7 +125,7 @@ def _motion(state: MachineState, found: SubStructure, motion: Pose, how: str) ->
         after=after,
         placed=ids,
         attempt=f"Sub-structure {found.letter} {how}",
-        rendered=lambda: _rendered(after, found.letter, f"Sub-structure {found.letter} {how}."),
+        render=lambda: _rendered(after, found.letter, f"Sub-structure {found.letter} {how}."),
     )
 
 

@@ -55,7 +55,7 @@ def start(
     return Change(
         after=after,
         placed=(block.id,),
-        rendered=lambda: f"Started. {words.placement(after, block)}",
+        render=lambda: f"Started. {words.placement(after, block)}",
     )
 
 
@@ -106,7 +106,7 @@ def attach_block_to(
         after=after,
         placed=(block.id,),
         attempt=f"A {module.name} on face {face} of block {base.id}",
-        rendered=lambda: f"Attached. {words.placement(after, block)}",
+        render=lambda: f"Attached. {words.placement(after, block)}",
     )
 
 
@@ -160,7 +160,7 @@ def connect_blocks(
     return Change(
         after=after,
         touched=(link.id,),
-        rendered=lambda: f"Connected. {words.connector_line(link)}.",
+        render=lambda: f"Connected. {words.connector_line(link)}.",
     )
 
 

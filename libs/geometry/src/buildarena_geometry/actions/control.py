@@ -68,7 +68,7 @@ def add_control_sequence(state: MachineState, time: Number, key: Key, hold_for: 
         )
     press = KeyPress(time_s=time, key=key, hold_for_s=hold_for)
     after = replace(state, control_sequence=(*state.control_sequence, press))
-    return Change(after=after, rendered=lambda: f"Added.\n{words.control_sequence(after)}")
+    return Change(after=after, render=lambda: f"Added.\n{words.control_sequence(after)}")
 
 
 def remove_control_sequence(state: MachineState, index: Index) -> Change:
@@ -84,13 +84,13 @@ def remove_control_sequence(state: MachineState, index: Index) -> Change:
             Cause.BAD_INDEX, f"There is no entry {shown(index)}. Entries: {choices}."
         )
     after = replace(state, control_sequence=(*presses[:index], *presses[index + 1 :]))
-    return Change(after=after, rendered=lambda: f"Removed.\n{words.control_sequence(after)}")
+    return Change(after=after, render=lambda: f"Removed.\n{words.control_sequence(after)}")
 
 
 def reset_control_sequence(state: MachineState) -> Change:
     """Removes every key press from the control sequence; key bindings stay."""
     after = replace(state, control_sequence=())
-    return Change(after=after, rendered=lambda: words.control_sequence(after))
+    return Change(after=after, render=lambda: words.control_sequence(after))
 
 
 def _bind(state: MachineState, block_id: str, action: str, key: str, *, keep: bool) -> Change:
@@ -105,5 +105,5 @@ def _bind(state: MachineState, block_id: str, action: str, key: str, *, keep: bo
     return Change(
         after=after,
         touched=(block.id,),
-        rendered=lambda: f"Bound: {words.title(block)}, {action}: {listing(keys)}.",
+        render=lambda: f"Bound: {words.title(block)}, {action}: {listing(keys)}.",
     )

@@ -42,5 +42,5 @@ def review_control_sequence(state: MachineState) -> Change:
     return _answer(state, lambda: words.control_sequence(state))
 
 
-def _answer(state: MachineState, rendered: Callable[[], str]) -> Change:
-    return Change(after=state, rendered=rendered)
+def _answer(state: MachineState, render: Callable[[], str]) -> Change:
+    return Change(after=state, render=render)

@@ -30,11 +30,11 @@ def twist_block(state: MachineState, block_id: BlockId, angle: Number) -> Change
             f"{words.heading(found)} sits on no face and can't be twisted.",
         )
     turn = about_axis(_seat_normal(state, found), -angle)
-    rendered = f"by {plain(angle)}°"
+    turned = f"by {plain(angle)}°"
     if isinstance(found, Connector):
         pose = found.world_from_connector.turned(turn)
-        return _move_connector(state, found, pose, f"Twisted {rendered}")
-    return _move(state, found, found.world_from_block.turned(turn), "twisted " + rendered)
+        return _move_connector(state, found, pose, f"Twisted {turned}")
+    return _move(state, found, found.world_from_block.turned(turn), "twisted " + turned)
 
 
 def shift_block(state: MachineState, block_id: BlockId, shift_real: Triple) -> Change:
@@ -51,11 +51,11 @@ def shift_block(state: MachineState, block_id: BlockId, shift_real: Triple) -> C
             f"One call shifts by at most {LARGEST_SHIFT} in each direction, "
             f"not {point(shift_real)}.",
         )
-    rendered = f"by {point(shift_real)}"
+    moved = f"by {point(shift_real)}"
     if isinstance(found, Connector):
         pose = found.world_from_connector.shifted(shift_real)
-        return _move_connector(state, found, pose, f"Shifted {rendered}")
-    return _move(state, found, found.world_from_block.shifted(shift_real), "shifted " + rendered)
+        return _move_connector(state, found, pose, f"Shifted {moved}")
+    return _move(state, found, found.world_from_block.shifted(shift_real), "shifted " + moved)
 
 
 def flip_spin(state: MachineState, block_id: BlockId) -> Change:
@@ -76,7 +76,7 @@ def flip_spin(state: MachineState, block_id: BlockId) -> Change:
     return Change(
         after=after,
         touched=(block.id,),
-        rendered=lambda: f"Flipped. {words.place_line(block)}.",
+        render=lambda: f"Flipped. {words.place_line(block)}.",
     )
 
 
@@ -96,7 +96,7 @@ def _move(state: MachineState, block: Block, pose: Pose, how: str) -> Change:
         after=after,
         placed=(block.id,),
         attempt=f"{words.heading(block)} {how}",
-        rendered=lambda: " ".join(
+        render=lambda: " ".join(
             [f"Moved. {words.place_line(moved)}.", *words.loosened(after, [block.id])]
         ),
     )
@@ -108,5 +108,5 @@ def _move_connector(state: MachineState, link: Connector, pose: Pose, how: str) 
     return Change(
         after=after,
         touched=(link.id,),
-        rendered=lambda: f"{how}; its ends stay on their faces. {words.connector_line(moved)}.",
+        render=lambda: f"{how}; its ends stay on their faces. {words.connector_line(moved)}.",
     )

@@ -38,7 +38,7 @@ def reset(state: MachineState) -> Change:
     return Change(
         after=after,
         removed=(*state.blocks, *state.connectors),
-        rendered=lambda: "Everything is removed; ids start at 1 again.",
+        render=lambda: "Everything is removed; ids start at 1 again.",
     )
 
 
@@ -67,20 +67,20 @@ def without(state: MachineState, gone: list[Block]) -> tuple[MachineState, tuple
     return replace(state, blocks=blocks, occupants=occupants, connectors=connectors), links
 
 
-def rendered_removal(after: MachineState, links: tuple[str, ...]) -> list[str]:
+def removal_sentences(after: MachineState, links: tuple[str, ...]) -> list[str]:
     """Sentences about the connectors a removal took along and the blocks that hang in the air."""
-    rendered = []
+    sentences = []
     if links:
-        rendered.append(f"Connectors that ended on it went too: {listing(links)}.")
-    rendered.extend(words.detached(after, after.joints()))
-    return rendered
+        sentences.append(f"Connectors that ended on it went too: {listing(links)}.")
+    sentences.extend(words.detached(after, after.joints()))
+    return sentences
 
 
 def _removal(after: MachineState, gone: Block | Connector, links: tuple[str, ...]) -> Change:
     return Change(
         after=after,
         removed=(gone.id, *links),
-        rendered=lambda: " ".join(
-            [f"Removed {words.title(gone)}.", *rendered_removal(after, links)]
+        render=lambda: " ".join(
+            [f"Removed {words.title(gone)}.", *removal_sentences(after, links)]
         ),
     )

@@ -243,7 +243,7 @@ class Module:
         physics: how it behaves as a body; None for connectors and cargo, which a task describes.
         grabs: whether its far end, opposite to the face it sits on, holds what it touches.
         link: what a connector is: a rigid strut, or a rope that pulls and never pushes.
-        description: what models are told about it.
+        description: what models read about it.
         besiege_data: further entries of its block in Besiege's machine files: type, key, value.
     """
 

@@ -1,4 +1,4 @@
-"""The kinds of arguments actions take: how models are told of them and how they are read.
+"""The kinds of arguments actions take: how they are described to models and how they are read.
 
 An action's signature is annotated with these, and both its tool definition and the check of what
 arrives are made from that one place.

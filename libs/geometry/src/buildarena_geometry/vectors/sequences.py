@@ -29,7 +29,7 @@ def run_sequences(
 
     Args:
         content: JSON values: a list of sequences, one sequence, or a bare list of {op, params}.
-        every_state: whether each step tells the state after it, or the last step only.
+        every_state: whether each step holds the state after it, or the last step only.
         catalogue: the modules to build with; the basic ones if left out.
 
     Yields:
@@ -40,16 +40,16 @@ def run_sequences(
     """
     for sequence in _sequences(Reader(value=content, where="input", error=SequenceError)):
         run, steps = _prepare(sequence, catalogue)
-        rendered: list[dict[str, Any]] = []
+        done: list[dict[str, Any]] = []
         for step in steps:
             outcome = run.act(step)
-            rendered.append({"ok": outcome.ok, "kind": kind_of(outcome)})
+            done.append({"ok": outcome.ok, "kind": kind_of(outcome)})
             if every_state:
-                rendered[-1]["state"] = run.rendered_state()
-        if rendered and not every_state:
-            rendered[-1]["state"] = run.rendered_state()
+                done[-1]["state"] = run.state()
+        if done and not every_state:
+            done[-1]["state"] = run.state()
         seed = sequence.value.get("seed") if isinstance(sequence.value, dict) else None
-        yield {"seed": seed, "steps": rendered}
+        yield {"seed": seed, "steps": done}
 
 
 def parse(data: bytes) -> object:
@@ -89,7 +89,7 @@ class _Run:
         self._put_in_order(name, arguments, outcome)
         return outcome
 
-    def rendered_state(self) -> dict[str, Any]:
+    def state(self) -> dict[str, Any]:
         return state_entry(self.machine.state, self.order)
 
     def _put_in_order(self, name: object, arguments: object, outcome: Outcome) -> None:

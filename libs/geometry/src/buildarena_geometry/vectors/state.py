@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from buildarena_geometry.outcomes import Outcome
     from buildarena_geometry.state import MachineState
 
-# The vectors know no name of their own for these.
+# The vectors have no name of their own for these.
 _KIND_OF_CAUSE = {
     Cause.EXCESS_CONNECTION: "too_close",
     Cause.UNKNOWN_ACTION: "bad_action",
@@ -33,8 +33,8 @@ def state_entry(state: MachineState, order: Iterable[str]) -> dict[str, Any]:
     """A state in the vectors' field names; positions are east, north, up.
 
     Args:
-        state: what to tell.
-        order: the ids of all its parts in the order to tell them in.
+        state: what to write.
+        order: the ids of all its parts in the order to write them in.
     """
     return {
         "blocks": [

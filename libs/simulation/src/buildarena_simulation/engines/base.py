@@ -1,7 +1,7 @@
 """The seam between the shared model and an engine.
 
 An engine builds bodies from clusters, steps them, and reports poses and contact forces. Loads,
-breaking, control, heating and recording are shared and know no engine.
+breaking, control, heating and recording are shared and independent of the engine.
 """
 
 from collections.abc import Mapping

@@ -35,7 +35,7 @@ def read_contacts(
         cluster_of_link: Cluster of each body and link.
         shapes: (C,) shapes of each cluster.
         motion: Where the clusters are.
-        outsiders: A negative number of its own for each moving body that is no cluster.
+        outsiders: A negative number of its own for each moving body that is not a cluster.
     """
     rows: dict[int, list[tuple[float, ...]]] = {}
     for contact in contacts:

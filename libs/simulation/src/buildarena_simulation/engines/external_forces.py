@@ -1,7 +1,7 @@
 """Thrust and drag as steady forces in the frames of an engine's bodies.
 
 Both change little from one evaluation to the next, so they are worked out once for the steps
-between; told in a body's own principal frame they turn with it.
+between; given in a body's own principal frame, they turn with it.
 """
 
 import numpy as np

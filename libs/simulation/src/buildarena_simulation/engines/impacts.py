@@ -1,8 +1,8 @@
 """Contact forces averaged over an interval at little cost.
 
 Contacts at rest change slowly, so the interval's last step stands for all quiet ones. A step in
-which something is struck is read as well: its impulse would else be missed, or counted for the
-whole interval.
+which something is struck is read as well: otherwise its impulse would be missed, or counted for
+the whole interval.
 """
 
 from collections.abc import Callable
@@ -13,8 +13,8 @@ import numpy as np
 from buildarena_simulation.structure.contacts import ContactForces, mean_contacts
 from buildarena_simulation.structure.model import FloatArray
 
-_JOLT: Final = 3.0
-"""A change of velocity faster than this many g is a impact: more than fall and driving make."""
+_IMPACT: Final = 3.0
+"""A change of velocity faster than this many g is an impact: more than fall and driving make."""
 
 
 class ImpactWatch:
@@ -28,13 +28,13 @@ class ImpactWatch:
 
     def __init__(self, step_count: int, *, gravity: float, time_step_s: float) -> None:
         self._count = step_count
-        self._limit = _JOLT * gravity * time_step_s
+        self._limit = _IMPACT * gravity * time_step_s
         self._impacts: list[ContactForces] = []
         self._ends_in_impact = False
 
     @property
     def struck(self) -> bool:
-        """Whether there was a impact."""
+        """Whether there was an impact."""
         return bool(self._impacts)
 
     def is_impact(self, change: FloatArray) -> bool:
@@ -47,11 +47,11 @@ class ImpactWatch:
         return self._ends_in_impact
 
     def take(self, contacts: ContactForces) -> None:
-        """Keeps the reading of a step that was a impact."""
+        """Keeps the reading of a step that was an impact."""
         self._impacts.append(contacts)
 
     def mean(self, read: Callable[[], ContactForces]) -> ContactForces:
-        """The mean over the interval; if it ended in a impact, its quiet steps are not known of.
+        """The mean over the interval; if it ended in an impact, its quiet steps are unknown.
 
         Args:
             read: Reads the contacts of the last step.

@@ -86,7 +86,7 @@ def mjcf_of(world: World, state: MjcfState, settings: MjcfSettings) -> str:
             iterations=settings.iterations,
             tolerance=1e-10,
         ),
-        '<flag autoreset="disable"/>',  # a rollout that blows up must not start anew in silence
+        '<flag autoreset="disable"/>',  # a rollout that blows up must not restart unnoticed
         "</option>",
         "<default>",
         _tag("geom", condim=3, solref=settings.solref, solimp=settings.solimp),

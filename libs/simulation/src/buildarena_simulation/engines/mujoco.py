@@ -189,7 +189,7 @@ class MujocoEngine:
         self._dof_invweight_times_mass = model.dof_invweight0[:6] * mass
 
     def _set_drag(self, moments: FloatArray) -> None:
-        """Damping of each piece's free joint: Unity's v *= 1 - drag·dt, told as a force."""
+        """Damping of each piece's free joint: Unity's v *= 1 - drag·dt, as a force."""
         model, clusters = self._model, self._clusters
         for piece in clusters.pieces:
             root, inside = piece[0], list(piece)

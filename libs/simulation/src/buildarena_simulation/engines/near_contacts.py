@@ -1,8 +1,8 @@
-"""Contacts a hair apart, for engines that report only what overlaps.
+"""Contacts with a small gap, for engines that report only what overlaps.
 
 Two rigid bodies touch in few points; one of them tilted by a thousandth of a radian, the others are
 out of touch. A structure that bends ever so little would touch with all of them, so blocks within
-that hair count as touching, with no force of their own yet, and take part in the even sharing.
+that gap count as touching, with no force of their own yet, and take part in the even sharing.
 """
 
 from typing import Final
@@ -16,7 +16,7 @@ from buildarena_simulation.structure.model import FloatArray, IntArray, ShapeKin
 from buildarena_simulation.structure.motion import Motion
 from buildarena_simulation.structure.vectors import turned
 
-_HAIR: Final = 0.04
+_GAP: Final = 0.04
 """Gap within which a block counts as touching, units."""
 
 _LEVEL: Final = 0.97
@@ -64,7 +64,7 @@ class NearContacts:
         world: int,
         cargo_number: int,
     ) -> ContactForces:
-        """The contacts, and those a hair apart beside them.
+        """The contacts, and those with a small gap as well.
 
         Args:
             contacts: What the engine reports.
@@ -127,11 +127,11 @@ class NearContacts:
         cosines = np.abs(axes[:, 2] @ rotation)
         reach = (cosines * self._half).sum(axis=1)
         across = np.abs(axes[:, :2].T @ rotation) @ self._half[:, :, None]
-        room = size + across[:, :, 0] - np.abs(local[:, :2])
+        overlap = size + across[:, :, 0] - np.abs(local[:, :2])
         near = (
-            (np.abs(local[:, 2] - reach) < _HAIR)
+            (np.abs(local[:, 2] - reach) < _GAP)
             & (cosines.max(axis=1) > _LEVEL)
-            & (room > _OVERLAP).all(axis=1)
+            & (overlap > _OVERLAP).all(axis=1)
         )
         touching = contacts.block[contacts.other == number]
         rows = np.flatnonzero(near & ~np.isin(self._block, touching))

@@ -11,7 +11,7 @@ _STREAMS = (1, 2)
 
 @contextlib.contextmanager
 def quiet_output() -> Iterator[None]:
-    """Nothing printed meanwhile, by Python or C, reaches stdout or stderr."""
+    """While it lasts, nothing that Python or C prints reaches stdout or stderr."""
     sys.stdout.flush()
     sys.stderr.flush()
     kept = [os.dup(stream) for stream in _STREAMS]

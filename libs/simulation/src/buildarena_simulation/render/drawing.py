@@ -63,7 +63,7 @@ def _painted(picture: Picture, camera: Camera) -> list[_Item]:
         pixels, depth = camera.project(ends)
         if depth.min() >= _NEAR:
             width = max(1, round(0.12 * camera.focal / float(depth.mean())))
-            # Braces lie on the blocks' faces; nearer by a hair, they are painted over them.
+            # Braces lie on the blocks' faces; drawn slightly nearer, they are painted over them.
             items.append((float(depth.mean()) - 0.6, "line", _points(pixels), color, width))
     for center, radius, color in picture.balls:
         pixels, depth = camera.project(center[None])

@@ -106,7 +106,7 @@ class Scene:
 
     @property
     def azimuth_deg(self) -> float:
-        """Whence to look: across the gap where there is terrain, otherwise from the south-east."""
+        """Where to look from: across the gap if there is terrain, otherwise from the south-east."""
         return -14.0 if self._terrain else -55.0
 
     def focus(self, sample: int) -> FloatArray:

@@ -16,7 +16,7 @@ from buildarena_simulation.structure.model import FloatArray, IntArray
 from buildarena_simulation.structure.vectors import cross, summed_by
 
 _NORMAL_GRID: Final = 4.0
-"""Normals are told apart by their components rounded to quarters."""
+"""Normals count as equal if their components round to the same quarters."""
 
 _NORMAL_DIGITS: Final = np.array([256, 16, 1])
 _ROUNDS: Final = 4
@@ -48,7 +48,7 @@ class ContactForces:
 
     Attributes:
         block: (K,) block each acts on.
-        other: (K,) any number that tells the body on the other side; ground and terrain are one.
+        other: (K,) a number that identifies the body on the other side; ground and terrain are one.
         weight: (K,) share of the point that belongs to the block, above 0, at most 1.
         normal: (K, 3) unit vector from the other body to the block, world frame.
         point: (K, 3) world frame, units.

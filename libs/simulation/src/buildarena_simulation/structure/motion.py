@@ -35,7 +35,7 @@ class Motion:
         return np.asarray(self.position + turned(self.rotation, clusters.center_of_mass))
 
     def after_break(self, old: Clusters, new: Clusters) -> "Motion":
-        """The same motion, told for the clusters left after a break.
+        """The same motion, expressed for the clusters left after a break.
 
         Poses stay; each new cluster's centre of mass keeps the velocity the old cluster had there
         (v + cross(spin, r)), so linear and angular momentum stay as they were.

@@ -93,7 +93,7 @@ class MemberForces:
     """A factorised stiffness matrix; maps self-equilibrated wrenches to member forces.
 
     Attributes:
-        inside: (K,) indices of the members it tells of: those within one cluster.
+        inside: (K,) indices of the members it solves for: those within one cluster.
     """
 
     def __init__(
