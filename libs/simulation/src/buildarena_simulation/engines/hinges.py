@@ -5,9 +5,28 @@ from dataclasses import dataclass
 import numpy as np
 
 from buildarena_simulation.structure.clusters import Clusters
-from buildarena_simulation.structure.model import FloatArray, Structure
+from buildarena_simulation.structure.model import FloatArray, IntArray, Structure
 from buildarena_simulation.structure.motion import Motion
 from buildarena_simulation.structure.vectors import cross
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HingedPiece:
+    """A multibody of an engine; its links are the piece's clusters in order.
+
+    Attributes:
+        body: The engine's id of it.
+        inside: Its clusters, the root first.
+        wheel_signs: Per hinge, -1 where the link turned is not the wheel's but its mount's.
+        wheel_places: Per hinge, which wheel of the structure it is.
+        wheel_torques: Per hinge, torque limit of its motor, mass·unit²/s².
+    """
+
+    body: int
+    inside: tuple[int, ...]
+    wheel_signs: FloatArray
+    wheel_places: IntArray
+    wheel_torques: FloatArray
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -11,7 +11,6 @@ import math
 import shutil
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError
 from importlib.metadata import version as distribution_version
 from pathlib import Path
@@ -29,7 +28,7 @@ from buildarena_simulation.engines.base import (
 from buildarena_simulation.engines.bullet_contacts import WORLD, read_contacts
 from buildarena_simulation.engines.closest_points import shape_table
 from buildarena_simulation.engines.external_forces import Force, drag_forces, thrust_forces
-from buildarena_simulation.engines.hinges import hinge_frames, hinge_rate
+from buildarena_simulation.engines.hinges import HingedPiece, hinge_frames, hinge_rate
 from buildarena_simulation.engines.impacts import ImpactWatch
 from buildarena_simulation.engines.near_contacts import NearContacts
 from buildarena_simulation.engines.quiet_output import quiet_output
@@ -37,7 +36,7 @@ from buildarena_simulation.engines.ropes import rope_forces
 from buildarena_simulation.engines.urdf import urdf_of
 from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.contacts import ContactForces
-from buildarena_simulation.structure.model import FloatArray, IntArray
+from buildarena_simulation.structure.model import FloatArray
 from buildarena_simulation.structure.motion import Motion
 
 # It greets when it is imported, on streams where our own output may be JSON.
@@ -74,7 +73,7 @@ class PyBulletEngine:
         self._client = {"physicsClientId": pybullet.connect(pybullet.DIRECT)}
         self._folder = Path(tempfile.mkdtemp(prefix="buildarena-"))
         self._serial = itertools.count()
-        self._pieces: list[_Piece] = []
+        self._pieces: list[HingedPiece] = []
         self._near = NearContacts(world)
         self._cargo: int | None = None
         self._start_world()
@@ -226,7 +225,7 @@ class PyBulletEngine:
         self._set_friction(body, -1, FRICTION_TERRAIN)
         return int(body)
 
-    def _add_piece(self, inside: tuple[int, ...], motion: Motion) -> "_Piece":
+    def _add_piece(self, inside: tuple[int, ...], motion: Motion) -> HingedPiece:
         clusters, structure, root = self._clusters, self._structure, inside[0]
         body = self._load(inside, motion)
         self._free_of_damping(body)
@@ -239,7 +238,7 @@ class PyBulletEngine:
                 pybullet.resetJointState(body, link - 1, 0.0, rate, **self._client)
         hinged = list(inside[1:])
         places = [self._place_of_wheel[int(wheel)] for wheel in clusters.wheel[hinged]]
-        return _Piece(
+        return HingedPiece(
             body=body,
             inside=inside,
             wheel_signs=np.where(clusters.wheel_is_outer[hinged], 1.0, -1.0),
@@ -388,22 +387,3 @@ class PyBulletEngine:
             world=WORLD,
             cargo_number=_CARGO,
         )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Piece:
-    """A multibody; its links are the piece's clusters in order.
-
-    Attributes:
-        body: PyBullet's id.
-        inside: Its clusters, the root first.
-        wheel_signs: Per hinge, -1 where the link turned is not the wheel's but its mount's.
-        wheel_places: Per hinge, which wheel of the structure it is.
-        wheel_torques: Per hinge, torque limit of its motor, mass·unit²/s².
-    """
-
-    body: int
-    inside: tuple[int, ...]
-    wheel_signs: FloatArray
-    wheel_places: IntArray
-    wheel_torques: FloatArray
