@@ -20,7 +20,7 @@ from buildarena_pipeline.runtime.active_lease import LeaseKeeper
 from buildarena_pipeline.runtime.job_runner import JobRunner
 from buildarena_simworker.simulate import SimulateHandler
 from buildarena_worker.builtin.designs import DESIGNS
-from buildarena_worker.verify import Verifier
+from buildarena_worker.wiring import verifier
 
 BUILDARENA = str(Path(sys.executable).parent / "buildarena")
 
@@ -80,7 +80,7 @@ def test_an_agent_builds_a_bridge_and_gets_its_score(context) -> None:
     assert result["outcome"] == "success"
     assert result["indicator"] > 100
     (job,) = context.store.jobs.page(limit=2)
-    report = Verifier(context).verify(job.id)
+    report = verifier(context).verify(job.id)
     assert report["ok"], [check for check in report["checks"] if not check["ok"]]
 
 

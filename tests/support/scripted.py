@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from buildarena_store import Usage
-from buildarena_worker.session.host import Answer
-from buildarena_worker.session.messages import Reply, Request, ToolCall
+from buildarena_worker.session.messages import Answer, Reply, Request, ToolCall
 
 
 class Scripted:
-    """A model that says given things in turn, then one thing for ever."""
+    """A model that says given things in turn, then one thing forever."""
 
     def __init__(self, *replies: Reply, last: Reply | None = None) -> None:
         self.replies = list(replies)

@@ -5,7 +5,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from buildarena_worker.concurrency_gate import ConcurrencyGate
+from buildarena_worker.session.concurrency_gate import ConcurrencyGate
 
 
 class Crowd:

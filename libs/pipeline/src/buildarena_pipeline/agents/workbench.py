@@ -37,7 +37,7 @@ class Workbench:
         )
 
     def result(self) -> tuple[str, Machine] | None:
-        """What is to be simulated: the assembly if there is one, else the only machine."""
+        """What is to be simulated: the assembly if there is one, otherwise the only machine."""
         if ASSEMBLY in self.machines:
             return ASSEMBLY, self.machines[ASSEMBLY]
         if len(self.machines) == 1:

@@ -9,7 +9,7 @@ from typing import Any
 from buildarena_pipeline.catalog.models import ModelRegistry
 from buildarena_pipeline.errors import PermanentError
 from buildarena_worker.builtin import BuiltinClient
-from buildarena_worker.session.host import ModelClient
+from buildarena_worker.session.messages import ModelClient
 
 
 class ModelClients:

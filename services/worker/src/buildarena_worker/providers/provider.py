@@ -35,8 +35,7 @@ from buildarena_worker.providers.retries import RetryPolicy
 from buildarena_worker.providers.senders import sender_for
 from buildarena_worker.providers.throttle import Throttle
 from buildarena_worker.providers.wire import Answered
-from buildarena_worker.session.host import Answer
-from buildarena_worker.session.messages import Reply, Request
+from buildarena_worker.session.messages import Answer, Reply, Request
 
 log = structlog.get_logger(__name__)
 
