@@ -51,7 +51,7 @@ def submit(context) -> Callable[..., Job]:
 
 @pytest.fixture
 def play(context) -> Callable[..., Job]:
-    """Builds the expert's bridge of another task, as an outside agent, and submits it."""
+    """Builds the expert's bridge of another task, as an external agent, and submits it."""
 
     def play_task(task: str, design: str = "support-1", seed: int = 0) -> Job:
         sessions = ExternalSessions(context)

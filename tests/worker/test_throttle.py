@@ -82,7 +82,7 @@ throttle.SLOT_TTL_S = 1
 
 async def hold():
     async with throttle.Throttle(sys.argv[1], "p", start=1).slot():
-        print("on_hold", flush=True)
+        print("taken", flush=True)
         await asyncio.sleep(60)
 
 asyncio.run(hold())
@@ -141,9 +141,9 @@ def test_slots_of_a_dead_worker_are_free_again_soon(context, broker_url, monkeyp
         throttle = Throttle(broker_url, "p", start=1)
         async with asyncio.timeout(10), throttle.slot():
             await asyncio.sleep(2)  # renewed meanwhile
-            held = open_slots(broker_url)
+            open_now = open_slots(broker_url)
         await throttle.close()
-        return held
+        return open_now
 
     with subprocess.Popen(
         [sys.executable, "-c", HOLDER, broker_url], stdout=subprocess.PIPE

@@ -19,7 +19,7 @@ class ActionResult:
         arguments: What was given to it.
         ok: Whether the action was accepted.
         reason: The refusal class, if it was refused.
-        feedback: What the model was told.
+        feedback: What the model read of the outcome.
     """
 
     name: str

@@ -154,9 +154,9 @@ def _call(call: Mapping[str, Any]) -> ToolCall:
 
 def read_error(status: int, headers: Mapping[str, str], text: bytes) -> ProviderError:
     """What an error answer means: by its code, its words, or its status."""
-    said = text.decode(errors="replace")
+    words = text.decode(errors="replace")
     try:
-        body = json.loads(said)
+        body = json.loads(words)
     except ValueError:
         body = None
     error = body.get("error", body) if isinstance(body, dict) else None
@@ -166,7 +166,7 @@ def read_error(status: int, headers: Mapping[str, str], text: bytes) -> Provider
     failure = failure_of_status(status)
     if not QUOTA.isdisjoint(names):
         failure, overloaded = Failure.QUOTA_EXCEEDED, False
-    elif error.get("code") == "context_length_exceeded" or _says(said, OVERFLOW):
+    elif error.get("code") == "context_length_exceeded" or _says(words, OVERFLOW):
         failure, overloaded = Failure.CONTEXT_OVERFLOW, False
     elif overloaded:
         failure = failure if failure is Failure.OUTAGE else Failure.REQUEST_REFUSED
@@ -175,8 +175,8 @@ def read_error(status: int, headers: Mapping[str, str], text: bytes) -> Provider
     elif status == HTTPStatus.FORBIDDEN and _flagged(error.get("metadata")):
         failure = Failure.REQUEST_REFUSED
     else:
-        overloaded = status in TOO_MANY or (status == UNAVAILABLE and _says(said, OVERLOADED))
-    message = error.get("message") or said.strip() or "no reason given"
+        overloaded = status in TOO_MANY or (status == UNAVAILABLE and _says(words, OVERLOADED))
+    message = error.get("message") or words.strip() or "no reason given"
     return ProviderError(
         f"HTTP {status}: {message}", failure, overloaded=overloaded, headers=headers
     )
@@ -187,7 +187,7 @@ def _says(text: str, phrases: tuple[str, ...]) -> bool:
 
 
 def _flagged(metadata: Any) -> bool:
-    """Whether an error tells of a moderation: OpenRouter gives that the status of a bad key."""
+    """Whether an error comes from a moderation: OpenRouter gives that the status of a bad key."""
     return isinstance(metadata, dict) and not metadata.keys().isdisjoint(
         {"flagged_input", "reasons"}
     )
