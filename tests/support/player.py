@@ -84,6 +84,7 @@ class Player:
         limits: dict[str, Any] | None = None,
         append: Callable[[JournalEntry], None] | None = None,
         lost: bool = False,
+        budgets: Any = None,
         offline: bool = False,
         loop: Loop = Loop(),  # noqa: B008 - frozen
         pack: PromptPack | None = None,
@@ -108,7 +109,7 @@ class Player:
                 client=client,
                 journal=KeptInMemory(written, append),  # type: ignore[arg-type]
                 active=active,
-                guard=BudgetGuard(None, active, lambda *_: Decimal()),  # type: ignore[arg-type]
+                guard=BudgetGuard(budgets, active, lambda *_: Decimal()),
                 gate=gate,
             )
         session = Session(

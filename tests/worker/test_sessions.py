@@ -3,6 +3,7 @@ from __future__ import annotations
 import pytest
 from scripted import Scripted, call
 
+from buildarena_store import StaleLeaseError, Usage
 from buildarena_worker.session.messages import Message, Reply, ToolCall
 from buildarena_worker.session.results import Diverged, Failed, LimitReached, Superseded
 
@@ -197,3 +198,24 @@ def test_endless_talk_meets_the_turn_limit(play) -> None:
     assert isinstance(played.failure, Failed)
     assert played.failure.reason == "turn_limit"
     assert len(played.entries) == 300
+
+
+def test_a_reply_that_came_after_the_lease_had_ended_is_paid_for_and_not_used(play) -> None:
+    def refuse(_: object) -> None:
+        raise StaleLeaseError("job", 1)
+
+    budgets = Budgets()
+    played = play(client=Scripted(), append=refuse, budgets=budgets)
+    assert isinstance(played.failure, Superseded)
+    assert [usage.requests for usage in budgets.lost] == [1]
+    assert played.session.transcript.turns == []
+
+
+class Budgets:
+    """Notes what was paid for in vain."""
+
+    def __init__(self) -> None:
+        self.lost: list[Usage] = []
+
+    def charge_lost(self, _: object, usage: Usage) -> None:
+        self.lost.append(usage)
