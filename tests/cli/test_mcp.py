@@ -18,9 +18,9 @@ from running import wait_until
 from buildarena_cli.local import free_port
 from buildarena_pipeline.runtime.active_lease import LeaseKeeper
 from buildarena_pipeline.runtime.job_runner import JobRunner
-from buildarena_simworker.simulate import SimulateHandler
+from buildarena_simworker.simulate import simulate_handler
 from buildarena_worker.builtin.designs import DESIGNS
-from buildarena_worker.verify import Verifier
+from buildarena_worker.wiring import verifier
 
 BUILDARENA = str(Path(sys.executable).parent / "buildarena")
 
@@ -28,7 +28,7 @@ BUILDARENA = str(Path(sys.executable).parent / "buildarena")
 def simulate_all(context) -> None:
     keeper = LeaseKeeper(context.store.leases, lambda: None)
     keeper.start()
-    JobRunner(context.store.leases, SimulateHandler(context), keeper, "w").process_next(
+    JobRunner(context.store.leases, simulate_handler(context), keeper, "w").process_next(
         "simulate.mujoco", ""
     )
     keeper.stop()
@@ -80,7 +80,7 @@ def test_an_agent_builds_a_bridge_and_gets_its_score(context) -> None:
     assert result["outcome"] == "success"
     assert result["indicator"] > 100
     (job,) = context.store.jobs.page(limit=2)
-    report = Verifier(context).verify(job.id)
+    report = verifier(context).verify(job.id)
     assert report["ok"], [check for check in report["checks"] if not check["ok"]]
 
 

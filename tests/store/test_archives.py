@@ -17,7 +17,7 @@ from buildarena_pipeline.runtime.context import Context
 from buildarena_store import ArtifactStore, UnknownIdError, archives
 from buildarena_store.archives import ArchiveError, read_archive, write_archive
 from buildarena_store.tables import metadata
-from buildarena_worker.verify import Verifier
+from buildarena_worker.wiring import verifier
 
 SPEC = SweepSpec(
     tasks=["lift-1"], models=["builtin/expert"], seeds=[0, 1], simulator="mujoco", name="moved"
@@ -58,7 +58,7 @@ def test_a_sweep_arrives_whole_and_can_be_verified_there(context, archive, elsew
     assert after == [replace(job, owner="key_k", payer=sweep_id) for job in before]
     assert {job.id: other.store.journal.read(job.id) for job in after} == journals
     assert other.store.sweeps.progress(sweep_id).outcomes == {"success": 2}
-    report = Verifier(other).verify(after[0].id)
+    report = verifier(other).verify(after[0].id)
     assert report["ok"], report
 
 

@@ -19,7 +19,7 @@ from buildarena_pipeline.runtime.context import Context, open_context
 from buildarena_pipeline.submission.submission import Submissions
 from buildarena_store import ArtifactStore, SweepState
 from buildarena_store.database import Database, alembic_config
-from buildarena_worker.verify import Verifier
+from buildarena_worker.wiring import verifier
 
 BEFORE = Path(__file__).parents[1] / "data" / "store" / "before-states"
 REVISION = "2026_11_21_keys_budgets_tasks"
@@ -108,7 +108,7 @@ def test_ended_jobs_verify(upgraded: Context) -> None:
     ended = [job for job in upgraded.store.jobs.page(limit=100) if job.success is not None]
     assert ended
     for job in ended:
-        report = Verifier(upgraded).verify(job.id)
+        report = verifier(upgraded).verify(job.id)
         assert report["ok"], [check for check in report["checks"] if not check["ok"]]
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from decimal import Decimal
 from types import MappingProxyType
 from typing import Any
 
@@ -11,10 +12,19 @@ from buildarena_benchmark import Task, builtin_tasks
 from buildarena_pipeline.catalog.models import load_registry
 from buildarena_pipeline.catalog.prompt_packs import PromptPack, PromptPacks
 from buildarena_pipeline.catalog.specs import Decoding
+from buildarena_pipeline.runtime.active_lease import ActiveLease
 from buildarena_pipeline.submission.submission import model_config
 from buildarena_store import JournalEntry, RolloutRecord
 from buildarena_worker.providers import ModelClients
-from buildarena_worker.session.host import ModelClient, SessionIO, SuspendedError
+from buildarena_worker.session.budget_guard import BudgetGuard
+from buildarena_worker.session.concurrency_gate import ConcurrencyGate
+from buildarena_worker.session.host import LiveHost, ReplayHost
+from buildarena_worker.session.messages import ModelClient
+from buildarena_worker.session.results import (
+    Finished,
+    SessionResult,
+    Suspended,
+)
 from buildarena_worker.session.session import Session
 from buildarena_worker.workflow import Workflows
 from buildarena_worker.workflow.rounds import Loop, run_session
@@ -26,9 +36,33 @@ class Played:
 
     session: Session
     entries: list[JournalEntry]
-    suspended: SuspendedError | None = None
-    failure: Exception | None = None
-    end: Any = None
+    result: SessionResult | Exception
+
+    @property
+    def suspended(self) -> Suspended | None:
+        """The result, if the session waits for a simulation."""
+        return self.result if isinstance(self.result, Suspended) else None
+
+    @property
+    def end(self) -> Finished | None:
+        """The result, if the session came to its end."""
+        return self.result if isinstance(self.result, Finished) else None
+
+    @property
+    def failure(self) -> SessionResult | Exception | None:
+        """The result, if it is neither."""
+        return None if self.suspended or self.end else self.result
+
+
+class KeptInMemory:
+    """A journal in memory."""
+
+    def __init__(self, entries: list[JournalEntry], append: Any) -> None:
+        self._append = append or entries.append
+
+    def append(self, lease: Any, entry: JournalEntry) -> None:
+        del lease
+        self._append(entry)
 
 
 @dataclass
@@ -49,7 +83,8 @@ class Player:
         rollouts: Sequence[RolloutRecord] = (),
         limits: dict[str, Any] | None = None,
         append: Callable[[JournalEntry], None] | None = None,
-        still_held: Callable[[], bool] = lambda: True,
+        lost: bool = False,
+        budgets: Any = None,
         offline: bool = False,
         loop: Loop = Loop(),  # noqa: B008 - frozen
         pack: PromptPack | None = None,
@@ -60,27 +95,33 @@ class Player:
         if client is None and not offline:
             client = ModelClients(self.registry).for_config(config)
         written = list(entries)
-        io = SessionIO(
-            client=client,
+        host: Any = ReplayHost(
             entries=list(entries),
             rollouts=rollouts,
-            append=append or written.append,
-            still_held=still_held,
             limits=limits or {},
             load_trajectory=trajectories.__getitem__,
         )
+        gate = ConcurrencyGate()
+        if client is not None:
+            active = ActiveLease(lease=None, budgeted=False, lost=lost)  # type: ignore[arg-type]
+            host = LiveHost(
+                kept=host,
+                client=client,
+                journal=KeptInMemory(written, append),  # type: ignore[arg-type]
+                active=active,
+                guard=BudgetGuard(budgets, active, lambda *_: Decimal()),
+                gate=gate,
+            )
         session = Session(
             task=builtin_tasks()[task] if isinstance(task, str) else task,
             seed=seed,
             model_config=config,
             pack=pack or PromptPacks().load("default"),
-            io=io,
+            host=host,
         )
-        played = Played(session=session, entries=written)
         try:
-            played.end = run_session(session, Workflows(workflows).find(workflow), loop)
-        except SuspendedError as suspended:
-            played.suspended = suspended
+            with gate.acquired():
+                result: Any = run_session(session, Workflows(workflows).find(workflow), loop)
         except Exception as failure:  # noqa: BLE001 - tests look at it
-            played.failure = failure
-        return played
+            result = failure
+        return Played(session=session, entries=written, result=result)

@@ -58,7 +58,7 @@ class ProviderStandIn:
     ) -> None:
         self.raw = raw
         self.counts = Counts()
-        self.guard = threading.Lock()
+        self.lock = threading.Lock()
         self.respond = respond or MODELS[model]
         self.fault = fault
         self.latency_s = latency_s
@@ -88,7 +88,7 @@ class _Handler(BaseHTTPRequestHandler):
     def do_POST(self) -> None:
         body = json.loads(self.rfile.read(int(self.headers["content-length"])))
         counts = self.standin.counts
-        with self.standin.guard:
+        with self.standin.lock:
             number = counts.requests
             counts.requests += 1
             counts.bodies.append(body)
@@ -123,7 +123,7 @@ class _Handler(BaseHTTPRequestHandler):
         wire = _WIRES[_wire_of(self.path)]
         reply = self.standin.respond(wire.read(body))
         used = _used(body, reply)
-        with self.standin.guard:
+        with self.standin.lock:
             counts.answered += 1
             counts.input_tokens += used[0]
             counts.output_tokens += used[1]

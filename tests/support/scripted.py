@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from buildarena_store import Usage
-from buildarena_worker.session.host import Answer
-from buildarena_worker.session.messages import Reply, Request, ToolCall
+from buildarena_worker.session.messages import Answer, Reply, Request, ToolCall
 
 
 class Scripted:

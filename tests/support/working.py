@@ -8,8 +8,8 @@ from buildarena_pipeline.catalog.models import load_registry
 from buildarena_pipeline.runtime.active_lease import LeaseKeeper
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.job_runner import JobRunner
-from buildarena_simworker.simulate import SimulateHandler
-from buildarena_worker.construct import ConstructHandler
+from buildarena_simworker.simulate import simulate_handler
+from buildarena_worker.wiring import construct_handler
 
 
 def work(context: Context, *, steps: int = 1000, threads: int = 1) -> None:
@@ -23,8 +23,8 @@ def work(context: Context, *, steps: int = 1000, threads: int = 1) -> None:
     keeper = LeaseKeeper(context.store.leases, lambda: None)
     keeper.start()
     handlers = {
-        "construct": ConstructHandler(context, load_registry()),
-        "simulate": SimulateHandler(context),
+        "construct": construct_handler(context, load_registry()),
+        "simulate": simulate_handler(context),
     }
     runners = {
         stage: JobRunner(context.store.leases, made, keeper, "w")

@@ -16,9 +16,9 @@ def test_a_sweep_stops_at_its_budget_and_goes_on_with_more(context, submissions)
     assert context.store.sweeps.get(sweep_id).state == "budget_exhausted"
     budget = context.store.budgets.get(sweep_id)
     assert budget.spent_requests == 20
-    held = context.store.jobs.page(limit=10, state="on_hold")
-    assert held
-    assert all("max_requests is 20" in job.detail for job in held if job.requests)
+    on_hold = context.store.jobs.page(limit=10, state="on_hold")
+    assert on_hold
+    assert all("max_requests is 20" in job.detail for job in on_hold if job.requests)
 
     again = submissions.submit_sweep(
         spec.model_copy(update={"budget": Budget(max_requests=10_000)}), resume=True
@@ -44,7 +44,7 @@ def test_a_small_token_budget_stops_before_the_first_request(context, submission
     assert "max_tokens is 1,000, 0 is spent" in job.detail
 
 
-def test_taking_up_a_finished_sweep_does_nothing_twice(context, submissions) -> None:
+def test_resuming_a_finished_sweep_does_nothing_twice(context, submissions) -> None:
     spec = SweepSpec(**WISH, seeds=[0])
     first = submissions.submit_sweep(spec)
     work(context, threads=4)

@@ -5,23 +5,23 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from buildarena_worker.concurrency_gate import ConcurrencyGate
+from buildarena_worker.session.concurrency_gate import ConcurrencyGate
 
 
 class Crowd:
-    """Counts how many are inside at once."""
+    """Counts how many work at once."""
 
     def __init__(self) -> None:
         self.now = self.most = 0
-        self._guard = threading.Lock()
+        self._lock = threading.Lock()
 
     def come(self, change: int = 1) -> None:
-        with self._guard:
+        with self._lock:
             self.now += change
             self.most = max(self.most, self.now)
 
 
-def test_few_are_inside_at_once_and_all_get_their_turn() -> None:
+def test_few_work_at_once_and_all_get_their_turn() -> None:
     gate, crowd = ConcurrencyGate(places=3, patience_s=60), Crowd()
 
     def session(_: int) -> None:
@@ -39,21 +39,21 @@ def test_few_are_inside_at_once_and_all_get_their_turn() -> None:
     assert crowd.now == 0
 
 
-def test_who_waits_outside_leaves_its_place_to_others() -> None:
-    gate, inside = ConcurrencyGate(places=1, patience_s=60), threading.Event()
+def test_who_waits_leaves_its_place_to_others() -> None:
+    gate, started = ConcurrencyGate(places=1, patience_s=60), threading.Event()
 
     def other() -> None:
         with gate.acquired():
-            inside.set()
+            started.set()
 
     with gate.acquired(), ThreadPoolExecutor(1) as threads:
         came = threads.submit(other)
         with gate.released():
-            assert inside.wait(30)
+            assert started.wait(30)
         came.result()
 
 
-def test_a_session_that_is_stuck_inside_does_not_stop_the_others() -> None:
+def test_a_stuck_session_does_not_stop_the_others() -> None:
     gate = ConcurrencyGate(places=1, patience_s=0.01)
 
     def other() -> str:

@@ -20,9 +20,9 @@ from buildarena_pipeline.catalog.specs import JobSpec
 from buildarena_pipeline.submission.submission import Submissions
 from buildarena_store import Job
 from buildarena_worker.builtin.designs import DESIGNS
-from buildarena_worker.session.host import SessionIO
+from buildarena_worker.session.host import ReplayHost
 from buildarena_worker.session.session import Session
-from buildarena_worker.verify import Verifier
+from buildarena_worker.wiring import verifier
 
 BRIDGE = Path(__file__).parents[2] / "examples" / "tasks" / "suspension-bridge.yaml"
 OTHER = EXAMPLE.replace("final_mass: 200", "final_mass: 300")
@@ -76,7 +76,7 @@ def own(name: str, builtin: str, **changes: object) -> str:
 
 
 def assert_verified(context, job: Job) -> None:
-    report = Verifier(context).verify(job.id)
+    report = verifier(context).verify(job.id)
     assert report["ok"], [check for check in report["checks"] if not check["ok"]]
 
 
@@ -169,14 +169,6 @@ def test_the_papers_suspension_bridge_is_built_from_parts_and_scored(
 def test_a_prompt_pack_without_the_task_uses_the_tasks_own_words() -> None:
     pack = replace(PromptPacks().load("default"), statements={"support-1": "Of another task."})
     task = parse_custom_task(EXAMPLE, origin="task")
-    io = SessionIO(
-        client=None,
-        entries=[],
-        rollouts=[],
-        append=lambda _: None,
-        still_held=lambda: True,
-        limits={},
-        load_trajectory=dict.__getitem__,
-    )
-    session = Session(task=task, seed=0, model_config={}, pack=pack, io=io)
+    host = ReplayHost(entries=[], rollouts=[], limits={}, load_trajectory={}.__getitem__)
+    session = Session(task=task, seed=0, model_config={}, pack=pack, host=host)
     assert session.statement == task.statement.strip()

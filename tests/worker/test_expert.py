@@ -8,7 +8,7 @@ import pytest
 
 from buildarena_benchmark import builtin_tasks, score
 from buildarena_simulation import simulate
-from buildarena_worker.errors import ConstructionFailedError
+from buildarena_worker.session.results import Failed
 
 TASKS = sorted(builtin_tasks())
 SEEDS = range(int(os.environ.get("EXPERT_SEEDS", "1")))
@@ -32,7 +32,7 @@ def tried(play, model: str, task: str, seed: int, engine: str):
 @pytest.mark.parametrize("task", TASKS)
 def test_the_expert_succeeds(play, task, seed, engine) -> None:
     result = tried(play, "builtin/expert", task, seed, engine)
-    assert not isinstance(result, Exception), result
+    assert not isinstance(result, Failed), result
     assert result.success, result
 
 
@@ -41,4 +41,4 @@ def test_the_expert_succeeds(play, task, seed, engine) -> None:
 @pytest.mark.parametrize("task", TASKS)
 def test_the_other_baselines_fail(play, model, task, seed) -> None:
     result = tried(play, model, task, seed, "mujoco")
-    assert isinstance(result, ConstructionFailedError) or not result.success
+    assert isinstance(result, Failed) or not result.success

@@ -99,10 +99,10 @@ def test_lures_reach_nothing(play, monkeypatch, workflow, task) -> None:
     finally:
         watching = False
     assert seen == []
-    assert type(played.failure).__name__ == "ConstructionFailedError"
+    assert type(played.failure).__name__ == "Failed"
 
 
-def test_lures_in_a_good_machine_go_the_whole_road_as_text(
+def test_lures_in_a_good_machine_go_the_whole_way_as_text(
     context, submissions, monkeypatch, tmp_path
 ) -> None:
     monkeypatch.setitem(builtin.MODELS, "expert", spiced_expert())

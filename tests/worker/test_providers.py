@@ -11,10 +11,10 @@ from provider_standin import ProviderStandIn
 from buildarena_pipeline.catalog.models import ModelEntry, Price, ProviderEntry
 from buildarena_pipeline.errors import PermanentError, TransientError
 from buildarena_store import Usage
-from buildarena_worker.errors import ConstructionFailedError
 from buildarena_worker.providers.provider import ProviderClient
 from buildarena_worker.providers.retries import RetryPolicy
 from buildarena_worker.session.messages import Message, Reply, Request, Tool, ToolCall
+from buildarena_worker.session.results import Failed
 
 QUICK = RetryPolicy(tries=5, first_wait_s=0.01, longest_wait_s=0.05, timeout_s=2.0)
 PRICE = Price(input=2.0, output=8.0, cached=0.5)
@@ -178,7 +178,7 @@ def overflow(_: int) -> str:
 def test_an_overflowing_context_is_the_models_own_failure(play, client) -> None:
     with ProviderStandIn("idle", fault=overflow) as standin:
         failure = play(client=client(standin)).failure
-    assert isinstance(failure, ConstructionFailedError)
+    assert isinstance(failure, Failed)
     assert failure.reason == "context_overflow"
     assert standin.counts.requests == 1
 

@@ -3,13 +3,9 @@ from __future__ import annotations
 import pytest
 from scripted import Scripted, call
 
-from buildarena_worker.errors import (
-    ConstructionFailedError,
-    JournalMismatchError,
-    LeaseLostError,
-    LimitReachedError,
-)
+from buildarena_store import StaleLeaseError, Usage
 from buildarena_worker.session.messages import Message, Reply, ToolCall
+from buildarena_worker.session.results import Diverged, Failed, LimitReached, Superseded
 
 START = call("start", init_shift=[0, 0, 0], init_rotation=[0, 0, 0], note="")
 PLAN = Reply(
@@ -41,7 +37,7 @@ def test_every_workflow_leads_the_expert_to_a_machine(play, workflow) -> None:
 
 def test_the_idle_model_builds_nothing(play) -> None:
     failure = play("builtin/idle").failure
-    assert isinstance(failure, ConstructionFailedError)
+    assert isinstance(failure, Failed)
     assert failure.reason == "plan_unreadable"
 
 
@@ -71,7 +67,7 @@ def test_a_finished_session_replays_without_a_model(play) -> None:
 def test_a_journal_of_another_session_is_refused(play) -> None:
     other = play("builtin/random").entries
     failure = play(entries=other).failure
-    assert isinstance(failure, JournalMismatchError)
+    assert isinstance(failure, Diverged)
 
 
 def test_the_reply_is_journalled_before_it_is_used(play) -> None:
@@ -85,8 +81,8 @@ def test_the_reply_is_journalled_before_it_is_used(play) -> None:
 
 def test_a_lost_lease_stops_the_session_before_it_pays(play) -> None:
     model = Scripted()
-    failure = play(client=model, still_held=lambda: False).failure
-    assert isinstance(failure, LeaseLostError)
+    failure = play(client=model, lost=True).failure
+    assert isinstance(failure, Superseded)
     assert model.requests == []
 
 
@@ -96,7 +92,7 @@ def test_a_lost_lease_stops_the_session_before_it_pays(play) -> None:
 )
 def test_limits_stop_a_session_within_one_request(play, limits, requests) -> None:
     played = play(workflow="builder", client=Scripted(last=START), limits=limits)
-    assert isinstance(played.failure, LimitReachedError)
+    assert isinstance(played.failure, LimitReached)
     assert played.failure.limit in limits
     assert len(played.entries) == requests
 
@@ -112,9 +108,9 @@ def test_too_many_sub_structures_fail_the_plan(play) -> None:
     part = "<sub_structure><name>{}</name><function>x</function></sub_structure>"
     text = PLAN.text.replace("</sub_structures>", part.format("two") + "</sub_structures>")
     failure = play(client=Scripted(Reply(text=text))).failure
-    assert isinstance(failure, ConstructionFailedError)
+    assert isinstance(failure, Failed)
     assert failure.reason == "constraint_violated"
-    assert "2 sub-structures, the task allows 1" in str(failure)
+    assert "2 sub-structures, the task allows 1" in failure.detail
 
 
 @pytest.mark.parametrize("role", ["reviewer", "guidance"])
@@ -125,9 +121,9 @@ def test_an_objection_ends_the_session(play, role) -> None:
     if role == "guidance":
         replies = [PLAN, draft, Reply(text="TERMINATE"), draft, START, objection]
     failure = play(client=Scripted(*replies)).failure
-    assert isinstance(failure, ConstructionFailedError)
+    assert isinstance(failure, Failed)
     assert failure.reason == "objection"
-    assert str(failure) == f"{role}: no rope"
+    assert failure.detail == f"{role}: no rope"
 
 
 def test_parallel_calls_are_refused_and_do_nothing(play) -> None:
@@ -192,13 +188,34 @@ def test_roles_see_the_thread_from_their_own_side(play) -> None:
 
 def test_a_machine_of_one_block_is_no_machine(play) -> None:
     failure = play(workflow="builder", client=Scripted(START)).failure
-    assert isinstance(failure, ConstructionFailedError)
+    assert isinstance(failure, Failed)
     assert failure.reason == "empty_machine"
 
 
 def test_endless_talk_meets_the_turn_limit(play) -> None:
     talk = Reply(text="Let me think.")
     played = play(workflow="builder", client=Scripted(last=talk))
-    assert isinstance(played.failure, ConstructionFailedError)
+    assert isinstance(played.failure, Failed)
     assert played.failure.reason == "turn_limit"
     assert len(played.entries) == 300
+
+
+def test_a_reply_that_came_after_the_lease_had_ended_is_paid_for_and_not_used(play) -> None:
+    def refuse(_: object) -> None:
+        raise StaleLeaseError("job", 1)
+
+    budgets = Budgets()
+    played = play(client=Scripted(), append=refuse, budgets=budgets)
+    assert isinstance(played.failure, Superseded)
+    assert [usage.requests for usage in budgets.lost] == [1]
+    assert played.session.transcript.turns == []
+
+
+class Budgets:
+    """Notes what was paid for in vain."""
+
+    def __init__(self) -> None:
+        self.lost: list[Usage] = []
+
+    def charge_lost(self, _: object, usage: Usage) -> None:
+        self.lost.append(usage)

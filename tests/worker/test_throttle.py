@@ -60,11 +60,11 @@ def test_the_limit_halves_on_complaints_and_grows_with_answers(context, broker_u
         limits = [await throttle.limit()]
         for _ in range(2):  # at the same time: one complaint
             async with throttle.slot() as slot:
-                slot.was_too_much()
+                slot.rejected()
         limits.append(await throttle.limit())
         for _ in range(4):
             async with throttle.slot() as slot:
-                slot.went_well()
+                slot.succeeded()
         limits.append(await throttle.limit())
         await throttle.close()
         return limits
@@ -78,11 +78,11 @@ def test_the_limit_halves_on_complaints_and_grows_with_answers(context, broker_u
 HOLDER = """
 import asyncio, sys
 from buildarena_worker.providers import throttle
-throttle.HOLD_S = 1
+throttle.SLOT_TTL_S = 1
 
 async def hold():
     async with throttle.Throttle(sys.argv[1], "p", start=1).slot():
-        print("on_hold", flush=True)
+        print("taken", flush=True)
         await asyncio.sleep(60)
 
 asyncio.run(hold())
@@ -135,15 +135,15 @@ def test_a_busy_worker_leaves_slots_to_others(context, broker_url) -> None:
 
 
 def test_slots_of_a_dead_worker_are_free_again_soon(context, broker_url, monkeypatch) -> None:
-    monkeypatch.setattr(throttle_module, "HOLD_S", 1)
+    monkeypatch.setattr(throttle_module, "SLOT_TTL_S", 1)
 
     async def come_after() -> int:
         throttle = Throttle(broker_url, "p", start=1)
         async with asyncio.timeout(10), throttle.slot():
             await asyncio.sleep(2)  # renewed meanwhile
-            held = open_slots(broker_url)
+            open_now = open_slots(broker_url)
         await throttle.close()
-        return held
+        return open_now
 
     with subprocess.Popen(
         [sys.executable, "-c", HOLDER, broker_url], stdout=subprocess.PIPE
@@ -161,7 +161,7 @@ def test_requests_go_on_when_the_store_is_gone() -> None:
     async def main() -> None:
         throttle = Throttle("redis://127.0.0.1:1/0", "p")
         async with throttle.slot() as slot:
-            slot.went_well()
+            slot.succeeded()
         await throttle.close()
 
     started = time.monotonic()

@@ -12,8 +12,8 @@ from buildarena_pipeline.errors import PermanentError, StartupError
 from buildarena_simulation import simulate
 from buildarena_worker.builtin.expert import reply as expert
 from buildarena_worker.builtin.reading import read_situation
-from buildarena_worker.errors import ConstructionFailedError
 from buildarena_worker.session.messages import Reply, Request
+from buildarena_worker.session.results import Failed
 from buildarena_worker.workflow import Workflows
 from buildarena_worker.workflow.rounds import Loop
 
@@ -73,7 +73,7 @@ def test_a_round_without_a_machine_is_followed_by_another(play) -> None:
 def test_rounds_without_any_machine_fail(play) -> None:
     model = Scripted(last=call("raise_objection", reason="no"))
     played = play(workflow="builder", client=model, loop=Loop(rounds=2))
-    assert isinstance(played.failure, ConstructionFailedError)
+    assert isinstance(played.failure, Failed)
     assert len(played.entries) == 2
 
 
@@ -138,7 +138,7 @@ def test_a_packs_own_statement_takes_the_tasks_place(play) -> None:
 
 
 OWN = '''
-from buildarena_worker.workflow.stages import solo_stage
+from buildarena_worker.workflow.phases import solo_phase
 
 class Twice:
     """Builds alone, after thinking aloud."""
@@ -146,7 +146,7 @@ class Twice:
     name = "twice"
 
     def build(self, session):
-        return solo_stage(session)
+        return solo_phase(session)
 '''
 
 

@@ -14,7 +14,7 @@ class OneBlock:
 
     def build(self, session: Session) -> Machine:
         """A starting block with one more on it."""
-        dialogue = Dialogue(session, stage="build", opening=session.statement)
+        dialogue = Dialogue(session, phase="build", opening=session.statement)
         dialogue.turn(Role(name="builder", system="Say something."))
         session.machine = Machine()
         session.machine.act("start", {})

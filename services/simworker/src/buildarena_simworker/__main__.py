@@ -10,12 +10,12 @@ from buildarena_pipeline.errors import StartupError
 from buildarena_pipeline.runtime.settings import Settings
 from buildarena_pipeline.runtime.worker_process import WorkerSpec, run_worker
 from buildarena_simulation import ENGINES, SIMULATION_VERSION
-from buildarena_simworker.simulate import SimulateHandler
+from buildarena_simworker.simulate import simulate_handler
 from buildarena_store.states import simulate_queue
 
 
 def main() -> None:
-    """Serves one engine's queue until it is told to stop."""
+    """Serves one engine's queue until it is asked to stop."""
     parser = argparse.ArgumentParser(prog="buildarena_simworker", description=main.__doc__)
     parser.add_argument("--engine", required=True, choices=sorted(ENGINES))
     engine = parser.parse_args().engine
@@ -27,7 +27,7 @@ def main() -> None:
                 queues=[simulate_queue(engine)],
                 pool="prefork",
                 concurrency=settings.simulations_per_worker,
-                make_handler=SimulateHandler,
+                make_handler=simulate_handler,
                 versions={
                     "geometry": geometry_version,
                     "simulation": SIMULATION_VERSION,

@@ -10,9 +10,11 @@ from typing import Any
 
 from buildarena_benchmark import Score, Task, failed_score, score
 from buildarena_geometry import KeyPress, Machine
+from buildarena_pipeline.catalog.tasks import TaskCatalog
 from buildarena_pipeline.errors import PermanentError, TransientError
 from buildarena_pipeline.runtime.active_lease import ActiveLease
 from buildarena_pipeline.runtime.context import Context
+from buildarena_pipeline.runtime.notify import Notifier
 from buildarena_pipeline.runtime.scoring import best_rollout, rollout_score, task_of
 from buildarena_simulation import (
     SIMULATION_VERSION,
@@ -26,9 +28,11 @@ from buildarena_simulation import (
 from buildarena_store import (
     ArtifactInfo,
     ArtifactMissingError,
+    ArtifactStore,
     RolloutRecord,
     Stage,
     StaleLeaseError,
+    Store,
 )
 from buildarena_store.states import CONSTRUCT_QUEUE
 
@@ -49,17 +53,25 @@ class SimulateHandler:
     """Runs rollouts.
 
     Args:
-        context: The process' connections.
+        store: Where jobs and rollouts are.
+        artifacts: Where machines and trajectories are.
+        queues: Where construct workers are notified.
+        tasks: The tasks.
     """
 
-    def __init__(self, context: Context) -> None:
-        self._context = context
+    def __init__(
+        self, *, store: Store, artifacts: ArtifactStore, queues: Notifier, tasks: TaskCatalog
+    ) -> None:
+        self._store = store
+        self._artifacts = artifacts
+        self._queues = queues
+        self._tasks = tasks
 
     def __call__(self, active: ActiveLease) -> None:
         """Simulates the job's waiting rollout; the job ends, or goes back to its session."""
-        context, lease = self._context, active.lease
+        store, lease = self._store, active.lease
         job = lease.job
-        records = context.store.rollouts.read(job.id)
+        records = store.rollouts.read(job.id)
         waiting = [record for record in records if record.finished_at is None]
         if not waiting:
             raise PermanentError("no rollout waits", reason="no_rollout")
@@ -69,25 +81,25 @@ class SimulateHandler:
             values = {name: getattr(same, name) for name in MADE} | {"wall_s": 0.0}
             trajectory = None
         else:
-            task = task_of(job, context.tasks)
+            task = task_of(job, self._tasks)
             done = self._simulate(task, request, lambda: _require(active))
             values, trajectory = _values(request, done), done.trajectory
-        with context.store.database.transaction() as connection:
+        with store.database.transaction() as connection:
             if trajectory is not None:
                 made = {f"trajectory-{request.number}": trajectory}
-                context.store.results.attach(job.id, made, connection=connection)
-            completed = context.store.rollouts.complete(
+                store.results.attach(job.id, made, connection=connection)
+            completed = store.rollouts.complete(
                 job.id, request.number, connection=connection, **values
             )
             if request.final:
                 final = rollout_score(job, best_rollout([*records, completed]))
-                context.store.results.finish(lease, final, connection=connection)
+                store.results.finish(lease, final, connection=connection)
             else:
-                context.store.leases.queue_again(
+                store.leases.queue_again(
                     lease, stage=Stage.CONSTRUCT, queue=CONSTRUCT_QUEUE, connection=connection
                 )
         if not request.final:
-            context.queues.notify_one(CONSTRUCT_QUEUE, job.id)
+            self._queues.notify_one(CONSTRUCT_QUEUE, job.id)
 
     def _simulate(
         self, task: Task, request: RolloutRecord, require_held: Callable[[], None]
@@ -111,7 +123,7 @@ class SimulateHandler:
             )
         except SimulationError as error:
             raise TransientError(str(error), reason="simulator_fault", delay_s=2.0) from error
-        kept = self._context.artifacts.put(write_trajectory(trajectory), PARQUET)
+        kept = self._artifacts.put(write_trajectory(trajectory), PARQUET)
         return _Done(
             score=score(task, machine, trajectory),
             trajectory=kept,
@@ -121,10 +133,20 @@ class SimulateHandler:
 
     def _machine(self, digest: str) -> Machine:
         try:
-            document: dict[str, Any] = json.loads(self._context.artifacts.get(digest))
+            document: dict[str, Any] = json.loads(self._artifacts.get(digest))
         except ArtifactMissingError as error:
             raise TransientError(str(error), reason="artifact_missing", delay_s=5.0) from error
         return Machine.from_document(document)
+
+
+def simulate_handler(context: Context) -> SimulateHandler:
+    """What does the simulate stage, from a process' connections."""
+    return SimulateHandler(
+        store=context.store,
+        artifacts=context.artifacts,
+        queues=context.queues,
+        tasks=context.tasks,
+    )
 
 
 MADE = (

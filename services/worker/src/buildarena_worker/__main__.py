@@ -14,8 +14,7 @@ from buildarena_pipeline.runtime.job_runner import StageHandler
 from buildarena_pipeline.runtime.settings import Settings
 from buildarena_pipeline.runtime.worker_process import WorkerSpec, run_worker
 from buildarena_store.states import CONSTRUCT_QUEUE, VERIFY_QUEUE
-from buildarena_worker.construct import ConstructHandler
-from buildarena_worker.verify import VerificationRunner
+from buildarena_worker.wiring import construct_handler, verification_runner
 
 
 def main() -> None:
@@ -25,10 +24,10 @@ def main() -> None:
         registry = load_registry(settings.models_file)
 
         def make_handler(context: Context) -> StageHandler:
-            return ConstructHandler(context, registry)
+            return construct_handler(context, registry)
 
         def make_others(context: Context) -> Mapping[str, Callable[[str], None]]:
-            return {VERIFY_QUEUE: VerificationRunner(context).process}
+            return {VERIFY_QUEUE: verification_runner(context).process}
 
         run_worker(
             WorkerSpec(

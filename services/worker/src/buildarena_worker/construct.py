@@ -3,40 +3,49 @@
 from __future__ import annotations
 
 from decimal import Decimal
+from typing import assert_never
 
 from buildarena_pipeline.catalog.models import ModelRegistry
 from buildarena_pipeline.catalog.prices import price_usd
-from buildarena_pipeline.catalog.prompt_packs import PromptPack, PromptPacks
-from buildarena_pipeline.errors import PermanentError, StartupError
+from buildarena_pipeline.catalog.prompt_packs import PromptPacks
+from buildarena_pipeline.catalog.tasks import TaskCatalog
+from buildarena_pipeline.errors import PermanentError
 from buildarena_pipeline.runtime.active_lease import ActiveLease
-from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.machine_documents import machine_bytes
+from buildarena_pipeline.runtime.notify import Notifier
 from buildarena_pipeline.runtime.scoring import failure_score, rollout_score, task_of
 from buildarena_simulation import read_trajectory
 from buildarena_store import (
+    ArtifactStore,
     Job,
     JobScore,
-    JournalEntry,
     Lease,
     Outcome,
     RolloutRequest,
+    Shortage,
     Stage,
     StaleLeaseError,
+    Store,
 )
 from buildarena_store.states import AttemptResult, JobState, simulate_queue
-from buildarena_worker.budget_guard import BudgetGuard, BudgetUsedUpError, Price
-from buildarena_worker.concurrency_gate import ConcurrencyGate
-from buildarena_worker.errors import (
-    ConstructionFailedError,
-    JournalMismatchError,
-    LeaseLostError,
-    LimitReachedError,
-)
+from buildarena_worker.jobs import loop_of, pack_of
 from buildarena_worker.providers import ModelClients
-from buildarena_worker.session.host import SessionIO, SuspendedError
+from buildarena_worker.session.budget_guard import BudgetGuard, Price
+from buildarena_worker.session.concurrency_gate import ConcurrencyGate
+from buildarena_worker.session.host import LiveHost, ReplayHost
+from buildarena_worker.session.results import (
+    BudgetExhausted,
+    Diverged,
+    Failed,
+    Finished,
+    LimitReached,
+    SessionResult,
+    Superseded,
+    Suspended,
+)
 from buildarena_worker.session.session import Session
-from buildarena_worker.workflow import SessionEnd, Workflows
-from buildarena_worker.workflow.rounds import Loop, run_session
+from buildarena_worker.workflow import Workflows
+from buildarena_worker.workflow.rounds import run_session
 
 JSON = "application/json"
 
@@ -45,62 +54,91 @@ class ConstructHandler:
     """Runs construction sessions.
 
     Args:
-        context: The process' connections.
-        registry: Models and providers.
+        store: Where jobs and journals are.
+        artifacts: Where machines, transcripts and trajectories are.
+        queues: Where simulators are notified.
+        tasks: The tasks.
+        registry: Models and their prices.
+        clients: Answer the sessions' requests.
+        packs: The prompts.
+        workflows: The ways to build.
+        gate: Lets few sessions work at once.
     """
 
-    def __init__(self, context: Context, registry: ModelRegistry) -> None:
-        self._context = context
+    def __init__(
+        self,
+        *,
+        store: Store,
+        artifacts: ArtifactStore,
+        queues: Notifier,
+        tasks: TaskCatalog,
+        registry: ModelRegistry,
+        clients: ModelClients,
+        packs: PromptPacks,
+        workflows: Workflows,
+        gate: ConcurrencyGate,
+    ) -> None:
+        self._store = store
+        self._artifacts = artifacts
+        self._queues = queues
+        self._tasks = tasks
         self._registry = registry
-        self._clients = ModelClients(registry, context.settings.broker_url)
-        self._packs = PromptPacks(context.settings.prompt_packs)
-        self._workflows = Workflows(context.settings.workflows)
-        self._gate = ConcurrencyGate()
+        self._clients = clients
+        self._packs = packs
+        self._workflows = workflows
+        self._gate = gate
 
     def __call__(self, active: ActiveLease) -> None:
         """Runs the job's session as far as it gets: to a simulation, or to its end."""
         lease, job = active.lease, active.lease.job
-        guard = BudgetGuard(self._context.store.budgets, active, self._price_of(job))
-        task = task_of(job, self._context.tasks)
-        pack = pack_of(job, self._packs)
-        io = SessionIO(
-            client=self._clients.for_config(job.model_config),
-            entries=[] if lease.first else self._context.store.journal.read(job.id),
-            rollouts=[] if lease.first else self._context.store.rollouts.read(job.id),
-            append=lambda entry: self._append(lease, entry),
-            still_held=lambda: not active.lost,
-            limits=job.limits,
-            load_trajectory=lambda digest: read_trajectory(self._context.artifacts.get(digest)),
-            reserve=guard,
-            waiting=self._gate.released,
+        session = Session(
+            task=task_of(job, self._tasks),
+            seed=job.seed,
+            model_config=job.model_config,
+            pack=pack_of(job, self._packs),
+            host=self._host(active),
         )
-        session = Session(task=task, seed=job.seed, model_config=job.model_config, pack=pack, io=io)
-        try:
-            workflow = self._workflows.find(str(job.track_config["workflow"]))
-            with self._gate.acquired():
-                end = run_session(session, workflow, loop_of(job))
-        except SuspendedError as suspended:
-            self._suspend(lease, session, suspended)
-        except BudgetUsedUpError as used_up:
-            self._stop(lease, used_up)
-        except ConstructionFailedError as failure:
-            self._fail(lease, session, Outcome.CONSTRUCTION_FAILED, failure.reason, str(failure))
-        except LimitReachedError as limit:
-            self._fail(lease, session, Outcome.LIMIT, limit.limit, str(limit))
-        except LeaseLostError as lost:
-            raise StaleLeaseError(job.id, lease.token) from lost
-        except JournalMismatchError as mismatch:
-            raise PermanentError(str(mismatch), reason="journal_mismatch") from mismatch
-        else:
-            self._finish(lease, session, end)
+        workflow = self._workflows.find(str(job.track_config["workflow"]))
+        with self._gate.acquired():
+            result = run_session(session, workflow, loop_of(job))
+        self._move_on(lease, session, result)
 
-    def _append(self, lease: Lease, entry: JournalEntry) -> None:
-        try:
-            self._context.store.journal.append(lease, entry)
-        except StaleLeaseError:
-            # The job was cancelled or lost meanwhile, but its budgets did pay for the reply.
-            self._context.store.budgets.charge_lost(lease, entry.usage)
-            raise
+    def _host(self, active: ActiveLease) -> LiveHost:
+        lease, job = active.lease, active.lease.job
+        kept = ReplayHost(
+            entries=[] if lease.first else self._store.journal.read(job.id),
+            rollouts=[] if lease.first else self._store.rollouts.read(job.id),
+            limits=job.limits,
+            load_trajectory=lambda digest: read_trajectory(self._artifacts.get(digest)),
+        )
+        return LiveHost(
+            kept=kept,
+            client=self._clients.for_config(job.model_config),
+            journal=self._store.journal,
+            active=active,
+            guard=BudgetGuard(self._store.budgets, active, self._price_of(job)),
+            gate=self._gate,
+        )
+
+    def _move_on(self, lease: Lease, session: Session, result: SessionResult) -> None:
+        """Writes down how the session ended, and with it where the job goes."""
+        match result:
+            case Suspended():
+                self._suspend(lease, session, result)
+            case Finished(best=best):
+                self._write_end(lease, session, rollout_score(lease.job, best))
+            case Failed(reason=reason, detail=detail):
+                self._fail(lease, session, Outcome.CONSTRUCTION_FAILED, reason, detail)
+            case LimitReached(limit=limit, detail=detail):
+                self._fail(lease, session, Outcome.LIMIT, limit, detail)
+            case BudgetExhausted(shortage=shortage):
+                self._hand_back(lease, shortage)
+            case Superseded():
+                raise StaleLeaseError(lease.job.id, lease.token)
+            case Diverged(detail=detail):
+                raise PermanentError(detail, reason="journal_mismatch")
+            case _:
+                assert_never(result)
 
     def _price_of(self, job: Job) -> Price:
         entry = self._registry.models.get(job.model)
@@ -114,28 +152,27 @@ class ConstructHandler:
 
         return price
 
-    def _stop(self, lease: Lease, used_up: BudgetUsedUpError) -> None:
-        """Hands the job back as it is and stops the sweep whose budget is used up."""
-        context, detail = self._context, str(used_up)
-        with context.store.lifecycle.command() as connection:
-            context.store.leases.advance(
+    def _hand_back(self, lease: Lease, shortage: Shortage) -> None:
+        """Hands the job back as it is and stops the sweep whose budget is exhausted."""
+        with self._store.lifecycle.command() as connection:
+            self._store.leases.advance(
                 lease,
                 to=JobState.QUEUED,
                 connection=connection,
                 result=AttemptResult.BUDGET_EXHAUSTED,
-                note=detail,
+                note=shortage.detail,
                 notified_at=None,
-                detail=detail,
+                detail=shortage.detail,
             )
-            context.store.lifecycle.exhaust(
-                used_up.shortage.budget_id, detail, connection=connection
+            self._store.lifecycle.exhaust(
+                shortage.budget_id, shortage.detail, connection=connection
             )
 
-    def _suspend(self, lease: Lease, session: Session, suspended: SuspendedError) -> None:
+    def _suspend(self, lease: Lease, session: Session, suspended: Suspended) -> None:
         """Keeps the machine and hands the job to its simulator, all in one transaction."""
-        context, job = self._context, lease.job
-        machine = context.artifacts.put(machine_bytes(suspended.machine), JSON)
-        transcript = context.artifacts.put(session.transcript.to_json(), JSON)
+        job = lease.job
+        machine = self._artifacts.put(machine_bytes(suspended.machine), JSON)
+        transcript = self._artifacts.put(session.transcript.to_json(), JSON)
         engine = str(job.track_config["simulator"])
         controls = None
         if suspended.controls is not None:
@@ -151,18 +188,18 @@ class ConstructHandler:
             controls=controls,
         )
         queue = simulate_queue(engine)
-        with context.store.database.transaction() as connection:
+        with self._store.database.transaction() as connection:
             made = {"machine": machine, "transcript": transcript}
-            context.store.results.attach(job.id, made, connection=connection)
-            context.store.rollouts.request(job.id, request, connection=connection)
-            context.store.leases.queue_again(
+            self._store.results.attach(job.id, made, connection=connection)
+            self._store.rollouts.request(job.id, request, connection=connection)
+            self._store.leases.queue_again(
                 lease,
                 stage=Stage.SIMULATE,
                 queue=queue,
                 connection=connection,
                 **_counts(session),
             )
-        context.queues.notify_one(queue, job.id)
+        self._queues.notify_one(queue, job.id)
 
     def _fail(
         self, lease: Lease, session: Session, outcome: Outcome, reason: str, detail: str
@@ -173,17 +210,14 @@ class ConstructHandler:
         )
         self._write_end(lease, session, score)
 
-    def _finish(self, lease: Lease, session: Session, end: SessionEnd) -> None:
-        self._write_end(lease, session, rollout_score(lease.job, end.best))
-
     def _write_end(self, lease: Lease, session: Session, score: JobScore) -> None:
-        context, job = self._context, lease.job
-        made = {"transcript": context.artifacts.put(session.transcript.to_json(), JSON)}
+        job = lease.job
+        made = {"transcript": self._artifacts.put(session.transcript.to_json(), JSON)}
         if session.machine is not None and session.machine.started:
-            made["machine"] = context.artifacts.put(machine_bytes(session.machine), JSON)
-        with context.store.database.transaction() as connection:
-            context.store.results.attach(job.id, made, connection=connection)
-            context.store.results.finish(lease, score, connection=connection, **_counts(session))
+            made["machine"] = self._artifacts.put(machine_bytes(session.machine), JSON)
+        with self._store.database.transaction() as connection:
+            self._store.results.attach(job.id, made, connection=connection)
+            self._store.results.finish(lease, score, connection=connection, **_counts(session))
 
 
 def _counts(session: Session) -> dict[str, object]:
@@ -193,33 +227,3 @@ def _counts(session: Session) -> dict[str, object]:
         "refused_actions": sum(refusals.values()),
         "refusals": refusals,
     }
-
-
-def pack_of(job: Job, packs: PromptPacks) -> PromptPack:
-    """The job's prompt pack, as long as it is still the one that the job was submitted with.
-
-    Raises:
-        PermanentError: It has changed, or it is not on this worker.
-    """
-    name, wanted = str(job.track_config["prompts"]), job.track_config["prompts_digest"]
-    try:
-        pack = packs.load(name)
-    except StartupError as error:
-        raise PermanentError(str(error), reason="no_prompts") from error
-    if pack.digest != wanted:
-        raise PermanentError(
-            f"prompt pack {pack.name!r} has changed since the job was submitted: submit it again "
-            "to run it on the new track",
-            reason="prompts_changed",
-        )
-    return pack
-
-
-def loop_of(job: Job) -> Loop:
-    """What the job's track says about rounds, analyst and example."""
-    config = job.track_config
-    return Loop(
-        rounds=int(config["rounds"]),
-        analyst=bool(config["analyst"]),
-        one_shot=bool(config["one_shot"]),
-    )

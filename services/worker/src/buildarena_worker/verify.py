@@ -18,9 +18,9 @@ from buildarena_benchmark import failed_score, score
 from buildarena_geometry import KeyPress, Machine
 from buildarena_pipeline.agents.workbench import Workbench
 from buildarena_pipeline.catalog.prompt_packs import PromptPacks
+from buildarena_pipeline.catalog.tasks import TaskCatalog
 from buildarena_pipeline.catalog.tracks import EXTERNAL_WORKFLOW
 from buildarena_pipeline.errors import PermanentError
-from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.machine_documents import machine_bytes
 from buildarena_pipeline.runtime.scoring import best_rollout, task_of
 from buildarena_simulation import (
@@ -30,14 +30,24 @@ from buildarena_simulation import (
     simulate,
     write_trajectory,
 )
-from buildarena_store import ExternalCall, Job, RolloutRecord, Usage
-from buildarena_worker.construct import loop_of, pack_of
-from buildarena_worker.errors import (
-    ConstructionFailedError,
-    JournalMismatchError,
-    LimitReachedError,
+from buildarena_store import (
+    ArtifactStore,
+    ExternalCall,
+    Job,
+    RolloutRecord,
+    Store,
+    Usage,
+    Verifications,
 )
-from buildarena_worker.session.host import SessionIO, SuspendedError
+from buildarena_worker.jobs import loop_of, pack_of
+from buildarena_worker.session.host import ReplayHost
+from buildarena_worker.session.results import (
+    Failed,
+    Finished,
+    LimitReached,
+    SessionResult,
+    Suspended,
+)
 from buildarena_worker.session.session import Session
 from buildarena_worker.workflow import Workflows
 from buildarena_worker.workflow.rounds import run_session
@@ -53,19 +63,6 @@ class Check:
     found: Any
 
 
-class _ReplayIO(SessionIO):
-    """Gives kept answers only, and notes which machines were to be simulated."""
-
-    machines: list[tuple[Machine, Sequence[KeyPress] | None]]
-
-    def simulate(
-        self, machine: Machine, controls: Sequence[KeyPress] | None, *, final: bool
-    ) -> RolloutRecord:
-        # A copy: what an analyst looks up in the machine later is added to its log.
-        self.machines.append((machine.copy(), controls))
-        return super().simulate(machine, controls, final=final)
-
-
 log = structlog.get_logger(__name__)
 
 
@@ -73,13 +70,27 @@ class Verifier:
     """Verifies jobs.
 
     Args:
-        context: The process' connections.
+        store: Where jobs, journals and rollouts are.
+        artifacts: Where kept trajectories are.
+        tasks: The tasks.
+        packs: The prompts.
+        workflows: The ways to build.
     """
 
-    def __init__(self, context: Context) -> None:
-        self._context = context
-        self._packs = PromptPacks(context.settings.prompt_packs)
-        self._workflows = Workflows(context.settings.workflows)
+    def __init__(
+        self,
+        *,
+        store: Store,
+        artifacts: ArtifactStore,
+        tasks: TaskCatalog,
+        packs: PromptPacks,
+        workflows: Workflows,
+    ) -> None:
+        self._store = store
+        self._artifacts = artifacts
+        self._tasks = tasks
+        self._packs = packs
+        self._workflows = workflows
 
     def verify(self, job_id: str) -> dict[str, Any]:
         """Verifies a job that was scored.
@@ -87,7 +98,7 @@ class Verifier:
         Returns:
             ``{"ok", "checks": [{"name", "ok", "kept", "found"}]}``.
         """
-        job = self._context.store.jobs.get(job_id)
+        job = self._store.jobs.get(job_id)
         checks = self._checks(job)
         return {"ok": all(check.ok for check in checks), "checks": [asdict(c) for c in checks]}
 
@@ -97,65 +108,65 @@ class Verifier:
         if job.track_config["workflow"] == EXTERNAL_WORKFLOW:
             return self._external_checks(job)
         try:
-            session, io, failure = self._replay(job)
-        except (JournalMismatchError, PermanentError, SuspendedError) as error:
-            return [Check(name="replay", ok=False, kept="the journal", found=str(error))]
-        records = self._context.store.rollouts.read(job.id)
+            session, host, result = self._replay(job)
+        except PermanentError as error:
+            return [_broken_off(str(error))]
+        match result:
+            case Finished():
+                reasons = []
+            case Failed(reason=reason) | LimitReached(limit=reason):
+                reasons = [_compare("reason", job.reason, reason)]
+            case Suspended(number=number):
+                return [_broken_off(f"waits for rollout {number}")]
+            case _:
+                return [_broken_off(getattr(result, "detail", str(result)))]
+        records = self._store.rollouts.read(job.id)
         checks = [
             _compare(
                 "transcript", self._artifact(job, "transcript"), _hash(session.transcript.to_json())
             ),
-            _compare("rollouts", len(records), len(io.machines)),
-            *_usage_checks(job, io.spent.usage),
+            _compare("rollouts", len(records), len(host.simulated)),
+            *_usage_checks(job, host.usage),
+            *reasons,
         ]
-        if isinstance(failure, ConstructionFailedError):
-            checks.append(_compare("reason", job.reason, failure.reason))
-        if isinstance(failure, LimitReachedError):
-            checks.append(_compare("reason", job.reason, failure.limit))
-        for record, (machine, controls) in zip(records, io.machines, strict=False):
+        for record, (machine, controls) in zip(records, host.simulated, strict=False):
             checks += self._rollout_checks(job, record, machine, controls)
         checks += self._score_checks(job, session.machine, records)
         return checks
 
     def _external_checks(self, job: Job) -> list[Check]:
-        """An outside agent's calls are made again; what it thought in between is its own."""
-        with self._context.store.database.transaction() as connection:
-            calls = self._context.store.external_calls.read(job.id, connection=connection)
+        """An external agent's calls are made again; what it thought in between is its own."""
+        with self._store.database.transaction() as connection:
+            calls = self._store.external_calls.read(job.id, connection=connection)
         bench = Workbench()
         again = [bench.call(call.machine, call.tool, call.arguments) for call in calls]
-        checks = [_compare("calls", [_said(call) for call in calls], [_said(c) for c in again])]
+        checks = [
+            _compare("calls", [_answer_of(call) for call in calls], [_answer_of(c) for c in again])
+        ]
         chosen = bench.result()
         machine = None if chosen is None else chosen[1]
-        records = self._context.store.rollouts.read(job.id)
+        records = self._store.rollouts.read(job.id)
         if machine is not None:
             for record in records:
                 checks += self._rollout_checks(job, record, machine, None)
         return checks + self._score_checks(job, machine, records)
 
-    def _replay(self, job: Job) -> tuple[Session, _ReplayIO, Exception | None]:
-        io = _ReplayIO(
-            client=None,
-            entries=self._context.store.journal.read(job.id),
-            rollouts=self._context.store.rollouts.read(job.id),
-            append=lambda _: None,
-            still_held=lambda: True,
+    def _replay(self, job: Job) -> tuple[Session, ReplayHost, SessionResult]:
+        host = ReplayHost(
+            entries=self._store.journal.read(job.id),
+            rollouts=self._store.rollouts.read(job.id),
             limits=job.limits,
-            load_trajectory=lambda digest: read_trajectory(self._context.artifacts.get(digest)),
+            load_trajectory=lambda digest: read_trajectory(self._artifacts.get(digest)),
         )
-        io.machines = []
         session = Session(
-            task=task_of(job, self._context.tasks),
+            task=task_of(job, self._tasks),
             seed=job.seed,
             model_config=job.model_config,
             pack=pack_of(job, self._packs),
-            io=io,
+            host=host,
         )
         workflow = self._workflows.find(str(job.track_config["workflow"]))
-        try:
-            run_session(session, workflow, loop_of(job))
-        except (ConstructionFailedError, LimitReachedError) as failure:
-            return session, io, failure
-        return session, io, None
+        return session, host, run_session(session, workflow, loop_of(job))
 
     def _rollout_checks(
         self,
@@ -168,7 +179,7 @@ class Verifier:
         checks = [_compare(f"{name}: machine", record.machine_hash, _hash(machine_bytes(machine)))]
         simulated_by = (record.versions or {}).get("simulation")
         checks.append(_compare(f"{name}: simulation version", simulated_by, SIMULATION_VERSION))
-        task = task_of(job, self._context.tasks)
+        task = task_of(job, self._tasks)
         try:
             trajectory = simulate(
                 machine,
@@ -193,28 +204,29 @@ class Verifier:
             best = best_rollout(records)
             wanted = {name: _plain(getattr(best, name)) for name in SCORED}
         else:
-            failed = failed_score(task_of(job, self._context.tasks), machine)
+            failed = failed_score(task_of(job, self._tasks), machine)
             wanted = {name: _plain(getattr(failed, name)) for name in SCORED}
         return [_compare(f"score: {n}", _plain(getattr(job, n)), v) for n, v in wanted.items()]
 
     def _artifact(self, job: Job, name: str) -> str | None:
-        return self._context.store.jobs.artifacts(job.id).get(name)
+        return self._store.jobs.artifacts(job.id).get(name)
 
 
 class VerificationRunner:
     """Does the verifications that messages speak of.
 
     Args:
-        context: The process' connections.
+        verifications: What was asked for.
+        verifier: Does them.
     """
 
-    def __init__(self, context: Context) -> None:
-        self._context = context
-        self._verifier = Verifier(context)
+    def __init__(self, verifications: Verifications, verifier: Verifier) -> None:
+        self._verifications = verifications
+        self._verifier = verifier
 
     def process(self, verification_id: str) -> None:
         """Does a verification, unless another worker has it."""
-        claimed = self._context.store.verifications.claim(verification_id)
+        claimed = self._verifications.claim(verification_id)
         if claimed is None:
             return
         try:
@@ -223,14 +235,14 @@ class VerificationRunner:
             log.exception("verification_failed", job=claimed.job_id)
             failed = Check(name="verification", ok=False, kept=None, found=f"it broke off: {error}")
             report = {"ok": False, "checks": [asdict(failed)]}
-        self._context.store.verifications.finish(verification_id, report)
+        self._verifications.finish(verification_id, report)
 
 
 SCORED = ("success", "indicator", "metrics", "flags")
 COUNTED = ("requests", "input_tokens", "output_tokens", "cached_tokens", "reasoning_tokens")
 
 
-def _said(call: ExternalCall) -> list[Any]:
+def _answer_of(call: ExternalCall) -> list[Any]:
     return [call.ok, call.reason, call.feedback]
 
 
@@ -238,6 +250,10 @@ def _usage_checks(job: Job, usage: Usage) -> list[Check]:
     checks = [_compare(f"usage: {n}", getattr(job, n), getattr(usage, n)) for n in COUNTED]
     checks.append(_compare("usage: cost_usd", f"{job.cost_usd:f}", f"{usage.cost_usd:.6f}"))
     return checks
+
+
+def _broken_off(detail: str) -> Check:
+    return Check(name="replay", ok=False, kept="the journal", found=detail)
 
 
 def _compare(name: str, kept: Any, found: Any) -> Check:

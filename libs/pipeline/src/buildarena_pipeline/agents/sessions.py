@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import re
-from collections import Counter, OrderedDict
-from collections.abc import Mapping, Sequence
+from collections import OrderedDict
+from collections.abc import Sequence
 from threading import Lock
 from typing import Any
 
@@ -16,6 +15,7 @@ from buildarena_pipeline.errors import PipelineError, SubmissionError
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.machine_documents import machine_bytes
 from buildarena_pipeline.runtime.scoring import failure_score, task_of
+from buildarena_pipeline.transcript import ActionResult, Transcript, Turn
 from buildarena_store import (
     ExternalCall,
     Job,
@@ -127,11 +127,14 @@ class ExternalSessions:
                     "there is no machine to simulate: build one, or join several in 'assembly'"
                 )
             _, machine = chosen
-            transcript = context.artifacts.put(_transcript(calls), JSON)
+            transcript = _transcript(calls)
             kept = context.artifacts.put(machine_bytes(machine), JSON)
-            made = {"machine": kept, "transcript": transcript}
+            made = {
+                "machine": kept,
+                "transcript": context.artifacts.put(transcript.to_json(spaced=True), JSON),
+            }
             context.store.results.attach(job_id, made, connection=connection)
-            refusals = dict(Counter(c.reason or "refused" for c in calls if not c.ok))
+            refusals = transcript.refusals
             task = task_of(job, context.tasks)
             broken = broken_constraint(task, machine)
             if broken is not None:
@@ -209,24 +212,26 @@ def _unknown(field: str, value: str, choices: Sequence[str]) -> ValidationIssue:
     )
 
 
-def _transcript(calls: Sequence[ExternalCall]) -> bytes:
-    turns: list[Mapping[str, Any]] = [
-        {
-            "index": index,
-            "stage": "external",
-            "sub_structure": call.machine,
-            "role": "agent",
-            "text": "",
-            "actions": [
-                {
-                    "name": call.tool,
-                    "arguments": call.arguments,
-                    "ok": call.ok,
-                    "reason": call.reason,
-                    "feedback": call.feedback,
-                }
-            ],
-        }
-        for index, call in enumerate(calls)
-    ]
-    return json.dumps({"version": "1", "turns": turns}, ensure_ascii=False).encode()
+def _transcript(calls: Sequence[ExternalCall]) -> Transcript:
+    """What an external agent did; what it thought in between is not known."""
+    return Transcript(
+        [
+            Turn(
+                index=index,
+                stage="external",
+                sub_structure=call.machine,
+                role="agent",
+                text="",
+                actions=(
+                    ActionResult(
+                        name=call.tool,
+                        arguments=call.arguments,
+                        ok=call.ok,
+                        reason=call.reason,
+                        feedback=call.feedback,
+                    ),
+                ),
+            )
+            for index, call in enumerate(calls)
+        ]
+    )

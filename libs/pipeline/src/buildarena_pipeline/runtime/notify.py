@@ -2,8 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 from buildarena_pipeline.broker.queues import MAX_WAITING
 from buildarena_pipeline.runtime.context import Context
+
+
+class Notifier(Protocol):
+    """The part of the queues that stage handlers use."""
+
+    def notify_one(self, queue: str, job_id: str) -> None:
+        """Sends a queue's workers a message for one more job, unless enough wait."""
 
 
 def notify_waiting(context: Context, queue: str) -> None:

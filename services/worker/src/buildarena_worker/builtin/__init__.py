@@ -11,8 +11,7 @@ from decimal import Decimal
 from buildarena_pipeline.errors import PermanentError
 from buildarena_store import Usage
 from buildarena_worker.builtin import expert, idle, random_builder
-from buildarena_worker.session.host import Answer
-from buildarena_worker.session.messages import Reply, Request
+from buildarena_worker.session.messages import Answer, Reply, Request
 
 MODELS = {"expert": expert.reply, "random": random_builder.reply, "idle": idle.reply}
 CHARACTERS_PER_TOKEN = 4

@@ -71,7 +71,7 @@ def _whole_script(design: Design) -> Sequence[Action]:
 
 def _drawing(design: Design, situation: Situation) -> str:
     steps = "\n".join(
-        f"{number}. {_spelled(action)}"
+        f"{number}. {_rendered(action)}"
         for number, action in enumerate(_script(design, situation), start=1)
     )
     return f"Drawing of {situation.part}, in building order:\n{steps}"
@@ -82,7 +82,7 @@ def _guide(design: Design, situation: Situation) -> Reply:
     done = situation.builder_turns
     if done >= len(script):
         return Reply(text=DONE)
-    return Reply(text=f"Step {done + 1} of {len(script)}: {_spelled(script[done])}")
+    return Reply(text=f"Step {done + 1} of {len(script)}: {_rendered(script[done])}")
 
 
 def _act(script: Sequence[Action], done: int) -> Reply:
@@ -93,6 +93,6 @@ def _act(script: Sequence[Action], done: int) -> Reply:
     return Reply(text="", calls=(call,))
 
 
-def _spelled(action: Action) -> str:
+def _rendered(action: Action) -> str:
     name, arguments = action
     return f"{name} " + ", ".join(f"{key} {value}" for key, value in arguments.items() if value)

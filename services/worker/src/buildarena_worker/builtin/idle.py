@@ -6,6 +6,6 @@ from buildarena_worker.session.messages import Reply, Request
 
 
 def reply(request: Request) -> Reply:
-    """Always the word that ends a stage."""
+    """Always the word that ends a phase."""
     del request
     return Reply(text="TERMINATE")

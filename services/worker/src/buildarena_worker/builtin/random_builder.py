@@ -16,7 +16,7 @@ BLOCKS = ("Small Wooden Block", "Powered Wheel", "Water Cannon", "Torch", "Steel
 CONNECTORS = ("Brace", "Winch", "Torch")
 FACES = "ABCDEFG"
 KEYS = ("UpArrow", "DownArrow", "Alpha1", "Space")
-FEWEST_ACTIONS, MAX_ACTIONS = 6, 14
+MIN_ACTIONS, MAX_ACTIONS = 6, 14
 
 PLAN = """<building_plan>
 <overall_structure>whatever luck makes of it</overall_structure>
@@ -54,7 +54,7 @@ def _rng(request: Request, situation: Situation) -> random.Random:
 
 def _length(request: Request, situation: Situation) -> int:
     rng = random.Random(f"{request.seed}/{situation.task}/{situation.part}")  # noqa: S311 - as above
-    return rng.randint(FEWEST_ACTIONS, MAX_ACTIONS)
+    return rng.randint(MIN_ACTIONS, MAX_ACTIONS)
 
 
 def _guide(situation: Situation, request: Request) -> Reply:

@@ -27,7 +27,7 @@ class Situation:
         refining: Whether a built machine is being corrected.
         own_turns: Replies that this role gave before.
         own_actions: Tools that this role called before.
-        builder_turns: Replies of the builder that this role heard of.
+        builder_turns: Replies of the builder that this role has read.
         last_text: What was said last.
     """
 
@@ -45,8 +45,8 @@ class Situation:
 def read_situation(request: Request) -> Situation:
     """Finds the cues that our prompts carry in their headings."""
     system = "\n".join(m.text for m in request.messages if m.role == "system")
-    heard = [m.text for m in request.messages if m.role == "user"]
-    opening = heard[0] if heard else ""
+    received = [m.text for m in request.messages if m.role == "user"]
+    opening = received[0] if received else ""
     own = [m for m in request.messages if m.role == "assistant"]
     part = _PART.search(opening)
     return Situation(
@@ -57,7 +57,7 @@ def read_situation(request: Request) -> Situation:
         refining=_REFINEMENT.search(opening) is not None,
         own_turns=len(own),
         own_actions=sum(len(m.calls) for m in own),
-        builder_turns=sum(len(_BUILDER.findall(text)) for text in heard),
+        builder_turns=sum(len(_BUILDER.findall(text)) for text in received),
         last_text=request.messages[-1].text if request.messages else "",
     )
 

@@ -1,4 +1,4 @@
-"""A key-value store whose commands gather for some milliseconds and go out in one message.
+"""A key-value store whose commands are collected for some milliseconds and sent in one message.
 
 A message costs more than what it asks for, and hundreds of requests want something each second.
 """
@@ -13,8 +13,8 @@ from redis.asyncio import Redis
 
 log = structlog.get_logger(__name__)
 
-GATHER_S = 0.005
-"""How long commands gather: little beside a model's seconds."""
+BATCH_S = 0.005
+"""How long commands are collected: little beside a model's seconds."""
 
 
 class BatchedRedis:
@@ -26,36 +26,36 @@ class BatchedRedis:
 
     def __init__(self, url: str) -> None:
         self._redis: Any = Redis.from_url(url, socket_timeout=5)
-        self._asked: list[tuple[tuple[Any, ...], asyncio.Future[Any]]] = []
+        self._waiting: list[tuple[tuple[Any, ...], asyncio.Future[Any]]] = []
         self._sender: asyncio.Task[None] | None = None
 
-    def ask(self, *command: Any) -> asyncio.Future[Any]:
+    def execute(self, *command: Any) -> asyncio.Future[Any]:
         """The store's answer to a command; failures are logged here and raised there."""
         answer: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
-        self._asked.append((command, answer))
+        self._waiting.append((command, answer))
         if self._sender is None or self._sender.done():
             self._sender = asyncio.create_task(self._send())
         return answer
 
-    def tell(self, *command: Any) -> None:
+    def execute_nowait(self, *command: Any) -> None:
         """Sends a command whose answer nobody waits for."""
-        self.ask(*command).add_done_callback(_unread)
+        self.execute(*command).add_done_callback(_unread)
 
     async def close(self) -> None:
-        """Closes the connection, after what is still to be said."""
+        """Closes the connection, after what is still to be sent."""
         if self._sender is not None:
             await self._sender
         await self._redis.aclose()
 
     async def _send(self) -> None:
-        while self._asked:
-            await asyncio.sleep(GATHER_S)
-            asked, self._asked = self._asked, []
-            answers: list[Any] = [ConnectionError("the store was not asked")] * len(asked)
+        while self._waiting:
+            await asyncio.sleep(BATCH_S)
+            batch, self._waiting = self._waiting, []
+            answers: list[Any] = [ConnectionError("the command was not sent")] * len(batch)
             try:
-                answers = await self._answers([command for command, _ in asked])
-            finally:  # whatever happens, nobody may wait for ever
-                _hand_out([answer for _, answer in asked], answers)
+                answers = await self._answers([command for command, _ in batch])
+            finally:  # whatever happens, nobody may wait forever
+                _deliver([answer for _, answer in batch], answers)
 
     async def _answers(self, commands: list[tuple[Any, ...]]) -> list[Any]:
         pipeline = self._redis.pipeline(transaction=False)
@@ -71,9 +71,9 @@ class BatchedRedis:
         return answers
 
 
-def _hand_out(waiting: list[asyncio.Future[Any]], answers: list[Any]) -> None:
+def _deliver(waiting: list[asyncio.Future[Any]], answers: list[Any]) -> None:
     for future, answer in zip(waiting, answers, strict=True):
-        if future.done():  # who asked was cancelled
+        if future.done():  # its caller was cancelled
             continue
         if isinstance(answer, Exception):
             future.set_exception(answer)

@@ -9,7 +9,7 @@ from typing import Any
 from buildarena_pipeline.catalog.models import ModelRegistry
 from buildarena_pipeline.errors import PermanentError
 from buildarena_worker.builtin import BuiltinClient
-from buildarena_worker.session.host import ModelClient
+from buildarena_worker.session.messages import ModelClient
 
 
 class ModelClients:
@@ -24,7 +24,7 @@ class ModelClients:
         self._registry = registry
         self._throttle_url = throttle_url
         self._clients: dict[str, ModelClient] = {}
-        self._guard = threading.Lock()
+        self._lock = threading.Lock()
 
     def for_config(self, model_config: Mapping[str, Any]) -> ModelClient:
         """The client for a job's model.
@@ -33,7 +33,7 @@ class ModelClients:
             PermanentError: The operator's registry lacks the model, or its key is not set.
         """
         name = str(model_config["name"])
-        with self._guard:
+        with self._lock:
             if name not in self._clients:
                 self._clients[name] = self._make(name)
             return self._clients[name]

@@ -12,7 +12,7 @@ class RetryPolicy:
     """How often and how long a request is tried.
 
     Attributes:
-        tries: Sendings at the most.
+        tries: Sendings at most.
         first_wait_s: Longest wait after the first failure; doubles with each.
         longest_wait_s: No wait is longer, whatever a provider asks for.
         timeout_s: Time for one sending, connection included.
@@ -26,8 +26,8 @@ class RetryPolicy:
     def wait_s(self, failures: int, headers: Mapping[str, str] | None, rng: random.Random) -> float:
         """How long to wait after this many failures.
 
-        What the provider asks for in Retry-After counts; else a random part of a doubling wait,
-        so that workers do not come back all at once.
+        What the provider asks for in Retry-After counts; otherwise a random part of a doubling
+        wait, so that workers do not come back all at once.
         """
         asked = _retry_after(headers)
         if asked is not None:

@@ -22,15 +22,15 @@ from typing import Any
 
 from buildarena_worker.providers.batched_redis import BatchedRedis
 
-START, LEAST, MOST = 64.0, 1.0, 2048.0
-HOLD_S = 30
+START, MIN_LIMIT, MAX_LIMIT = 64.0, 1.0, 2048.0
+SLOT_TTL_S = 30
 """A slot that was not renewed for so long is free again: its process died."""
 CALM_S = 2
 """Several complaints within this time count as one: they speak of the same crowd."""
 SPARE_S = 0.25
 """How long a free slot stays with its process: longer than a session takes for its next request."""
-ASK_AGAIN_S = 0.02, 0.1
-"""A refused request asks again after a random time between these."""
+RETRY_S = 0.02, 0.1
+"""A refused request tries again after a random time between these."""
 REFUSED_MS = 150
 """While one waits, which shows for this time, a new request waits its turn like it."""
 LIMIT_KEPT_S = 86400
@@ -52,9 +52,9 @@ _GIVE = f"""
 local limit = tonumber(redis.call('GET', KEYS[2]) or ARGV[3])
 if ARGV[2] == 'grow' then
   local step = redis.call('EXISTS', KEYS[4]) == 1 and 1 / limit or 1
-  limit = math.min({MOST}, limit + step)
+  limit = math.min({MAX_LIMIT}, limit + step)
 elseif ARGV[2] == 'shrink' and redis.call('SET', KEYS[3], 1, 'NX', 'EX', {CALM_S}) then
-  limit = math.max({LEAST}, limit / 2)
+  limit = math.max({MIN_LIMIT}, limit / 2)
   redis.call('SET', KEYS[4], 1, 'EX', {LIMIT_KEPT_S})
 end
 redis.call('SET', KEYS[2], tostring(limit), 'EX', {LIMIT_KEPT_S})
@@ -83,24 +83,24 @@ class Throttle:
         self._store = None if url is None else BatchedRedis(url)
         self._keys = [f"buildarena:throttle:{provider}:{part}" for part in _PARTS]
         self._start = start
-        self._held: set[str] = set()
+        self._taken: set[str] = set()
         self._spare: deque[tuple[str, float]] = deque()
         self._renewing: asyncio.Task[None] | None = None
 
     @asynccontextmanager
     async def slot(self) -> AsyncIterator[Slot]:
-        """Waits for a free slot and holds it inside the block; say there how it went."""
+        """Waits for a free slot and keeps it inside the block; say there how it went."""
         slot = Slot()
-        held = None if self._store is None else await self._take(self._store)
+        taken = None if self._store is None else await self._take(self._store)
         try:
             yield slot
         finally:
-            if held is not None and self._store is not None:
-                self._give(self._store, held, slot.verdict)
+            if taken is not None and self._store is not None:
+                self._give(self._store, taken, slot.verdict)
 
     async def limit(self) -> float:
         """The limit now."""
-        raw = None if self._store is None else await self._store.ask("GET", self._keys[1])
+        raw = None if self._store is None else await self._store.execute("GET", self._keys[1])
         return self._start if raw is None else float(raw)
 
     async def close(self) -> None:
@@ -111,8 +111,8 @@ class Throttle:
             self._renewing.cancel()
             with suppress(asyncio.CancelledError):
                 await self._renewing
-        if self._held:
-            self._store.tell("ZREM", self._keys[0], *self._held)
+        if self._taken:
+            self._store.execute_nowait("ZREM", self._keys[0], *self._taken)
         await self._store.close()
 
     async def _take(self, store: BatchedRedis) -> str | None:
@@ -120,50 +120,50 @@ class Throttle:
         slot_id, standing = uuid.uuid4().hex, "new"
         while not self._spare:
             try:
-                if await self._eval(store, _TAKE, slot_id, HOLD_S, self._start, standing):
-                    self._hold(store, slot_id)
+                if await self._eval(store, _TAKE, slot_id, SLOT_TTL_S, self._start, standing):
+                    self._add(store, slot_id)
                     return slot_id
             except Exception:  # noqa: BLE001 - the store has logged it
                 return None
             standing = "waiting"
-            await asyncio.sleep(random.uniform(*ASK_AGAIN_S))  # noqa: S311 - spreads waits
+            await asyncio.sleep(random.uniform(*RETRY_S))  # noqa: S311 - spreads waits
         return self._spare.pop()[0]
 
     def _give(self, store: BatchedRedis, slot_id: str, verdict: str) -> None:
         """Frees a slot soon; the request that had it does not wait for that."""
 
-        def heard(answer: asyncio.Future[Any]) -> None:
+        def received(answer: asyncio.Future[Any]) -> None:
             if answer.cancelled() or answer.exception() is not None or not answer.result():
-                self._held.discard(slot_id)
+                self._taken.discard(slot_id)
                 return
             loop = asyncio.get_running_loop()
             self._spare.append((slot_id, loop.time()))
             loop.call_later(SPARE_S, self._return_spares, store)
 
-        told = self._eval(store, _GIVE, slot_id, verdict, self._start)
-        told.add_done_callback(heard)
+        answer = self._eval(store, _GIVE, slot_id, verdict, self._start)
+        answer.add_done_callback(received)
 
     def _return_spares(self, store: BatchedRedis) -> None:
         """Gives back the slots that nobody has wanted for a while."""
         oldest = asyncio.get_running_loop().time() - SPARE_S
         while self._spare and self._spare[0][1] <= oldest:
             slot_id, _ = self._spare.popleft()
-            self._held.discard(slot_id)
-            store.tell("ZREM", self._keys[0], slot_id)
+            self._taken.discard(slot_id)
+            store.execute_nowait("ZREM", self._keys[0], slot_id)
 
-    def _hold(self, store: BatchedRedis, slot_id: str) -> None:
-        self._held.add(slot_id)
+    def _add(self, store: BatchedRedis, slot_id: str) -> None:
+        self._taken.add(slot_id)
         if self._renewing is None or self._renewing.done():
             self._renewing = asyncio.create_task(self._renew(store))
 
     async def _renew(self, store: BatchedRedis) -> None:
-        while self._held:
-            await asyncio.sleep(HOLD_S / 3)
+        while self._taken:
+            await asyncio.sleep(SLOT_TTL_S / 3)
             with suppress(Exception):  # the store has logged it; the next time may do
-                await self._eval(store, _RENEW, HOLD_S, *self._held)
+                await self._eval(store, _RENEW, SLOT_TTL_S, *self._taken)
 
     def _eval(self, store: BatchedRedis, script: str, *arguments: Any) -> asyncio.Future[Any]:
-        return store.ask("EVAL", script, len(self._keys), *self._keys, *arguments)
+        return store.execute("EVAL", script, len(self._keys), *self._keys, *arguments)
 
 
 class Slot:
@@ -172,10 +172,10 @@ class Slot:
     def __init__(self) -> None:
         self.verdict = "keep"
 
-    def went_well(self) -> None:
+    def succeeded(self) -> None:
         """The provider answered: it may take a little more."""
         self.verdict = "grow"
 
-    def was_too_much(self) -> None:
+    def rejected(self) -> None:
         """The provider complained of the load: halve it."""
         self.verdict = "shrink"

@@ -10,10 +10,10 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from buildarena_worker.errors import ConstructionFailedError
+from buildarena_pipeline.transcript import ActionResult
 from buildarena_worker.session.messages import Message, Reply, Tool, ToolCall
+from buildarena_worker.session.results import ConstructionFailedError
 from buildarena_worker.session.session import Session
-from buildarena_worker.session.transcript import ActionRecord
 
 TERMINATE = re.compile(r"\bTERMINATE\b")
 NO_REPLY = "(no answer)"
@@ -28,7 +28,7 @@ OBJECTION = Tool(
     },
 )
 
-Act = Callable[[ToolCall], ActionRecord]
+Act = Callable[[ToolCall], ActionResult]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,10 +49,10 @@ class Role:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Said:
+class _Utterance:
     role: str
     reply: Reply
-    actions: Sequence[ActionRecord]
+    actions: Sequence[ActionResult]
 
 
 class Dialogue:
@@ -60,37 +60,37 @@ class Dialogue:
 
     Args:
         session: The session it is part of.
-        stage: Stage name for journal and transcript.
-        opening: What every role is told first.
+        phase: The workflow's phase, for journal and transcript.
+        opening: What every role reads first.
         sub_structure: What it is about, if it is one part of the machine.
     """
 
     def __init__(
-        self, session: Session, *, stage: str, opening: str, sub_structure: str | None = None
+        self, session: Session, *, phase: str, opening: str, sub_structure: str | None = None
     ) -> None:
         self._session = session
-        self._stage = stage
+        self._phase = phase
         self._opening = opening
         self._sub_structure = sub_structure
-        self._thread: list[_Said] = []
+        self._thread: list[_Utterance] = []
 
-    def turn(self, role: Role, *, also: str = "") -> Reply:
+    def turn(self, role: Role, *, extra: str = "") -> Reply:
         """Lets a role speak and carries out the tool it calls.
 
         Args:
             role: Who speaks.
-            also: Something that only this role is told now.
+            extra: Something that only this role reads, and only now.
 
         Raises:
             ConstructionFailedError: The role raised an objection.
         """
         reply, entry = self._session.ask(
-            self._view(role, also), role.tools, stage=self._stage, role=role.name
+            self._view(role, extra), role.tools, phase=self._phase, role=role.name
         )
         actions = _carry_out(role, reply)
-        self._thread.append(_Said(role=role.name, reply=reply, actions=actions))
+        self._thread.append(_Utterance(role=role.name, reply=reply, actions=actions))
         self._session.record(
-            stage=self._stage,
+            phase=self._phase,
             sub_structure=self._sub_structure,
             role=role.name,
             reply=reply,
@@ -102,51 +102,52 @@ class Dialogue:
                 raise ConstructionFailedError("objection", f"{role.name}: {action.feedback}")
         return reply
 
-    def _view(self, role: Role, also: str) -> list[Message]:
+    def _view(self, role: Role, extra: str) -> list[Message]:
         messages = [Message(role="system", text=role.system)]
-        heard = [self._opening]
-        for said in self._thread:
-            if said.role == role.name:
-                messages += _flush(heard)
-                messages += _own(said)
-                heard = []
+        received = [self._opening]
+        for utterance in self._thread:
+            if utterance.role == role.name:
+                messages += _joined(received)
+                messages += _own(utterance)
+                received = []
             else:
-                heard.append(_heard(said))
-        if also:
-            heard.append(also)
-        return messages + _flush(heard)
+                received.append(_rendered(utterance))
+        if extra:
+            received.append(extra)
+        return messages + _joined(received)
 
 
-def _flush(heard: list[str]) -> list[Message]:
-    return [Message(role="user", text="\n\n".join(heard))] if heard else []
+def _joined(received: list[str]) -> list[Message]:
+    return [Message(role="user", text="\n\n".join(received))] if received else []
 
 
-def _own(said: _Said) -> list[Message]:
-    own = [Message(role="assistant", text=said.reply.text, calls=said.reply.calls)]
-    if not said.reply.text and not said.reply.calls:
+def _own(utterance: _Utterance) -> list[Message]:
+    own = [Message(role="assistant", text=utterance.reply.text, calls=utterance.reply.calls)]
+    if not utterance.reply.text and not utterance.reply.calls:
         own = [Message(role="assistant", text=NO_REPLY)]
     own += [
         Message(role="tool", text=action.feedback, call_id=call.id, tool=call.name)
-        for call, action in zip(said.reply.calls, said.actions, strict=True)
+        for call, action in zip(utterance.reply.calls, utterance.actions, strict=True)
     ]
     return own
 
 
-def _heard(said: _Said) -> str:
-    parts = [said.reply.text] if said.reply.text else []
+def _rendered(utterance: _Utterance) -> str:
+    parts = [utterance.reply.text] if utterance.reply.text else []
     parts += [
-        f"{action.name}({_spelled(action.arguments)}): {action.feedback}" for action in said.actions
+        f"{action.name}({_rendered_arguments(action.arguments)}): {action.feedback}"
+        for action in utterance.actions
     ]
-    return f"[{said.role}] " + ("\n".join(parts) or NO_REPLY)
+    return f"[{utterance.role}] " + ("\n".join(parts) or NO_REPLY)
 
 
-def _spelled(arguments: object) -> str:
+def _rendered_arguments(arguments: object) -> str:
     if isinstance(arguments, dict):
         return ", ".join(f"{name}={value!r}" for name, value in arguments.items())
     return str(arguments)
 
 
-def _carry_out(role: Role, reply: Reply) -> list[ActionRecord]:
+def _carry_out(role: Role, reply: Reply) -> list[ActionResult]:
     calls = reply.calls
     if not calls:
         return []
@@ -162,7 +163,7 @@ def _carry_out(role: Role, reply: Reply) -> list[ActionRecord]:
     if call.name == OBJECTION.name:
         reason = call.arguments.get("reason") if isinstance(call.arguments, dict) else None
         return [
-            ActionRecord(
+            ActionResult(
                 name=call.name,
                 arguments=call.arguments,
                 ok=True,
@@ -174,7 +175,7 @@ def _carry_out(role: Role, reply: Reply) -> list[ActionRecord]:
     return [role.act(call)]
 
 
-def _refused(call: ToolCall, reason: str, text: str) -> ActionRecord:
-    return ActionRecord(
+def _refused(call: ToolCall, reason: str, text: str) -> ActionResult:
+    return ActionResult(
         name=call.name, arguments=call.arguments, ok=False, reason=reason, feedback=text
     )

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
+from buildarena_store import Usage
 from buildarena_store.ids import content_hash
 
 
@@ -20,7 +21,7 @@ class ToolCall:
     Attributes:
         id: Ties the call to its result.
         name: Tool name, as the model spelled it.
-        arguments: What the model gave: an object, or any text that is no JSON object.
+        arguments: What the model gave: an object, or any text that is not a JSON object.
     """
 
     id: str
@@ -121,6 +122,37 @@ class Reply:
             for id_, name, arguments in data["calls"]
         )
         return Reply(text=data["text"], calls=calls, finish=data["finish"])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Answer:
+    """A reply with what it took to get it.
+
+    Attributes:
+        reply: The reply.
+        usage: What it cost.
+        latency_s: Time until it was there, retries included.
+        tries: Requests that it took.
+        provider_request_id: The provider's own id of it, if it gave one.
+    """
+
+    reply: Reply
+    usage: Usage
+    latency_s: float
+    tries: int = 1
+    provider_request_id: str | None = None
+
+
+class ModelClient(Protocol):
+    """Something that answers requests: a provider, a built-in model, a fake."""
+
+    def complete(self, request: Request) -> Answer:
+        """Asks the model.
+
+        Raises:
+            TransientError: The provider failed, after the declared retries.
+            PermanentError: The provider will never answer, for example a bad key.
+        """
 
 
 def _plain(message: Message) -> list[Any]:

@@ -8,11 +8,11 @@ from typing import Any
 from buildarena_benchmark import Task, broken_constraint
 from buildarena_geometry import Machine
 from buildarena_pipeline.catalog.prompt_packs import PromptPack
+from buildarena_pipeline.transcript import ActionResult, ModelTurn, Transcript
 from buildarena_store import JournalEntry
-from buildarena_worker.errors import ConstructionFailedError
-from buildarena_worker.session.host import SessionIO
+from buildarena_worker.session.host import SessionHost
 from buildarena_worker.session.messages import Message, Reply, Request, Tool
-from buildarena_worker.session.transcript import ActionRecord, Transcript, Turn
+from buildarena_worker.session.results import ConstructionFailedError
 
 
 class Session:
@@ -23,10 +23,10 @@ class Session:
         seed: The job's seed.
         model_config: The job's model configuration.
         pack: The sentences to use.
-        io: Where answers come from.
+        host: Where answers come from.
 
     Attributes:
-        additions: What is said behind the task's statement: an example, results of rounds.
+        additions: What follows the task's statement: an example, results of rounds.
         machine: What is being built.
     """
 
@@ -37,12 +37,12 @@ class Session:
         seed: int,
         model_config: Mapping[str, Any],
         pack: PromptPack,
-        io: SessionIO,
+        host: SessionHost,
     ) -> None:
         self.task = task
         self.seed = seed
         self.pack = pack
-        self.io = io
+        self.host = host
         self.transcript = Transcript()
         self.additions: list[str] = []
         self.machine: Machine | None = None
@@ -50,12 +50,12 @@ class Session:
 
     @property
     def statement(self) -> str:
-        """What the model is told of the task: the pack's or the task's words, and additions."""
-        told = self.pack.statements.get(self.task.name, self.task.statement)
-        return "\n\n".join([told.strip(), *self.additions])
+        """The task as the model reads it: the pack's or the task's words, and additions."""
+        statement = self.pack.statements.get(self.task.name, self.task.statement)
+        return "\n\n".join([statement.strip(), *self.additions])
 
     def ask(
-        self, messages: Sequence[Message], tools: Sequence[Tool], *, stage: str, role: str
+        self, messages: Sequence[Message], tools: Sequence[Tool], *, phase: str, role: str
     ) -> tuple[Reply, JournalEntry]:
         """The model's reply to a conversation.
 
@@ -65,7 +65,7 @@ class Session:
         request = Request(
             model_config=self._model_config, messages=messages, tools=tools, seed=self.seed
         )
-        entry = self.io.ask(request, stage=stage, role=role)
+        entry = self.host.ask(request, phase=phase, role=role)
         reply = Reply.from_json(entry.reply)
         if reply.finish == "context_overflow":
             raise ConstructionFailedError(
@@ -76,18 +76,18 @@ class Session:
     def record(
         self,
         *,
-        stage: str,
+        phase: str,
         sub_structure: str | None,
         role: str,
         reply: Reply,
         entry: JournalEntry,
-        actions: Sequence[ActionRecord] = (),
+        actions: Sequence[ActionResult] = (),
     ) -> None:
         """Adds a turn to the transcript."""
         self.transcript.turns.append(
-            Turn(
+            ModelTurn(
                 index=len(self.transcript.turns),
-                stage=stage,
+                stage=phase,
                 sub_structure=sub_structure,
                 role=role,
                 text=reply.text,

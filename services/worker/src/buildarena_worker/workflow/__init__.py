@@ -1,6 +1,6 @@
 """Workflows: who speaks when, from the task to the finished machine."""
 
-from buildarena_worker.workflow.base import SessionEnd, Workflow
+from buildarena_worker.workflow.base import Workflow
 from buildarena_worker.workflow.registry import Workflows
 
-__all__ = ["SessionEnd", "Workflow", "Workflows"]
+__all__ = ["Workflow", "Workflows"]

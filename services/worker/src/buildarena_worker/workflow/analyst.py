@@ -8,17 +8,17 @@ from typing import Any
 import numpy as np
 
 from buildarena_geometry import Machine
+from buildarena_pipeline.transcript import ActionResult, Turn
 from buildarena_simulation import Trajectory
 from buildarena_store import RolloutRecord
 from buildarena_worker.session.dialogue import Act, Dialogue, Role
 from buildarena_worker.session.messages import Tool, ToolCall
 from buildarena_worker.session.session import Session
-from buildarena_worker.session.transcript import ActionRecord, Turn
 from buildarena_worker.workflow.machine_tools import QUERIES, acting_on, tools_named
 
 ANALYST_TURNS = 20
 ROWS = 60
-"""Rows that one look at transcript or trajectory returns at the most."""
+"""Rows that one look at transcript or trajectory returns at most."""
 
 TRANSCRIPT = Tool(
     name="read_transcript",
@@ -67,7 +67,7 @@ def analyse(
         result: The rollout's result in words.
 
     Returns:
-        The advice, or what it said last when it used up its turns.
+        The advice, or its last text when it used up its turns.
     """
     opening = session.pack.say(
         "analyse",
@@ -76,7 +76,7 @@ def analyse(
         round=str(number),
         result=result,
     )
-    dialogue = Dialogue(session, stage="analyse", opening=opening)
+    dialogue = Dialogue(session, phase="analyse", opening=opening)
     role = Role(
         name="analyst",
         system=session.pack.roles["analyst"],
@@ -93,7 +93,7 @@ def analyse(
 
 
 def _reading(session: Session, machine: Machine, record: RolloutRecord) -> Act:
-    trajectory = session.io.trajectory(record)
+    trajectory = session.host.trajectory(record)
     turns = list(session.transcript.turns)
     on_machine = acting_on(machine)
     readers: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
@@ -102,7 +102,7 @@ def _reading(session: Session, machine: Machine, record: RolloutRecord) -> Act:
         BREAKS.name: lambda _: _breaks(trajectory),
     }
 
-    def act(call: ToolCall) -> ActionRecord:
+    def act(call: ToolCall) -> ActionResult:
         reader = readers.get(call.name)
         if reader is None:
             return on_machine(call)
@@ -112,7 +112,7 @@ def _reading(session: Session, machine: Machine, record: RolloutRecord) -> Act:
             text = reader(given)
         except (KeyError, TypeError, ValueError, OverflowError) as error:
             reason, text = "malformed_arguments", f"That can't be read: {error}."
-        return ActionRecord(
+        return ActionResult(
             name=call.name,
             arguments=call.arguments,
             ok=reason is None,
@@ -127,8 +127,8 @@ def _turns(turns: list[Turn], given: Mapping[str, Any]) -> str:
     first = max(0, int(given["first_turn"]))
     lines = []
     for turn in turns[first : first + ROWS]:
-        said = turn.text.replace("\n", " ")[:300]
-        lines.append(f"{turn.index} [{turn.role}] {said}")
+        text = turn.text.replace("\n", " ")[:300]
+        lines.append(f"{turn.index} [{turn.role}] {text}")
         lines += [f"  {a.name}({a.arguments}): {a.feedback[:300]}" for a in turn.actions]
     return "\n".join(lines) or f"There are {len(turns)} turns."
 

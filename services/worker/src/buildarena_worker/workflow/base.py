@@ -1,25 +1,12 @@
-"""What all workflows share: the form of a workflow, and the form of a session's end."""
+"""What all workflows share: their form, and what each asks of a machine."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Protocol
 
 from buildarena_geometry import Machine
-from buildarena_store import RolloutRecord
-from buildarena_worker.errors import ConstructionFailedError
+from buildarena_worker.session.results import ConstructionFailedError
 from buildarena_worker.session.session import Session
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SessionEnd:
-    """A session that came to its end.
-
-    Attributes:
-        best: The rollout that counts.
-    """
-
-    best: RolloutRecord
 
 
 class Workflow(Protocol):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from buildarena_geometry import Machine
 from buildarena_worker.session.session import Session
-from buildarena_worker.workflow.stages import solo_stage
+from buildarena_worker.workflow.phases import solo_phase
 
 
 class Builder:
@@ -14,4 +14,4 @@ class Builder:
 
     def build(self, session: Session) -> Machine:
         """Builds the machine of the session's task as one structure."""
-        return solo_stage(session)
+        return solo_phase(session)

@@ -1,4 +1,4 @@
-"""The control stage: the controller programs the keys, sees what came of it, and revises."""
+"""The control phase: the controller programs the keys, sees the result, and revises."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from typing import Any
 from buildarena_geometry import KeyPress, Machine
 from buildarena_pipeline.runtime.scoring import best_rollout
 from buildarena_store import RolloutRecord
-from buildarena_worker.errors import ConstructionFailedError
 from buildarena_worker.session.dialogue import Dialogue, Role
+from buildarena_worker.session.results import ConstructionFailedError
 from buildarena_worker.session.session import Session
 
-TRIALS = 3
-"""Trials of a transport session; the best counts. Source: the paper's task details."""
+ATTEMPTS = 3
+"""Attempts of a transport session; the best counts. Source: the paper's task details."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,19 +29,19 @@ class _ProgramError(ValueError):
 
 
 def drive(session: Session, machine: Machine, *, final: bool) -> RolloutRecord:
-    """Lets the controller drive the machine in up to three trials.
+    """Lets the controller drive the machine in up to three attempts.
 
     Args:
         session: The session.
         machine: What is to be driven.
-        final: Whether the job ends with the last trial.
+        final: Whether the job ends with the last attempt.
 
     Returns:
         The best rollout.
 
     Raises:
-        ConstructionFailedError: No trial had a usable program.
-        SuspendedError: A simulation must be done first.
+        ConstructionFailedError: No attempt had a usable program.
+        SessionEnded: A simulation must be done first.
     """
     pack, task = session.pack, session.task
     opening = pack.say(
@@ -51,12 +51,12 @@ def drive(session: Session, machine: Machine, *, final: bool) -> RolloutRecord:
         summary=machine.act("get_machine_summary", {}).text,
         powered=machine.act("review_powered_blocks", {}).text,
     )
-    dialogue = Dialogue(session, stage="control", opening=opening)
+    dialogue = Dialogue(session, phase="control", opening=opening)
     controller = Role(name="controller", system=pack.roles["controller"])
     records: list[RolloutRecord] = []
-    also, problem = "", ""
-    for trial in range(1, TRIALS + 1):
-        text = dialogue.turn(controller, also=also).text
+    extra, problem = "", ""
+    for attempt in range(1, ATTEMPTS + 1):
+        text = dialogue.turn(controller, extra=extra).text
         try:
             program = _read_program(machine, text)
         except _ProgramError as error:
@@ -64,19 +64,19 @@ def drive(session: Session, machine: Machine, *, final: bool) -> RolloutRecord:
             trajectory = "(not simulated)"
         else:
             session.machine = program.machine
-            record = session.io.simulate(
-                program.machine, program.presses, final=final and trial == TRIALS
+            record = session.host.simulate(
+                program.machine, program.presses, final=final and attempt == ATTEMPTS
             )
             records.append(record)
-            trajectory = _spelled(record.trace or ())
+            trajectory = _rendered(record.trace or ())
             result = (
                 f"{'success' if record.success else 'no success'}, "
                 f"{task.indicator.name} {record.indicator:.2f} {task.indicator.unit}"
             )
-        also = pack.say(
+        extra = pack.say(
             "control_again",
-            trial=str(trial),
-            trials=str(TRIALS),
+            trial=str(attempt),
+            trials=str(ATTEMPTS),
             trajectory=trajectory,
             result=result,
         )
@@ -114,7 +114,7 @@ def _read_program(machine: Machine, text: str) -> _Program:
     return _Program(machine=driven, presses=driven.control_sequence)
 
 
-def _spelled(trace: Sequence[Sequence[float]]) -> str:
+def _rendered(trace: Sequence[Sequence[float]]) -> str:
     return "\n".join(", ".join(f"{value:.2f}" for value in row) for row in trace) or "(none)"
 
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 from buildarena_geometry import Machine
 from buildarena_worker.session.session import Session
 from buildarena_worker.workflow.base import require_started
-from buildarena_worker.workflow.stages import (
-    assemble_stage,
-    build_stage,
-    draft_stage,
-    plan_stage,
-    refine_stage,
+from buildarena_worker.workflow.phases import (
+    assemble_phase,
+    build_phase,
+    draft_phase,
+    plan_phase,
+    refine_phase,
 )
 
 
@@ -24,14 +24,14 @@ class FiveRole:
 
     def build(self, session: Session) -> Machine:
         """Builds the machine of the session's task."""
-        plan = plan_stage(session)
+        plan = plan_phase(session)
         machines: dict[str, Machine] = {}
         for part in plan.sub_structures:
-            blueprint = draft_stage(session, plan, part)
-            machine = build_stage(session, part, blueprint)
+            blueprint = draft_phase(session, plan, part)
+            machine = build_phase(session, part, blueprint)
             require_started(machine)
-            refine_stage(session, machine, part, blueprint)
+            refine_phase(session, machine, part, blueprint)
             machines[part.name] = machine
         if len(machines) == 1:
             return next(iter(machines.values()))
-        return assemble_stage(session, plan, machines)
+        return assemble_phase(session, plan, machines)

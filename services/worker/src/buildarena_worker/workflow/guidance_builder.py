@@ -6,8 +6,8 @@ from buildarena_geometry import Machine
 from buildarena_worker.session.session import Session
 from buildarena_worker.workflow.base import require_started
 from buildarena_worker.workflow.machine_tools import modules_text
+from buildarena_worker.workflow.phases import build_phase, refine_phase
 from buildarena_worker.workflow.plan import SubStructure
-from buildarena_worker.workflow.stages import build_stage, refine_stage
 
 
 class GuidanceBuilder:
@@ -18,9 +18,9 @@ class GuidanceBuilder:
     def build(self, session: Session) -> Machine:
         """Builds the machine of the session's task as one structure."""
         task = session.task
-        told = f"{session.statement}\n\nModules\n\n{modules_text(task.constraints.modules)}"
-        part = SubStructure(name="machine", text=told)
-        machine = build_stage(session, part, told)
+        brief = f"{session.statement}\n\nModules\n\n{modules_text(task.constraints.modules)}"
+        part = SubStructure(name="machine", text=brief)
+        machine = build_phase(session, part, brief)
         require_started(machine)
-        refine_stage(session, machine, part, told)
+        refine_phase(session, machine, part, brief)
         return machine

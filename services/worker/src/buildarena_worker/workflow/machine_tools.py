@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from buildarena_geometry import Machine, Refused, load_catalogue, tool_definitions
+from buildarena_pipeline.transcript import ActionResult
 from buildarena_worker.session.dialogue import Act
 from buildarena_worker.session.messages import Tool, ToolCall
-from buildarena_worker.session.transcript import ActionRecord
 
 QUERIES = ("get_machine_summary", "get_block_details")
 BUILD = (
@@ -54,9 +54,9 @@ def tools_named(names: Sequence[str]) -> list[Tool]:
 def acting_on(machine: Machine) -> Act:
     """Carries out tool calls on a machine."""
 
-    def act(call: ToolCall) -> ActionRecord:
+    def act(call: ToolCall) -> ActionResult:
         outcome = machine.act(call.name, call.arguments)
-        return ActionRecord(
+        return ActionResult(
             name=call.name,
             arguments=call.arguments,
             ok=outcome.ok,

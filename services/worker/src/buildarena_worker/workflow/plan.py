@@ -62,10 +62,10 @@ def read_plan(text: str) -> Plan:
         if not name:
             raise PlanError(f"sub-structure {number} has no <name>")
         parts = [(part, _last(block, part)) for part in PARTS]
-        told = "\n".join(f"- {part.replace('_', ' ')}: {said}" for part, said in parts if said)
-        if not told:
+        lines = [f"- {part.replace('_', ' ')}: {text}" for part, text in parts if text]
+        if not lines:
             raise PlanError(f"sub-structure {name!r} says nothing but its name")
-        found.append(SubStructure(name=name, text=told))
+        found.append(SubStructure(name=name, text="\n".join(lines)))
     names = [sub_structure.name for sub_structure in found]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:

@@ -1,4 +1,4 @@
-"""Finds workflows by name: the built-in ones, and an operator's own."""
+"""Finds workflows by name: the built-in ones, and an operator's custom ones."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ class Workflows:
     """Workflows by name.
 
     Args:
-        own: Operator's workflows: name to ``module:Class`` or ``path/to/file.py:Class``.
+        custom: Operator's workflows: name to ``module:Class`` or ``path/to/file.py:Class``.
 
     Raises:
         StartupError: One of them can't be loaded; the message names it.
     """
 
-    def __init__(self, own: Mapping[str, str]) -> None:
+    def __init__(self, custom: Mapping[str, str]) -> None:
         self._makers: dict[str, Callable[[], Workflow]] = {kind.name: kind for kind in BUILTIN}
-        for source in workflow_sources(own).values():
+        for source in workflow_sources(custom).values():
             if source.place:
                 self._makers[source.name] = _load(source)
 
@@ -65,7 +65,7 @@ def _module(source: WorkflowSource) -> ModuleType:
     name = f"buildarena_workflow_{source.name.replace('-', '_')}"
     spec = importlib.util.spec_from_file_location(name, Path(source.place))
     if spec is None or spec.loader is None:
-        raise ImportError(f"{source.place} is no Python file")
+        raise ImportError(f"{source.place} is not a Python file")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module

@@ -1,20 +1,23 @@
 """From the task to the score: one round, or several when a closed loop is wanted.
 
-In a closed loop a failed round is followed by another, which is told what the simulator said,
+In a closed loop a failed round is followed by another, which reads what the simulator measured
 and, if an analyst is wanted, what that analyst advises.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from typing import TypeVar
 
 from buildarena_geometry import Machine
 from buildarena_pipeline.runtime.scoring import best_rollout
 from buildarena_store import RolloutRecord
-from buildarena_worker.errors import ConstructionFailedError
+from buildarena_worker.session.results import Failed, Finished, SessionEnded, SessionResult
 from buildarena_worker.session.session import Session
 from buildarena_worker.workflow.analyst import analyse
-from buildarena_worker.workflow.base import SessionEnd, Workflow
+from buildarena_worker.workflow.base import Workflow
 from buildarena_worker.workflow.control import drive
 from buildarena_worker.workflow.examples import example_for
 
@@ -24,7 +27,7 @@ class Loop:
     """What a session does besides one round of its workflow.
 
     Attributes:
-        rounds: Rounds at the most; 1 is the benchmark's single shot.
+        rounds: Rounds at most; 1 is the benchmark's single shot.
         analyst: Whether an analyst advises between rounds.
         one_shot: Whether an example construction is shown.
     """
@@ -34,54 +37,71 @@ class Loop:
     one_shot: bool = False
 
 
-def run_session(session: Session, workflow: Workflow, loop: Loop) -> SessionEnd:
+def run_session(session: Session, workflow: Workflow, loop: Loop) -> SessionResult:
     """Builds, checks and simulates, in as many rounds as wanted and needed.
 
-    Raises:
-        ConstructionFailedError: No round gave a machine that may be simulated.
-        SuspendedError: A simulation must be done first.
+    Returns:
+        How the session ended; whatever it is, the session's transcript and machine are as they
+        were then.
     """
     if loop.one_shot:
         session.additions.append(example_for(session.task, session.pack))
     records: list[RolloutRecord] = []
-    failure: ConstructionFailedError | None = None
+    failure: Failed | None = None
     for number in range(1, loop.rounds + 1):
         final = number == loop.rounds
-        try:
-            machine, record = _one_round(session, workflow, final=final)
-        except ConstructionFailedError as error:
-            failure = error
+        played = _caught(partial(_one_round, session, workflow, final=final))
+        if isinstance(played, Failed):
+            failure = played
             session.additions.append(
-                session.pack.say("round_failed", round=str(number), reason=str(error))
+                session.pack.say("round_failed", round=str(number), reason=failure.detail)
             )
             continue
-        records.append(record)
-        if record.success or final:
+        if not isinstance(played, _Round):
+            return played
+        records.append(played.record)
+        if played.record.success or final:
             break
-        _tell_result(session, machine, record, number, loop)
-    if not records:
-        assert failure is not None, "a loop has at least one round"  # noqa: S101 - ours
-        raise failure
-    return SessionEnd(best=best_rollout(records))
+        ended = _caught(partial(_report, session, played, number, loop))
+        if ended is not None:
+            return ended
+    if records:
+        return Finished(best=best_rollout(records))
+    assert failure is not None, "a loop has at least one round"  # noqa: S101 - ours
+    return failure
 
 
-def _one_round(
-    session: Session, workflow: Workflow, *, final: bool
-) -> tuple[Machine, RolloutRecord]:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Round:
+    machine: Machine
+    record: RolloutRecord
+
+
+Made = TypeVar("Made")
+
+
+def _caught(work: Callable[[], Made]) -> Made | SessionResult:
+    """What work returns, or the result that ended it: the one place where unwinding stops."""
+    try:
+        return work()
+    except SessionEnded as ended:
+        return ended.result
+
+
+def _one_round(session: Session, workflow: Workflow, *, final: bool) -> _Round:
     machine = workflow.build(session)
     session.check_machine(machine)
     if session.task.control == "agent":
-        return machine, drive(session, machine, final=final)
-    return machine, session.io.simulate(machine, None, final=final)
+        return _Round(machine=machine, record=drive(session, machine, final=final))
+    return _Round(machine=machine, record=session.host.simulate(machine, None, final=final))
 
 
-def _tell_result(
-    session: Session, machine: Machine, record: RolloutRecord, number: int, loop: Loop
-) -> None:
-    result = describe(session, record)
+def _report(session: Session, played: _Round, number: int, loop: Loop) -> None:
+    """Adds a failed round's result, and the analyst's advice, to what the next round reads."""
+    result = describe(session, played.record)
     session.additions.append(session.pack.say("round_result", round=str(number), result=result))
     if loop.analyst:
-        advice = analyse(session, machine, record, number=number, result=result)
+        advice = analyse(session, played.machine, played.record, number=number, result=result)
         session.additions.append(session.pack.say("advice", round=str(number), advice=advice))
 
 
@@ -93,7 +113,7 @@ def describe(session: Session, record: RolloutRecord) -> str:
         f"{indicator.name.capitalize()}: {record.indicator or 0.0:.2f} {indicator.unit}.".strip(),
     ]
     metrics = record.metrics or {}
-    known = [f"{name} {_spelled(value)}" for name, value in metrics.items() if value is not None]
+    known = [f"{name} {_rendered(value)}" for name, value in metrics.items() if value is not None]
     if known:
         parts.append("Measured: " + ", ".join(known) + ".")
     if record.flags:
@@ -101,5 +121,5 @@ def describe(session: Session, record: RolloutRecord) -> str:
     return " ".join(parts)
 
 
-def _spelled(value: object) -> str:
+def _rendered(value: object) -> str:
     return f"{value:.3g}" if isinstance(value, float) else str(value)

@@ -107,10 +107,10 @@ class Draft:
         """Twists a block by quarter turns until it points in a direction."""
         wanted = np.array(way, dtype=float)
         for angle in (0, 90, 180, 270):
-            trial = self.machine.copy()
-            if angle and not trial.act("twist_block", {"block_id": block, "angle": angle}).ok:
+            turned = self.machine.copy()
+            if angle and not turned.act("twist_block", {"block_id": block, "angle": angle}).ok:
                 continue
-            pointing = trial.blocks[block].pointing
+            pointing = turned.blocks[block].pointing
             if pointing is not None and pointing @ wanted > ALIGNED:
                 if angle:
                     self.do("twist_block", block_id=block, angle=angle)

@@ -21,7 +21,7 @@ from buildarena_worker.builtin.designs.drafting import (
 
 PAIRS: tuple[tuple[Direction, ...], ...] = (SIDES, (EAST, WEST), (NORTH, SOUTH))
 """On which sides the cannons sit, by seed: opposite ones, so that the thrust is balanced."""
-TOLD = "cannons round the starting block, spraying down, each with a torch two blocks below"
+CANNONS = "cannons round the starting block, spraying down, each with a torch two blocks below"
 
 
 def engine(seed: int) -> Design:
@@ -30,7 +30,9 @@ def engine(seed: int) -> Design:
     return Design(
         overall="A rocket engine: heated water cannons that push one way.",
         parts={
-            "engine": PartDesign(description=f"{len(sides)} {TOLD}", actions=_engine(sides, load=0))
+            "engine": PartDesign(
+                description=f"{len(sides)} {CANNONS}", actions=_engine(sides, load=0)
+            )
         },
     )
 
@@ -42,7 +44,7 @@ def rocket(seed: int) -> Design:
         overall="A rocket: a heated engine under a short nose, balanced about its axis.",
         parts={
             "rocket": PartDesign(
-                description=f"{len(sides)} {TOLD}; a nose of {load} blocks",
+                description=f"{len(sides)} {CANNONS}; a nose of {load} blocks",
                 actions=_engine(sides, load=load),
             )
         },
@@ -65,7 +67,7 @@ def framed_rocket(seed: int) -> Design:
     return Design(
         overall="A rocket of two sub-structures: an engine, and a frame above it on four braces.",
         parts={
-            "engine": PartDesign(description=f"{len(SIDES)} {TOLD}", actions=engine_actions),
+            "engine": PartDesign(description=f"{len(SIDES)} {CANNONS}", actions=engine_actions),
             "frame": PartDesign(
                 description=f"A flat cross with arms of {arm} blocks",
                 actions=tuple(frame.actions),

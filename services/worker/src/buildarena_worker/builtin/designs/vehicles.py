@@ -55,8 +55,10 @@ def _vehicle(
             wheels.append(draft.wheel(end, side))
     if deck is not None:
         _railed_deck(draft, middle, deck)
-    told = "no deck" if deck is None else f"a railed deck of {2 * deck[0] + 1} x {2 * deck[1] + 1}"
-    description = f"A spine of {length} blocks, two cross members with two wheels each, {told}"
+    carries = (
+        "no deck" if deck is None else f"a railed deck of {2 * deck[0] + 1} x {2 * deck[1] + 1}"
+    )
+    description = f"A spine of {length} blocks, two cross members with two wheels each, {carries}"
     return Design(
         overall="A vehicle on four powered wheels that steers by driving its sides apart.",
         parts={"vehicle": PartDesign(description=description, actions=tuple(draft.actions))},

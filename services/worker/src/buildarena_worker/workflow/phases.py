@@ -1,12 +1,12 @@
-"""The stages that workflows are made of."""
+"""The phases that workflows are made of."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
 from buildarena_geometry import Machine
-from buildarena_worker.errors import ConstructionFailedError
 from buildarena_worker.session.dialogue import OBJECTION, TERMINATE, Dialogue, Role
+from buildarena_worker.session.results import ConstructionFailedError
 from buildarena_worker.session.session import Session
 from buildarena_worker.workflow.machine_tools import (
     ASSEMBLE,
@@ -20,13 +20,13 @@ from buildarena_worker.workflow.plan import Plan, PlanError, SubStructure, read_
 
 DRAFT_TURNS = 50
 BUILD_TURNS = 300
-"""Replies a stage may take. Source: the paper's workflow appendix."""
+"""Replies a phase may take. Source: the paper's workflow appendix."""
 SHOWN = 200
 """Characters of a reply that a failure quotes."""
 
 
-def plan_stage(session: Session) -> Plan:
-    """Lets the planner write a plan, with one more try when it can't be read.
+def plan_phase(session: Session) -> Plan:
+    """Lets the planner write a plan, with a second attempt when it can't be read.
 
     Raises:
         ConstructionFailedError: No readable plan, or one with too many sub-structures.
@@ -38,37 +38,37 @@ def plan_stage(session: Session) -> Plan:
         statement=session.statement,
         modules=modules_text(task.constraints.modules),
     )
-    dialogue = Dialogue(session, stage="plan", opening=opening)
+    dialogue = Dialogue(session, phase="plan", opening=opening)
     planner = Role(name="planner", system=pack.roles["planner"])
-    also = ""
+    extra = ""
     for last in (False, True):
-        text = dialogue.turn(planner, also=also).text
+        text = dialogue.turn(planner, extra=extra).text
         try:
             plan = read_plan(text)
         except PlanError as error:
             if last:
-                told = f"{error}; the planner said {text[:SHOWN]!r}"
-                raise ConstructionFailedError("plan_unreadable", told) from error
-            also = pack.say("plan_again", error=str(error))
+                detail = f"{error}; the planner said {text[:SHOWN]!r}"
+                raise ConstructionFailedError("plan_unreadable", detail) from error
+            extra = pack.say("plan_again", error=str(error))
         else:
             _check_plan(session, plan)
             return plan
-    raise AssertionError("the second try returns or raises")
+    raise AssertionError("the second attempt returns or raises")
 
 
 def _check_plan(session: Session, plan: Plan) -> None:
     limits = session.task.constraints
     count = len(plan.sub_structures)
-    least, most = limits.min_sub_structures, limits.max_sub_structures
-    if not least <= count <= most:
-        allowed = str(most) if least == most else f"{least} to {most}"
+    fewest, most = limits.min_sub_structures, limits.max_sub_structures
+    if not fewest <= count <= most:
+        allowed = str(most) if fewest == most else f"{fewest} to {most}"
         raise ConstructionFailedError(
             "constraint_violated",
             f"the plan has {count} sub-structures, the task allows {allowed}",
         )
 
 
-def draft_stage(session: Session, plan: Plan, part: SubStructure) -> str:
+def draft_phase(session: Session, plan: Plan, part: SubStructure) -> str:
     """Lets drafter and reviewer alternate; the drafter's final drawing.
 
     Raises:
@@ -84,20 +84,20 @@ def draft_stage(session: Session, plan: Plan, part: SubStructure) -> str:
         name=part.name,
         sub_structure=part.text,
     )
-    dialogue = Dialogue(session, stage="draft", opening=opening, sub_structure=part.name)
+    dialogue = Dialogue(session, phase="draft", opening=opening, sub_structure=part.name)
     drafter = Role(name="drafter", system=pack.roles["drafter"])
     reviewer = Role(name="reviewer", system=pack.roles["reviewer"], tools=[OBJECTION])
     for turn in range(DRAFT_TURNS):
         if turn % 2 == 0:
             dialogue.turn(drafter)
         elif TERMINATE.search(dialogue.turn(reviewer).text):
-            return dialogue.turn(drafter, also=pack.say("blueprint", name=part.name)).text
+            return dialogue.turn(drafter, extra=pack.say("blueprint", name=part.name)).text
     raise ConstructionFailedError(
         "turn_limit", f"no agreed drawing of {part.name} within {DRAFT_TURNS} turns"
     )
 
 
-def build_stage(session: Session, part: SubStructure, blueprint: str) -> Machine:
+def build_phase(session: Session, part: SubStructure, blueprint: str) -> Machine:
     """Lets builder and guidance alternate, the builder first, until guidance ends it.
 
     Raises:
@@ -106,13 +106,13 @@ def build_stage(session: Session, part: SubStructure, blueprint: str) -> Machine
     machine = Machine()
     session.machine = machine
     opening = session.pack.say("build", task=session.task.name, name=part.name, blueprint=blueprint)
-    dialogue = Dialogue(session, stage="build", opening=opening, sub_structure=part.name)
+    dialogue = Dialogue(session, phase="build", opening=opening, sub_structure=part.name)
     builder, guidance = _builder(session, machine, BUILD), _guidance(session)
     _alternate(dialogue, (builder, guidance), ends=guidance, what=f"building {part.name}")
     return machine
 
 
-def refine_stage(session: Session, machine: Machine, part: SubStructure, blueprint: str) -> None:
+def refine_phase(session: Session, machine: Machine, part: SubStructure, blueprint: str) -> None:
     """Lets guidance and builder correct powered parts, when the machine has wheels."""
     if not any(block.module.kind == "wheel" for block in machine.blocks.values()):
         return
@@ -123,12 +123,12 @@ def refine_stage(session: Session, machine: Machine, part: SubStructure, bluepri
         blueprint=blueprint,
         summary=machine.act("get_machine_summary", {}).text,
     )
-    dialogue = Dialogue(session, stage="refine", opening=opening, sub_structure=part.name)
+    dialogue = Dialogue(session, phase="refine", opening=opening, sub_structure=part.name)
     builder, guidance = _builder(session, machine, REFINE), _guidance(session)
     _alternate(dialogue, (guidance, builder), ends=guidance, what=f"refining {part.name}")
 
 
-def assemble_stage(session: Session, plan: Plan, machines: Mapping[str, Machine]) -> Machine:
+def assemble_phase(session: Session, plan: Plan, machines: Mapping[str, Machine]) -> Machine:
     """Lets builder and guidance put the sub-structures together."""
     assembly = Machine(available=machines)
     session.machine = assembly
@@ -139,13 +139,13 @@ def assemble_stage(session: Session, plan: Plan, machines: Mapping[str, Machine]
     opening = session.pack.say(
         "assemble", task=session.task.name, overall=plan.overall, sub_structures=parts
     )
-    dialogue = Dialogue(session, stage="assemble", opening=opening)
+    dialogue = Dialogue(session, phase="assemble", opening=opening)
     builder, guidance = _builder(session, assembly, ASSEMBLE), _guidance(session)
     _alternate(dialogue, (builder, guidance), ends=guidance, what="assembling")
     return assembly
 
 
-def solo_stage(session: Session) -> Machine:
+def solo_phase(session: Session) -> Machine:
     """Lets one role design and build alone."""
     pack, task = session.pack, session.task
     machine = Machine()
@@ -156,7 +156,7 @@ def solo_stage(session: Session) -> Machine:
         statement=session.statement,
         modules=modules_text(task.constraints.modules),
     )
-    dialogue = Dialogue(session, stage="build", opening=opening)
+    dialogue = Dialogue(session, phase="build", opening=opening)
     role = Role(
         name="builder",
         system=pack.roles["solo"],

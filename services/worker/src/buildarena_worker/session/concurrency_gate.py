@@ -1,4 +1,4 @@
-"""The turnstile: few of a process' sessions work at once, the others wait outside."""
+"""The concurrency gate: few of a process' sessions work at once, the others wait."""
 
 from __future__ import annotations
 
@@ -7,22 +7,23 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 PLACES = 4
-"""More than one, because a session inside also waits for the database. With 2 a process of 200
+"""More than one, because a session that works also waits for the database. With 2 a process of 200
 sessions does less, with 6 no more."""
 PATIENCE_S = 1.0
-"""Whoever waited so long goes in all the same: nothing that happens inside can stop the others."""
+"""After so long a session starts without a place, so that a stuck one can't stop the others."""
 
 
 class ConcurrencyGate:
     """Keeps a crowd of sessions from all working at the same time.
 
     Model replies come in bursts. If all sessions that got one work at once, each is done only when
-    nearly all are, they ask their models at the same moment, and the next burst is no smaller.
-    One after the other, each asks as soon as it is done, the replies come spread, and nobody
-    waits. No session waits for long: this is about order, it guards nothing.
+    nearly all are, they ask their models at the same moment, and the next burst is as large. If
+    they work one after the other, each asks as soon as it is done, the replies come at different
+    times, and no session waits. The gate only puts sessions in order; nothing depends on it for
+    correctness.
 
     Args:
-        places: Sessions inside at once.
+        places: Sessions that work at once.
         patience_s: Longest wait for a place.
     """
 
@@ -33,7 +34,7 @@ class ConcurrencyGate:
 
     @contextmanager
     def acquired(self) -> Iterator[None]:
-        """Waits for a place and has it inside the block."""
+        """Waits for a place and keeps it inside the block."""
         self._enter()
         try:
             yield
@@ -42,7 +43,7 @@ class ConcurrencyGate:
 
     @contextmanager
     def released(self) -> Iterator[None]:
-        """Gives the thread's place away inside the block, in which it waits for something."""
+        """Gives up the thread's place inside the block, in which it waits for something."""
         self._leave()
         try:
             yield

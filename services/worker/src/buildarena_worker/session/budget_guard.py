@@ -7,9 +7,9 @@ from collections.abc import Callable
 from decimal import Decimal
 
 from buildarena_pipeline.runtime.active_lease import ActiveLease
-from buildarena_store import Budgets, Need, Shortage
-from buildarena_worker.errors import LeaseLostError, WorkerError
+from buildarena_store import Budgets, Need, Usage
 from buildarena_worker.session.messages import Request
+from buildarena_worker.session.results import BudgetExhausted, SessionEnded, Superseded
 
 WAIT_S = 0.2
 CHARACTERS_PER_TOKEN = 3
@@ -19,18 +19,6 @@ OUTPUT_TOKENS = 4096
 
 Price = Callable[[int, int], Decimal]
 """US dollars for input and output tokens."""
-
-
-class BudgetUsedUpError(WorkerError):
-    """A budget can't pay for the job's next request.
-
-    Attributes:
-        shortage: Which budget, and what is lacking.
-    """
-
-    def __init__(self, shortage: Shortage) -> None:
-        super().__init__(shortage.detail)
-        self.shortage = shortage
 
 
 class BudgetGuard:
@@ -48,22 +36,25 @@ class BudgetGuard:
         self._active = active
         self._price = price
 
-    def __call__(self, request: Request) -> None:
+    def reserve(self, request: Request) -> None:
         """Reserves what a request may cost; waits while open requests may give back enough.
 
         Raises:
-            BudgetUsedUpError: No budget is left for it.
-            LeaseLostError: The lease ended while it waited.
+            SessionEnded: No budget is left for it, or the lease ended while it waited.
         """
         if not self._active.budgeted:
             return
         need = self._need(request)
         while (shortage := self._budgets.reserve(self._active.lease, need)) is not None:
             if not shortage.temporary:
-                raise BudgetUsedUpError(shortage)
+                raise SessionEnded(BudgetExhausted(shortage=shortage))
             if self._active.lost:
-                raise LeaseLostError("the lease ended while the job waited for its budget")
+                raise SessionEnded(Superseded())
             time.sleep(WAIT_S)
+
+    def charge_lost(self, usage: Usage) -> None:
+        """Counts a reply that was paid for but came after the lease had ended."""
+        self._budgets.charge_lost(self._active.lease, usage)
 
     def _need(self, request: Request) -> Need:
         given = request.model_config["decoding"].get("max_tokens")

@@ -1,0 +1,59 @@
+"""What can go wrong with one request to a provider, in words of our own for all wires."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from enum import StrEnum
+
+
+class Failure(StrEnum):
+    """Kinds of failures; what follows from each is decided in `provider`."""
+
+    OUTAGE = "outage"
+    """The provider can't be reached, is overloaded, or answers nonsense: worth another try."""
+    CONTEXT_OVERFLOW = "context_overflow"
+    """The conversation is longer than the model's context: the model's own failure."""
+    CONTENT_FILTER = "content_filter"
+    """The provider's filter stopped the request: the model's own failure as well."""
+    BAD_CREDENTIALS = "bad_credentials"
+    MODEL_NOT_FOUND = "model_not_found"
+    QUOTA_EXCEEDED = "quota_exceeded"
+    REQUEST_REFUSED = "request_refused"
+    """Anything else that the provider will refuse again."""
+
+
+RETRIED_STATUS = frozenset({408, 409, 425, 429, 500, 502, 503, 504, 520, 522, 524, 529})
+
+
+def failure_of_status(status: int) -> Failure:
+    """What an HTTP status means when nothing else is known."""
+    if status in {401, 403}:
+        return Failure.BAD_CREDENTIALS
+    if status == 404:  # noqa: PLR2004 - HTTP's not found
+        return Failure.MODEL_NOT_FOUND
+    if status == 402:  # noqa: PLR2004 - HTTP's payment required
+        return Failure.QUOTA_EXCEEDED
+    return Failure.OUTAGE if status in RETRIED_STATUS else Failure.REQUEST_REFUSED
+
+
+class ProviderError(Exception):
+    """A provider did not answer a request.
+
+    Attributes:
+        failure: What kind of failure it is.
+        overloaded: Whether the provider said that it gets too many requests.
+        headers: The answer's headers in lower case, if there was an answer.
+    """
+
+    def __init__(
+        self,
+        message: str,
+        failure: Failure,
+        *,
+        overloaded: bool = False,
+        headers: Mapping[str, str] | None = None,
+    ) -> None:
+        super().__init__(message)
+        self.failure = failure
+        self.overloaded = overloaded
+        self.headers = headers

@@ -1,0 +1,230 @@
+"""Anthropic's and Google's wires through pydantic-ai and the providers' own libraries."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable, Sequence
+from itertools import cycle
+from typing import Any
+
+from pydantic_ai.direct import model_request
+from pydantic_ai.exceptions import (
+    ContentFilterError,
+    ModelAuthenticationError,
+    ModelContextWindowExceededError,
+    ModelHTTPError,
+    ModelNotFoundError,
+    ModelOverloadedError,
+    ModelQuotaExceededError,
+    ModelRateLimitError,
+)
+from pydantic_ai.messages import (
+    ModelMessage,
+    ModelRequest,
+    ModelRequestPart,
+    ModelResponse,
+    ModelResponsePart,
+    SystemPromptPart,
+    TextPart,
+    ToolCallPart,
+    ToolReturnPart,
+    UserPromptPart,
+)
+from pydantic_ai.models import Model, ModelRequestParameters
+from pydantic_ai.settings import ModelSettings
+from pydantic_ai.tools import ToolDefinition
+
+from buildarena_pipeline.catalog.models import ModelEntry, ProviderEntry
+from buildarena_worker.providers.answered import (
+    Answered,
+    TokenCounts,
+    arguments_of,
+    arguments_text,
+)
+from buildarena_worker.providers.failures import RETRIED_STATUS, Failure, ProviderError
+from buildarena_worker.session.messages import Message, Reply, Request, Tool, ToolCall
+
+POOLS = 16
+"""Connection pools per model over httpx: it looks at all connections of a pool for each request,
+so that many small pools carry hundreds of open requests at less cost than one large one."""
+FINISH = {"tool_call": "stop", None: "stop"}
+FAILURES: tuple[tuple[type[Exception], Failure], ...] = (
+    (ModelContextWindowExceededError, Failure.CONTEXT_OVERFLOW),
+    (ContentFilterError, Failure.CONTENT_FILTER),
+    (ModelAuthenticationError, Failure.BAD_CREDENTIALS),
+    (ModelNotFoundError, Failure.MODEL_NOT_FOUND),
+    (ModelQuotaExceededError, Failure.QUOTA_EXCEEDED),
+)
+
+Connected = tuple[Model, Callable[[], Awaitable[Any]]]
+"""A model with connections of its own, and how to close them."""
+
+
+class LibrarySender:
+    """Sends through pydantic-ai and the provider's library.
+
+    Args:
+        models: One model several times.
+        takes_parallel_tool_calls: Whether the provider lets parallel tool calls be turned off.
+    """
+
+    def __init__(self, models: Sequence[Connected], *, takes_parallel_tool_calls: bool) -> None:
+        self._models = cycle([model for model, _ in models])
+        self._closers = [close for _, close in models]
+        self._takes_parallel_tool_calls = takes_parallel_tool_calls
+
+    async def send(self, request: Request) -> Answered:
+        """The model's answer to a conversation.
+
+        Raises:
+            ProviderError: The provider says no, can't be reached, or answers nonsense.
+        """
+        try:
+            response = await model_request(
+                next(self._models),
+                to_wire(request.messages),
+                model_settings=self._settings(request),
+                model_request_parameters=request_parameters(request.tools),
+            )
+        except Exception as error:
+            raise _translated(error) from error
+        return from_wire(response)
+
+    async def close(self) -> None:
+        """Closes the connections."""
+        for close in self._closers:
+            await close()
+
+    def _settings(self, request: Request) -> ModelSettings:
+        decoding = request.model_config["decoding"]
+        settings = ModelSettings(seed=request.seed)
+        if "temperature" in decoding:
+            settings["temperature"] = decoding["temperature"]
+        if "top_p" in decoding:
+            settings["top_p"] = decoding["top_p"]
+        if "max_tokens" in decoding:
+            settings["max_tokens"] = decoding["max_tokens"]
+        if request.tools and self._takes_parallel_tool_calls:
+            settings["parallel_tool_calls"] = False
+        return settings
+
+
+def anthropic_sender(entry: ModelEntry, provider: ProviderEntry, key: str) -> LibrarySender:
+    """The sender of a model behind Anthropic's API."""
+    models = [_anthropic(entry, provider, key) for _ in range(POOLS)]
+    return LibrarySender(models, takes_parallel_tool_calls=True)
+
+
+def google_sender(entry: ModelEntry, provider: ProviderEntry, key: str) -> LibrarySender:
+    """The sender of a model behind Google's API."""
+    models = [_google(entry, provider, key) for _ in range(POOLS)]
+    return LibrarySender(models, takes_parallel_tool_calls=False)
+
+
+def _anthropic(entry: ModelEntry, provider: ProviderEntry, key: str) -> Connected:
+    from anthropic import AsyncAnthropic
+    from pydantic_ai.models.anthropic import AnthropicModel
+    from pydantic_ai.providers.anthropic import AnthropicProvider
+
+    client = AsyncAnthropic(base_url=provider.base_url, api_key=key, max_retries=0)
+    model = AnthropicModel(entry.model, provider=AnthropicProvider(anthropic_client=client))
+    return model, client.close
+
+
+def _google(entry: ModelEntry, provider: ProviderEntry, key: str) -> Connected:
+    from httpx2 import AsyncClient
+    from pydantic_ai.models.google import GoogleModel
+    from pydantic_ai.providers.google import GoogleProvider
+
+    http = AsyncClient(timeout=None)  # the retry policy's own timeout rules
+    google = GoogleProvider(api_key=key, base_url=provider.base_url, http_client=http)
+    return GoogleModel(entry.model, provider=google), http.aclose
+
+
+def _translated(error: Exception) -> ProviderError:
+    """A library's error in our words."""
+    status = error.status_code if isinstance(error, ModelHTTPError) else None
+    named = [failure for kind, failure in FAILURES if isinstance(error, kind)]
+    refused = status is not None and status not in RETRIED_STATUS
+    failure = (*named, Failure.REQUEST_REFUSED if refused else Failure.OUTAGE)[0]
+    return ProviderError(
+        f"{type(error).__name__}: {error}",
+        failure,
+        overloaded=isinstance(error, (ModelRateLimitError, ModelOverloadedError)),
+        headers=error.headers if isinstance(error, ModelHTTPError) else None,
+    )
+
+
+def to_wire(messages: Sequence[Message]) -> list[ModelMessage]:
+    """The conversation in pydantic-ai's form; adjacent messages of one side become one."""
+    wire: list[ModelMessage] = []
+    requests: list[ModelRequestPart] = []
+    for message in messages:
+        if message.role == "assistant":
+            if requests:
+                wire.append(ModelRequest(parts=requests))
+                requests = []
+            wire.append(ModelResponse(parts=_response_parts(message)))
+        else:
+            requests.append(_request_part(message))
+    if requests:
+        wire.append(ModelRequest(parts=requests))
+    return wire
+
+
+def _request_part(message: Message) -> ModelRequestPart:
+    if message.role == "system":
+        return SystemPromptPart(content=message.text)
+    if message.role == "tool":
+        return ToolReturnPart(
+            tool_name=message.tool or "",
+            content=message.text,
+            tool_call_id=message.call_id or "",
+        )
+    return UserPromptPart(content=message.text)
+
+
+def _response_parts(message: Message) -> list[ModelResponsePart]:
+    parts: list[ModelResponsePart] = []
+    if message.text:
+        parts.append(TextPart(content=message.text))
+    parts += [
+        ToolCallPart(tool_name=call.name, args=arguments_text(call), tool_call_id=call.id)
+        for call in message.calls
+    ]
+    return parts
+
+
+def request_parameters(tools: Sequence[Tool]) -> ModelRequestParameters:
+    """The tools in pydantic-ai's form."""
+    return ModelRequestParameters(
+        function_tools=[
+            ToolDefinition(
+                name=tool.name,
+                description=tool.description,
+                parameters_json_schema=dict(tool.parameters),
+            )
+            for tool in tools
+        ],
+        allow_text_output=True,
+    )
+
+
+def from_wire(response: ModelResponse) -> Answered:
+    """An answer in our form."""
+    text = "".join(part.content for part in response.parts if isinstance(part, TextPart))
+    calls = tuple(
+        ToolCall(id=part.tool_call_id, name=part.tool_name, arguments=arguments_of(part.args))
+        for part in response.parts
+        if isinstance(part, ToolCallPart)
+    )
+    finish, used = response.finish_reason, response.usage
+    return Answered(
+        reply=Reply(text=text, calls=calls, finish=FINISH.get(finish, finish or "stop")),
+        tokens=TokenCounts(
+            input=used.input_tokens,
+            output=used.output_tokens,
+            cached=used.cache_read_tokens,
+            reasoning=int(used.details.get("reasoning_tokens", 0)) if used.details else 0,
+        ),
+        response_id=response.provider_response_id,
+    )

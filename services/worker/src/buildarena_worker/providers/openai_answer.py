@@ -1,0 +1,193 @@
+"""Answers in OpenAI's chat completions: replies, what they used, and errors.
+
+Written from OpenAI's API reference, and lenient where other providers of this wire differ. What
+each answer means is compared with kept ones in ``tests/worker/test_openai_answers.py``.
+"""
+
+from __future__ import annotations
+
+import json
+import uuid
+from collections.abc import Mapping
+from contextlib import suppress
+from http import HTTPStatus
+from typing import Any
+
+from genai_prices.data_snapshot import get_snapshot
+
+from buildarena_worker.providers.answered import Answered, TokenCounts, arguments_of
+from buildarena_worker.providers.failures import Failure, ProviderError, failure_of_status
+from buildarena_worker.session.messages import Reply, ToolCall
+
+FINISH = {"length": "length", "content_filter": "content_filter"}
+"""Reasons to stop that say more than that the model was done."""
+THINKING, THOUGHT = "<think>", "</think>"
+"""Some models write their reasoning into the text, between these."""
+QUOTA = frozenset(
+    {
+        "insufficient_quota",
+        "billing_hard_limit_reached",
+        "credit_balance_exhausted",
+        "organization_spend_limit_exceeded",
+        "project_spend_limit_exceeded",
+        "organization_usage_limit_exceeded",
+    }
+)
+"""Codes for an account without means, which come with the status of a rate limit.
+Source: OpenAI's guide to error codes."""
+CODES = {
+    "context_length_exceeded": Failure.CONTEXT_OVERFLOW,
+    "model_not_found": Failure.MODEL_NOT_FOUND,
+    "invalid_api_key": Failure.BAD_CREDENTIALS,
+}
+OVERFLOW = ("maximum context length", "reduce the length of the messages")
+"""How providers that send no code say that the conversation is too long: OpenRouter, vLLM, Groq."""
+OVERLOADED = ("overloaded", "over capacity")
+TOO_MANY, UNAVAILABLE = (429, 529), 503
+"""HTTP's statuses for a limit of requests, and for being unavailable for whatever reason."""
+
+
+class AnswerReader:
+    """Reads the answers of one provider.
+
+    Args:
+        url: Where its API is; providers count tokens in different ways.
+    """
+
+    def __init__(self, url: str) -> None:
+        snapshot = get_snapshot()
+        self._counters = [snapshot.find_provider(None, "openai", None)]
+        with suppress(LookupError):
+            self._counters.insert(0, snapshot.find_provider(None, None, url))
+
+    def read(self, status: int, headers: Mapping[str, str], text: bytes) -> Answered:
+        """What an answer means.
+
+        Raises:
+            ProviderError: It is an error, or not an answer to a chat.
+        """
+        if status >= HTTPStatus.BAD_REQUEST:
+            raise read_error(status, headers, text)
+        try:
+            return self._answered(json.loads(text))
+        except (ValueError, KeyError, IndexError, TypeError, AttributeError) as error:
+            raise ProviderError(
+                f"the answer (HTTP {status}) is not a chat completion: "
+                f"{type(error).__name__}: {error}",
+                Failure.OUTAGE,
+            ) from error
+
+    def _answered(self, answer: Any) -> Answered:
+        choice, response_id, _ = answer["choices"][0], answer["id"], answer["model"]
+        message, finish = choice["message"], choice.get("finish_reason")
+        if finish is not None and not (finish and isinstance(finish, str)):
+            raise ValueError(f"finish_reason is {finish!r}")
+        tokens = self._tokens(answer.get("usage") or {})
+        if refusal := message.get("refusal"):
+            reply = Reply(text=refusal[:0], finish="content_filter")
+        else:
+            calls = tuple(_call(call) for call in message.get("tool_calls") or ())
+            text = _spoken(_content(message.get("content") or ""))
+            reply = Reply(text=text, calls=calls, finish=FINISH.get(finish or "stop", "stop"))
+        return Answered(
+            reply=reply,
+            tokens=tokens,
+            response_id=None if response_id is None else str(response_id),
+        )
+
+    def _tokens(self, usage: Mapping[str, Any]) -> TokenCounts:
+        """What was used; nothing where the provider's figures can't be read."""
+        details = usage.get("completion_tokens_details") or {}
+        reasoning = details.get("reasoning_tokens")
+        reasoning = reasoning if isinstance(reasoning, int) else 0
+        given = {"model": "", "usage": _without_nulls(usage)}
+        for counter in self._counters:
+            # Not every provider that is known is known to speak this wire.
+            with suppress(ValueError, LookupError, TypeError):
+                _, used = counter.extract_usage(given, api_flavor="chat")
+                counts = used.input_tokens, used.output_tokens, used.cache_read_tokens
+                sent, received, cached = (n if isinstance(n, int) else 0 for n in counts)
+                return TokenCounts(input=sent, output=received, cached=cached, reasoning=reasoning)
+        return TokenCounts(reasoning=reasoning)
+
+
+def _without_nulls(usage: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        name: _without_nulls(value) if isinstance(value, dict) else value
+        for name, value in usage.items()
+        if value is not None
+    }
+
+
+def _content(content: Any) -> str:
+    """The text of a message; some providers send it in parts."""
+    if isinstance(content, str):
+        return content
+    if not isinstance(content, list):
+        raise TypeError(f"content is {type(content).__name__}")
+    texts = [part if isinstance(part, str) else part.get("text") for part in content]
+    return "".join(text for text in texts if isinstance(text, str))
+
+
+def _spoken(text: str) -> str:
+    """The text without the thoughts that are marked in it; thoughts without an end are text."""
+    spoken = ""
+    while THINKING in text:
+        before, text = text.split(THINKING, 1)
+        spoken += before
+        if THOUGHT not in text:
+            return spoken + text
+        text = text.split(THOUGHT, 1)[1]
+    return spoken + text
+
+
+def _call(call: Mapping[str, Any]) -> ToolCall:
+    id_, function = call["id"], call["function"]
+    if call["type"] != "function" or id_ is None:
+        raise ValueError(f"a tool call of type {call['type']!r} with id {id_!r}")
+    return ToolCall(
+        id=id_ or f"call_{uuid.uuid4().hex}",
+        name=function["name"],
+        arguments=arguments_of(function["arguments"]),
+    )
+
+
+def read_error(status: int, headers: Mapping[str, str], text: bytes) -> ProviderError:
+    """What an error answer means: by its code, its words, or its status."""
+    words = text.decode(errors="replace")
+    try:
+        body = json.loads(words)
+    except ValueError:
+        body = None
+    error = body.get("error", body) if isinstance(body, dict) else None
+    error = error if isinstance(error, dict) else {}
+    names = [name for name in (error.get("code"), error.get("type")) if isinstance(name, str)]
+    overloaded = any(phrase in name.lower() for phrase in OVERLOADED for name in names)
+    failure = failure_of_status(status)
+    if not QUOTA.isdisjoint(names):
+        failure, overloaded = Failure.QUOTA_EXCEEDED, False
+    elif error.get("code") == "context_length_exceeded" or _says(words, OVERFLOW):
+        failure, overloaded = Failure.CONTEXT_OVERFLOW, False
+    elif overloaded:
+        failure = failure if failure is Failure.OUTAGE else Failure.REQUEST_REFUSED
+    elif names[:1] and error.get("code") in CODES:
+        failure = CODES[error["code"]]
+    elif status == HTTPStatus.FORBIDDEN and _flagged(error.get("metadata")):
+        failure = Failure.REQUEST_REFUSED
+    else:
+        overloaded = status in TOO_MANY or (status == UNAVAILABLE and _says(words, OVERLOADED))
+    message = error.get("message") or words.strip() or "no reason given"
+    return ProviderError(
+        f"HTTP {status}: {message}", failure, overloaded=overloaded, headers=headers
+    )
+
+
+def _says(text: str, phrases: tuple[str, ...]) -> bool:
+    return any(phrase in text.lower() for phrase in phrases)
+
+
+def _flagged(metadata: Any) -> bool:
+    """Whether an error comes from a moderation: OpenRouter gives that the status of a bad key."""
+    return isinstance(metadata, dict) and not metadata.keys().isdisjoint(
+        {"flagged_input", "reasons"}
+    )

@@ -1,0 +1,49 @@
+"""What a session has used, and the job's limits on it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from decimal import Decimal
+from typing import Any
+
+from buildarena_store import JournalEntry, Usage
+from buildarena_worker.session.results import LimitReached, SessionEnded
+
+
+@dataclass(slots=True)
+class Spending:
+    """What a session used so far, replayed answers included.
+
+    Attributes:
+        limits: The job's limits by name.
+        usage: Requests, tokens and money.
+        seconds: Time that its model took.
+    """
+
+    limits: Mapping[str, Any]
+    usage: Usage = field(default_factory=Usage)
+    seconds: float = 0.0
+
+    def add(self, entry: JournalEntry) -> None:
+        """Counts an answer."""
+        self.usage += entry.usage
+        self.seconds += entry.latency_s
+
+    def require_room(self) -> None:
+        """Checks that the session may ask once more.
+
+        Raises:
+            SessionEnded: A limit is reached.
+        """
+        spent: dict[str, float | Decimal] = {
+            "max_requests": self.usage.requests,
+            "max_tokens": self.usage.input_tokens + self.usage.output_tokens,
+            "max_cost_usd": self.usage.cost_usd,
+            "max_seconds": self.seconds,
+        }
+        for name, value in spent.items():
+            limit = self.limits.get(name)
+            if limit is not None and float(value) >= float(limit):
+                detail = f"{name} is {limit}, the session used {value}"
+                raise SessionEnded(LimitReached(limit=name, detail=detail))

@@ -1,0 +1,48 @@
+"""Puts the construct worker's parts together from a process' connections."""
+
+from __future__ import annotations
+
+from buildarena_pipeline.catalog.models import ModelRegistry
+from buildarena_pipeline.catalog.prompt_packs import PromptPacks
+from buildarena_pipeline.runtime.context import Context
+from buildarena_worker.construct import ConstructHandler
+from buildarena_worker.providers import ModelClients
+from buildarena_worker.session.concurrency_gate import ConcurrencyGate
+from buildarena_worker.verify import VerificationRunner, Verifier
+from buildarena_worker.workflow import Workflows
+
+
+def construct_handler(context: Context, registry: ModelRegistry) -> ConstructHandler:
+    """What does the construct stage.
+
+    Args:
+        context: The process' connections.
+        registry: Models and providers.
+    """
+    return ConstructHandler(
+        store=context.store,
+        artifacts=context.artifacts,
+        queues=context.queues,
+        tasks=context.tasks,
+        registry=registry,
+        clients=ModelClients(registry, context.settings.broker_url),
+        packs=PromptPacks(context.settings.prompt_packs),
+        workflows=Workflows(context.settings.workflows),
+        gate=ConcurrencyGate(),
+    )
+
+
+def verifier(context: Context) -> Verifier:
+    """What verifies finished jobs."""
+    return Verifier(
+        store=context.store,
+        artifacts=context.artifacts,
+        tasks=context.tasks,
+        packs=PromptPacks(context.settings.prompt_packs),
+        workflows=Workflows(context.settings.workflows),
+    )
+
+
+def verification_runner(context: Context) -> VerificationRunner:
+    """What does the verifications that messages speak of."""
+    return VerificationRunner(context.store.verifications, verifier(context))

@@ -1,0 +1,111 @@
+"""Requests carry what kept ones carried, for many models, settings and sets of tools."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from buildarena_worker.providers.openai_request import RequestWriter
+from buildarena_worker.session.dialogue import OBJECTION
+from buildarena_worker.session.messages import Message, Request, Tool, ToolCall
+from buildarena_worker.workflow.analyst import BREAKS, TRAJECTORY, TRANSCRIPT
+from buildarena_worker.workflow.machine_tools import ASSEMBLE, BUILD, QUERIES, REFINE, tools_named
+
+KEPT = json.loads((Path(__file__).parents[1] / "data/openai/requests.json").read_text())
+CALL = ToolCall(id="c1", name="start", arguments={"block": "Wüfel", "n": 1.5})
+TALK = [
+    Message(role="system", text="Build."),
+    Message(role="user", text="Go on \N{EN DASH} please"),
+    Message(role="assistant", text="I start.", calls=(CALL,)),
+    Message(role="tool", text="[OK]", call_id="c1", tool="start"),
+    Message(role="user", text="more"),
+    Message(role="user", text="and more"),
+    Message(role="assistant", text="", calls=(ToolCall(id="c2", name="x", arguments="no"),)),
+    Message(role="tool", text="[ERR]", call_id="c2", tool="x"),
+    Message(role="assistant", text="(no answer)"),
+    Message(role="assistant", text=""),
+    Message(role="user", text="end"),
+]
+DECODING: dict[str, dict[str, Any]] = {
+    "plain": {},
+    "sampled": {"temperature": 0.5, "top_p": 0.9},
+    "cool": {"temperature": 0},
+    "short": {"max_tokens": 100},
+    "all": {"temperature": 0.7, "top_p": 0.95, "max_tokens": 4096},
+}
+
+
+def closed(**properties: Any) -> dict[str, Any]:
+    """An object with these properties and no others."""
+    required = list(properties)
+    return {
+        "type": "object",
+        "properties": properties,
+        "required": required,
+        "additionalProperties": False,
+    }
+
+
+TEXT, NUMBER, NUMBERS = {"type": "string"}, {"type": "number"}, {"type": "number"}
+POINT = {**closed(x=NUMBER), "title": "P"}
+ODD = {
+    "bare": {"type": "object"},
+    "titled": {
+        "$schema": "http://json-schema.org/draft-07/schema#",
+        "title": "T",
+        **closed(a={"title": "A", "type": "string", "default": "x"}),
+    },
+    "optional": {**closed(a=TEXT, b={"type": "integer"}), "required": ["a"]},
+    "closed": closed(
+        a={"type": "string", "enum": ["x", "y"]}, v={"type": "array", "items": NUMBERS}
+    ),
+    "open": {"type": "object", "properties": {"a": TEXT}, "required": ["a"]},
+    "tuple": closed(
+        v={"type": "array", "items": NUMBER, "minItems": 3, "maxItems": 3}, u={"type": "array"}
+    ),
+    "union": closed(
+        v={"anyOf": [TEXT, {"type": "null"}]}, w={"oneOf": [TEXT, {"type": "integer"}]}
+    ),
+    "nested": closed(v=closed(x={"type": "number", "minimum": 0})),
+    "refs": {
+        "$defs": {"P": POINT},
+        **closed(p={"$ref": "#/$defs/P", "description": "a point"}, q={"$ref": "#/$defs/P"}),
+    },
+    "pattern": closed(s={"type": "string", "pattern": "^a", "format": "uri", "minLength": 1}),
+}
+TOOLS = {
+    "bare": [],
+    "build": tools_named(BUILD),
+    "build solo": [*tools_named(BUILD), OBJECTION],
+    "refine": tools_named(REFINE),
+    "assemble": tools_named(ASSEMBLE),
+    "objection": [OBJECTION],
+    "analyst": [*tools_named(QUERIES), TRANSCRIPT, TRAJECTORY, BREAKS],
+    "odd": [
+        Tool(
+            name=name,
+            description="Nothing at all." if name == "bare" else "d",
+            parameters=parameters,
+        )
+        for name, parameters in ODD.items()
+    ],
+}
+
+
+@pytest.mark.parametrize("case", KEPT["requests"], ids=lambda c: f"{c['decoding']}-{c['tools']}")
+def test_requests_carry_what_kept_ones_carried(case) -> None:
+    tools = TOOLS[case["tools"]]
+    for model in case["models"]:
+        writer = RequestWriter(model)
+        for seed in (case["sent"]["seed"], 77):  # the second has its frame already
+            config = {"decoding": DECODING[case["decoding"]]}
+            request = Request(model_config=config, messages=TALK, tools=tools, seed=seed)
+            body = json.loads(writer.body(request))
+            wanted = {**case["sent"], "model": model, "seed": seed}
+            wanted["messages"] = KEPT["messages"][case["messages"]]
+            if tools:
+                wanted["tools"] = KEPT["tools"][case["tools"]]
+            assert body == wanted
