@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from buildarena_worker.providers.openai_request import RequestWriter
+from buildarena_worker.providers.openai_schema import function_tool
 from buildarena_worker.session.dialogue import OBJECTION
 from buildarena_worker.session.messages import Message, Request, Tool, ToolCall
 from buildarena_worker.workflow.analyst import BREAKS, TRAJECTORY, TRANSCRIPT
@@ -109,3 +110,11 @@ def test_requests_carry_what_kept_ones_carried(case) -> None:
             if tools:
                 wanted["tools"] = KEPT["tools"][case["tools"]]
             assert body == wanted
+
+
+def test_schemas_are_written_as_kept_ones_were() -> None:
+    for case in json.loads((Path(__file__).parents[1] / "data/openai/schemas.json").read_text()):
+        tool = Tool(name="t", description="d", parameters=case["given"])
+        function = function_tool(tool)["function"]
+        found = {"sent": function["parameters"], "strict": function.get("strict", False)}
+        assert found == {"sent": case["sent"], "strict": case["strict"]}, case["given"]

@@ -78,20 +78,12 @@ class AnswerReader:
             ) from error
 
     def _answered(self, answer: Any) -> Answered:
-        choice, response_id, _ = answer["choices"][0], answer["id"], answer["model"]
-        message, finish = choice["message"], choice.get("finish_reason")
-        if finish is not None and not (finish and isinstance(finish, str)):
-            raise ValueError(f"finish_reason is {finish!r}")
-        tokens = self._tokens(answer.get("usage") or {})
-        if refusal := message.get("refusal"):
-            reply = Reply(text=refusal[:0], finish="content_filter")
-        else:
-            calls = tuple(_call(call) for call in message.get("tool_calls") or ())
-            text = _spoken(_content(message.get("content") or ""))
-            reply = Reply(text=text, calls=calls, finish=FINISH.get(finish or "stop", "stop"))
+        if "model" not in answer:
+            raise KeyError("model")
+        response_id = answer["id"]
         return Answered(
-            reply=reply,
-            tokens=tokens,
+            reply=_reply(answer["choices"][0]),
+            tokens=self._tokens(answer.get("usage") or {}),
             response_id=None if response_id is None else str(response_id),
         )
 
@@ -119,13 +111,30 @@ def _without_nulls(usage: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
+def _reply(choice: Mapping[str, Any]) -> Reply:
+    message, finish = choice["message"], choice.get("finish_reason")
+    refusal = message.get("refusal")
+    if finish == "" or not isinstance(finish, str | None) or not isinstance(refusal, str | None):
+        raise TypeError(f"finish_reason is {finish!r} and refusal {refusal!r}")
+    if refusal:
+        return Reply(text="", finish="content_filter")
+    return Reply(
+        text=_spoken(_content(message.get("content") or "")),
+        calls=tuple(_call(call) for call in message.get("tool_calls") or ()),
+        finish=FINISH.get(finish or "stop", "stop"),
+    )
+
+
 def _content(content: Any) -> str:
     """The text of a message; some providers send it in parts."""
     if isinstance(content, str):
         return content
     if not isinstance(content, list):
         raise TypeError(f"content is {type(content).__name__}")
-    texts = [part if isinstance(part, str) else part.get("text") for part in content]
+    texts = [
+        part["text"] if isinstance(part, dict) and part.get("type") == "text" else part
+        for part in content
+    ]
     return "".join(text for text in texts if isinstance(text, str))
 
 

@@ -65,9 +65,15 @@ def _written(schema: Any) -> Any:
     if not isinstance(schema, Mapping):
         return schema
     written = {name: value for name, value in schema.items() if name not in DROPPED}
+    typed = "type" in written
     for union in UNIONS:
         if union in written:
-            written[union] = [_written(member) for member in written[union]]
+            members = [_written(member) for member in written[union]]
+            if len(members) == 1 and not typed and isinstance(members[0], dict):
+                del written[union]
+                written = members[0] | written
+            else:
+                written[union] = members
     if "$ref" in written and len(written) > 1:
         # Strict mode allows nothing beside a reference, but everything beside a union of one.
         written["anyOf"] = [{"$ref": written.pop("$ref")}]
@@ -76,6 +82,7 @@ def _written(schema: Any) -> Any:
         written["properties"] = {name: _written(one) for name, one in properties.items()}
         if written.get("additionalProperties") is None:
             written["additionalProperties"] = False
+        written["additionalProperties"] = _written(written["additionalProperties"])
     if written.get("type") == "array" and isinstance(written.get("items"), Mapping):
         written["items"] = _written(written["items"])
     return written
