@@ -21,7 +21,7 @@ $(STAMP): requirements.lock $(addsuffix /pyproject.toml,$(PACKAGES))
 	@bash mk/install.sh $(VENV) $(PACKAGES)
 	@touch $@
 
-demo: $(STAMP) ## One small sweep from start to leaderboard; stops everything in the end
+demo: $(STAMP) ## One small sweep from start to leaderboard; stops everything at the end
 	@$(BIN)/buildarena demo
 
 up: $(STAMP) ## The whole service on this machine until Ctrl-C
@@ -44,10 +44,10 @@ check: $(STAMP) ## Lints, types and import rules alone
 clean: ## Removes the environment, caches and local data
 	rm -rf $(VENV) $(VENV)-uv .buildarena .mypy_cache .ruff_cache .pytest_cache .hypothesis
 
-openapi: $(STAMP) ## Writes the API's contract anew, after a wanted change
+openapi: $(STAMP) ## Writes the API's contract again, after an intended change
 	@$(BIN)/python -m buildarena_api.contract > tests/data/openapi.json
 
-lock: ## Compiles requirements.lock anew
+lock: ## Compiles requirements.lock again
 	bash mk/uv.sh pip compile --quiet --universal --generate-hashes --all-extras --no-annotate \
 		$(foreach p,$(PACKAGES),--no-emit-package $(subst /,-,buildarena-$(notdir $(p)))) \
 		--custom-compile-command "make lock" -o requirements.lock \

@@ -1,4 +1,4 @@
 .PHONY: bench-api
 
-bench-api: $(STAMP) ## What the API carries; JSON in .buildarena/
+bench-api: $(STAMP) ## Measures the API's throughput; JSON in .buildarena/
 	@$(BIN)/python tests/benchmarks/api/bench_api.py --json .buildarena/bench-api.json

@@ -1,6 +1,6 @@
 .PHONY: peer
 
-peer: $(STAMP) ## A session against litellm's proxy, a server that nobody here wrote
+peer: $(STAMP) ## Plays a session against litellm's proxy
 	@[ -x .venv-peer/bin/litellm ] || { bash mk/uv.sh venv --quiet --python $(BIN)/python .venv-peer && \
 		bash mk/uv.sh pip install --quiet --python .venv-peer/bin/python "litellm[proxy]==1.106.2"; }
 	@$(BIN)/python tests/peer/check_litellm.py .venv-peer/bin/litellm

@@ -1,4 +1,4 @@
 .PHONY: bench-sessions
 
-bench-sessions: $(STAMP) ## 200 sessions at once in one construct process
+bench-sessions: $(STAMP) ## Measures 200 sessions at once in one construct process
 	@$(BIN)/python tests/benchmarks/sessions/bench_sessions.py

@@ -1,1 +1,1 @@
-"""The only place that knows Celery and Redis."""
+"""Celery's application, the queues, and the watchdog of their consumer."""
