@@ -135,7 +135,7 @@ def test_handing_back_is_no_fault(context: Context, add) -> None:
     assert (job.state, job.faults) == ("queued", 0)
 
 
-def test_waiting_jobs_are_announced_once(context: Context, add) -> None:
+def test_workers_are_notified_of_waiting_jobs_once(context: Context, add) -> None:
     ids = add(1, 2, 3)
     assert set(context.store.leases.to_notify("construct", 10)) == set(ids)
     assert context.store.leases.to_notify("construct", 10) == []

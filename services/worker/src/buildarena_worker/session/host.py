@@ -173,7 +173,7 @@ class LiveHost:
         self._client = client
         self._journal = journal
         self._active = active
-        self._guard = guard
+        self._budget = guard
         self._gate = gate
 
     def ask(self, request: Request, *, phase: str, role: str) -> JournalEntry:
@@ -193,7 +193,7 @@ class LiveHost:
             span("model request", stage=phase, role=role, sequence=sequence),
             self._gate.released(),
         ):
-            self._guard.reserve(request)
+            self._budget.reserve(request)
             answer = self._client.complete(request)
         entry = JournalEntry(
             sequence=sequence,
@@ -215,7 +215,7 @@ class LiveHost:
             self._journal.append(self._active.lease, entry)
         except StaleLeaseError as stale:
             # The job was cancelled or lost meanwhile, but its budgets did pay for the reply.
-            self._guard.charge_lost(entry.usage)
+            self._budget.charge_lost(entry.usage)
             raise SessionEnded(Superseded()) from stale
 
     def simulate(

@@ -114,7 +114,7 @@ def build_phase(session: Session, part: SubStructure, blueprint: str) -> Machine
 
 def refine_phase(session: Session, machine: Machine, part: SubStructure, blueprint: str) -> None:
     """Lets guidance and builder correct powered parts, when the machine has wheels."""
-    if not any(block.module.kind == "wheel" for block in machine.blocks.values()):
+    if not any(block.module.spins for block in machine.blocks.values()):
         return
     opening = session.pack.say(
         "refine",
