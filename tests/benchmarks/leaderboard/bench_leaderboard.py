@@ -130,7 +130,7 @@ def settings_of(url: str) -> Settings:
 def measure(url: str, requests: int) -> dict[str, object]:
     """Asks an API in this process; its peak memory is that of an API process."""
     context = open_context(settings_of(url))
-    # No lifespan: the sweeper would look for a broker.
+    # No lifespan: the reaper would look for a broker.
     api = TestClient(create_app(context, load_registry()))
     tasks = list(builtin_tasks())
 

@@ -14,7 +14,7 @@ from buildarena_simulation.structure.contacts import ContactForces, mean_contact
 from buildarena_simulation.structure.model import FloatArray
 
 _JOLT: Final = 3.0
-"""A change of velocity faster than this many g is a impact: more than fall and driving make."""
+"""A change of velocity faster than this many g is an impact: more than fall and driving make."""
 
 
 class ImpactWatch:
@@ -34,7 +34,7 @@ class ImpactWatch:
 
     @property
     def struck(self) -> bool:
-        """Whether there was a impact."""
+        """Whether there was an impact."""
         return bool(self._impacts)
 
     def is_impact(self, change: FloatArray) -> bool:
@@ -47,11 +47,11 @@ class ImpactWatch:
         return self._ends_in_impact
 
     def take(self, contacts: ContactForces) -> None:
-        """Keeps the reading of a step that was a impact."""
+        """Keeps the reading of a step that was an impact."""
         self._impacts.append(contacts)
 
     def mean(self, read: Callable[[], ContactForces]) -> ContactForces:
-        """The mean over the interval; if it ended in a impact, its quiet steps are not known of.
+        """The mean over the interval; if it ended in an impact, its quiet steps are not known of.
 
         Args:
             read: Reads the contacts of the last step.
