@@ -109,11 +109,11 @@ def _write_rows(archive: zipfile.ZipFile, connection: Connection, sweep_id: str)
     of_jobs = {table: table.c.job_id.in_(members) for table in OF_JOBS}
     hashes = select(job_artifacts.c.hash).where(of_jobs[job_artifacts])
     played = select(jobs.c.task, jobs.c.task_version).where(jobs.c.id.in_(members))
-    own_tasks = func.row(tasks.c.name, tasks.c.version).in_(played)
+    played_tasks = func.row(tasks.c.name, tasks.c.version).in_(played)
     conditions: dict[Table, Any] = {
         sweeps: sweeps.c.id == sweep_id,
         jobs: jobs.c.id.in_(members),
-        tasks: own_tasks,
+        tasks: played_tasks,
         artifacts: artifacts.c.hash.in_(hashes),
         **of_jobs,
     }
