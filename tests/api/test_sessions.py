@@ -1,4 +1,4 @@
-"""Outside agents over the tools API."""
+"""External agents over the tools API."""
 
 from __future__ import annotations
 

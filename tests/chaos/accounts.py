@@ -59,7 +59,7 @@ def wrongs(database: Database) -> dict[str, list[str]]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PickUp:
-    """How a dead worker's job was claimed again.
+    """How a dead worker's job was recovered.
 
     Attributes:
         seconds: From the death to the next attempt.
@@ -75,7 +75,7 @@ class PickUp:
 
 
 def pick_ups(database: Database, strikes: Sequence[Strike]) -> list[PickUp]:
-    """How the jobs that dead workers held were claimed again, the slowest last."""
+    """How the jobs that dead workers had were recovered, the slowest last."""
     # A worker's id ends with its process'; a prefork worker's jobs are held by its children.
     query = text(
         "SELECT a.worker, a.stage, a.started_at, a.ended_at, (SELECT min(b.started_at) "

@@ -18,7 +18,7 @@ FILES = sorted((EXAMPLES / "sweeps").glob("*.yaml"))
 
 
 @pytest.fixture(autouse=True)
-def own_tasks(context) -> None:
+def custom_tasks(context) -> None:
     """The tasks that come as examples, uploaded."""
     for file in (EXAMPLES / "tasks").glob("*.yaml"):
         text = file.read_text()

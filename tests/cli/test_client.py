@@ -1,4 +1,4 @@
-"""What commands say to a server that is no BuildArena, breaks off, or is none at all."""
+"""What commands say to a server that is not BuildArena, breaks off, or is none at all."""
 
 from __future__ import annotations
 

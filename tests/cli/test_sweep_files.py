@@ -48,7 +48,7 @@ def file(tmp_path: Path) -> Path:
         ("samples: 3", "samples: 3\nseeds: [1]", "6: samples: give either seeds or samples"),
         ("samples: 3", "seeds: [1, -2]", "6: seeds[1]: Input should be greater than"),
         ("samples: 3", "sample: 3", "6: sample: there is no such field; choose from workflow, "),
-        ("samples: 3", "samples: 3\nsamples: 4", "7: samples: stands twice, first in line 6"),
+        ("samples: 3", "samples: 3\nsamples: 4", "7: samples: appears twice, first in line 6"),
         ("models: [builtin/idle]\n", "", "1: models: Field required"),
         (
             "models: [builtin/idle]",

@@ -92,7 +92,7 @@ def test_a_film_shows_the_trial(run, tmp_path: Path, kind: str) -> None:
 def test_a_seed_nudges_the_start(run, tmp_path: Path) -> None:
     starts = []
     for more in ([], ["--seed", "1"], ["--seed", "2"]):
-        data = tmp_path / "jittered.parquet"
+        data = tmp_path / "shifted.parquet"
         run(
             "simulate",
             str(DATA / "beam.json"),

@@ -106,19 +106,19 @@ def changed(file: Path, name: str, change: Callable[[bytes], bytes | None]) -> P
     ("member", "change", "said"),
     [
         ("artifacts/", lambda data: data + b" ", "was changed"),
-        ("artifacts/", lambda _: None, "not those that its rows speak of"),
+        ("artifacts/", lambda _: None, "its artifacts do not match its rows"),
         ("rows/jobs", lambda data: data.replace(b'"seed": 0', b'"seed": 7'), "was changed"),
-        ("rows/jobs", lambda data: data.replace(b'"seed"', b'"seeed"'), "other columns"),
+        ("rows/jobs", lambda data: data.replace(b'"seed"', b'"seeed"'), "this program's columns"),
         (
             "rows/journal",
             lambda data: data.replace(b'"job_', b'"jab_').replace(b"jab_id", b"job_id"),
             "not in the archive",
         ),
         ("rows/jobs", lambda data: data.replace(b'"faults": 0', b'"faults": "x"'), "a value"),
-        ("rows/jobs", lambda _: b"{", "not a sound archive"),
-        ("rows/jobs", lambda _: b"[1]\n", "other columns"),
-        ("rows/sweeps", lambda _: b"", "not a sound archive"),
-        ("manifest", lambda _: None, "not a sound archive"),
+        ("rows/jobs", lambda _: b"{", "not a valid archive"),
+        ("rows/jobs", lambda _: b"[1]\n", "this program's columns"),
+        ("rows/sweeps", lambda _: b"", "not a valid archive"),
+        ("manifest", lambda _: None, "not a valid archive"),
         ("manifest", lambda data: data.replace(b'"format": 1', b'"format": 9'), "format 9"),
     ],
 )
@@ -152,7 +152,7 @@ def test_a_bomb_is_not_unpacked(archive, elsewhere, monkeypatch) -> None:
 
 def test_what_is_no_archive_is_refused(context, tmp_path) -> None:
     (tmp_path / "x.zip").write_bytes(b"PK nonsense")
-    with pytest.raises(ArchiveError, match="not a sound archive"):
+    with pytest.raises(ArchiveError, match="not a valid archive"):
         read_archive(context.store.database, context.artifacts, tmp_path / "x.zip")
     with pytest.raises(UnknownIdError, match="sweep_x"):
         write_archive(context.store.database, context.artifacts, "sweep_x", tmp_path / "y.zip")

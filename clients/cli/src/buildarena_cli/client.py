@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 TIMEOUT_S = 60.0
 PATIENCE_S = 60.0
-"""How long a watching command puts up with a service that is being restarted."""
+"""How long a watching command waits for a service that is being restarted."""
 HEALTH = "/v1/health"
 CHUNK_BYTES = 1 << 20
 
@@ -149,7 +149,7 @@ class Client:
         if response.status == 503:  # noqa: PLR2004 - Service Unavailable
             raise UnreachableError(_problem(response))
         if response.status == 401:  # noqa: PLR2004 - Unauthorized
-            raise CommandError(f"{_problem(response)}: set {KEY_VARIABLE} to a good one")
+            raise CommandError(f"{_problem(response)}: set {KEY_VARIABLE} to a valid key")
         if response.failed:
             raise RefusedError(response, options.get("params"))
         return response

@@ -55,7 +55,7 @@ def checked_prefix(kind: str, given: str) -> str:
         hint = did_you_mean(wrong, KINDS) if "_" in given and wrong not in KINDS else ""
         raise CommandError(
             f"{given!r} is not the id of a {kind} (such as {kind}_{'0a1b2c3d4e5f60718293'}, "
-            f"or how it begins){hint}"
+            f"or its beginning){hint}"
         )
     return f"{kind}_{match[1]}"
 

@@ -45,7 +45,7 @@ def read_machine(file: Path) -> Machine:
         text = sys.stdin.read() if str(file) == "-" else file.read_text(encoding="utf-8")
         content = json.loads(text)
     except (OSError, ValueError, RecursionError) as error:
-        raise CommandError(f"{file}: no JSON can be read there: {error}") from error
+        raise CommandError(f"{file}: not valid JSON: {error}") from error
     if isinstance(content, dict) and "blocks" in content:
         return Machine.from_document(content)
     if isinstance(content, list):

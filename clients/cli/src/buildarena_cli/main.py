@@ -12,7 +12,7 @@ from buildarena_cli.lazy import CONTEXT, LazyGroup
 from buildarena_cli.terminal.output import is_terminal, warn
 
 UNWRAPPED = 10_000
-"""Columns of help texts that nobody reads on a terminal: a sentence stays one line."""
+"""Columns of help texts that go to no terminal: a sentence stays one line."""
 
 COMPLETING = "_BUILDARENA_COMPLETE"
 """The variable with which the shell's completion script calls."""

@@ -1,4 +1,4 @@
-"""Near words: what somebody may have meant who typed something else."""
+"""Near words: what a misspelled word may have meant."""
 
 from __future__ import annotations
 

@@ -34,15 +34,15 @@ MaxRequestsOption = Annotated[
 
 JobId = Annotated[
     str,
-    typer.Argument(help="Id of the job, or how it begins.", autocompletion=complete_job),
+    typer.Argument(help="Id of the job, or its beginning.", autocompletion=complete_job),
 ]
 SweepId = Annotated[
     str,
-    typer.Argument(help="Id of the sweep, or how it begins.", autocompletion=complete_sweep),
+    typer.Argument(help="Id of the sweep, or its beginning.", autocompletion=complete_sweep),
 ]
 KeyId = Annotated[
     str,
-    typer.Argument(help="Id of the key, or how it begins.", autocompletion=complete_key),
+    typer.Argument(help="Id of the key, or its beginning.", autocompletion=complete_key),
 ]
 TaskName = Annotated[str, typer.Argument(help="Task name.", autocompletion=complete_task)]
 ModelName = Annotated[str, typer.Argument(help="Model name.", autocompletion=complete_model)]
@@ -55,9 +55,7 @@ ModelsOption = Annotated[
     typer.Option("--model", help="Only these models.", autocompletion=complete_model),
 ]
 TrackOption = Annotated[str | None, typer.Option("--track", help="Track; default: the first.")]
-AfterOption = Annotated[
-    str | None, typer.Option("--after", help="Where the page before ended: its cursor.")
-]
+AfterOption = Annotated[str | None, typer.Option("--after", help="Cursor of the previous page.")]
 AllOption = Annotated[bool, typer.Option("--all", help="Every page.")]
 
 

@@ -14,7 +14,7 @@ from typing import IO, Any
 from urllib.parse import SplitResult, urlencode, urlsplit
 
 Failure = (OSError, HTTPException)
-"""What a request raises that found no server, or one that broke off."""
+"""What a request raises when there is no server, or when the connection breaks off."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

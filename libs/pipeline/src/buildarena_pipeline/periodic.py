@@ -1,4 +1,4 @@
-"""Work that a thread of its own does again and again."""
+"""Work that a thread repeats."""
 
 from __future__ import annotations
 

@@ -52,7 +52,7 @@ def simulate(
         scenario: What it is put through.
         engine: Name of the engine; see `ENGINES`.
         controls: A control sequence to use in place of the machine's own.
-        seed: Nudges the machine's start by up to a hundredth of a unit; None for the exact place.
+        seed: Shifts the machine's start by up to a hundredth of a unit; None for the exact place.
         on_progress: Called now and then with the share of the trial that is done, 0 to 1.
 
     Returns:

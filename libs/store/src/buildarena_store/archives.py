@@ -1,7 +1,7 @@
-"""Archives: a whole sweep as one ZIP file, to be kept, handed on, or taken in elsewhere.
+"""Archives: a whole sweep as one ZIP file, to be kept, passed on, or imported elsewhere.
 
 It holds every row that belongs to the sweep's jobs as JSON lines and every artifact by its hash.
-Taking one in checks ids and hashes; jobs that are there already stay as they are.
+An import checks ids and hashes; jobs that already exist stay as they are.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class ArchiveError(StoreError):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Imported:
-    """What became of an archive.
+    """The result of an import.
 
     Attributes:
         sweep_id: The sweep.
@@ -70,7 +70,7 @@ class Imported:
 
 
 def write_archive(database: Database, store: ArtifactStore, sweep_id: str, target: Path) -> None:
-    """Writes a sweep with all that belongs to it, as it is at one moment.
+    """Writes a sweep with everything that belongs to it, as of one moment.
 
     Raises:
         UnknownIdError: There is no such sweep.
@@ -109,11 +109,11 @@ def _write_rows(archive: zipfile.ZipFile, connection: Connection, sweep_id: str)
     of_jobs = {table: table.c.job_id.in_(members) for table in OF_JOBS}
     hashes = select(job_artifacts.c.hash).where(of_jobs[job_artifacts])
     played = select(jobs.c.task, jobs.c.task_version).where(jobs.c.id.in_(members))
-    own_tasks = func.row(tasks.c.name, tasks.c.version).in_(played)
+    played_tasks = func.row(tasks.c.name, tasks.c.version).in_(played)
     conditions: dict[Table, Any] = {
         sweeps: sweeps.c.id == sweep_id,
         jobs: jobs.c.id.in_(members),
-        tasks: own_tasks,
+        tasks: played_tasks,
         artifacts: artifacts.c.hash.in_(hashes),
         **of_jobs,
     }
@@ -134,7 +134,7 @@ def _plain(value: Any) -> Any:
 def read_archive(
     database: Database, store: ArtifactStore, source: Path, *, owner: str | None = None
 ) -> Imported:
-    """Takes a sweep in: all that is not there yet, or nothing.
+    """Imports a sweep: everything that is missing, or nothing.
 
     Jobs that had not ended come in on hold, and the sweep as paused: resuming it goes on from
     their journals.
@@ -159,11 +159,11 @@ def read_archive(
                 )
                 return _take_in(archive, connection, str(manifest["sweep"]), owner)
     except (zipfile.BadZipFile, KeyError, ValueError, TypeError, NotImplementedError) as error:
-        raise ArchiveError(f"this is not a sound archive of a sweep: {error}") from error
+        raise ArchiveError(f"this is not a valid archive of a sweep: {error}") from error
     except StatementError as error:
         if isinstance(error, OperationalError):
             raise
-        raise ArchiveError("a value in the archive is not what its column holds") from error
+        raise ArchiveError("a value in the archive does not fit its column") from error
 
 
 def _manifest(archive: zipfile.ZipFile) -> Mapping[str, Any]:
@@ -191,7 +191,7 @@ def _rows(archive: zipfile.ZipFile, table: Table) -> Iterator[dict[str, Any]]:
     for line in _bytes(archive, f"rows/{table.name}.jsonl").splitlines():
         values = json.loads(line)
         if not isinstance(values, dict) or values.keys() != columns.keys():
-            raise ArchiveError(f"{table.name} has other columns than this program's")
+            raise ArchiveError(f"{table.name} does not have this program's columns")
         yield {name: _typed(columns[name], value) for name, value in values.items()}
 
 
@@ -207,7 +207,7 @@ def _keep_artifacts(store: ArtifactStore, archive: zipfile.ZipFile) -> None:
     types = {row["hash"]: row["media_type"] for row in _rows(archive, artifacts)}
     inside = {match[1] for name in archive.namelist() if (match := ARTIFACT_NAME.fullmatch(name))}
     if inside != types.keys():
-        raise ArchiveError("its artifacts are not those that its rows speak of")
+        raise ArchiveError("its artifacts do not match its rows")
     for digest, media_type in types.items():
         data = _bytes(archive, f"artifacts/{digest}")
         if hashlib.sha256(data).hexdigest() != digest:
@@ -226,7 +226,7 @@ def _take_in(
     for table in OF_JOBS:
         rows = list(_rows(archive, table))
         if not {row["job_id"] for row in rows} <= ids:
-            raise ArchiveError(f"{table.name} speaks of jobs that are not in the archive")
+            raise ArchiveError(f"{table.name} names jobs that are not in the archive")
         _insert(connection, table, (row for row in rows if row["job_id"] in added))
     (sweep,) = _rows(archive, sweeps)
     open_jobs = any(row["state"] != JobState.DONE for row in job_rows)
@@ -246,7 +246,7 @@ def _take_in(
 def _arriving(row: dict[str, Any], sweep_id: str, owner: str | None) -> dict[str, Any]:
     key = JobKey(**{name: row[name] for name in JobKey.__dataclass_fields__})
     if row["id"] != key.job_id:
-        raise ArchiveError(f"job {row['id']} is not what its id says: it was changed")
+        raise ArchiveError(f"job {row['id']} does not match its id: it was changed")
     waiting = {
         "state": JobState.ON_HOLD,
         "lease_owner": None,

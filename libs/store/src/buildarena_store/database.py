@@ -45,7 +45,7 @@ def expected_schema() -> str:
 
 
 def ping_after_idling(engine: Engine) -> None:
-    """Has connections that were not used for a while tried before they are used again.
+    """Has connections that were idle for a while tested before they are used again.
 
     A server that was restarted is noticed so, at the cost of a round trip for rare uses only; a
     busy connection's break shows itself as an OperationalError, which all callers expect.

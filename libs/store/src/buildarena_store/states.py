@@ -58,7 +58,7 @@ class JobState(StrEnum):
 
 
 class Stage(StrEnum):
-    """What is done with a job next: its session goes on, or a machine of it is simulated."""
+    """What is done with a job next: its session continues, or its machine is simulated."""
 
     CONSTRUCT = "construct"
     SIMULATE = "simulate"

@@ -1,4 +1,4 @@
-"""Custom tasks: every version that was ever uploaded, for jobs may still need it."""
+"""Custom tasks: every version that was ever uploaded, as jobs may still need it."""
 
 from __future__ import annotations
 

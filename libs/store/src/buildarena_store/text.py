@@ -1,4 +1,4 @@
-"""Text that everything can hold: Postgres knows no NUL, UTF-8 no lone surrogate."""
+"""Text that everything can hold: Postgres has no NUL, UTF-8 no lone surrogates."""
 
 from __future__ import annotations
 

@@ -69,7 +69,7 @@ class Workers:
         peak_memory_bytes: int | None = None,
         own_time: datetime | None = None,
     ) -> None:
-        """Says that a worker is alive; forgets those that have not spoken for an hour."""
+        """Reports that a worker is alive; forgets those that have not reported for an hour."""
         row = {
             "kind": kind,
             "queues": list(queues),
@@ -91,7 +91,7 @@ class Workers:
             )
 
     def leave(self, worker_id: str) -> None:
-        """Strikes a worker that shuts down off the register."""
+        """Removes a worker that shuts down from the register."""
         with self._database.transaction() as connection:
             connection.execute(delete(workers).where(workers.c.id == worker_id))
 

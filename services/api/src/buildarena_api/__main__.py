@@ -21,7 +21,7 @@ POOL_SIZE = 10
 
 
 def main() -> None:
-    """Serves the API until it is told to stop."""
+    """Serves the API until it is asked to stop."""
     settings = Settings()
     set_up_logs(settings.log_level)
     try:

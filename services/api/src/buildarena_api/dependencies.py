@@ -1,4 +1,4 @@
-"""What routes get handed: the process' connections and the model registry."""
+"""What routes depend on: the process' connections and the model registry."""
 
 from __future__ import annotations
 
@@ -40,7 +40,5 @@ ExternalDep = Annotated[ExternalSessions, Depends(_external)]
 SubmissionsDep = Annotated[Submissions, Depends(_submissions)]
 IdPrefix = Annotated[
     str | None,
-    Query(
-        pattern=r"^[a-z]+_[0-9a-f]*$", max_length=40, description="Only ids that begin like this"
-    ),
+    Query(pattern=r"^[a-z]+_[0-9a-f]*$", max_length=40, description="Only ids with this prefix"),
 ]

@@ -71,7 +71,7 @@ class JobView(_Answer):
     owner: str | None = Field(description="Id of the API key that submitted it")
     state: AnyJobState
     stage: AnyStage
-    outcome: AnyOutcome | None = Field(description="How it ended; null while it goes on")
+    outcome: AnyOutcome | None = Field(description="How it ended; null until it has")
     reason: str | None = Field(description="Class of the failure, if any")
     detail: str | None
     success: bool | None
@@ -82,7 +82,7 @@ class JobView(_Answer):
     actions: int
     refused_actions: int
     refusals: dict[str, int] | None = Field(description="Refused actions by class")
-    faults: int = Field(description="Infrastructure faults at the present stage")
+    faults: int = Field(description="Infrastructure faults at the current stage")
     created_at: datetime
     started_at: datetime | None
     finished_at: datetime | None
@@ -123,12 +123,13 @@ class JobPage(_Answer):
 
 
 class ProgressView(_Answer):
-    """How far a sweep is."""
+    """Progress of a sweep."""
 
     total: int
     done: int
     stages: dict[str, int] = Field(
-        description="Jobs that go on, by stage and state", examples=[{"construct running": 2}]
+        description="Jobs that have not ended, by stage and state",
+        examples=[{"construct running": 2}],
     )
     outcomes: dict[str, int] = Field(description="Ended jobs by outcome", examples=[{"success": 4}])
     requests: int
@@ -190,7 +191,7 @@ class SweepAccepted(_Answer):
     jobs: int = Field(description="Jobs it consists of")
     added: int = Field(description="Jobs that are new; the others had been submitted before")
     resumed: bool = Field(
-        default=False, description="Whether an earlier submission of the same jobs goes on"
+        default=False, description="Whether an earlier submission of the same jobs was resumed"
     )
 
 

@@ -1,1 +1,1 @@
-"""Stage handlers that run simulators."""
+"""The simulation worker: runs simulators and scores rollouts."""

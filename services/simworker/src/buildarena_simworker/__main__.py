@@ -15,7 +15,7 @@ from buildarena_store.states import simulate_queue
 
 
 def main() -> None:
-    """Serves one engine's queue until it is asked to stop."""
+    """Serves one simulator's queue until it is asked to stop."""
     parser = argparse.ArgumentParser(prog="buildarena_simworker", description=main.__doc__)
     parser.add_argument("--engine", required=True, choices=sorted(ENGINES))
     engine = parser.parse_args().engine

@@ -28,7 +28,7 @@ COMMANDS: Final[Mapping[str, Entry]] = {
     ),
     "up": Entry("service", "up", "Start the whole service on this machine."),
     "down": Entry("running", "down", "Stop the service that runs on the data folder."),
-    "status": Entry("running", "status", "Show what of the service runs on the data folder."),
+    "status": Entry("running", "status", "Show which parts of the service run on the data folder."),
     "logs": Entry("running", "logs", "Print the logs of the service's processes."),
     "doctor": Entry("running", "doctor", "Show what is wrong with the service and what to do."),
     "sweep": Entry("sweeps", "app", "Submit and watch sweeps."),

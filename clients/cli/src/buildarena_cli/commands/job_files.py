@@ -76,7 +76,7 @@ def _fetched(client: Client, job_id: str, file: dict[str, Any], folder: Path) ->
 
     body = client.get_bytes(at("jobs", job_id, "artifacts", file["name"]))
     if sha256(body).hexdigest() != file["hash"]:
-        raise CommandError(f"{file['name']} of {job_id} arrived damaged: its hash is another")
+        raise CommandError(f"{file['name']} of {job_id} arrived damaged: its hash differs")
     target = folder / file_name(file["name"], file["media_type"])
     partial = target.with_name(target.name + ".partial")
     try:

@@ -75,7 +75,7 @@ def cancel_job(job_id: JobId, *, url: UrlOption = DEFAULT_URL, as_json: JsonOpti
 
 @app.command("retry")
 def retry_job(job_id: JobId, *, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) -> None:
-    """Queue an errored job again where it failed; a scored job is never rolled again."""
+    """Queue an errored job again where it failed; a scored job is never run again."""
     _change(url, job_id, "retry", as_json=as_json)
 
 
@@ -96,7 +96,7 @@ def verify_job(job_id: JobId, *, url: UrlOption = DEFAULT_URL, as_json: JsonOpti
             kept, found = entry["kept"], entry["found"]
             shown = kept if entry["ok"] else f"kept {kept}, found {found}"
             say(f"{mark}  {entry['name']:<32} {shown}")
-        say("Every figure is the same." if report["ok"] else "Not the same.")
+        say("Every figure is the same." if report["ok"] else "Some figures differ.")
     raise typer.Exit(DONE if report["ok"] else FAILED)
 
 

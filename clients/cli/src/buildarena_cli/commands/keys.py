@@ -37,7 +37,9 @@ def create_key(
     scope: Annotated[
         list[str], typer.Option(help="read, submit or admin; each includes those before it.")
     ] = ["submit"],  # noqa: B006 - typer only reads it
-    days: Annotated[int | None, typer.Option(help="How long it is good; forever without.")] = None,
+    days: Annotated[
+        int | None, typer.Option(help="Days until it expires; never by default.")
+    ] = None,
     max_cost_usd: MaxCostOption = None,
     max_tokens: MaxTokensOption = None,
     max_requests: MaxRequestsOption = None,
@@ -57,7 +59,7 @@ def create_key(
 
 @app.command("list")
 def list_keys(*, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) -> None:
-    """List all keys, those that ended included."""
+    """List all keys, including revoked and expired ones."""
     found = Client(url).get("/v1/keys")
     if as_json:
         print_json(found)
@@ -67,7 +69,7 @@ def list_keys(*, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) -> N
 
 @app.command("revoke")
 def revoke_key(key_id: KeyId, *, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) -> None:
-    """End a key at once; what was submitted with it goes on."""
+    """Revoke a key at once; its jobs continue."""
     client = Client(url)
     key = client.post(at("keys", whole_id(client, "key", key_id), "revoke"), {})
     if as_json:
@@ -86,7 +88,7 @@ def set_budget(
     url: UrlOption = DEFAULT_URL,
     as_json: JsonOption = False,
 ) -> None:
-    """Set what all jobs of a key may spend in all; what is not named has no limit."""
+    """Set the budget of all jobs of a key; what is not given is unlimited."""
     budget = budget_of(max_cost_usd, max_tokens, max_requests) or {}
     client = Client(url)
     key = client.put(at("keys", whole_id(client, "key", key_id), "budget"), budget)

@@ -178,7 +178,7 @@ def audit(
     model: ModelName,
     *,
     sample: Annotated[int | None, typer.Option(help="How many results; default: all.")] = None,
-    seed: Annotated[int, typer.Option(help="Of the choice of the sample.")] = 0,
+    seed: Annotated[int, typer.Option(help="Seed of the random sample.")] = 0,
     task: TasksOption = None,
     track: TrackOption = None,
     url: UrlOption = DEFAULT_URL,

@@ -39,7 +39,10 @@ def simulate_command(  # noqa: PLR0917 - the command line passes options by name
     task: TaskName,
     engine: Annotated[str | None, typer.Option(help="pybullet or mujoco.")] = None,
     seed: Annotated[
-        int | None, typer.Option(help="Nudge the start a hair, to see whether a result is luck.")
+        int | None,
+        typer.Option(
+            help="Shift the start a little, by this seed, to see whether a result is luck."
+        ),
     ] = None,
     video: Annotated[
         Path | None, typer.Option(help="Write a film (.mp4, .gif) or six pictures (.png).")
@@ -49,7 +52,7 @@ def simulate_command(  # noqa: PLR0917 - the command line passes options by name
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the score as JSON.")] = False,
 ) -> None:
-    """Put a machine through a task's trial and score it."""
+    """Simulate a machine in a task's trial and score it."""
     from buildarena_benchmark import failed_score, score
     from buildarena_simulation import ENGINES, write_trajectory
 

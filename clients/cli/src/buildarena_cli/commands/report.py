@@ -33,7 +33,7 @@ def report(
     sweeps: Annotated[
         list[str],
         typer.Argument(
-            help="Ids of sweeps, or how they begin; several are set side by side.",
+            help="Ids of sweeps, or their beginnings; several are set side by side.",
             autocompletion=complete_sweep,
         ),
     ],

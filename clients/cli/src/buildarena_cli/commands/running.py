@@ -39,7 +39,7 @@ def down(data: DataOption = None) -> None:
 
 
 def status(data: DataOption = None, *, as_json: JsonOption = False) -> None:
-    """Show what of the service runs on the data folder.
+    """Show which parts of the service run on the data folder.
 
     The exit code is 0 when everything is healthy, and 1 otherwise.
     """
@@ -83,9 +83,11 @@ def logs(
     ] = None,
     *,
     follow: Annotated[
-        bool, typer.Option("--follow", "-f", help="Go on until Ctrl-C with what is written.")
+        bool, typer.Option("--follow", "-f", help="Keep printing new lines until Ctrl-C.")
     ] = False,
-    lines: Annotated[int, typer.Option("--lines", "-n", help="Of each log at most.", min=0)] = 50,
+    lines: Annotated[
+        int, typer.Option("--lines", "-n", help="Lines of each log at most.", min=0)
+    ] = 50,
     data: DataOption = None,
 ) -> None:
     """Print the logs of the service's processes."""

@@ -50,27 +50,26 @@ def run_sweep(
     file: Annotated[Path, typer.Argument(help="YAML file of the sweep.")],
     *,
     dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Show what it would be and cost; submit nothing.")
+        bool,
+        typer.Option(
+            "--dry-run", help="Show the jobs and about what they would cost; submit nothing."
+        ),
     ] = False,
-    detach: Annotated[bool, typer.Option("--detach", help="Submit and do not wait.")] = False,
+    detach: Annotated[bool, typer.Option("--detach", help="Submit without waiting.")] = False,
     task: Annotated[
         list[str] | None,
-        typer.Option(
-            "--task", help="In the place of the file's tasks.", autocompletion=complete_task
-        ),
+        typer.Option("--task", help="Replaces the file's tasks.", autocompletion=complete_task),
     ] = None,
     model: Annotated[
         list[str] | None,
-        typer.Option(
-            "--model", help="In the place of the file's models.", autocompletion=complete_model
-        ),
+        typer.Option("--model", help="Replaces the file's models.", autocompletion=complete_model),
     ] = None,
     samples: Annotated[
-        int | None, typer.Option("--samples", help="In the place of the file's samples or seeds.")
+        int | None, typer.Option("--samples", help="Replaces the file's samples or seeds.")
     ] = None,
     seed: Annotated[
         list[int] | None,
-        typer.Option("--seed", help="In the place of the file's seeds or samples."),
+        typer.Option("--seed", help="Replaces the file's seeds or samples."),
     ] = None,
     max_cost_usd: MaxCostOption = None,
     max_tokens: MaxTokensOption = None,
@@ -151,7 +150,7 @@ def show_sweep(
     url: UrlOption = DEFAULT_URL,
     as_json: JsonOption = False,
 ) -> None:
-    """Show how far a sweep is."""
+    """Show a sweep's progress."""
     client = Client(url)
     whole = whole_id(client, "sweep", sweep_id)
     if wait:
@@ -163,7 +162,7 @@ def show_sweep(
 def pause_sweep(
     sweep_id: SweepId, *, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False
 ) -> None:
-    """Hold a sweep's waiting jobs; jobs that have begun go on to their end."""
+    """Put a sweep's waiting jobs on hold; running jobs continue."""
     _change(url, sweep_id, "pause", as_json=as_json)
 
 
@@ -177,7 +176,7 @@ def resume_sweep(
     url: UrlOption = DEFAULT_URL,
     as_json: JsonOption = False,
 ) -> None:
-    """Let a sweep go on that was paused, or that used up its budget and now gets more."""
+    """Resume a sweep that was paused, or one whose budget is used up, with a larger budget."""
     budget = budget_of(max_cost_usd, max_tokens, max_requests)
     body = {"budget": budget}
     _change(url, sweep_id, "resume", body, as_json=as_json)
@@ -224,7 +223,7 @@ def import_sweep(
     url: UrlOption = DEFAULT_URL,
     as_json: JsonOption = False,
 ) -> None:
-    """Take an exported sweep in; jobs that are there already stay as they are."""
+    """Import an exported sweep; jobs that already exist stay as they are."""
     try:
         done = Client(url).upload("/v1/archives", file, "application/zip")
     except OSError as error:

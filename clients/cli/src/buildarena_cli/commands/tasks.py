@@ -1,4 +1,4 @@
-"""The commands of tasks: look at them, and add one's own."""
+"""The commands of tasks: look at them, and add custom ones."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ TaskFile = Annotated[Path, typer.Argument(help="YAML file of the task.")]
 
 @app.command("list")
 def list_tasks(*, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) -> None:
-    """List the tasks; those that somebody added are marked."""
+    """List the tasks; custom ones are marked."""
     found = Client(url).get("/v1/tasks")
     if as_json:
         print_json(found)
@@ -58,7 +58,7 @@ def show_task(
     url: UrlOption = DEFAULT_URL,
     as_json: JsonOption = False,
 ) -> None:
-    """Show the statement that a model gets of a task; as JSON its whole document."""
+    """Show a task's statement as models read it; with --json, the whole document."""
     client = Client(url)
     try:
         task = client.get(at("tasks", name), version=version)
@@ -115,8 +115,8 @@ def add_task(file: TaskFile, *, url: UrlOption = DEFAULT_URL, as_json: JsonOptio
     say(f"{done['name']}, version {done['version']}")
     if not done["current"]:
         warn(
-            f"This version of {before.name} was there before; new submissions get a newer one. "
-            "Change its statement, or name it otherwise, to have it used."
+            f"This version of {before.name} already exists; new submissions get a newer one. "
+            "To use this text, change its statement or its name."
         )
 
 

@@ -19,7 +19,7 @@ app = new_group("Run workers by themselves.")
 @app.command("start")
 def start_worker(
     queue: Annotated[
-        str, typer.Argument(help="construct, or simulate.ENGINE, such as simulate.mujoco.")
+        str, typer.Argument(help="construct, or simulate.SIMULATOR, such as simulate.mujoco.")
     ],
 ) -> None:
     """Serve a queue from this process, with the servers that BUILDARENA_* name, until Ctrl-C."""

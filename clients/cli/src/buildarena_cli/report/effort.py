@@ -103,7 +103,7 @@ def rounds(material: Material) -> list[Block]:
 
 
 def simulators(material: Material) -> list[Block]:
-    """How far two simulators agree on the same machines."""
+    """How well two simulators agree on the same machines."""
     names = sorted({name for tried in material.verdicts.values() for name in tried})
     rows = []
     for first, second in combinations(names, 2):

@@ -46,7 +46,7 @@ class TaskComparison:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Comparison:
-    """Two models on all tasks that both were tried on."""
+    """Two models on all tasks that both played."""
 
     first: str
     second: str

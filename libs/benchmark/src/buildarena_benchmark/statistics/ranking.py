@@ -100,7 +100,7 @@ def rank_models(
     tail = (1 - level) / 2
     low = np.quantile(places, tail, axis=0, method="lower")
     high = np.quantile(places, 1 - tail, axis=0, method="higher")
-    # No place may be ruled out on account of a statistically tied model.
+    # A statistically tied model rules out no place.
     return Ranking(
         mean_rank=mean_ranks(*figures),
         rank=(1 + better.sum(axis=0)).astype(np.int64),

@@ -49,7 +49,7 @@ class Source:
         return self._located(path)[1]
 
     def issues(self, error: ValidationError, model: type[BaseModel]) -> tuple[ValidationIssue, ...]:
-        """What a model says against the content, in words, with lines and valid choices."""
+        """What the schema says against the content, in words, with lines and valid choices."""
         schema = model.model_json_schema()
         found = [self._issue(item, schema) for item in error.errors(include_url=False)]
         return tuple(dict.fromkeys(found))
@@ -151,7 +151,7 @@ class _CarefulLoader(yaml.SafeLoader):
             message = "anchors and aliases are not allowed: write the value out"
             raise _Refused(problem=message, problem_mark=event.start_mark)
         if self._level >= MAX_LEVELS:
-            message = f"more than {MAX_LEVELS} levels inside each other"
+            message = f"nested more than {MAX_LEVELS} levels deep"
             raise _Refused(problem=message, problem_mark=event.start_mark)
         self._level += 1
         node = super().compose_node(parent, index)
@@ -174,7 +174,7 @@ class _CarefulLoader(yaml.SafeLoader):
 
 
 def _key_issues(node: yaml.Node | None, around: str) -> Iterator[ValidationIssue]:
-    """Keys that are not words, or that stand twice in one mapping."""
+    """Keys that are not text, or that appear twice in one mapping."""
     if isinstance(node, yaml.SequenceNode):
         for index, item in enumerate(node.value):
             yield from _key_issues(item, f"{around}[{index}]")
@@ -185,11 +185,11 @@ def _key_issues(node: yaml.Node | None, around: str) -> Iterator[ValidationIssue
         line = key.start_mark.line + 1
         if not isinstance(key, yaml.ScalarNode) or key.tag != "tag:yaml.org,2002:str":
             shown = key.value if isinstance(key, yaml.ScalarNode) else "a collection"
-            yield ValidationIssue(path=around, line=line, message=f"the key {shown} is not a word")
+            yield ValidationIssue(path=around, line=line, message=f"the key {shown} is not text")
             continue
         field = f"{around}.{key.value}" if around else key.value
         if key.value in lines:
-            message = f"stands twice, first in line {lines[key.value]}"
+            message = f"appears twice, first in line {lines[key.value]}"
             yield ValidationIssue(path=field, line=line, message=message)
         lines.setdefault(key.value, line)
         yield from _key_issues(value, field)

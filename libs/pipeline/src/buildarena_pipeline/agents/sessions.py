@@ -41,7 +41,7 @@ class SessionClosedError(PipelineError):
 
 
 class NothingToSubmitError(PipelineError):
-    """There is no machine, or several and no assembly."""
+    """There is no machine, or there are several without an assembly."""
 
 
 class ExternalSessions:
@@ -100,7 +100,7 @@ class ExternalSessions:
             count = lease.job.actions
             if count >= MAX_CALLS:
                 raise SessionClosedError(
-                    f"session {job_id} has made {MAX_CALLS} calls, which is all it may: submit it"
+                    f"session {job_id} has made {MAX_CALLS} calls, the most it may make: submit it"
                 )
             bench = self._bench(job_id, count, connection)
             done = bench.call(machine, tool, arguments)
@@ -109,11 +109,11 @@ class ExternalSessions:
         return done
 
     def submit(self, job_id: str) -> Job:
-        """Ends the building: the machine is checked and goes to the simulator.
+        """Ends the session: the machine is checked and goes to the simulator.
 
         Raises:
             SessionClosedError: The session is not open.
-            NothingToSubmitError: There is no machine, or several and no assembly.
+            NothingToSubmitError: There is no machine, or there are several without an assembly.
         """
         context = self._context
         engine = None
@@ -166,7 +166,7 @@ class ExternalSessions:
         return context.store.jobs.get(job_id)
 
     def _check(self, task: str, agent: str, simulator: str) -> Task:
-        """The newest version of the task, if all that was named is there."""
+        """The newest version of the task, if everything that was named exists."""
         errors = []
         found = self._context.tasks.named([task]).get(task)
         if found is None:

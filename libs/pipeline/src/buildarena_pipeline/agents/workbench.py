@@ -24,7 +24,7 @@ class Workbench:
         self.machines: dict[str, Machine] = {}
 
     def call(self, machine: str, tool: str, arguments: Any) -> ExternalCall:
-        """Carries out an action and says what came of it; nothing that is given can raise."""
+        """Carries out an action and returns its result; no argument makes it raise."""
         tool, arguments = clean(tool), clean(arguments)
         outcome = self._machine(machine).act(tool, arguments)
         return ExternalCall(

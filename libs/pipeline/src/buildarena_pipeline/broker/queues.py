@@ -43,7 +43,7 @@ class Queues:
         self._redis = Redis.from_url(broker_url, socket_connect_timeout=2, socket_timeout=10)
 
     def notify(self, queue: str, job_ids: Sequence[str]) -> bool:
-        """Sends a queue's workers a message for each job, as well as it can.
+        """Sends a queue's workers a message for each job, if the broker can be reached.
 
         Returns:
             False when the broker could not be reached; the reaper will try again.

@@ -91,4 +91,4 @@ def reconnect() -> None:
     Raises:
         ConnectionResetError: Always; it is what Celery meets with a reconnection.
     """
-    raise ConnectionResetError("no message came while some wait: the connection is taken anew")
+    raise ConnectionResetError("no message was received while some wait: reconnecting")

@@ -74,7 +74,7 @@ class ModelRegistry:
 
 
 def load_registry(extra: Path | None = None) -> ModelRegistry:
-    """The built-in registry, with an operator's file added to it or taking its places.
+    """The built-in registry, with an operator's file added to it or replacing entries.
 
     Raises:
         StartupError: The file can't be used; the message names the offending entry.

@@ -1,4 +1,4 @@
-"""Prices of model requests: the registry's own where it gives one, else genai-prices'."""
+"""Prices of model requests: the registry's own where it gives one, otherwise genai-prices'."""
 
 from __future__ import annotations
 

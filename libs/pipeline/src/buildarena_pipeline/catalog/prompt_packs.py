@@ -1,4 +1,4 @@
-"""Prompt packs: all sentences that a session says to a model, in a folder, with a hash.
+"""Prompt packs: all texts that a session sends to a model, in a folder, with a hash.
 
 A pack of our layout is a folder of Markdown files: ``planner.md`` … are the roles' system
 messages, files under ``messages/`` are the frames of what the roles are told, with ``$name``
@@ -59,7 +59,7 @@ PUBLISHED_LEVELS = {"soft": 1, "medium": 2, "hard": 3}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PromptPack:
-    """The sentences of a session.
+    """The texts of a session.
 
     Attributes:
         name: What submissions call it.

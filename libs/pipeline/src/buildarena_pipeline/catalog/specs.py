@@ -62,7 +62,7 @@ class Budget(BaseModel):
 
 
 class ClosedLoop(BaseModel):
-    """Further rounds for samples that failed, told what the simulator said."""
+    """Further rounds for samples that failed, after reading the simulator's results."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 

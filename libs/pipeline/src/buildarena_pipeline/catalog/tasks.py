@@ -134,7 +134,7 @@ class TaskCatalog:
             fields = ("title", "category", "level", "indicator", "difficulty")
             changed = [name for name in fields if getattr(kept, name) != getattr(task, name)]
             raise TaskChangedError(
-                f"version {task.version} of {task.name} is there with another "
+                f"version {task.version} of {task.name} exists with another "
                 f"{' and '.join(changed)}, which cannot be changed alone: they stay as they were "
                 "first uploaded, or choose another name"
             )

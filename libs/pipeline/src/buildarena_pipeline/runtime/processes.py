@@ -16,7 +16,7 @@ _prctl = ctypes.CDLL(None).prctl if sys.platform == "linux" else None
 
 
 def die_with_parent(signal_number: int = signal.SIGTERM) -> None:
-    """Asks Linux to signal this process when the thread that started it ends; else no effect."""
+    """On Linux, has this process signalled when the thread that started it ends."""
     if _prctl is not None:
         _prctl(PR_SET_PDEATHSIG, int(signal_number))
 

@@ -1,4 +1,4 @@
-"""Traces by OpenTelemetry, when an endpoint is configured; else spans cost next to nothing.
+"""Traces by OpenTelemetry, when an endpoint is configured; otherwise spans cost next to nothing.
 
 All spans of one job are one trace, whichever processes made them: its id is made from the job's.
 """

@@ -88,7 +88,7 @@ class Engine(Protocol):
         """Changes the cargo's mass and, in proportion, its inertia."""
 
     def drop_rope(self, index: int) -> None:
-        """Takes a rope that gave way out of the world."""
+        """Removes a rope that gave way from the world."""
 
     def advance(self, wheel_speeds: FloatArray, thrusts: FloatArray) -> None:
         """Steps the world.
@@ -104,7 +104,7 @@ class Engine(Protocol):
 
     @property
     def struck(self) -> bool:
-        """Whether something was struck in the steps of `advance`."""
+        """Whether there was an impact in the steps of `advance`."""
 
     def rope_tensions(self) -> FloatArray:
         """Tension of each rope in the last step, (R,), mass·unit/s²."""

@@ -94,7 +94,7 @@ class ApiKeys:
         return value_of(ApiKey, row), secret
 
     def check(self, secret: str) -> KeyCheck | None:
-        """The key that has this secret, and whether it is still good; None when nobody has it."""
+        """The key that has this secret, and whether it is still valid; None when nobody has it."""
         expired = (api_keys.c.expires_at <= events.now).label("expired")
         stale = func.coalesce(api_keys.c.used_at < events.now - NOTED_EVERY, True).label("stale")
         with self._database.transaction() as connection:
@@ -117,7 +117,7 @@ class ApiKeys:
         return KeyCheck(key=key, refusal=None)
 
     def all(self) -> list[ApiKey]:
-        """Every key, oldest first, those that ended included."""
+        """Every key, oldest first, including revoked and expired ones."""
         query = select(*_COLUMNS).order_by(api_keys.c.created_at, api_keys.c.id)
         with self._database.transaction() as connection:
             return [value_of(ApiKey, row) for row in connection.execute(query)]
@@ -136,7 +136,7 @@ class ApiKeys:
         return value_of(ApiKey, row)
 
     def revoke(self, key_id: str) -> ApiKey:
-        """Ends a key at once; revoking it again changes nothing.
+        """Revokes a key at once; revoking it again changes nothing.
 
         Raises:
             UnknownIdError: There is no such key.

@@ -19,7 +19,7 @@ from buildarena_store.states import EXTERNAL_QUEUE, JobState, Outcome
 from buildarena_store.tables import external_calls, jobs
 
 IDLE_FOR = timedelta(hours=24)
-"""A session that makes no call for so long is cancelled."""
+"""A session that makes no call for this long is cancelled."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,7 +70,7 @@ class ExternalCalls:
         return bool(opened)
 
     def lease(self, job_id: str, *, connection: Connection) -> Lease | None:
-        """The agent's hold on its open session, locked until the transaction ends."""
+        """The agent's lease on its open session, locked until the transaction ends."""
         row = connection.execute(
             select(*JOB_COLUMNS)
             .where(

@@ -189,7 +189,7 @@ class Leases:
     def queue_again(
         self, lease: Lease, *, stage: Stage, queue: str, connection: Connection, **values: Any
     ) -> None:
-        """Passes the job on to a stage, there to be claimed afresh; faults are forgiven."""
+        """Passes the job on to a stage, to be claimed again there; its faults are forgotten."""
         self.advance(
             lease,
             to=JobState.QUEUED,
@@ -284,9 +284,7 @@ class Leases:
                     state=case((last, literal(JobState.DONE.value)), else_=JobState.QUEUED.value),
                     outcome=case((last, literal(Outcome.ERRORED.value)), else_=None),
                     reason=case((last, literal("lost_worker")), else_=None),
-                    detail=case(
-                        (last, literal("its workers were lost again and again")), else_=None
-                    ),
+                    detail=case((last, literal("it lost its workers again and again")), else_=None),
                     finished_at=case((last, events.now), else_=None),
                     faults=jobs.c.faults + 1,
                     lease_owner=None,
@@ -305,7 +303,9 @@ class Leases:
                 )
                 for row in rows
             ]
-            end_attempts(endings, AttemptResult.LOST, "no heartbeat came", connection=connection)
+            end_attempts(
+                endings, AttemptResult.LOST, "no heartbeat was received", connection=connection
+            )
         return [row.id for row in rows if row.state == JobState.QUEUED]
 
     def waiting_queues(self) -> list[str]:

@@ -1,4 +1,4 @@
-"""Transitions: the one way in which jobs that nobody works on change their state.
+"""Transitions: the only way to change the state of jobs that no worker has.
 
 A lease's holder moves its job through `leases`, which checks the fencing token as well.
 """
@@ -25,7 +25,7 @@ REOPENED: Final[Mapping[str, Any]] = MappingProxyType(
         "available_at": events.now,
     }
 )
-"""Columns of a job that had ended and goes on."""
+"""Columns of a job that had ended and is reopened."""
 
 
 def transition(

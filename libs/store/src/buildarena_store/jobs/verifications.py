@@ -18,7 +18,7 @@ from buildarena_store.states import VerificationState
 from buildarena_store.tables import verifications
 
 ABANDONED_AFTER = timedelta(minutes=10)
-"""A verification whose worker says nothing for so long is done by another: it writes no score."""
+"""After so long without an end, a verification is done by another worker: it writes no score."""
 NOTIFY_AGAIN_AFTER = timedelta(seconds=10)
 
 

@@ -50,7 +50,7 @@ class SweepLifecycle:
             yield connection
 
     def pause(self, sweep_id: str) -> None:
-        """Puts the sweep's waiting jobs on hold; jobs that have begun go on to their end.
+        """Puts the sweep's waiting jobs on hold; running jobs continue.
 
         Raises:
             UnknownIdError: There is no such sweep.
@@ -61,7 +61,7 @@ class SweepLifecycle:
             self._hold(sweep_id, connection)
 
     def resume(self, sweep_id: str, limits: BudgetLimits | None = None) -> None:
-        """Lets a paused or stopped sweep go on, with another budget if one is given.
+        """Resumes a paused or stopped sweep, with another budget if one is given.
 
         Raises:
             UnknownIdError: There is no such sweep.

@@ -1,4 +1,4 @@
-"""Who asks, and what they may do: API keys, scopes and rate limits.
+"""Who sends a request, and what they may do: API keys, scopes and rate limits.
 
 Reading needs the scope ``read``, everything else ``submit``, the service's own affairs ``admin``;
 each includes those before it. What somebody submitted, only its owner or an admin may change.
@@ -69,7 +69,7 @@ def check_binding(settings: Settings) -> None:
     """
     if not settings.require_keys and settings.host not in LOOPBACK:
         raise ValueError(
-            f"the API is to listen on {settings.host}, where others can reach it: set "
+            f"the API would listen on {settings.host}, where others can reach it: set "
             "BUILDARENA_REQUIRE_KEYS=true and BUILDARENA_ADMIN_KEY, or listen on 127.0.0.1"
         )
     if settings.require_keys and settings.admin_key is None:
@@ -134,7 +134,7 @@ def _identify(context: Context, given: HTTPAuthorizationCredentials | None) -> C
         return Caller(key_id=None, scope="admin")
     found = context.store.keys.check(secret)
     if found is None:
-        raise _unauthorized("this API key is not known here")
+        raise _unauthorized("unknown API key")
     if found.refusal is not None:
         raise _unauthorized(f"API key {found.key.id} is {found.refusal}")
     scopes = [scope for scope in SCOPES if scope in found.key.scopes]

@@ -33,7 +33,7 @@ def decode(cursor: str) -> tuple[datetime, str]:
 
 
 def _bad() -> ProblemError:
-    message = "not a cursor; take next_cursor of the page before, or leave it out"
+    message = "not a cursor; use next_cursor of the previous page, or leave it out"
     return ProblemError(
         422, f"cursor: {message}", errors=[ValidationIssue(path="cursor", message=message)]
     )

@@ -1,4 +1,4 @@
-"""Answers that a reader who has them need not get again."""
+"""Answers that are not sent again to a reader who has them."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ class _View(BaseModel):
 class Row(_View):
     """One model configuration on one task. What does not exist is null."""
 
-    rank: int | None = Field(description="Models that are statistically tied share a rank")
+    rank: int | None = Field(description="Statistically tied models share a rank")
     rank_low: int | None = Field(description="Lower end of the place's 95 % bootstrap interval")
     rank_high: int | None
     model: str
@@ -34,7 +34,7 @@ class Row(_View):
     errored: int = Field(description="Jobs that infrastructure faults ended: in no average")
     cancelled: int
     flagged: int = Field(description="Successes that a flag keeps out of the averages")
-    simulated: int = Field(description="Counted jobs whose machine was finished and tried")
+    simulated: int = Field(description="Counted jobs whose machine was finished and simulated")
     successes: int
     success_rate: float | None = Field(description="null when nothing was scored")
     success_low: float | None = Field(description="Lower end of the 95 % Wilson interval")
@@ -140,7 +140,7 @@ class ChangeView(_View):
     model: str
     before: dict[str, Any] | None
     after: dict[str, Any] | None
-    why: str | None = Field(description="What the one who changed it said, if anything")
+    why: str | None = Field(description="Reason that came with the change, if any")
     at: datetime
 
 

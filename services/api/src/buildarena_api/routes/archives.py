@@ -1,4 +1,4 @@
-"""Routes of archives: a whole sweep as one file, out and in."""
+"""Routes of archives: exporting and importing a whole sweep as one file."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ router = APIRouter(prefix="/v1", tags=["archives"])
 
 IMPORT_PATH = "/v1/archives"
 MAX_BYTES = 8 << 30
-"""Largest archive taken in: the paper's whole matrix has about 3 GB of trajectories."""
+"""Largest archive imported: the paper's whole matrix has about 3 GB of trajectories."""
 ZIP = "application/zip"
 
 
 class ImportedView(BaseModel):
-    """What became of an archive."""
+    """The result of an import."""
 
     model_config = ConfigDict(from_attributes=True)
 
@@ -70,7 +70,7 @@ def export_sweep(sweep_id: str, context: ContextDep) -> FileResponse:
 async def import_sweep(
     request: Request, response: Response, context: ContextDep, caller: CallerDep
 ) -> ImportedView:
-    """Takes an exported sweep in; jobs that are there already stay as they are. For admins."""
+    """Imports an exported sweep; jobs that already exist stay as they are. For admins."""
     source = _scratch()
     try:
         await _receive(request, source)

@@ -40,7 +40,7 @@ LastEventId = Annotated[
 async def stream_job(
     job_id: str, context: ContextDep, request: Request, last_event_id: LastEventId = 0
 ) -> EventSourceResponse:
-    """What happens to a job, from the beginning or from an event on."""
+    """Streams the events of a job, from the beginning or after a given one."""
     await run_in_threadpool(context.store.jobs.get, job_id)
     hub: EventHub = request.app.state.hub
     events = hub.listen(last_id=last_event_id, sweep_id=None, job_ids=frozenset({job_id}))
@@ -55,7 +55,7 @@ async def stream_job(
 async def stream_sweep(
     sweep_id: str, context: ContextDep, request: Request, last_event_id: LastEventId = 0
 ) -> EventSourceResponse:
-    """What happens to a sweep and its jobs, from the beginning or from an event on."""
+    """Streams the events of a sweep and its jobs, from the beginning or after a given one."""
     await run_in_threadpool(context.store.sweeps.get, sweep_id)
     job_ids = frozenset(await run_in_threadpool(context.store.sweeps.job_ids, sweep_id))
     hub: EventHub = request.app.state.hub

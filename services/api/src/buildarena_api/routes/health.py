@@ -112,7 +112,7 @@ def _clocks(context: Context) -> Check:
         name="clocks",
         ok=not wrong,
         detail="; ".join(wrong) or "workers and database agree",
-        advice="set these machines' clocks by NTP" if wrong else "",
+        advice="synchronise these machines' clocks by NTP" if wrong else "",
     )
 
 

@@ -138,7 +138,7 @@ def cancel_job(job_id: str, context: ContextDep, caller: CallerDep) -> JobView:
 
 @router.post("/{job_id}/retry", status_code=202, responses=problem_responses(404, 409, 503))
 def retry_job(job_id: str, context: ContextDep, caller: CallerDep) -> JobView:
-    """Queues an errored job again where it failed. A scored job is never rolled again."""
+    """Queues an errored job again where it failed. A scored job is never run again."""
     job = context.store.jobs.get(job_id)
     caller.require_owner(job.owner, f"job {job_id}")
     with context.store.database.transaction() as connection:

@@ -22,7 +22,7 @@ router = APIRouter(prefix="/v1/keys", tags=["keys"], dependencies=[Depends(admin
 
 
 class NewKey(BaseModel):
-    """A wish for a key."""
+    """A request for a key."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -32,7 +32,7 @@ class NewKey(BaseModel):
         Field(min_length=1, max_length=3, description="Each includes those before it"),
     ]
     days: Annotated[
-        int | None, Field(ge=1, le=3650, description="How long it is good; null forever")
+        int | None, Field(ge=1, le=3650, description="Days until it expires; null for never")
     ] = None
     budget: Budget | None = None
 
@@ -73,19 +73,19 @@ def create_key(body: NewKey, response: Response, context: ContextDep) -> KeyCrea
 
 @router.get("", responses=problem_responses(503))
 def list_keys(context: ContextDep) -> list[KeyView]:
-    """Lists all keys, oldest first, those that ended included."""
+    """Lists all keys, oldest first, including revoked and expired ones."""
     return [_view(context, key) for key in context.store.keys.all()]
 
 
 @router.post("/{key_id}/revoke", responses=problem_responses(404, 503))
 def revoke_key(key_id: str, context: ContextDep) -> KeyView:
-    """Ends a key at once. What was submitted with it goes on."""
+    """Revokes a key at once; its jobs continue."""
     return _view(context, context.store.keys.revoke(key_id))
 
 
 @router.put("/{key_id}/budget", responses=problem_responses(404, 422, 503))
 def set_budget(key_id: str, body: Budget, context: ContextDep) -> KeyView:
-    """Sets what all jobs of a key may spend, and lets its single jobs go on that had to stop.
+    """Sets the budget of all jobs of a key, and resumes its single jobs that had to stop.
 
     Sweeps that stopped for want of it go on when they are resumed.
     """

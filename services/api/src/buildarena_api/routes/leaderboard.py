@@ -51,7 +51,7 @@ class TaskDuelView(BaseModel):
 
 
 class Comparison(BaseModel):
-    """Two models on all tasks that both were tried on."""
+    """Two models on all tasks that both played."""
 
     track: str | None
     first: str
@@ -65,7 +65,7 @@ class ManifestEntry(BaseModel):
     name: str
     distinct: int
     values: list[dict[str, Any]] = Field(
-        description="value and jobs (how many say so); empty when there are too many"
+        description="value, and jobs that have it; empty when there are too many"
     )
 
 
@@ -78,11 +78,11 @@ class VerifyRequest(BaseModel):
     model: str
     tasks: list[str] | None = None
     sample: Annotated[int | None, Field(ge=1, le=10_000, description="Default: all")] = None
-    seed: Annotated[int, Field(description="Of the choice of the sample")] = 0
+    seed: Annotated[int, Field(description="Seed of the random sample")] = 0
 
 
 class VerifyAccepted(BaseModel):
-    """Verifications that were asked for."""
+    """Verifications that were requested."""
 
     scored: int = Field(description="Scored jobs of the model")
     verifications: list[str] = Field(description="Ids; see /v1/verifications/{id}")
@@ -122,7 +122,7 @@ def compare(
     first: Annotated[str, Query(description="A model, or model@configuration")],
     second: Annotated[str, Query(description="Another")],
 ) -> Comparison:
-    """Tells whether one model is better than another, task by task."""
+    """Compares two models, task by task."""
     tasks: list[TaskComparison] = []
     if selection.track is not None:
         every = boards.trials(selection.track, selection.query)
@@ -159,7 +159,7 @@ def changes(
     limit: Annotated[int, Query(ge=1, le=1000)] = 100,
     unscored: Annotated[bool, Query(description="Also jobs that ended without a score")] = False,
 ) -> ChangePage:
-    """What entered a track's board, left it or was scored anew, and why; the newest first."""
+    """What entered a track's board, left it or was scored again, and why; newest first."""
     if selection.track is None:
         return ChangePage(track=None, changes=[], next_before=None)
     found = context.store.results.boards.changes(
@@ -198,7 +198,7 @@ def manifest(
 
 @router.post("/leaderboard/verify", status_code=202, responses=problem_responses(422, 503))
 def verify(body: VerifyRequest, context: ContextDep, boards: BoardsDep) -> VerifyAccepted:
-    """Has all of a model's results on a board, or a sample, replayed and simulated again."""
+    """Replays and re-simulates all of a model's results on a board, or a sample."""
     tracks = boards.tracks()
     if body.track is not None and body.track not in tracks:
         raise unknown("track", body.track, tracks)

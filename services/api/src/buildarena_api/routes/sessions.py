@@ -26,7 +26,7 @@ MachineName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,40}$")]
 
 
 class OpenSession(BaseModel):
-    """A wish to build."""
+    """A request to build."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -48,7 +48,7 @@ class SessionOpened(BaseModel):
     """An open session."""
 
     id: str = Field(description="Also the id of the job that will hold the score")
-    statement: str = Field(description="What is to be built")
+    statement: str = Field(description="What to build")
     tools: list[ToolView]
 
 
@@ -125,7 +125,7 @@ def submit_session(
     context: ContextDep,
     caller: CallerDep,
 ) -> JobView:
-    """Ends the building; the machine is simulated and scored."""
+    """Ends the session; the machine is simulated and scored."""
     _require_own(session_id, context, caller)
     try:
         job = sessions.submit(session_id)

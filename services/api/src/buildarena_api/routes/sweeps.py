@@ -52,7 +52,7 @@ Resume = Annotated[
 
 
 class Resumption(BaseModel):
-    """How a sweep is to go on."""
+    """How to resume a sweep."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -103,13 +103,13 @@ def _accepted_before(
 
 @router.post("/estimate", responses=problem_responses(422, 503))
 def estimate_sweep(spec: SweepSpec, submissions: SubmissionsDep) -> SweepEstimate:
-    """Tells what a sweep would consist of and about what it would cost; stores nothing."""
+    """Estimates a sweep's jobs and their cost; stores nothing."""
     return SweepEstimate.model_validate(submissions.estimate(spec))
 
 
 @router.post("/{sweep_id}/pause", responses=problem_responses(404, 409, 503))
 def pause_sweep(sweep_id: str, context: ContextDep, caller: CallerDep) -> SweepView:
-    """Puts the sweep's waiting jobs on hold; jobs that have begun go on to their end."""
+    """Puts the sweep's waiting jobs on hold; running jobs continue."""
     _require_owner(context, caller, sweep_id)
     context.store.lifecycle.pause(sweep_id)
     return _view(context, context.store.sweeps.get(sweep_id))
@@ -123,7 +123,7 @@ def resume_sweep(
     submissions: SubmissionsDep,
     body: Resumption | None = None,
 ) -> SweepView:
-    """Lets a sweep go on that was paused or whose budget is used up, with more budget if given."""
+    """Resumes a paused sweep, or one whose budget is used up, with a larger budget if given."""
     _require_owner(context, caller, sweep_id)
     submissions.resume(sweep_id, None if body is None else body.budget)
     return _view(context, context.store.sweeps.get(sweep_id))
@@ -172,7 +172,7 @@ def list_sweeps(
 
 @router.get("/{sweep_id}", responses=problem_responses(404, 503))
 def show_sweep(sweep_id: str, context: ContextDep) -> SweepView:
-    """Shows a sweep and how far it is."""
+    """Shows a sweep and its progress."""
     return _view(context, context.store.sweeps.get(sweep_id))
 
 

@@ -48,7 +48,7 @@ class TaskView(BaseModel):
     title: str
     category: str
     level: int
-    statement: str = Field(description="What the model is told")
+    statement: str = Field(description="What the model reads")
     indicator: str = Field(description="Name of the figure it is ranked by", examples=["load"])
     unit: str = Field(description='The figure\'s unit; "1" for a ratio', examples=["mass units"])
     difficulty: dict[str, int] = Field(description="Weight of each difficulty dimension, if any")
@@ -57,11 +57,11 @@ class TaskView(BaseModel):
 
 
 class TaskDetail(TaskView):
-    """A version of a task, whole."""
+    """A version of a task with its whole document."""
 
     current: bool = Field(description="Whether new submissions get this version")
     document: dict[str, Any] = Field(
-        description="All that its file says, defaults included; JSON is YAML, so it can be uploaded"
+        description="The whole document, defaults included; JSON is YAML, so it can be uploaded"
     )
 
 

@@ -32,7 +32,7 @@ class VerificationView(BaseModel):
 
 @router.post("/jobs/{job_id}/verify", status_code=202, responses=problem_responses(404, 409, 503))
 def verify_job(job_id: str, context: ContextDep, response: Response) -> VerificationView:
-    """Has a scored job replayed without a model, re-simulated, and every figure compared."""
+    """Replays a scored job without a model, re-simulates it, and compares every figure."""
     job = context.store.jobs.get(job_id)
     if job.success is None:
         raise ProblemError(409, f"job {job_id} has no score to verify")

@@ -1,0 +1,109 @@
+"""Words that the glossary replaced do not come back. Pure text: nothing is imported or started."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+
+# The changelog and migrations tell what was renamed; recorded data is what it was; prompts and
+# geometry's texts are what models read, and change only with their versions.
+EXCLUDED = (
+    "CHANGELOG.md",
+    "LICENSE",
+    "migrations/",
+    "requirements",
+    "tests/data/",
+    "tests/test_words.py",
+    "libs/benchmark/src/buildarena_benchmark/leaderboard/published.csv",
+    "libs/benchmark/src/buildarena_benchmark/tasks/catalogue/",
+    "libs/geometry/src/",
+    "libs/pipeline/src/buildarena_pipeline/catalog/prompts/",
+)
+ENDINGS = {".md", ".py", ".toml", ".yaml", ".mk", ".sh", ".j2", ".json", ".in", "", ".ini", ".mako"}
+
+WORDS = (
+    (r"\bnudg(e|ed|es|ing)\b|\bnudged_at\b", "notify"),
+    (r"\bsweepers?\b", "reaper"),
+    (r"\bturnstiles?\b", "concurrency gate"),
+    (r"\bPassingFault\w*|\bpassing faults?\b", "transient fault, TransientError"),
+    (
+        r"\btaken?_up\b|\btake_?up\b|\bTakeUp\b|\b(take|takes|taken|took|taking) up again\b",
+        "resume",
+    ),
+    (r"\bdeaf\b", "stalled"),
+    (r"(?-i:\bMOST_[A-Z])", "MAX_"),
+    (r"(?-i:\bLEAST_[A-Z])", "MIN_"),
+    (r"\bGatheredStore\b", "BatchedRedis"),
+    (r"\bwas_too_much\b", "rejected"),
+    (r"\bwent_well\b", "succeeded"),
+    (r"\bduels?\b", "comparison"),
+    (r"\bjolts?\b", "impact"),
+    (r"\boutside agents?\b", "external agent"),
+    (r"\bown tasks?\b|\bown_tasks?\b", "custom task"),
+    (r"\bat the most\b", "at most"),
+    (r"\bfor ever\b", "forever"),
+    (r"\bcan't be told apart\b|\bcannot be told apart\b", "statistically tied"),
+    (r"\bset(s|ting)? fire\b|\bby fire\b", "inject faults"),
+    (r"\bwrong words\b", "usage error"),
+    (r"\bis no (YAML|JSON|UTF-8)\b", "is not valid …"),
+    (r"\bSimulationRoom\w*", "SimulationError"),
+    (r"(?-i:\bGuards\b)", "BodyLimitMiddleware"),
+    (r"\b_guard\b", "_lock"),
+    (r"\b(put|puts|putting) aside\b", "reserve"),
+    (r"\b(get|gets|getting) on\b", "make progress"),
+    (r"\broads? of (a|the|one) job\b", "job lifecycle"),
+    (r"\bFieldError\b|\bFieldProblem\b", "ValidationIssue"),
+    (r"\bis told in\b|\bso much as\b", "a plain sentence"),
+)
+PATTERNS = [(re.compile(word, re.IGNORECASE), instead) for word, instead in WORDS]
+
+
+def tracked() -> list[str]:
+    listed = subprocess.run(
+        ["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    if listed.returncode:
+        pytest.skip("this is not a checkout")
+    return [
+        name
+        for name in listed.stdout.split("\0")
+        if Path(name).suffix in ENDINGS
+        and not name.startswith(EXCLUDED)
+        and (ROOT / name).is_file()
+    ]
+
+
+def findings(name: str, text: str) -> list[str]:
+    """Old words of a text, each with its place and the word to use."""
+    return [
+        f"{name}:{number}: {found[0]!r}: say {instead!r}"
+        for number, line in enumerate(text.splitlines(), start=1)
+        for pattern, instead in PATTERNS
+        for found in pattern.finditer(line)
+    ]
+
+
+def test_old_words_do_not_come_back() -> None:
+    names = tracked()
+    assert len(names) > 300
+    found = [line for name in names for line in findings(name, (ROOT / name).read_text())]
+    assert not found, "\n" + "\n".join(found)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("The sweeper nudges workers.", ["'sweeper': say 'reaper'", "'nudges': say 'notify'"]),
+        ("MOST_ROWS = 3", ["'MOST_R': say 'MAX_'"]),
+        ("a task of your own, held for 3 s, the most it can bear", []),
+    ],
+)
+def test_an_old_word_is_named_with_the_one_to_use(text: str, says: list[str]) -> None:
+    assert [line.removeprefix("a.md:1: ") for line in sorted(findings("a.md", text))] == sorted(
+        says
+    )
