@@ -9,7 +9,9 @@ from terminals import on_terminal, piped
 
 from buildarena_cli.commands.job_lists import COLUMNS
 from buildarena_cli.terminal.output import columns, print_table
+from buildarena_cli.terminal.progress import FAULTS, STOPPED
 from buildarena_pipeline.catalog.specs import SweepSpec
+from buildarena_store import Outcome, SweepState
 
 WIDTHS = [200, 100, 80, 60, 40]
 LEAVING = [c.name for c in sorted(COLUMNS, key=lambda c: c.leaves) if c.leaves]
@@ -96,3 +98,8 @@ def test_a_sweep_is_listed_with_its_progress(url, context) -> None:
     assert head.split() == ["sweep", "name", "state", "ended", "jobs", "outcomes", "USD", "created"]
     assert row.split("  ")[0] == sweep.id
     assert "a sweep with a long name" in row
+
+
+def test_states_and_outcomes_are_spelled_as_the_service_spells_them() -> None:
+    assert set(FAULTS) <= set(Outcome)
+    assert set(STOPPED) <= set(SweepState)

@@ -86,7 +86,7 @@ def failed_score(task: "Task", machine: "Machine | None" = None) -> Score:
 
 
 def _finite(metrics: Mapping[str, Metric]) -> dict[str, Metric]:
-    """Metrics of a rollout that blew up may not be numbers; they are told as none."""
+    """Metrics of a rollout that blew up may not be numbers; they are left out as None."""
     return {
         name: None if isinstance(value, float) and not math.isfinite(value) else value
         for name, value in metrics.items()

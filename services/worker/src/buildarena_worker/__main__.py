@@ -18,7 +18,7 @@ from buildarena_worker.wiring import construct_handler, verification_runner
 
 
 def main() -> None:
-    """Serves the construct queue until it is told to stop."""
+    """Serves the construct queue until it is asked to stop."""
     settings = Settings()
     try:
         registry = load_registry(settings.models_file)

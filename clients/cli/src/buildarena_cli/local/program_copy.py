@@ -137,8 +137,8 @@ def _remove_left(place: Path) -> None:
 
 def _reason(error: Exception) -> str:
     if isinstance(error, subprocess.CalledProcessError):
-        said = error.stderr.decode(errors="replace").strip().splitlines()
-        return said[-1] if said else f"exit code {error.returncode}"
+        lines = error.stderr.decode(errors="replace").strip().splitlines()
+        return lines[-1] if lines else f"exit code {error.returncode}"
     if isinstance(error, OSError) and error.strerror:
         return error.strerror
     return str(error)

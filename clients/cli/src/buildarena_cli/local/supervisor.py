@@ -105,7 +105,7 @@ class Supervisor:
             for managed in self.managed:
                 if managed.process is not None and managed.process.poll() is not None:
                     self._restart(managed, managed.process.returncode)
-        # Children it started again are told when this thread ends: stay until they are stopped.
+        # Children that it restarted are signalled when this thread ends: stay until they stop.
         self._stopped.wait()
 
     def _restart(self, managed: ManagedProcess, code: int) -> None:

@@ -12,6 +12,9 @@ from buildarena_cli.terminal.output import is_terminal, say
 POLL_S = 0.3
 PLAIN_POLL_S = 2.0
 FAULTS = ("errored", "cancelled")
+"""Outcomes of jobs that were not scored, as the API spells them."""
+STOPPED = ("budget_exhausted", "paused")
+"""States of sweeps of which nothing more starts."""
 
 
 def watch_sweep(client: Client, sweep_id: str) -> dict[str, Any]:
@@ -34,9 +37,7 @@ def ended(sweep: dict[str, Any]) -> bool:
     """Whether nothing more will happen: every job has ended, or all others are on hold."""
     progress = sweep["progress"]
     moving = [name for name in progress["stages"] if not name.endswith(" on_hold")]
-    return not moving and (
-        progress["done"] == progress["total"] or sweep["state"] in {"budget_exhausted", "paused"}
-    )
+    return not moving and (progress["done"] == progress["total"] or sweep["state"] in STOPPED)
 
 
 def _watch_bars(client: Client, sweep_id: str) -> dict[str, Any]:

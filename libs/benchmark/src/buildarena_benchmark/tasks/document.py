@@ -60,7 +60,7 @@ class Constraints(_Document):
             have as many for each sub-structure that is allowed.
         modules: Names of the modules that may be used; None for all.
         min_modules: Fewest blocks or connectors of a module, by its name.
-        min_wheels: Fewest powered wheels; told to builders, judged by the scorer.
+        min_wheels: Fewest powered wheels; shown to builders, judged by the scorer.
     """
 
     min_sub_structures: Annotated[int, Field(ge=1, le=20)] = 1

@@ -1,7 +1,7 @@
 """Prompt packs: all texts that a session sends to a model, in a folder, with a hash.
 
 A pack of our layout is a folder of Markdown files: ``planner.md`` … are the roles' system
-messages, files under ``messages/`` are the frames of what the roles are told, with ``$name``
+messages, files under ``messages/`` are the frames of what the roles read, with ``$name``
 places. A pack of the published layout has ``prompt.yaml`` and maybe ``levels.yaml``; what it does
 not say is taken from the default pack.
 """
@@ -169,8 +169,8 @@ def _read_published(folder: Path, name: str) -> PromptPack:
                 roles[ours] = str(document["agents"][theirs]["system_message"]).strip()
         if "controller" in document:
             controller = document["controller"]
-            told = controller["system_message"] if isinstance(controller, dict) else controller
-            roles["controller"] = str(told).strip()
+            text = controller["system_message"] if isinstance(controller, dict) else controller
+            roles["controller"] = str(text).strip()
     except (KeyError, TypeError) as error:
         raise StartupError(
             f"prompt pack {name!r}: {folder / 'prompt.yaml'} needs agents, each with a "

@@ -64,18 +64,18 @@ class EventHub:
         """
         listener = _Listener(sweep_id, job_ids)
         await self._join(listener)
-        told: set[int] = set()
+        sent: set[int] = set()
         try:
             while True:
                 page = await asyncio.to_thread(self._before, last_id, sweep_id, job_ids)
                 for event in page:
-                    told.add(event.id)
+                    sent.add(event.id)
                     yield event
                 if not page:
                     break
                 last_id = page[-1].id
             while (new := await listener.queue.get()) is not None:
-                if new.id not in told:
+                if new.id not in sent:
                     yield new
         finally:
             self._listeners.discard(listener)

@@ -32,8 +32,8 @@ def _summary(turns: list[dict[str, Any]]) -> str:
     actions = [action for turn in turns for action in turn["actions"]]
     refused = Counter(action["reason"] or "refused" for action in actions if not action["ok"])
     share = sum(refused.values()) / len(actions) if actions else 0.0
-    told = ", ".join(f"{count} {name}" for name, count in refused.most_common()) or "none"
-    return f"{len(turns)} turns, {len(actions)} actions, {share:.1%} of them refused ({told})."
+    rendered = ", ".join(f"{count} {name}" for name, count in refused.most_common()) or "none"
+    return f"{len(turns)} turns, {len(actions)} actions, {share:.1%} of them refused ({rendered})."
 
 
 def _turn(turn: dict[str, Any]) -> list[str]:

@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from buildarena_api.dependencies import ContextDep
 from buildarena_api.http.problems import ProblemError, problem_responses
-from buildarena_store.states import VERIFY_QUEUE
+from buildarena_store.states import VERIFY_QUEUE, VerificationState
 
 router = APIRouter(prefix="/v1", tags=["verification"])
 
@@ -22,7 +22,7 @@ class VerificationView(BaseModel):
 
     id: str
     job_id: str
-    state: Literal["queued", "running", "done"]
+    state: Literal[VerificationState.QUEUED, VerificationState.RUNNING, VerificationState.DONE]
     report: dict[str, Any] | None = Field(
         description="ok, and checks with name, ok, kept and found; null until it is done"
     )
