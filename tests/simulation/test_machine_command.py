@@ -118,7 +118,7 @@ def test_an_empty_machine_is_a_failed_trial_not_a_crash(run, tmp_path: Path) -> 
 @pytest.mark.parametrize(
     ("content", "arguments", "told"),
     [
-        ("{", [], "no JSON"),
+        ("{", [], "not valid JSON"),
         ('{"blocks": 3}', [], "version is missing"),
         ('{"hello": 1}', [], "neither a machine document nor an action log"),
         ("[]", ["--engine", "havok"], "pybullet, mujoco"),
