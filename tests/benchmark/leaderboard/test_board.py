@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from buildarena_benchmark.leaderboard import (
     BoardQuery,
+    EndedJob,
     TrackBoard,
-    Trial,
     compare_models,
     summarise,
 )
@@ -24,9 +24,9 @@ WEIGHTS = {
 }
 
 
-def trials(task: str, model: str, successes: int, of: int, **values: object) -> list[Trial]:
+def trials(task: str, model: str, successes: int, of: int, **values: object) -> list[EndedJob]:
     return [
-        Trial(
+        EndedJob(
             **{
                 "job_id": f"{task}/{model}/{seed}",
                 "task": task,
@@ -46,7 +46,7 @@ def trials(task: str, model: str, successes: int, of: int, **values: object) -> 
     ]
 
 
-def board_of(*groups: list[Trial], versions: dict[str, str] | None = None) -> TrackBoard:
+def board_of(*groups: list[EndedJob], versions: dict[str, str] | None = None) -> TrackBoard:
     board = TrackBoard({"lift-1": "v2", "support-1": "v2"} | (versions or {}), WEIGHTS)
     for group in groups:
         for trial in group:
@@ -201,7 +201,7 @@ def test_a_board_kept_up_to_date_equals_one_made_anew(steps, rng: random.Random)
         *trials("lift-1", "b", 6, 10),
         *trials("support-1", "a", 1, 10),
     ]
-    kept: dict[str, Trial] = {}
+    kept: dict[str, EndedJob] = {}
     board = board_of()
     for what, number in steps:
         trial = pool[number]

@@ -10,7 +10,7 @@ from typing import Any
 
 from sqlalchemy import Connection, Integer, Row, cast, func, select, text
 
-from buildarena_benchmark.leaderboard import Trial
+from buildarena_benchmark.leaderboard import EndedJob
 from buildarena_store.database import Database
 from buildarena_store.rows import columns_of, value_of
 from buildarena_store.states import JobState
@@ -32,7 +32,7 @@ class BoardFeed:
     """
 
     mark: int
-    put: Sequence[Trial]
+    put: Sequence[EndedJob]
     gone: Sequence[str]
     task_versions: int
 
@@ -106,7 +106,7 @@ class Boards:
         gone = sorted(ids - {trial.job_id for trial in put})
         return BoardFeed(mark=new_mark, put=put, gone=gone, task_versions=task_versions)
 
-    def of_sweep(self, sweep_id: str) -> list[tuple[Trial, list[Round]]]:
+    def of_sweep(self, sweep_id: str) -> list[tuple[EndedJob, list[Round]]]:
         """A sweep's ended jobs with their rounds, in a fixed order."""
         members = select(sweep_jobs.c.job_id).where(sweep_jobs.c.sweep_id == sweep_id)
         query = (
@@ -202,12 +202,12 @@ _COLUMNS = [
 ]
 
 
-def _trials(connection: Connection, query: Any) -> Iterator[Trial]:
+def _trials(connection: Connection, query: Any) -> Iterator[EndedJob]:
     # A hundred thousand rows repeat a few dozen words and settings: one object serves them all.
     decodings: dict[str, Mapping[str, Any]] = {}
     result = connection.execution_options(stream_results=True).execute(query)
     for row in result.yield_per(CHUNK):
-        yield Trial(
+        yield EndedJob(
             job_id=row.job_id,
             track=sys.intern(row.track),
             task=sys.intern(row.task),

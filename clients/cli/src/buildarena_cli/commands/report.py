@@ -16,7 +16,7 @@ from buildarena_cli.terminal.completion import complete_sweep
 from buildarena_cli.terminal.output import say
 
 if TYPE_CHECKING:
-    from buildarena_benchmark.leaderboard import Trial
+    from buildarena_benchmark.leaderboard import EndedJob
 
 ENDINGS = (".html", ".md", ".pdf")
 PLAIN: Final[Mapping[str, Any]] = {
@@ -71,7 +71,7 @@ def collect(client: Client, ids: Sequence[str]) -> Any:
     variants = {sweep["id"]: variant(sweep["spec"]) for sweep in found}
     several = len(set(variants.values())) > 1
     registry = {entry["name"]: entry["model"] for entry in client.get("/v1/models")}
-    trials: dict[str, Trial] = {}
+    trials: dict[str, EndedJob] = {}
     rounds: dict[str, list[tuple[bool, float]]] = {}
     snapshots: dict[str, str] = {}
     verdicts: dict[tuple[str, str], dict[str, tuple[bool, float]]] = {}
@@ -126,11 +126,11 @@ def variant(spec: Mapping[str, Any]) -> str:
     return ", ".join(parts)
 
 
-def _trial(result: Mapping[str, Any], row: str) -> Trial:
-    from buildarena_benchmark.leaderboard import Trial
+def _trial(result: Mapping[str, Any], row: str) -> EndedJob:
+    from buildarena_benchmark.leaderboard import EndedJob
 
-    values = {name: result[name] for name in Trial.__dataclass_fields__ if name in result}
+    values = {name: result[name] for name in EndedJob.__dataclass_fields__ if name in result}
     values |= {"model": row, "flags": tuple(result["flags"])}
     if row != result["model"]:
         values["configuration"] = f"{row} {result['configuration']}"
-    return Trial(**values)
+    return EndedJob(**values)

@@ -6,21 +6,21 @@ import contextlib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from buildarena_benchmark.leaderboard import Board, Trial
+from buildarena_benchmark.leaderboard import Board, EndedJob
 from buildarena_cli.client import Client, RefusedError, at
 from buildarena_cli.report.document import Block, Grid, Heading, Paragraph
 from buildarena_cli.report.material import Material, ReportTask
 from buildarena_cli.terminal.output import in_words
 
 
-def read_tasks(client: Client, trials: Sequence[Trial]) -> dict[str, ReportTask]:
+def read_tasks(client: Client, trials: Sequence[EndedJob]) -> dict[str, ReportTask]:
     """The tasks by name: of a custom task the version that the report is about.
 
     That is the newest one, or one that was tried if the newest was not.
     """
     tasks = {}
     listed = {entry["name"]: entry for entry in client.get("/v1/tasks")}
-    tried: dict[str, list[Trial]] = {}
+    tried: dict[str, list[EndedJob]] = {}
     for trial in trials:
         tried.setdefault(trial.task, []).append(trial)
     for name in dict.fromkeys([*listed, *tried]):
@@ -67,7 +67,7 @@ def custom_tasks(material: Material, board: Board) -> list[Block]:
     ]
 
 
-def _reported(trials: Sequence[Trial], entry: Mapping[str, Any] | None) -> str:
+def _reported(trials: Sequence[EndedJob], entry: Mapping[str, Any] | None) -> str:
     versions = [trial.task_version for trial in trials]
     if entry is not None and entry["version"] in versions:
         return str(entry["version"])

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from buildarena_benchmark.leaderboard import Cell, PublishedRow, Trial, published_rows
+from buildarena_benchmark.leaderboard import Cell, EndedJob, PublishedRow, published_rows
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,7 +48,7 @@ class Material:
 
     title: str
     tasks: Mapping[str, ReportTask]
-    trials: Sequence[Trial]
+    trials: Sequence[EndedJob]
     rounds: Mapping[str, Sequence[tuple[bool, float]]]
     snapshots: Mapping[str, str]
     unfinished: int

@@ -3,6 +3,7 @@
 from buildarena_benchmark.leaderboard.board import Board, BoardQuery, TaskBoard, TrackBoard
 from buildarena_benchmark.leaderboard.cells import Cell, summarise
 from buildarena_benchmark.leaderboard.comparisons import Comparison, TaskComparison, compare_models
+from buildarena_benchmark.leaderboard.ended_jobs import EndedJob
 from buildarena_benchmark.leaderboard.latex import cost_table, performance_table, plain_table
 from buildarena_benchmark.leaderboard.overall import OverallRow
 from buildarena_benchmark.leaderboard.published import (
@@ -10,7 +11,6 @@ from buildarena_benchmark.leaderboard.published import (
     published_overall,
     published_rows,
 )
-from buildarena_benchmark.leaderboard.trials import Trial
 from buildarena_benchmark.outcomes import SCORED
 
 __all__ = [
@@ -19,12 +19,12 @@ __all__ = [
     "BoardQuery",
     "Cell",
     "Comparison",
+    "EndedJob",
     "OverallRow",
     "PublishedRow",
     "TaskBoard",
     "TaskComparison",
     "TrackBoard",
-    "Trial",
     "compare_models",
     "cost_table",
     "performance_table",

@@ -8,8 +8,8 @@ from datetime import datetime
 from typing import Final
 
 from buildarena_benchmark.leaderboard.cells import Cell, summarise
+from buildarena_benchmark.leaderboard.ended_jobs import EndedJob
 from buildarena_benchmark.leaderboard.overall import OverallRow, Weights, overall_rows, rank_cells
-from buildarena_benchmark.leaderboard.trials import Trial
 
 KEPT_RANKINGS: Final = 256
 """Rankings of tasks that are kept: the present ones, and those of recent filters."""
@@ -38,7 +38,7 @@ class BoardQuery:
     include_flagged: bool = False
     overall: frozenset[str] | None = None
 
-    def holds(self, trial: Trial) -> bool:
+    def holds(self, trial: EndedJob) -> bool:
         """Whether a trial ended in the time that was asked for."""
         if self.since is None and self.until is None:
             return True
@@ -95,7 +95,7 @@ class TrackBoard:
     def __init__(self, versions: Mapping[str, str], weights: Weights) -> None:
         self._versions = versions
         self._weights = weights
-        self._cells: dict[CellKey, dict[str, Trial]] = {}
+        self._cells: dict[CellKey, dict[str, EndedJob]] = {}
         self._places: dict[str, CellKey] = {}
         self._summaries: dict[tuple[CellKey, bool], Cell] = {}
         self._rankings: dict[tuple[int, ...], tuple[list[Cell], list[RankedCell]]] = {}
@@ -104,7 +104,7 @@ class TrackBoard:
         """Takes other tasks for known from now on; arguments as for the constructor."""
         self._versions, self._weights = versions, weights
 
-    def put(self, trial: Trial) -> bool:
+    def put(self, trial: EndedJob) -> bool:
         """Adds or replaces a trial; returns whether anything changed."""
         key = (trial.task, trial.task_version, trial.configuration)
         place = self._places.get(trial.job_id)
@@ -131,7 +131,7 @@ class TrackBoard:
     def __len__(self) -> int:
         return len(self._places)
 
-    def trials(self, query: BoardQuery) -> Iterable[Trial]:
+    def trials(self, query: BoardQuery) -> Iterable[EndedJob]:
         """The trials that a query's board is made of, flagged ones included."""
         for keys in self._chosen(query)[0].values():
             for key in keys:

@@ -13,7 +13,7 @@ from zlib import crc32
 import numpy as np
 from numpy.typing import NDArray
 
-from buildarena_benchmark.leaderboard.trials import Trial
+from buildarena_benchmark.leaderboard.ended_jobs import EndedJob
 from buildarena_benchmark.outcomes import SIMULATED, Outcome
 from buildarena_benchmark.statistics import (
     cost_per_success,
@@ -92,7 +92,7 @@ class Cell:
     replicates: NDArray[np.float64] | None = field(repr=False, compare=False)
 
 
-def counted_trials(trials: Iterable[Trial], *, include_flagged: bool = False) -> list[Trial]:
+def counted_trials(trials: Iterable[EndedJob], *, include_flagged: bool = False) -> list[EndedJob]:
     """The trials that averages are made of.
 
     A flag casts doubt on a success, so a flagged success leaves numerator and denominator. A
@@ -105,7 +105,7 @@ def counted_trials(trials: Iterable[Trial], *, include_flagged: bool = False) ->
     ]
 
 
-def summarise(trials: Sequence[Trial], *, include_flagged: bool = False) -> Cell:
+def summarise(trials: Sequence[EndedJob], *, include_flagged: bool = False) -> Cell:
     """Summarises the trials of one model configuration on one task; at least one.
 
     The order of the trials does not matter.
@@ -164,10 +164,10 @@ def summarise(trials: Sequence[Trial], *, include_flagged: bool = False) -> Cell
 class _Means:
     """Means over the trials that have a value."""
 
-    def __init__(self, trials: Sequence[Trial]) -> None:
+    def __init__(self, trials: Sequence[EndedJob]) -> None:
         self._trials = trials
 
-    def of(self, value: Callable[[Trial], float | None]) -> float | None:
+    def of(self, value: Callable[[EndedJob], float | None]) -> float | None:
         # fsum is exact, so the order of the trials cannot show in the last digit.
         values = [v for v in map(value, self._trials) if v is not None]
         return math.fsum(values) / len(values) if values else None
@@ -180,7 +180,7 @@ def _tries(
     return {k: chance for k, chance in found.items() if chance is not None}
 
 
-def _refusals(trials: Iterable[Trial]) -> dict[str, int]:
+def _refusals(trials: Iterable[EndedJob]) -> dict[str, int]:
     total: Counter[str] = Counter()
     for trial in trials:
         total.update(trial.refusals)

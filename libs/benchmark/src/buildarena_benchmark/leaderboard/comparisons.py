@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from buildarena_benchmark.leaderboard.cells import counted_trials
-from buildarena_benchmark.leaderboard.trials import Trial
+from buildarena_benchmark.leaderboard.ended_jobs import EndedJob
 from buildarena_benchmark.statistics import (
     PairedTest,
     difference_interval,
@@ -53,7 +53,7 @@ class Comparison:
     tasks: Sequence[TaskComparison]
 
 
-def compare_models(first: Sequence[Trial], second: Sequence[Trial]) -> Comparison | None:
+def compare_models(first: Sequence[EndedJob], second: Sequence[EndedJob]) -> Comparison | None:
     """Compares two models; None when one of them has no trial.
 
     Each side has one model configuration; p-values are adjusted by Holm over the tasks.
@@ -79,14 +79,16 @@ def compare_models(first: Sequence[Trial], second: Sequence[Trial]) -> Compariso
     )
 
 
-def _by_task(trials: Iterable[Trial]) -> dict[str, list[Trial]]:
-    found: dict[str, list[Trial]] = {}
+def _by_task(trials: Iterable[EndedJob]) -> dict[str, list[EndedJob]]:
+    found: dict[str, list[EndedJob]] = {}
     for trial in trials:
         found.setdefault(trial.task, []).append(trial)
     return found
 
 
-def _compare_task(task: str, first: Sequence[Trial], second: Sequence[Trial]) -> TaskComparison:
+def _compare_task(
+    task: str, first: Sequence[EndedJob], second: Sequence[EndedJob]
+) -> TaskComparison:
     seeds_1, seeds_2 = ({trial.seed: trial for trial in side} for side in (first, second))
     shared = sorted(seeds_1.keys() & seeds_2.keys())
     counts = tuple((sum(t.success for t in side), len(side)) for side in (first, second))

@@ -9,7 +9,7 @@ from typing import Final
 
 from buildarena_api.http.etags import Answer
 from buildarena_benchmark import Task
-from buildarena_benchmark.leaderboard import Board, BoardQuery, TrackBoard, Trial
+from buildarena_benchmark.leaderboard import Board, BoardQuery, EndedJob, TrackBoard
 from buildarena_pipeline.catalog.tasks import TaskCatalog
 from buildarena_store import Boards
 
@@ -80,7 +80,7 @@ class BoardCache:
                 self._answers.popitem(last=False)
             return answer
 
-    def trials(self, track: str, query: BoardQuery) -> list[Trial]:
+    def trials(self, track: str, query: BoardQuery) -> list[EndedJob]:
         """The ended jobs that a board is made of."""
         with self._lock:
             self._refresh()

@@ -14,7 +14,7 @@ _NOTHING: Final[Mapping[str, Any]] = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Trial:
+class EndedJob:
     """One ended job.
 
     Attributes:
