@@ -150,7 +150,7 @@ def test_settings_do_not_print_the_operators_key(context) -> None:
     assert ADMIN not in repr(changed)
 
 
-def test_too_many_requests_are_told_when_to_come_back(context) -> None:
+def test_too_many_requests_are_reported_when_to_come_back(context) -> None:
     own = open_context(context.settings.model_copy(update={"rate_limit": "5/minute"}))
     with TestClient(create_app(own, load_registry())) as client:
         answers = [client.get("/v1/models") for _ in range(7)]

@@ -103,7 +103,7 @@ def test_a_body_that_lies_about_its_size_is_refused(api) -> None:
     assert api.post("/v1/sweeps", content=endless()).status_code == 413
 
 
-def test_answers_tell_browsers_to_be_careful(api) -> None:
+def test_answers_say_browsers_to_be_careful(api) -> None:
     headers = api.get("/v1/health", headers={"Origin": "http://elsewhere"}).headers
     assert headers["x-content-type-options"] == "nosniff"
     assert "access-control-allow-origin" not in headers

@@ -41,8 +41,8 @@ def worker(environment: dict[str, str]) -> Iterator[subprocess.Popen[bytes]]:
     try:
         yield process
     except AssertionError as error:
-        told = "\n".join(log.read_text().splitlines()[-20:])
-        raise AssertionError(f"{error}; exit code {process.poll()}; log:\n{told}") from error
+        rendered = "\n".join(log.read_text().splitlines()[-20:])
+        raise AssertionError(f"{error}; exit code {process.poll()}; log:\n{rendered}") from error
     finally:
         process.kill()
         process.wait()

@@ -36,7 +36,7 @@ def test_a_sound_machine_is_called_sound(machine_file) -> None:
     assert "The machine is sound." in run("machine", "check", str(machine_file)).stdout
 
 
-def test_a_broken_constraint_is_told(machine_file) -> None:
+def test_a_broken_constraint_is_reported(machine_file) -> None:
     done = run("machine", "check", str(machine_file), "--task", str(SUSPENSION_BRIDGE))
     assert done.exit_code == 1
     assert "Winch" in done.stdout

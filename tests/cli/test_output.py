@@ -77,7 +77,7 @@ def test_headings_are_bold_where_that_is_wanted(url, environment, styled) -> Non
     assert ("\x1b" in shown) is styled
 
 
-def test_columns_tell_the_width_when_they_are_set(url) -> None:
+def test_columns_say_the_width_when_they_are_set(url) -> None:
     _, shown = on_terminal(200, "job", "list", "--url", url, COLUMNS="40", NO_COLOR="1")
     assert shown.splitlines()[0] == "job"
 

@@ -64,7 +64,7 @@ def file(tmp_path: Path) -> Path:
         (GOOD, "", "1: must be a mapping of fields"),
     ],
 )
-def test_a_mistake_is_told_before_anything_is_sent(file, old, new, says) -> None:
+def test_a_mistake_is_reported_before_anything_is_sent(file, old, new, says) -> None:
     assert old in GOOD
     file.write_text(GOOD.replace(old, new))
     done = run("sweep", "run", str(file), "--url", "http://127.0.0.1:1")
@@ -81,7 +81,7 @@ def test_every_mistake_has_its_line(file) -> None:
     ]
 
 
-def test_what_the_service_does_not_know_is_told_with_its_line(url, file) -> None:
+def test_what_the_service_does_not_know_is_reported_with_its_line(url, file) -> None:
     text = GOOD.replace("lift-1", "lift-9").replace(
         "[builtin/idle]", "\n  - builtin/idle\n  - gpt-6"
     )
@@ -112,7 +112,7 @@ def test_flags_take_the_place_of_the_files_fields(url, file) -> None:
     assert accepted["jobs"] == 2
 
 
-def test_a_flags_mistake_is_told_by_its_name(url, file) -> None:
+def test_a_flags_mistake_is_reported_by_its_name(url, file) -> None:
     done = run_cli(url, "sweep", "run", str(file), "--task", "lift-1", "--task", "lift-9")
     assert done.returncode == 1
     assert done.stderr.startswith("--task: tasks[1]: there is no task 'lift-9'; choose from ")
@@ -127,7 +127,7 @@ def test_a_files_mistake_is_made_good_by_a_flag(url, file) -> None:
     assert run_cli(url, "sweep", "run", str(file), "--dry-run", "--samples", "2").returncode == 0
 
 
-def test_a_jobs_options_are_told_with_their_lines(url, tmp_path) -> None:
+def test_a_jobs_options_are_reported_with_their_lines(url, tmp_path) -> None:
     options = tmp_path / "options.yaml"
     options.write_text("simulator: mujoco\nlimits:\n  max_requests: 0\n")
     done = run_cli(url, "job", "submit", "lift-1", "builtin/idle", "--options", str(options))

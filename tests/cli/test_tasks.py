@@ -37,7 +37,7 @@ def test_a_good_file_is_checked_without_a_server(file) -> None:
     assert (answer["ok"], answer["name"], answer["errors"]) == (True, "narrow-gap", [])
 
 
-def test_check_and_add_tell_the_same_faults(url, file) -> None:
+def test_check_and_add_say_the_same_faults(url, file) -> None:
     for text, says in (
         (WRONG, [f"{file}:12: scenario.placement.gap: ", f"{file}:13: scoring: "]),
         ("a: &a [x]\nb: *a\n", [f"{file}:1: anchors and aliases"]),
@@ -59,7 +59,7 @@ def test_check_and_add_tell_the_same_faults(url, file) -> None:
     ]
 
 
-def test_a_missing_file_is_told(url, tmp_path) -> None:
+def test_a_missing_file_is_reported(url, tmp_path) -> None:
     for words in (["check"], ["add", "--url", url]):
         done = run("task", words[0], str(tmp_path / "nowhere.yaml"), *words[1:])
         assert done.returncode == 1
@@ -98,7 +98,7 @@ def test_versions_are_kept_and_shown(url, file) -> None:
     assert "new submissions get a newer one" in again.stderr
 
 
-def test_a_task_that_is_not_there_is_told_with_the_choices(url, file) -> None:
+def test_a_task_that_is_not_there_is_reported_with_the_choices(url, file) -> None:
     run_cli(url, "task", "add", str(file))
     done = run_cli(url, "task", "show", "nowhere")
     assert done.returncode == 1

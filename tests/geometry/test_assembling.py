@@ -137,7 +137,7 @@ def test_removing_a_sub_structure_takes_what_was_attached_to_it(assembly):
     assert add(assembly, "deck").ok, "its place is free again"
 
 
-def test_sub_structures_that_nothing_joins_are_told(assembly):
+def test_sub_structures_that_nothing_joins_are_reported(assembly):
     add(assembly, "deck")
     add(assembly, "tower", init_shift=[0, 6, 0])
     assert assembly.detached == ("B_1", "B_2")

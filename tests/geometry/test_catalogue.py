@@ -85,7 +85,7 @@ def test_what_a_module_does_stands_in_its_entry():
     assert [name for name, module in basic.items() if module.link == "rope"] == ["Winch"]
 
 
-def test_what_models_are_told_of_a_module_agrees_with_what_it_does():
+def test_what_models_are_reported_of_a_module_agrees_with_what_it_does():
     basic = load_catalogue()
     wheel, cannon, torch = (basic[name] for name in ("Powered Wheel", "Water Cannon", "Torch"))
     assert f"turns at {wheel.motor.speed_rpm:g} rpm" in wheel.description

@@ -213,7 +213,7 @@ FURTHER_REFUSALS = {
 
 def texts():
     cart, _ = run(*CAR[:4])
-    told = {}
+    rendered = {}
     for name, actions in (
         *SEQUENCES.items(),
         *((f"refused: {cause.value}", actions) for cause, actions in REFUSALS.items()),
@@ -221,8 +221,8 @@ def texts():
     ):
         uses_machines = any(word in name for word in ("machine", "assembly"))
         available = {"cart": cart} if uses_machines else None
-        told[name] = run(*actions, available=available)[1]
-    return told
+        rendered[name] = run(*actions, available=available)[1]
+    return rendered
 
 
 TEXTS = texts()
@@ -294,8 +294,8 @@ def test_a_summary_costs_few_tokens_a_part():
 
 
 def test_all_tools_together_cost_few_tokens():
-    told = json.dumps([asdict(tool) for tool in tool_definitions()])
-    assert tokens(told) <= 4_200
+    rendered = json.dumps([asdict(tool) for tool in tool_definitions()])
+    assert tokens(rendered) <= 4_200
 
 
 @pytest.mark.parametrize("name", TEXTS)
@@ -304,7 +304,7 @@ def test_no_text_shows_a_negative_zero(name):
 
 
 @pytest.mark.parametrize(
-    ("direction", "told"),
+    ("direction", "rendered"),
     [
         ((0, 1, 0), "<North>"),
         ((1, 0, 0), "<East>"),
@@ -321,12 +321,12 @@ def test_no_text_shows_a_negative_zero(name):
         ((0, -0.6, -0.8), "<South with -53.1° pitch>"),
     ],
 )
-def test_directions_are_told_by_compass_and_pitch(direction, told):
-    assert caption(direction) == told
+def test_directions_are_reported_by_compass_and_pitch(direction, rendered):
+    assert caption(direction) == rendered
 
 
 @pytest.mark.parametrize(
-    ("axle", "flipped", "told"),
+    ("axle", "flipped", "rendered"),
     [
         ((1, 0, 0), False, "forward rolls it <North>"),
         ((1, 0, 0), True, "forward rolls it <South>"),
@@ -338,17 +338,17 @@ def test_directions_are_told_by_compass_and_pitch(direction, told):
         ((0, 0, 1), True, "too flat to roll, forward spins it counterclockwise seen from above"),
     ],
 )
-def test_wheels_tell_what_their_forward_key_does(axle, flipped, told):
-    assert rolling(axle, clockwise=not flipped) == told
+def test_wheels_say_what_their_forward_key_does(axle, flipped, rendered):
+    assert rolling(axle, clockwise=not flipped) == rendered
 
 
 @pytest.mark.parametrize(
-    ("value", "told"), [(-0.001, "0.00"), (0.005, "0.01"), (-1.5, "-1.50"), (2, "2.00")]
+    ("value", "rendered"), [(-0.001, "0.00"), (0.005, "0.01"), (-1.5, "-1.50"), (2, "2.00")]
 )
-def test_numbers_have_two_decimals_and_no_negative_zero(value, told):
-    assert number(value) == told
+def test_numbers_have_two_decimals_and_no_negative_zero(value, rendered):
+    assert number(value) == rendered
 
 
-@pytest.mark.parametrize(("value", "told"), [(0.004, "0.004"), (3.65, "3.65"), (-0.0, "0")])
-def test_amounts_have_the_digits_they_need(value, told):
-    assert plain(value) == told
+@pytest.mark.parametrize(("value", "rendered"), [(0.004, "0.004"), (3.65, "3.65"), (-0.0, "0")])
+def test_amounts_have_the_digits_they_need(value, rendered):
+    assert plain(value) == rendered

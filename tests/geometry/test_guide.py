@@ -39,10 +39,10 @@ def test_the_guides_pictures_are_drawn_by_the_library_as_it_is(name):
 
 def test_the_first_machine_is_saved_and_drives_north(tmp_path):
     command = [sys.executable, str(EXAMPLES / "first_machine.py"), str(tmp_path)]
-    told = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    rendered = subprocess.run(command, check=True, capture_output=True, text=True).stdout
     car = Machine.from_document(json.loads((tmp_path / "car.json").read_text()))
     assert car.part_count == 7
-    summary = told[told.rindex("7 parts") :]
+    summary = rendered[rendered.rindex("7 parts") :]
     assert summary.count("forward rolls it <North>") == 4
     assert (tmp_path / "car.glb").read_bytes().startswith(b"glTF")
     assert (tmp_path / "car.svg").read_text().startswith("<svg")

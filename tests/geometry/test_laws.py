@@ -183,7 +183,7 @@ def test_verdicts_do_not_depend_on_how_the_machine_is_turned(sequence, rotation)
     upright, turned = run([]), run([], init_rotation=rotation)
     for name, arguments in sequence:
         if name == "shift_block":
-            continue  # shifts are told in the world's directions
+            continue  # shifts are given in the world's directions
         ours, theirs = upright.act(name, arguments), turned.act(name, arguments)
         assert ours.ok == theirs.ok, (name, arguments, ours.text, theirs.text)
     motion = turned.blocks["1"].world_from_block

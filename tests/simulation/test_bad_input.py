@@ -84,7 +84,7 @@ def test_the_process_goes_on_after_a_failed_trial(engine: str, tasks: dict[str, 
     assert simulate(replayed(beam(3)), scenario, engine).time_s[-1] == pytest.approx(0.2)
 
 
-def test_a_rollout_that_blows_up_is_told_and_never_a_success(
+def test_a_rollout_that_blows_up_is_reported_and_never_a_success(
     engine: str, tasks: dict[str, Task], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fragile(name: str, world: World) -> Engine:

@@ -116,7 +116,7 @@ def test_an_empty_machine_is_a_failed_trial_not_a_crash(run, tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize(
-    ("content", "arguments", "told"),
+    ("content", "arguments", "rendered"),
     [
         ("{", [], "not valid JSON"),
         ('{"blocks": 3}', [], "version is missing"),
@@ -124,8 +124,8 @@ def test_an_empty_machine_is_a_failed_trial_not_a_crash(run, tmp_path: Path) -> 
         ("[]", ["--engine", "havok"], "pybullet, mujoco"),
     ],
 )
-def test_bad_input_is_told_in_one_line(
-    run, tmp_path: Path, content: str, arguments: list[str], told: str
+def test_bad_input_is_reported_in_one_line(
+    run, tmp_path: Path, content: str, arguments: list[str], rendered: str
 ) -> None:
     file = tmp_path / "machine.json"
     file.write_text(content, encoding="utf-8")
@@ -133,11 +133,11 @@ def test_bad_input_is_told_in_one_line(
         file.write_text(json.dumps(beam(3)), encoding="utf-8")
     done = run("simulate", str(file), *arguments)
     assert done.exit_code == 1
-    assert told in done.output
+    assert rendered in done.output
     assert "Traceback" not in done.output
 
 
-def test_an_unknown_task_is_told_with_the_known_ones(run) -> None:
+def test_an_unknown_task_is_reported_with_the_known_ones(run) -> None:
     done = run("simulate", str(DATA / "beam.json"), task_name="support-9")
     assert done.exit_code == 1
     assert "support-3" in done.output

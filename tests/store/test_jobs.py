@@ -55,7 +55,7 @@ def test_only_errored_jobs_are_retried(context: Context, add) -> None:
     assert context.store.jobs.get(job_id).state == "queued"
 
 
-def test_what_happened_to_a_job_is_told_in_order(context: Context, add) -> None:
+def test_what_happened_to_a_job_is_reported_in_order(context: Context, add) -> None:
     (job_id,) = add(1)
     lease = context.store.leases.claim("construct", owner="w")
     assert lease is not None

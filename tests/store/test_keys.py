@@ -27,7 +27,7 @@ def test_a_secret_is_nowhere_in_the_database(context: Context) -> None:
     assert secret.removeprefix("ba_") not in rows[0]
 
 
-def test_revoked_and_expired_keys_are_told_apart(context: Context) -> None:
+def test_revoked_and_expired_keys_are_reported_apart(context: Context) -> None:
     revoked, revoked_secret = context.store.keys.create(name="a", scopes=["read"])
     context.store.keys.revoke(revoked.id)
     first = context.store.keys.revoke(revoked.id).revoked_at

@@ -96,7 +96,7 @@ def test_a_scored_job_cannot_be_scored_again(context: Context, add) -> None:
     assert context.store.leases.claim("construct", owner="w") is None
 
 
-def test_heartbeats_keep_a_lease_and_tell_of_lost_ones(context: Context, add) -> None:
+def test_heartbeats_keep_a_lease_and_say_of_lost_ones(context: Context, add) -> None:
     add(1, 2)
     kept, lost = claim(context), claim(context)
     with context.store.database.transaction() as connection:

@@ -46,7 +46,7 @@ def test_a_connection_that_the_server_dropped_is_noticed(
         connection.exec_driver_sql(f"SELECT pg_terminate_backend({before}, 5000)")
     other.close()
     if idle_s:
-        # A busy connection's break is told to its user, once.
+        # A busy connection's break reaches its user, once.
         with pytest.raises(OperationalError):
             backend()
     assert backend() != before

@@ -1,4 +1,4 @@
-"""Models for session tests that say what they are told to say."""
+"""Models for session tests that reply as scripted."""
 
 from __future__ import annotations
 

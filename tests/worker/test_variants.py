@@ -27,7 +27,7 @@ def text_of(request: Request) -> str:
     return "\n".join(message.text for message in request.messages)
 
 
-def test_a_failed_round_is_followed_by_one_that_is_told_the_result(play, rollout) -> None:
+def test_a_failed_round_is_followed_by_one_that_is_reported_the_result(play, rollout) -> None:
     model = Scripted(*CROSS, *CROSS)
     played = play(
         workflow="builder",

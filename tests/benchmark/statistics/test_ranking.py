@@ -87,7 +87,7 @@ def test_equal_models_are_seldom_told_apart() -> None:
 
 
 @pytest.mark.parametrize(("trials", "apart"), [(1, False), (3, False), (4, True)])
-def test_very_few_trials_tell_nothing_apart(trials, apart) -> None:
+def test_very_few_trials_say_nothing_apart(trials, apart) -> None:
     success = np.array([[1.0, 0.0]])
     never_varies = np.repeat(success[None], 50, axis=0)
     counts = np.full((1, 2), trials)

@@ -177,7 +177,7 @@ async def _listen(url: str, listeners: int, process: psutil.Process) -> dict[str
         delays = sorted(moment - happened for moment in heard)
     return {
         "listeners": listeners,
-        "told": len(delays),
+        "received": len(delays),
         "all_connected_s": round(connected_s, 2),
         "median_delay_s": round(statistics.median(delays), 3),
         "longest_delay_s": round(delays[-1], 3),

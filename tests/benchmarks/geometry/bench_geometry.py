@@ -112,10 +112,10 @@ def refine_ms(action: str, first: dict[str, object], second: dict[str, object]) 
 
 def resident_mb() -> float:
     """Peak resident memory of a fresh process that builds a 200-block machine."""
-    told = subprocess.run(
+    rendered = subprocess.run(
         [sys.executable, "-c", RESIDENT_PROGRAM], check=True, capture_output=True, text=True
     )
-    return int(told.stdout) / 1024
+    return int(rendered.stdout) / 1024
 
 
 def measure() -> list[Figure]:
@@ -179,8 +179,8 @@ def main() -> int:
     for figure in figures:
         beside = f"  (published library: {figure.published})" if figure.published else ""
         verdict = "ok  " if figure.met else "MISS"
-        told = f"{figure.value:.3g} {figure.unit}, bar {figure.bar:g}{beside}"
-        sys.stdout.write(f"{verdict} {figure.name}: {told}\n")
+        rendered = f"{figure.value:.3g} {figure.unit}, bar {figure.bar:g}{beside}"
+        sys.stdout.write(f"{verdict} {figure.name}: {rendered}\n")
     if options.json:
         options.json.parent.mkdir(parents=True, exist_ok=True)
         entries = [{**asdict(figure), "met": figure.met} for figure in figures]

@@ -34,9 +34,9 @@ SEQUENCES = [
 @pytest.mark.parametrize("sequence", SEQUENCES)
 def test_every_step_has_the_vectors_verdict_and_state(sequence):
     compared = steps_to_compare(sequence)
-    told = next(iter(run_sequences(sequence)))["steps"]
+    rendered = next(iter(run_sequences(sequence)))["steps"]
     rebound: set[str] = set()
-    for index, (step, ours) in enumerate(zip(compared, told, strict=False)):
+    for index, (step, ours) in enumerate(zip(compared, rendered, strict=False)):
         if not step.get("overlap", {}).get("robust", True) and ours["kind"] != step["kind"]:
             break  # too close to touching for a verdict; the machines part ways here
         if lost_keys(sequence, index):
