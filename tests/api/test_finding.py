@@ -122,3 +122,13 @@ def test_artifacts_that_are_not_there(api, ids) -> None:
     assert api.get(f"/v1/jobs/{ids[0]}/artifacts").json() == []
     assert api.get(f"/v1/jobs/{ids[0]}/artifacts/machine").status_code == 404
     assert api.get("/v1/jobs/job_0/artifacts").status_code == 404
+
+
+def test_a_misspelled_outcome_or_state_is_refused_with_the_values(api) -> None:
+    for name, value, right in (("outcome", "sucess", "success"), ("state", "held", "on_hold")):
+        answer = api.get("/v1/jobs", params={name: value})
+        assert answer.status_code == 422
+        (issue,) = answer.json()["errors"]
+        assert issue["field"] == name
+        assert right in issue["choices"]
+        assert issue["message"].startswith("Input should be '")

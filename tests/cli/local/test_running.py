@@ -50,7 +50,7 @@ def test_the_life_of_a_service_in_the_background(data) -> None:
         shown = json.loads(piped("status", "--json", *where).stdout)
         assert shown["healthy"] is True
         names = {process["name"] for process in shown["processes"]}
-        assert {"supervisor", "postgres", "valkey", "api", "construct worker"} <= names
+        assert {"supervisor", "postgres", "valkey", "api", "construct-worker"} <= names
         (api,) = (p for p in shown["processes"] if p["name"] == "api")
         assert api["ports"] == [int(port)]
         table = piped("status", *where).stdout

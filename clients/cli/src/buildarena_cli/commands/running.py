@@ -58,13 +58,18 @@ def status(data: DataOption = None, *, as_json: JsonOption = False) -> None:
     health, facts = _health(run), process_facts(run)
     healthy = health["status"] == "ok" and all(fact.started_at is not None for fact in facts)
     if as_json:
-        processes = [asdict(fact) for fact in facts]
+        processes = [{**asdict(fact), "name": _log_name(fact.name)} for fact in facts]
         shown = {"running": True, "data": str(folder), "url": run.url, "pid": run.pid}
         print_json({**shown, "healthy": healthy, "processes": processes, "health": health})
     else:
         _show(run, folder, health, facts)
     if not healthy:
         raise typer.Exit(FAILED)
+
+
+def _log_name(process: str) -> str:
+    """A process' name as its log file and the command `logs` spell it."""
+    return process.replace(" ", "-")
 
 
 def complete_process(ctx: typer.Context, incomplete: str) -> list[str]:
@@ -98,7 +103,7 @@ def logs(
     if not files:
         raise CommandError(f"there are no logs in {folder.absolute() / 'logs'}")
     if process is not None:
-        name = process.replace(" ", "-")
+        name = _log_name(process)
         if name not in files:
             raise CommandError(
                 f"there is no process {process!r}; choose from {', '.join(files)}"
@@ -165,7 +170,7 @@ def _show(run: Run, folder: Path, health: dict[str, Any], facts: list[ProcessFac
         since = datetime.fromtimestamp(fact.started_at or 0).astimezone()
         rows.append(
             (
-                fact.name.replace(" ", "-"),
+                _log_name(fact.name),
                 str(fact.pid),
                 number(memory, 0),
                 ", ".join(map(str, fact.ports)),

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from http import HTTPStatus
 from typing import Any
 
@@ -19,6 +20,9 @@ from buildarena_pipeline.errors import SubmissionError
 from buildarena_store import ArtifactMissingError, TransitionError, UnknownIdError
 
 PROBLEM_JSON = "application/problem+json"
+ENUM_MEMBER = re.compile(r"<\w+\.\w+: ('[^']*')>")
+"""How pydantic spells a member of an enum; people need its value."""
+QUOTED = re.compile(r"'([^']*)'")
 
 log = structlog.get_logger(__name__)
 
@@ -100,10 +104,7 @@ def add_problem_handlers(app: FastAPI) -> None:
 
     @app.exception_handler(RequestValidationError)
     async def on_invalid(_: Request, error: RequestValidationError) -> JSONResponse:
-        errors = [
-            ValidationIssue(path=_field(entry["loc"]), message=entry["msg"])
-            for entry in error.errors()
-        ]
+        errors = [_issue(entry) for entry in error.errors()]
         detail = "; ".join(f"{entry.path}: {entry.message}" for entry in errors)
         return _answer(422, detail, errors)
 
@@ -148,6 +149,13 @@ def _add_store_handlers(app: FastAPI) -> None:
         return _answer(
             503, "the database can't be reached; nothing was stored", headers={"Retry-After": "2"}
         )
+
+
+def _issue(entry: Mapping[str, Any]) -> ValidationIssue:
+    """What FastAPI found, with the choices where values are spelled out."""
+    message = ENUM_MEMBER.sub(r"\1", entry["msg"])
+    choices = QUOTED.findall(message) if entry["type"] in {"literal_error", "enum"} else ()
+    return ValidationIssue(path=_field(entry["loc"]), message=message, choices=tuple(choices))
 
 
 def _field(location: Sequence[str | int]) -> str:
