@@ -20,9 +20,10 @@ from buildarena_pipeline.errors import SubmissionError
 from buildarena_store import ArtifactMissingError, TransitionError, UnknownIdError
 
 PROBLEM_JSON = "application/problem+json"
-ENUM_MEMBER = re.compile(r"<\w+\.\w+: ('[^']*')>")
-"""How pydantic spells a member of an enum; people need its value."""
 QUOTED = re.compile(r"'([^']*)'")
+"""How pydantic spells the values that it expects."""
+MAX_SHOWN = 100
+"""Characters of a wrong value that are repeated."""
 
 log = structlog.get_logger(__name__)
 
@@ -105,7 +106,7 @@ def add_problem_handlers(app: FastAPI) -> None:
     @app.exception_handler(RequestValidationError)
     async def on_invalid(_: Request, error: RequestValidationError) -> JSONResponse:
         errors = [_issue(entry) for entry in error.errors()]
-        detail = "; ".join(f"{entry.path}: {entry.message}" for entry in errors)
+        detail = "; ".join(map(_described, errors))
         return _answer(422, detail, errors)
 
     @app.exception_handler(HTTPException)
@@ -152,10 +153,18 @@ def _add_store_handlers(app: FastAPI) -> None:
 
 
 def _issue(entry: Mapping[str, Any]) -> ValidationIssue:
-    """What FastAPI found, with the choices where values are spelled out."""
-    message = ENUM_MEMBER.sub(r"\1", entry["msg"])
-    choices = QUOTED.findall(message) if entry["type"] in {"literal_error", "enum"} else ()
-    return ValidationIssue(path=_field(entry["loc"]), message=message, choices=tuple(choices))
+    """What FastAPI found; where values are spelled out, with the value and the choices."""
+    path, message = _field(entry["loc"]), str(entry["msg"])
+    if entry["type"] not in {"literal_error", "enum"}:
+        return ValidationIssue(path=path, message=message)
+    name, given = path.rpartition(".")[2], repr(entry["input"])[:MAX_SHOWN]
+    choices = tuple(QUOTED.findall(message))
+    return ValidationIssue(path=path, message=f"there is no {name} {given}", choices=choices)
+
+
+def _described(issue: ValidationIssue) -> str:
+    choices = f"; choose from {', '.join(issue.choices)}" if issue.choices else ""
+    return f"{issue.path}: {issue.message}{choices}"
 
 
 def _field(location: Sequence[str | int]) -> str:
