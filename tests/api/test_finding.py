@@ -131,4 +131,4 @@ def test_a_misspelled_outcome_or_state_is_refused_with_the_values(api) -> None:
         (issue,) = answer.json()["errors"]
         assert issue["field"] == name
         assert right in issue["choices"]
-        assert issue["message"] == f"there is no {name} {value!r}"
+        assert issue["message"] == f"there is no such value: {value!r}"

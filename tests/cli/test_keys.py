@@ -62,7 +62,7 @@ def test_without_a_key_the_command_says_what_to_set(call) -> None:
 
 
 def test_a_wrong_scope_is_named_with_the_choices(call) -> None:
-    with pytest.raises(CommandError, match="'read', 'submit' or 'admin'"):
+    with pytest.raises(CommandError, match="'root'; choose from read, submit, admin"):
         call("key", "create", "x", "--scope", "root")
 
 

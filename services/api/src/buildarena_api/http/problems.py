@@ -157,9 +157,9 @@ def _issue(entry: Mapping[str, Any]) -> ValidationIssue:
     path, message = _field(entry["loc"]), str(entry["msg"])
     if entry["type"] not in {"literal_error", "enum"}:
         return ValidationIssue(path=path, message=message)
-    name, given = path.rpartition(".")[2], repr(entry["input"])[:MAX_SHOWN]
+    given = repr(entry["input"])[:MAX_SHOWN]
     choices = tuple(QUOTED.findall(message))
-    return ValidationIssue(path=path, message=f"there is no {name} {given}", choices=choices)
+    return ValidationIssue(path=path, message=f"there is no such value: {given}", choices=choices)
 
 
 def _described(issue: ValidationIssue) -> str:
