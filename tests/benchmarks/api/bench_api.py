@@ -12,12 +12,8 @@ import asyncio
 import json
 import os
 import statistics
-import subprocess
 import sys
-import tempfile
 import time
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -25,11 +21,8 @@ import httpx
 import psutil
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "support"))
+from api_process import api_process
 from overhead import measure_overhead
-from running import wait_until
-
-from buildarena_cli.local import EmbeddedPostgres, EmbeddedValkey, free_port
-from buildarena_store import Database
 
 MEBIBYTE = 1024 * 1024
 SWEEP = {"tasks": ["lift-1"], "models": ["builtin/idle"], "simulator": "mujoco"}
@@ -47,55 +40,17 @@ def main() -> None:
     parser.add_argument("--json", type=Path, help="also write the figures to this file")
     given = parser.parse_args()
     figures: dict[str, Any] = {"load_average_before": os.getloadavg()[0]}
-    with service() as (url, process):
+    with api_process() as (url, pid):
         figures["large_sweep"] = _large_sweeps(url, given.jobs)
         asyncio.run(_submit_steadily(url, given.rate, 1, "lift-3"))  # warm
         figures["submitting"] = asyncio.run(_submit_steadily(url, given.rate, given.seconds))
-        figures["listeners"] = asyncio.run(_listen(url, given.listeners, process))
+        figures["listeners"] = asyncio.run(_listen(url, given.listeners, psutil.Process(pid)))
     figures["overhead"] = measure_overhead(given.overhead_jobs)
     text = json.dumps(figures, indent=2) + "\n"
     sys.stdout.write(text)
     if given.json is not None:
         given.json.parent.mkdir(parents=True, exist_ok=True)
         given.json.write_text(text)
-
-
-@contextmanager
-def service() -> Iterator[tuple[str, psutil.Process]]:
-    """An API process with its database and broker, and no workers."""
-    with ExitStack() as stack:
-        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
-        postgres = EmbeddedPostgres(folder / "pg", folder / "pg.log")
-        stack.callback(postgres.stop, postgres.start())
-        valkey = EmbeddedValkey(folder / "valkey", folder / "valkey.log")
-        stack.callback(valkey.stop, valkey.start())
-        database = Database(postgres.url)
-        database.migrate()
-        database.close()
-        port = free_port()
-        environment = {
-            **os.environ,
-            "BUILDARENA_DATABASE_URL": postgres.url,
-            "BUILDARENA_BROKER_URL": valkey.url,
-            "BUILDARENA_DATA": str(folder / "data"),
-            "BUILDARENA_PORT": str(port),
-        }
-        log = stack.enter_context((folder / "api.log").open("wb"))
-        api = subprocess.Popen(
-            [sys.executable, "-m", "buildarena_api"], env=environment, stdout=log, stderr=log
-        )
-        stack.callback(api.wait)
-        stack.callback(api.terminate)
-        url = f"http://127.0.0.1:{port}"
-        wait_until(lambda: _answers(url), 30, "the API")
-        yield url, psutil.Process(api.pid)
-
-
-def _answers(url: str) -> bool:
-    try:
-        return httpx.get(f"{url}/v1/models").is_success
-    except httpx.TransportError:
-        return False
 
 
 def _large_sweeps(url: str, jobs: int) -> dict[str, Any]:

@@ -14,20 +14,15 @@ import os
 import statistics
 import subprocess
 import sys
-import tempfile
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import httpx
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "support"))
-from running import wait_until
-
-from buildarena_cli.local import EmbeddedPostgres, EmbeddedValkey, free_port
-from buildarena_store import Database
+from api_process import api_process
 
 BUILDARENA = str(Path(sys.executable).parent / "buildarena")
 REFERENCE = [sys.executable, "-c", "import typer, httpx"]
@@ -47,7 +42,7 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=ROUNDS)
     parser.add_argument("--json", type=Path, help="also write the figures to this file")
     given = parser.parse_args()
-    with service() as url:
+    with api_process() as (url, _):
         figures = measured(url, given.rounds)
     text = json.dumps(figures, indent=2) + "\n"
     sys.stdout.write(text)
@@ -99,38 +94,6 @@ def measured(url: str, rounds: int) -> dict[str, Any]:
         "commands": rows,
         "met": all(row["ratio"] <= GOALS[row["kind"]] for row in rows),
     }
-
-
-@contextmanager
-def service() -> Iterator[str]:
-    """The URL of an API process with its database and broker, and no workers."""
-    with ExitStack() as stack:
-        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
-        folder.chmod(0o755)
-        postgres = EmbeddedPostgres(folder / "pg", folder / "pg.log")
-        stack.callback(postgres.stop, postgres.start())
-        valkey = EmbeddedValkey(folder / "valkey", folder / "valkey.log")
-        stack.callback(valkey.stop, valkey.start())
-        database = Database(postgres.url)
-        database.migrate()
-        database.close()
-        port = free_port()
-        environment = {
-            **os.environ,
-            "BUILDARENA_DATABASE_URL": postgres.url,
-            "BUILDARENA_BROKER_URL": valkey.url,
-            "BUILDARENA_DATA": str(folder / "data"),
-            "BUILDARENA_PORT": str(port),
-        }
-        with (folder / "api.log").open("wb") as log:
-            process = subprocess.Popen(
-                [sys.executable, "-m", "buildarena_api"], env=environment, stdout=log, stderr=log
-            )
-        stack.callback(process.wait)
-        stack.callback(process.terminate)
-        url = f"http://127.0.0.1:{port}"
-        wait_until(lambda: _answers(url), 60, "the API answers")
-        yield url
 
 
 def _taken(runs: Mapping[str, Callable[[], float]], rounds: int) -> dict[str, list[float]]:
@@ -190,13 +153,6 @@ def _asked(url: str, path: str) -> float:
         begun = time.perf_counter()
         client.get(path)
         return time.perf_counter() - begun
-
-
-def _answers(url: str) -> bool:
-    try:
-        return httpx.get(f"{url}/v1/health", timeout=5).is_success
-    except httpx.TransportError:
-        return False
 
 
 if __name__ == "__main__":

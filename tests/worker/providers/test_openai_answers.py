@@ -45,6 +45,7 @@ def test_answers_mean_what_kept_ones_meant(status) -> None:
         ({"error": {"message": "No such thing.\nAsk again.", "code": "x"}}, "HTTP 400: No such"),
         ({"detail": "odd"}, 'HTTP 400: {"detail": "odd"}'),
         ("", "HTTP 400: no reason given"),
+        ({"error": {"message": "Odd.", "code": {"a": 1}, "type": "x"}}, "HTTP 400: Odd."),
     ],
 )
 def test_an_error_says_what_the_provider_said(body, says) -> None:

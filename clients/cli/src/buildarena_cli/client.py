@@ -8,13 +8,12 @@ import os
 import time
 from collections.abc import Generator, Iterator, Mapping
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 from buildarena_cli.defaults import KEY_VARIABLE
 from buildarena_cli.errors import CommandError
-from buildarena_cli.near import QUOTED, did_you_mean, near_field
+from buildarena_cli.near import near_field
 
 if TYPE_CHECKING:
     from buildarena_cli.wire import Response
@@ -22,6 +21,7 @@ if TYPE_CHECKING:
 TIMEOUT_S = 60.0
 PATIENCE_S = 60.0
 """How long a watching command waits for a service that is being restarted."""
+STATE_POLL_S = 0.3
 HEALTH = "/v1/health"
 CHUNK_BYTES = 1 << 20
 
@@ -121,6 +121,12 @@ class Client:
                     raise
                 time.sleep(0.5)
 
+    def get_in_state(self, path: str, state: str) -> Any:
+        """As get_patiently, once what is there says that it is in a state."""
+        while (answer := self.get_patiently(path))["state"] != state:
+            time.sleep(STATE_POLL_S)
+        return answer
+
     def _chunks(self, path: str) -> Generator[bytes, None, None]:
         """The pieces of an answer; at least one, and all of them or an error."""
         with self._sending(), self._wire.opened("GET", path, timeout_s=None) as answer:
@@ -151,7 +157,7 @@ class Client:
         if response.status == 401:  # noqa: PLR2004 - Unauthorized
             raise CommandError(f"{_problem(response)}: set {KEY_VARIABLE} to a valid key")
         if response.failed:
-            raise RefusedError(response, options.get("params"))
+            raise RefusedError(response)
         return response
 
     @contextlib.contextmanager
@@ -170,15 +176,14 @@ class RefusedError(CommandError):
 
     Args:
         response: What it answered.
-        sent: The request's parameters: what near words are near to.
 
     Attributes:
         status: The HTTP status.
         errors: Its field errors: ``field``, ``message``, ``line`` and ``choices`` of each.
     """
 
-    def __init__(self, response: Response, sent: Mapping[str, Any] | None = None) -> None:
-        super().__init__(_problem(response, sent or {}))
+    def __init__(self, response: Response) -> None:
+        super().__init__(_problem(response))
         self.status = response.status
         self.errors: list[dict[str, Any]] = []
         with contextlib.suppress(ValueError, KeyError, TypeError):
@@ -202,7 +207,7 @@ def _given(params: Mapping[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in params.items() if value is not None}
 
 
-def _problem(response: Response, sent: Mapping[str, Any] = MappingProxyType({})) -> str:
+def _problem(response: Response) -> str:
     try:
         problem = response.json()
         errors = problem["errors"]
@@ -211,13 +216,12 @@ def _problem(response: Response, sent: Mapping[str, Any] = MappingProxyType({}))
         return f"HTTP {response.status} from {response.url}"
     if not errors:
         return detail
-    return "\n".join(_line(error, str(sent.get(error["field"], ""))) for error in errors)
+    return "\n".join(map(_line, errors))
 
 
-def _line(error: Mapping[str, Any], given: str) -> str:
+def _line(error: Mapping[str, Any]) -> str:
     line = f"{error['field']}: {error['message']}"
     if error["choices"]:
         line += f"; choose from {', '.join(error['choices'])}"
-        return line + near_field(error["field"], error["message"], error["choices"])
-    # What pydantic says of a word that is none of a few.
-    return line + did_you_mean(given, QUOTED.findall(error["message"]))
+        line += near_field(error["field"], error["message"], error["choices"])
+    return line

@@ -25,9 +25,10 @@ from sqlalchemy.exc import OperationalError, StatementError
 from buildarena_store import events
 from buildarena_store.artifacts import ArtifactStore
 from buildarena_store.database import Database, expected_schema
-from buildarena_store.errors import StoreError, UnknownIdError
+from buildarena_store.errors import StoreError
 from buildarena_store.jobs.job import JobKey
 from buildarena_store.states import JobState, SweepState
+from buildarena_store.sweeps.sweeps import Sweeps
 from buildarena_store.tables import (
     artifacts,
     attempts,
@@ -76,7 +77,7 @@ def write_archive(database: Database, store: ArtifactStore, sweep_id: str, targe
         UnknownIdError: There is no such sweep.
         ArtifactMissingError: The artifact store has lost something of it.
     """
-    _require_sweep(database, sweep_id)
+    Sweeps(database).get(sweep_id)
     with (
         database.transaction() as connection,
         zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive,
@@ -95,13 +96,6 @@ def write_archive(database: Database, store: ArtifactStore, sweep_id: str, targe
             "written_at": datetime.now(UTC).isoformat(),
         }
         archive.writestr("manifest.json", json.dumps(manifest, indent=2))
-
-
-def _require_sweep(database: Database, sweep_id: str) -> None:
-    query = select(sweeps.c.id).where(sweeps.c.id == sweep_id)
-    with database.statement() as connection:
-        if connection.execute(query).first() is None:
-            raise UnknownIdError("sweep", sweep_id)
 
 
 def _write_rows(archive: zipfile.ZipFile, connection: Connection, sweep_id: str) -> None:

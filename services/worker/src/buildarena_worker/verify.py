@@ -34,6 +34,7 @@ from buildarena_store import (
     ArtifactStore,
     ExternalCall,
     Job,
+    JobState,
     RolloutRecord,
     Store,
     Usage,
@@ -103,7 +104,7 @@ class Verifier:
         return {"ok": all(check.ok for check in checks), "checks": [asdict(c) for c in checks]}
 
     def _checks(self, job: Job) -> list[Check]:
-        if job.state != "done" or job.success is None:
+        if job.state != JobState.DONE or job.success is None:
             return [_compare("scored", kept=True, found=False)]
         if job.track_config["workflow"] == EXTERNAL_WORKFLOW:
             return self._external_checks(job)
@@ -192,7 +193,7 @@ class Verifier:
         else:
             again, digest = score(task, machine, trajectory), _hash(write_trajectory(trajectory))
         checks.append(_compare(f"{name}: trajectory", record.trajectory_hash, digest))
-        for field in ("success", "indicator", "metrics", "flags"):
+        for field in SCORED:
             kept = _plain(getattr(record, field))
             checks.append(_compare(f"{name}: {field}", kept, _plain(getattr(again, field))))
         return checks

@@ -16,7 +16,7 @@ from buildarena_cli.options import (
     UrlOption,
 )
 from buildarena_cli.terminal.completion import complete_model, complete_sweep, complete_task
-from buildarena_cli.terminal.output import columns, number, print_json, print_table, warn
+from buildarena_cli.terminal.output import columns, minute_of, number, print_json, print_table, warn
 
 MAX_LIMIT = 1000
 COLUMNS = columns(
@@ -95,5 +95,5 @@ def _row(job: dict[str, Any]) -> list[str]:
         job["reason"] or "",
         ", ".join(job["flags"] or ()),
         number(job["indicator"], 2),
-        job["created_at"][:16].replace("T", " "),
+        minute_of(job["created_at"]),
     ]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -84,9 +83,7 @@ def verify_job(job_id: JobId, *, url: UrlOption = DEFAULT_URL, as_json: JsonOpti
     """Replay a finished job without a model, simulate it again and compare every figure."""
     client = Client(url)
     check = client.post(at("jobs", whole_id(client, "job", job_id), "verify"), {})
-    while check["state"] != "done":
-        time.sleep(0.3)
-        check = client.get_patiently(at("verifications", check["id"]))
+    check = client.get_in_state(at("verifications", check["id"]), "done")
     report = check["report"]
     if as_json:
         print_json(report)

@@ -19,7 +19,7 @@ from buildarena_cli.options import (
     UrlOption,
     budget_of,
 )
-from buildarena_cli.terminal.output import columns, number, print_json, print_table, say
+from buildarena_cli.terminal.output import columns, minute_of, number, print_json, print_table, say
 
 app = new_group(
     "Make, list and revoke API keys. Needs a key with the scope admin in BUILDARENA_KEY."
@@ -123,7 +123,7 @@ def _row(key: dict[str, Any]) -> list[str]:
         key["id"],
         key["name"],
         ", ".join(key["scopes"]),
-        "" if used is None else used[:16].replace("T", " "),
+        "" if used is None else minute_of(used),
         state,
         spent(key["budget"]),
     ]

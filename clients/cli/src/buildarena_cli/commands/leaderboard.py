@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Any
@@ -193,11 +192,7 @@ def audit(
     client = Client(url)
     accepted = client.post("/v1/leaderboard/verify", body)
     for id_ in accepted["verifications"]:
-        path = at("verifications", id_)
-        check = client.get_patiently(path)
-        while check["state"] != "done":
-            time.sleep(0.3)
-            check = client.get_patiently(path)
+        check = client.get_in_state(at("verifications", id_), "done")
         if not check["report"]["ok"]:
             wrong = [entry for entry in check["report"]["checks"] if not entry["ok"]]
             differences.append({"job_id": check["job_id"], "checks": wrong})

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections import deque
 from dataclasses import asdict
@@ -58,18 +57,14 @@ def status(data: DataOption = None, *, as_json: JsonOption = False) -> None:
     health, facts = _health(run), process_facts(run)
     healthy = health["status"] == "ok" and all(fact.started_at is not None for fact in facts)
     if as_json:
-        processes = [{**asdict(fact), "name": _log_name(fact.name)} for fact in facts]
         shown = {"running": True, "data": str(folder), "url": run.url, "pid": run.pid}
-        print_json({**shown, "healthy": healthy, "processes": processes, "health": health})
+        print_json(
+            {**shown, "healthy": healthy, "processes": list(map(asdict, facts)), "health": health}
+        )
     else:
         _show(run, folder, health, facts)
     if not healthy:
         raise typer.Exit(FAILED)
-
-
-def _log_name(process: str) -> str:
-    """A process' name as its log file and the command `logs` spell it."""
-    return process.replace(" ", "-")
 
 
 def complete_process(ctx: typer.Context, incomplete: str) -> list[str]:
@@ -96,14 +91,14 @@ def logs(
     data: DataOption = None,
 ) -> None:
     """Print the logs of the service's processes."""
-    from buildarena_cli.local.service import log_files
+    from buildarena_cli.local.service import log_files, log_name
 
     folder = data_folder(data)
     files = log_files(folder)
     if not files:
         raise CommandError(f"there are no logs in {folder.absolute() / 'logs'}")
     if process is not None:
-        name = _log_name(process)
+        name = log_name(process)
         if name not in files:
             raise CommandError(
                 f"there is no process {process!r}; choose from {', '.join(files)}"
@@ -170,7 +165,7 @@ def _show(run: Run, folder: Path, health: dict[str, Any], facts: list[ProcessFac
         since = datetime.fromtimestamp(fact.started_at or 0).astimezone()
         rows.append(
             (
-                _log_name(fact.name),
+                fact.name,
                 str(fact.pid),
                 number(memory, 0),
                 ", ".join(map(str, fact.ports)),
@@ -212,17 +207,10 @@ def _print_line(line: bytes, prefix: str) -> None:
 
 def _peak_memory_bytes(url: str) -> int | None:
     """The peak that the local stack at this URL noted, if it is one of this folder's."""
+    from buildarena_cli.local.service import noted_run
+
     data = data_folder(None)
-    for run in (data / "run.json", data / "demo" / "run.json"):
-        noted = _read(run)
-        if noted.get("url") == url:
-            return int(noted["peak_memory_bytes"])
+    for run in (noted_run(data), noted_run(data / "demo")):
+        if run is not None and run.url == url:
+            return run.peak_memory_bytes
     return None
-
-
-def _read(path: Path) -> dict[str, Any]:
-    try:
-        noted: dict[str, Any] = json.loads(path.read_text())
-    except (OSError, ValueError):
-        return {}
-    return noted

@@ -96,7 +96,7 @@ def demo(data: DataOption = None, port: PortOption = None) -> None:
 
 
 def _detach(settings: Settings, *, keys: bool) -> None:
-    from buildarena_cli.local.service import is_running, start
+    from buildarena_cli.local.service import is_running, start, unwritable
 
     data = settings.data.absolute()
     if is_running(data):
@@ -107,10 +107,7 @@ def _detach(settings: Settings, *, keys: bool) -> None:
     try:
         run = start(data, ["--port", str(settings.port), *(["--keys"] if keys else [])])
     except OSError as error:
-        raise CommandError(
-            f"the data folder {data} can't be written ({error.strerror}): "
-            "choose another with --data or BUILDARENA_DATA"
-        ) from error
+        raise unwritable(data, error) from error
     say(f"API {run.url}  ·  docs {run.url}/docs  ·  pid {run.pid}  ·  logs {data / 'logs'}")
     say("`buildarena down` stops it.")
 

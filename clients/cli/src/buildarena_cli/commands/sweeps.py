@@ -27,7 +27,7 @@ from buildarena_cli.options import (
     budget_of,
 )
 from buildarena_cli.terminal.completion import complete_model, complete_task
-from buildarena_cli.terminal.output import columns, number, print_json, print_table, say
+from buildarena_cli.terminal.output import columns, minute_of, number, print_json, print_table, say
 from buildarena_cli.terminal.progress import ended, exit_code, watch_sweep
 
 app = new_group("Submit and watch sweeps.")
@@ -244,7 +244,7 @@ def _row(sweep: dict[str, Any]) -> list[str]:
         f"{progress['total']:,}",
         ", ".join(f"{n:,} {name}" for name, n in sorted(progress["outcomes"].items())),
         number(progress["cost_usd"], 2),
-        sweep["created_at"][:16].replace("T", " "),
+        minute_of(sweep["created_at"]),
     ]
 
 

@@ -22,6 +22,7 @@ from typing import Any, Final
 import psutil
 
 from buildarena_cli.errors import CommandError
+from buildarena_pipeline.runtime.processes import memory_bytes
 
 LOCK: Final = "lock"
 RUN: Final = "run.json"
@@ -56,7 +57,7 @@ class ProcessFacts:
     """What the system knows of a process; None when it is gone, or belongs to somebody else.
 
     Attributes:
-        name: What it does.
+        name: What it does, as its log is named.
         pid: Its id.
         memory_bytes: Of it and its children.
         started_at: Seconds since 1970.
@@ -171,6 +172,19 @@ def process_facts(run: Run) -> list[ProcessFacts]:
     return [_facts(SUPERVISOR, run.pid), *(_facts(n, pid) for n, pid in run.processes.items())]
 
 
+def log_name(process: str) -> str:
+    """A process' name as its log file and the command `logs` spell it."""
+    return process.replace(" ", "-")
+
+
+def unwritable(data: Path, error: OSError) -> CommandError:
+    """What to say when a data folder can't be written."""
+    return CommandError(
+        f"the data folder {data} can't be written ({error.strerror}): "
+        "choose another with --data or BUILDARENA_DATA"
+    )
+
+
 def log_files(data: Path) -> dict[str, Path]:
     """Logs by the name of their process."""
     return {file.stem: file for file in sorted((data.absolute() / "logs").glob("*.log"))}
@@ -208,20 +222,11 @@ def _facts(name: str, pid: int) -> ProcessFacts:
         started = process.create_time()
         # The supervisor's children have rows of their own.
         members = [process] if name == SUPERVISOR else [process, *process.children(recursive=True)]
-        memory = sum(_memory_bytes(member) for member in members)
+        memory = sum(memory_bytes(member) for member in members)
         for member in members:
             with contextlib.suppress(psutil.Error):
                 listening = member.net_connections("tcp")
                 ports |= {c.laddr.port for c in listening if c.status == psutil.CONN_LISTEN}
     return ProcessFacts(
-        name=name, pid=pid, memory_bytes=memory, started_at=started, ports=sorted(ports)
+        name=log_name(name), pid=pid, memory_bytes=memory, started_at=started, ports=sorted(ports)
     )
-
-
-def _memory_bytes(process: psutil.Process) -> int:
-    """Its share of memory: pages that several processes use are divided among them."""
-    with contextlib.suppress(psutil.Error, AttributeError):
-        return int(process.memory_full_info().pss)
-    with contextlib.suppress(psutil.Error):
-        return int(process.memory_info().rss)
-    return 0

@@ -15,8 +15,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import IO, Any, Self
 
-import httpx
-
+from buildarena_cli.client import HEALTH
 from buildarena_cli.errors import CommandError
 from buildarena_cli.local import (
     EmbeddedPostgres,
@@ -26,7 +25,8 @@ from buildarena_cli.local import (
     Supervisor,
 )
 from buildarena_cli.local.programs import programs
-from buildarena_cli.local.service import LOCK, READY, RUN
+from buildarena_cli.local.service import LOCK, READY, RUN, log_name, unwritable
+from buildarena_cli.wire import Failure, Wire
 from buildarena_pipeline.catalog.tracks import SIMULATORS
 from buildarena_pipeline.errors import StartupError
 from buildarena_pipeline.runtime.processes import die_with_parent, tree_memory_bytes
@@ -135,10 +135,7 @@ class Stack:
             self.logs.mkdir(parents=True, exist_ok=True)
             lock = (data / LOCK).open("w")
         except OSError as error:
-            raise CommandError(
-                f"the data folder {data} can't be written ({error.strerror}): "
-                "choose another with --data or BUILDARENA_DATA"
-            ) from error
+            raise unwritable(data, error) from error
         try:
             _locked(lock)
         except OSError as error:
@@ -202,7 +199,7 @@ class Stack:
     def _launch_program(
         self, name: str, module: Sequence[str], environment: dict[str, str]
     ) -> None:
-        log_file = self.logs / f"{name.replace(' ', '-')}.log"
+        log_file = self.logs / f"{log_name(name)}.log"
 
         def start() -> subprocess.Popen[bytes]:
             with log_file.open("ab") as log:
@@ -222,10 +219,11 @@ class Stack:
         self._tell("waiting until everything answers")
         deadline = time.monotonic() + READY_WITHIN_S
         missing = "the API"
+        wire = Wire(self.url, {})
         while time.monotonic() < deadline:
             self.require_running()
-            with contextlib.suppress(httpx.TransportError, ValueError):
-                health = httpx.get(f"{self.url}/v1/health", timeout=5).json()
+            with contextlib.suppress(*Failure, ValueError):
+                health = wire.send("GET", HEALTH, timeout_s=5).json()
                 served = {f"simulate.{engine}" for engine in self._simulators}
                 bad = [
                     check["name"]

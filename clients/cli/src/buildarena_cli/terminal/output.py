@@ -110,6 +110,11 @@ def number(value: float | None, digits: int = 1) -> str:
     return NOTHING if value is None else f"{value:,.{digits}f}"
 
 
+def minute_of(timestamp: str) -> str:
+    """An ISO 8601 timestamp to the minute, for people."""
+    return timestamp[:16].replace("T", " ")
+
+
 def in_words(indicator: str, unit: str) -> str:
     """An indicator with its unit, if it has one."""
     name = indicator.replace("_", " ")

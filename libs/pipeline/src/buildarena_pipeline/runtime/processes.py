@@ -32,10 +32,11 @@ def tree_memory_bytes(pid: int | None = None) -> int:
         members = [root, *root.children(recursive=True)]
     except psutil.NoSuchProcess:
         return 0
-    return sum(_memory_bytes(member) for member in members)
+    return sum(memory_bytes(member) for member in members)
 
 
-def _memory_bytes(process: psutil.Process) -> int:
+def memory_bytes(process: psutil.Process) -> int:
+    """A process' share of memory: pages that several use are divided among them; 0 when gone."""
     try:
         for line in Path(f"/proc/{process.pid}/smaps_rollup").read_text().splitlines():
             if line.startswith("Pss:"):

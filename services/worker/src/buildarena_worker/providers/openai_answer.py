@@ -1,7 +1,7 @@
 """Answers in OpenAI's chat completions: replies, what they used, and errors.
 
 Written from OpenAI's API reference, and lenient where other providers of this wire differ. What
-each answer means is compared with kept ones in ``tests/worker/test_openai_answers.py``.
+each answer means is compared with kept ones in ``tests/worker/providers/test_openai_answers.py``.
 """
 
 from __future__ import annotations
@@ -36,7 +36,6 @@ QUOTA = frozenset(
 """Codes for an account without means, which come with the status of a rate limit.
 Source: OpenAI's guide to error codes."""
 CODES = {
-    "context_length_exceeded": Failure.CONTEXT_OVERFLOW,
     "model_not_found": Failure.MODEL_NOT_FOUND,
     "invalid_api_key": Failure.BAD_CREDENTIALS,
 }
@@ -170,17 +169,18 @@ def read_error(status: int, headers: Mapping[str, str], text: bytes) -> Provider
         body = None
     error = body.get("error", body) if isinstance(body, dict) else None
     error = error if isinstance(error, dict) else {}
-    names = [name for name in (error.get("code"), error.get("type")) if isinstance(name, str)]
+    code = error.get("code")
+    names = [name for name in (code, error.get("type")) if isinstance(name, str)]
     overloaded = any(phrase in name.lower() for phrase in OVERLOADED for name in names)
     failure = failure_of_status(status)
     if not QUOTA.isdisjoint(names):
         failure, overloaded = Failure.QUOTA_EXCEEDED, False
-    elif error.get("code") == "context_length_exceeded" or _says(words, OVERFLOW):
+    elif code == "context_length_exceeded" or _says(words, OVERFLOW):
         failure, overloaded = Failure.CONTEXT_OVERFLOW, False
     elif overloaded:
         failure = failure if failure is Failure.OUTAGE else Failure.REQUEST_REFUSED
-    elif names[:1] and error.get("code") in CODES:
-        failure = CODES[error["code"]]
+    elif isinstance(code, str) and code in CODES:
+        failure = CODES[code]
     elif status == HTTPStatus.FORBIDDEN and _flagged(error.get("metadata")):
         failure = Failure.REQUEST_REFUSED
     else:

@@ -1,7 +1,7 @@
 """Requests in OpenAI's chat completions: our messages, tools and settings as its JSON.
 
 Written from OpenAI's API reference. Bodies are compared with kept ones in
-``tests/worker/test_openai_requests.py``.
+``tests/worker/providers/test_openai_requests.py``.
 """
 
 from __future__ import annotations
