@@ -22,7 +22,7 @@ from sqlalchemy import (
 )
 from sqlalchemy.dialects.postgresql import JSON, JSONB
 
-from buildarena_store.states import JobState
+from buildarena_store.states import JobState, VerificationState
 
 metadata = MetaData(
     naming_convention={
@@ -93,6 +93,9 @@ jobs = Table(
     _count("actions"),
     _count("refused_actions"),
     Column("refusals", JSONB),
+    # What it was imported from, if it was, and when its figures were found again here.
+    Column("imported_from", Text),
+    _time("verified_at"),
     _time("created_at", now=True),
     _time("started_at"),
     _time("finished_at"),
@@ -136,6 +139,23 @@ sweep_jobs = Table(
     Column("sweep_id", Text, ForeignKey("sweeps.id", ondelete="CASCADE"), primary_key=True),
     Column("job_id", Text, ForeignKey("jobs.id"), primary_key=True),
     Index("ix_sweep_jobs_job", "job_id"),
+)
+
+# Who wants a job beside the sweeps that do; the operator's name is empty.
+job_wants = Table(
+    "job_wants",
+    metadata,
+    Column("job_id", Text, ForeignKey("jobs.id"), primary_key=True),
+    Column("owner", Text, primary_key=True),
+)
+
+# Names that belong to the key that first used them; the operator's key is null.
+names = Table(
+    "names",
+    metadata,
+    Column("kind", Text, primary_key=True),
+    Column("name", Text, primary_key=True),
+    Column("owner", Text),
 )
 
 tasks = Table(
@@ -218,8 +238,12 @@ journal = Table(
     Column("latency_s", Double, nullable=False),
     Column("tries", Integer, nullable=False, server_default=text("1")),
     Column("provider_request_id", Text),
+    # Who paid for it: a job may be handed over to another sweep later.
+    Column("payer", Text),
+    Column("owner", Text),
     _time("created_at", now=True),
 )
+Index("ix_journal_owner", journal.c.owner, postgresql_where=journal.c.owner.is_not(None))
 
 external_calls = Table(
     "external_calls",
@@ -280,10 +304,18 @@ verifications = Table(
     Column("job_id", Text, ForeignKey("jobs.id"), nullable=False),
     Column("state", Text, nullable=False),
     Column("report", JSONB),
+    Column("owner", Text),
     _time("created_at", now=True),
     _time("claimed_at"),
     _time("notified_at"),
     _time("finished_at"),
+)
+# Equal verifications are one.
+Index(
+    "ix_verifications_open",
+    verifications.c.job_id,
+    unique=True,
+    postgresql_where=verifications.c.state != VerificationState.DONE,
 )
 
 # Written by triggers on jobs, so that no writer can forget it.
