@@ -91,17 +91,26 @@ def downgrade() -> None:
 def _backfill() -> None:
     """What the new tables and columns say of the rows that were there before."""
     for statement in (
-        "UPDATE journal SET payer = jobs.payer, owner = jobs.owner FROM jobs "
-        "WHERE jobs.id = journal.job_id AND (jobs.payer, jobs.owner) IS DISTINCT FROM (NULL, NULL)",
+        (
+            "UPDATE journal SET payer = jobs.payer, owner = jobs.owner FROM jobs "
+            "WHERE jobs.id = journal.job_id "
+            "AND (jobs.payer IS NOT NULL OR jobs.owner IS NOT NULL)"
+        ),
         "INSERT INTO job_wants SELECT id, COALESCE(owner, '') FROM jobs WHERE payer IS NULL",
-        "INSERT INTO names SELECT DISTINCT ON (name) 'task', name, owner FROM tasks "
-        "ORDER BY name, created_at",
-        "INSERT INTO names SELECT DISTINCT ON (model) 'agent', model_config->>'model', owner "
-        f"FROM jobs WHERE track LIKE '{EXTERNAL}' AND model_config->>'model' IS NOT NULL "
-        "ORDER BY model, created_at ON CONFLICT DO NOTHING",
+        (
+            "INSERT INTO names SELECT DISTINCT ON (name) 'task', name, owner FROM tasks "
+            "ORDER BY name, created_at"
+        ),
+        (
+            "INSERT INTO names SELECT DISTINCT ON (model) 'agent', model_config->>'model', owner "
+            f"FROM jobs WHERE track LIKE '{EXTERNAL}' AND model_config->>'model' IS NOT NULL "
+            "ORDER BY model, created_at ON CONFLICT DO NOTHING"
+        ),
         # Of equal verifications that wait, the oldest stays.
-        "DELETE FROM verifications WHERE state <> 'done' AND id NOT IN (SELECT DISTINCT ON "
-        "(job_id) id FROM verifications WHERE state <> 'done' ORDER BY job_id, created_at)",
+        (
+            "DELETE FROM verifications WHERE state <> 'done' AND id NOT IN (SELECT DISTINCT ON "
+            "(job_id) id FROM verifications WHERE state <> 'done' ORDER BY job_id, created_at)"
+        ),
     ):
         op.execute(statement)
 
