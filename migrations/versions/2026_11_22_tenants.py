@@ -40,6 +40,10 @@ def upgrade() -> None:
     op.add_column("verifications", sa.Column("owner", sa.Text()))
     op.add_column("journal", sa.Column("payer", sa.Text()))
     op.add_column("journal", sa.Column("owner", sa.Text()))
+    op.add_column(
+        "sweep_jobs",
+        sa.Column("wanted", sa.Boolean(), server_default=sa.text("true"), nullable=False),
+    )
     op.create_table(
         "job_wants",
         sa.Column("job_id", sa.Text(), nullable=False),
@@ -79,6 +83,7 @@ def downgrade() -> None:
     op.drop_table("names")
     op.drop_table("job_wants")
     for table, column in (
+        ("sweep_jobs", "wanted"),
         ("journal", "owner"),
         ("journal", "payer"),
         ("verifications", "owner"),
@@ -96,6 +101,11 @@ def _backfill() -> None:
             "WHERE jobs.id = journal.job_id "
             "AND (jobs.payer IS NOT NULL OR jobs.owner IS NOT NULL)"
         ),
+        # A cancelled sweep no longer pays.
+        "UPDATE jobs SET payer = taker.id, owner = taker.owner FROM sweep_jobs, sweeps AS taker, "
+        "sweeps AS payer WHERE jobs.state <> 'done' AND payer.id = jobs.payer "
+        "AND payer.state = 'cancelled' AND sweep_jobs.job_id = jobs.id "
+        "AND taker.id = sweep_jobs.sweep_id AND taker.state <> 'cancelled'",
         "INSERT INTO job_wants SELECT id, COALESCE(owner, '') FROM jobs WHERE payer IS NULL",
         (
             "INSERT INTO names SELECT DISTINCT ON (name) 'task', name, owner FROM tasks "

@@ -15,6 +15,8 @@ from dataclasses import replace
 import httpx
 import pytest
 from live_api import live_api
+from pydantic import SecretStr
+from sqlalchemy import text
 
 from buildarena_pipeline.catalog.specs import Budget, SweepSpec
 from buildarena_pipeline.errors import TransientError
@@ -39,8 +41,37 @@ from buildarena_store.states import (
 
 SECONDS = float(os.environ.get("CHAOS_COMMANDS_S", "6"))
 THREADS = 20
+SEEDS, WIDE = 1500, 40
+JOB = {"task": "support-1", "model": "builtin/idle"}
 WORKERS = 3
-COMMANDS = ("pause", "resume", "cancel", "retry", "submit")
+COMMANDS = ("pause", "resume", "cancel", "retry", "submit", "submit job", "cancel job")
+KEYS = 3
+OTHERS = 0.1
+"""Share of the commands over sweeps that are, most likely, another key's."""
+WRONG = {
+    "jobs that a cancelled sweep pays for": (
+        "SELECT jobs.id FROM jobs JOIN sweeps ON sweeps.id = payer "
+        "WHERE jobs.state <> 'done' AND sweeps.state = 'cancelled'"
+    ),
+    "jobs of another key than their payer's": (
+        "SELECT jobs.id FROM jobs JOIN sweeps ON sweeps.id = payer "
+        "WHERE jobs.owner IS DISTINCT FROM sweeps.owner"
+    ),
+    "jobs on hold that somebody wants now": (
+        "SELECT jobs.id FROM jobs JOIN sweep_jobs ON job_id = jobs.id AND wanted "
+        "JOIN sweeps ON sweeps.id = sweep_id WHERE jobs.state = 'on_hold' "
+        "AND sweeps.state = 'active'"
+    ),
+    "cancelled jobs that somebody wants": (
+        "SELECT jobs.id FROM jobs JOIN sweep_jobs ON job_id = jobs.id AND wanted "
+        "JOIN sweeps ON sweeps.id = sweep_id WHERE outcome = 'cancelled' "
+        "AND sweeps.state <> 'cancelled'"
+    ),
+    "budgets that are not what was journalled at their expense": (
+        "SELECT id FROM budgets WHERE spent_requests <> "
+        "(SELECT count(*) FROM journal WHERE payer = budgets.id)"
+    ),
+}
 SCORE = JobScore(outcome=Outcome.UNSUCCESSFUL, success=False, indicator=0.0)
 NEED = Need(cost_usd=0, tokens=10)
 
@@ -92,29 +123,39 @@ def handler(context, rng: random.Random):
 
 def spec(rng: random.Random) -> dict[str, object]:
     """One of a few sweeps that share jobs; some with a budget that is soon used up."""
-    first = rng.randrange(6)
+    first = rng.randrange(SEEDS)
     wish = {
         "tasks": ["support-1"],
         "models": ["builtin/idle"],
-        "seeds": list(range(first, first + 6)),
+        "seeds": list(range(first, first + WIDE)),
     }
-    return wish | ({"budget": {"max_requests": rng.randrange(1, 9)}} if rng.random() < 0.6 else {})
+    return wish | ({"budget": {"max_requests": rng.randrange(1, 50)}} if rng.random() < 0.6 else {})
 
 
 class Commander(threading.Thread):
     """Gives random commands until the time is over; keeps what was answered."""
 
-    def __init__(self, url: str, seed: int, sweeps: list[str], ends: float) -> None:
+    def __init__(self, url: str, secret: str, seed: int, sweeps: list[str], ends: float) -> None:
         super().__init__(name=f"commander-{seed}")
+        self._headers = {"Authorization": f"Bearer {secret}"}
         self.answers: Counter[tuple[str, int]] = Counter()
         self.failures: list[str] = []
         self._rng, self._sweeps, self._ends, self._url = random.Random(seed), sweeps, ends, url
 
     def run(self) -> None:
-        with httpx.Client(base_url=self._url, timeout=60) as client:
+        job, mine = "", []
+        with httpx.Client(base_url=self._url, timeout=60, headers=self._headers) as client:
             while time.monotonic() < self._ends:
                 command = self._rng.choice(COMMANDS)
-                if command == "submit" or not self._sweeps:
+                if command == "submit job" or (command == "cancel job" and not job):
+                    command = "submit job"
+                    answer = client.post(
+                        "/v1/jobs", json=JOB | {"seed": self._rng.randrange(SEEDS)}
+                    )
+                    job = answer.json()["id"]
+                elif command == "cancel job":
+                    answer = client.post(f"/v1/jobs/{job}/cancel")
+                elif command == "submit" or not self._sweeps:
                     command = "submit"
                     resume = self._rng.random() < 0.5
                     answer = client.post(
@@ -122,8 +163,10 @@ class Commander(threading.Thread):
                     )
                     if answer.status_code == 202:
                         self._sweeps.append(answer.json()["id"])
+                        mine.append(answer.json()["id"])
                 else:
-                    chosen = self._rng.choice(self._sweeps[-8:])
+                    others = not mine or self._rng.random() < OTHERS
+                    chosen = self._rng.choice((self._sweeps if others else mine)[-8:])
                     answer = client.post(f"/v1/sweeps/{chosen}/{command}", json={})
                 self.answers[command, answer.status_code] += 1
                 if answer.status_code >= 500:
@@ -136,16 +179,23 @@ def work_until(context, ends: float, seed: int) -> None:
     runner = JobRunner(context.store.leases, work, keeper, f"w{seed}")
     while time.monotonic() < ends:
         runner.process_next(CONSTRUCT_QUEUE, "")
-        time.sleep(0.002)
+        time.sleep(0.03)
 
 
 @pytest.mark.timeout(SECONDS * 3 + 120)
 def test_commands_at_once_leave_legal_histories(context) -> None:
     ends = time.monotonic() + SECONDS
     sweeps: list[str] = []
-    unlimited = context.settings.model_copy(update={"rate_limit": "1000000/minute"})
-    with live_api(replace(context, settings=unlimited)) as url:
-        commanders = [Commander(url, seed, sweeps, ends) for seed in range(THREADS)]
+    keys = [context.store.keys.create(name=f"K{n}", scopes=["submit"])[1] for n in range(KEYS)]
+    guarded = {
+        "rate_limit": "1000000/minute",
+        "require_keys": True,
+        "admin_key": SecretStr("operator-secret-that-is-long-enough"),
+    }
+    with live_api(replace(context, settings=context.settings.model_copy(update=guarded))) as url:
+        commanders = [
+            Commander(url, keys[seed % KEYS], seed, sweeps, ends) for seed in range(THREADS)
+        ]
         workers = [
             threading.Thread(target=work_until, args=(context, ends, seed))
             for seed in range(WORKERS)
@@ -157,11 +207,14 @@ def test_commands_at_once_leave_legal_histories(context) -> None:
     answers = sum((commander.answers for commander in commanders), Counter())
     sys.stdout.write(f"{sum(answers.values())} commands: {dict(sorted(answers.items()))}\n")
     assert not [failure for commander in commanders for failure in commander.failures]
-    assert {status for _, status in answers} <= {200, 202, 409}
-    accepted = {"submit": 202, "retry": 202}
+    assert {status for _, status in answers} <= {200, 202, 403, 409}
+    accepted = {"submit": 202, "retry": 202, "submit job": 202}
     assert all(answers[command, accepted.get(command, 200)] for command in COMMANDS)
     require_legal_histories(context)
     require_states_follow_from_histories(context, sweeps)
+    with context.store.database.transaction() as connection:
+        for name, query in WRONG.items():
+            assert not list(connection.execute(text(query)).scalars()), name
 
 
 def histories(context) -> tuple[dict[str, list[str]], dict[str, list[str]]]:

@@ -4,6 +4,7 @@ import pytest
 
 from buildarena_pipeline.runtime.context import Context
 from buildarena_store import UnknownIdError
+from buildarena_store.tables import jobs
 
 
 def test_a_job_with_the_same_key_is_the_same_job(context: Context, new_job, add) -> None:
@@ -45,13 +46,13 @@ def test_a_cancelled_job_is_opened_again_when_it_is_wanted_again(context, new_jo
 def test_only_errored_jobs_are_retried(context: Context, add) -> None:
     (job_id,) = add(1)
     with context.store.database.transaction() as connection:
-        assert not context.store.jobs.retry([job_id], connection=connection)
+        assert not context.store.jobs.retry(jobs.c.id == job_id, connection=connection)
     lease = context.store.leases.claim("construct", owner="w")
     assert lease is not None
     context.store.leases.give_up(lease, "no key", reason="missing_key")
     assert context.store.jobs.get(job_id).outcome == "errored"
     with context.store.database.transaction() as connection:
-        assert context.store.jobs.retry([job_id], connection=connection)
+        assert context.store.jobs.retry(jobs.c.id == job_id, connection=connection)
     assert context.store.jobs.get(job_id).state == "queued"
 
 

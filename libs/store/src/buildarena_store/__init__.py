@@ -11,6 +11,8 @@ from buildarena_store.boards import BoardChange, BoardFeed, Boards, Round
 from buildarena_store.database import Database
 from buildarena_store.errors import (
     ArtifactMissingError,
+    NameTakenError,
+    NotOwnedError,
     SchemaVersionError,
     StaleLeaseError,
     StoreError,
@@ -68,9 +70,11 @@ __all__ = [
     "KeyCheck",
     "Lease",
     "Leases",
+    "NameTakenError",
     "Need",
     "NewJob",
     "NewSweep",
+    "NotOwnedError",
     "Outcome",
     "Results",
     "RolloutRecord",

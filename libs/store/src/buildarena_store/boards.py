@@ -198,6 +198,7 @@ _COLUMNS = [
     jobs.c.id.label("job_id"),
     jobs.c.model_hash.label("configuration"),
     jobs.c.model_config["decoding"].label("decoding"),
+    jobs.c.limits,
     cast(jobs.c.metrics["parts"], Integer).label("parts"),
 ]
 
@@ -214,7 +215,9 @@ def _trials(connection: Connection, query: Any) -> Iterator[EndedJob]:
             task_version=sys.intern(row.task_version),
             model=sys.intern(row.model),
             configuration=sys.intern(row.configuration),
-            decoding=decodings.setdefault(row.configuration, row.decoding or {}),
+            decoding=decodings.setdefault(
+                row.configuration, {**(row.decoding or {}), **row.limits}
+            ),
             seed=row.seed,
             outcome=sys.intern(row.outcome),
             reason=None if row.reason is None else sys.intern(row.reason),

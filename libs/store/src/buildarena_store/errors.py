@@ -37,6 +37,22 @@ class TransitionError(StoreError):
         self.to = to
 
 
+class NotOwnedError(StoreError):
+    """Somebody would change what belongs to another key; nothing was changed."""
+
+    def __init__(self, kind: str, id_: str) -> None:
+        super().__init__(f"{kind} {id_} was submitted with another key; only an admin may")
+
+
+class NameTakenError(StoreError):
+    """A name belongs to the key that first used it; nothing was changed."""
+
+    def __init__(self, kind: str, name: str) -> None:
+        super().__init__(
+            f"the {kind} name {name!r} belongs to the key that first used it: choose another name"
+        )
+
+
 class StaleLeaseError(StoreError):
     """A write came from an owner whose lease on the job is over; nothing was written."""
 

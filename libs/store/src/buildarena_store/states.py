@@ -104,7 +104,8 @@ class VerificationState(StrEnum):
 JOB_TRANSITIONS: Final[Mapping[JobState, frozenset[JobState]]] = MappingProxyType(
     {
         JobState.QUEUED: frozenset({JobState.RUNNING, JobState.ON_HOLD, JobState.DONE}),
-        JobState.RUNNING: frozenset({JobState.QUEUED, JobState.DONE}),
+        # From running to on hold when its payer cancels, and who wants it still lets it wait.
+        JobState.RUNNING: frozenset({JobState.QUEUED, JobState.ON_HOLD, JobState.DONE}),
         JobState.ON_HOLD: frozenset({JobState.QUEUED, JobState.DONE}),
         # An errored job is retried; a cancelled one is wanted again.
         JobState.DONE: frozenset({JobState.QUEUED}),

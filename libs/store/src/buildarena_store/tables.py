@@ -138,6 +138,8 @@ sweep_jobs = Table(
     metadata,
     Column("sweep_id", Text, ForeignKey("sweeps.id", ondelete="CASCADE"), primary_key=True),
     Column("job_id", Text, ForeignKey("jobs.id"), primary_key=True),
+    # False when the owner cancelled just this job.
+    Column("wanted", Boolean, nullable=False, server_default=text("true")),
     Index("ix_sweep_jobs_job", "job_id"),
 )
 

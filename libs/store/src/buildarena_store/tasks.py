@@ -10,6 +10,7 @@ from typing import Any
 from sqlalchemy import Select, select, tuple_
 from sqlalchemy.dialects.postgresql import distinct_on, insert
 
+from buildarena_store.accounts.names import claim_name
 from buildarena_store.database import Database
 from buildarena_store.rows import columns_of, value_of
 from buildarena_store.tables import tasks
@@ -41,11 +42,29 @@ class Tasks:
     def __init__(self, database: Database) -> None:
         self._database = database
 
-    def add(self, *, name: str, version: str, document: str, owner: str | None = None) -> bool:
+    def add(
+        self,
+        *,
+        name: str,
+        version: str,
+        document: str,
+        owner: str | None = None,
+        force: bool = False,
+    ) -> bool:
         """Stores a version with its YAML text, unless it is there.
+
+        Args:
+            name: The task's name, which is the owner's from now on.
+            version: Hash of all that can change a score.
+            document: The text.
+            owner: Id of the API key that uploads it; None for the operator.
+            force: Add a version to another key's task, as an admin may.
 
         Returns:
             Whether it is new.
+
+        Raises:
+            NameTakenError: The name is another key's.
         """
         statement = (
             insert(tasks)
@@ -54,6 +73,7 @@ class Tasks:
             .returning(tasks.c.version)
         )
         with self._database.transaction() as connection:
+            claim_name("task", name, owner=owner, connection=connection, force=force)
             return connection.execute(statement).first() is not None
 
     def newest(self, names: Collection[str] | None = None) -> list[StoredTask]:

@@ -23,8 +23,8 @@ class EndedJob:
         task: Task name.
         task_version: Content hash of the task; trials of different versions are never mixed.
         model: Model name.
-        configuration: Hash of model and decoding: what makes a row of a board.
-        decoding: How the model's replies were sampled.
+        configuration: Hash of model, decoding and limits: what makes a row of a board.
+        decoding: How the model's replies were sampled, and the limits of its sessions, if any.
         seed: Seed; models tried with the same one can be compared in pairs.
         outcome: How the job ended.
         reason: Class of its failure, if any.

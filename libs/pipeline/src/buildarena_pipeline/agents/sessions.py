@@ -27,10 +27,11 @@ from buildarena_store import (
     Stage,
     UnknownIdError,
 )
-from buildarena_store.ids import content_hash
+from buildarena_store.accounts.names import claim_name
+from buildarena_store.jobs.job import configuration_hash
 from buildarena_store.states import simulate_queue
 
-AGENT_NAME = re.compile(r"^[A-Za-z0-9_.-]{1,80}$")
+AGENT_NAME = re.compile(r"[A-Za-z0-9_.-]{1,80}")
 MAX_CALLS = 2000
 CACHED_BENCHES = 256
 JSON = "application/json"
@@ -57,12 +58,28 @@ class ExternalSessions:
         self._lock = Lock()
 
     def open(
-        self, *, task: str, agent: str, seed: int, simulator: str, owner: str | None = None
+        self,
+        *,
+        task: str,
+        agent: str,
+        seed: int,
+        simulator: str,
+        owner: str | None = None,
+        force: bool = False,
     ) -> Job:
         """Opens a session for one task, which belongs to the key that opened it.
 
+        Args:
+            task: The task's name.
+            agent: The agent's name, which is the key's from now on.
+            seed: The seed.
+            simulator: The simulator's name.
+            owner: Id of the API key; None for the operator.
+            force: Play under another key's name, as an admin may.
+
         Raises:
             SubmissionError: Something is unknown, or this agent played this seed already.
+            NameTakenError: The agent's name is another key's.
         """
         chosen = self._check(task, agent, simulator)
         track = external_track(simulator)
@@ -70,7 +87,7 @@ class ExternalSessions:
         key = JobKey(
             task=task,
             task_version=chosen.version,
-            model_hash=content_hash(config),
+            model_hash=configuration_hash(config, {}),
             track=track.id,
             seed=seed,
         )
@@ -81,12 +98,13 @@ class ExternalSessions:
             track_config=track.as_config(),
             owner=owner,
         )
+        # Refused inside the transaction, so that nothing of it stays.
         with self._context.store.database.transaction() as connection:
+            claim_name("agent", agent, owner=owner, connection=connection, force=force)
             self._context.store.jobs.add([new], connection=connection)
-            opened = self._context.store.external_calls.open(key.job_id, connection=connection)
-        if not opened:
-            message = f"agent {agent!r} has played seed {seed} of {task}: take another seed"
-            raise SubmissionError([ValidationIssue(path="seed", message=message)])
+            if not self._context.store.external_calls.open(key.job_id, connection=connection):
+                message = f"agent {agent!r} has played seed {seed} of {task}: take another seed"
+                raise SubmissionError([ValidationIssue(path="seed", message=message)])
         return self._context.store.jobs.get(key.job_id)
 
     def call(self, job_id: str, *, machine: str, tool: str, arguments: Any) -> ExternalCall:
@@ -173,7 +191,7 @@ class ExternalSessions:
             errors.append(_unknown("task", task, sorted(self._context.tasks.newest())))
         if simulator not in SIMULATORS:
             errors.append(_unknown("simulator", simulator, SIMULATORS))
-        if not AGENT_NAME.match(agent):
+        if not AGENT_NAME.fullmatch(agent):
             message = "1 to 80 letters, digits, dots, dashes and underscores"
             errors.append(ValidationIssue(path="agent", message=message))
         if errors or found is None:

@@ -113,22 +113,26 @@ class TaskCatalog:
             created_at=row.created_at,
         )
 
-    def add(self, task: Task, text: str, *, owner: str | None = None) -> bool:
+    def add(self, task: Task, text: str, *, owner: str | None = None, force: bool = False) -> bool:
         """Stores a task, unless this version of it is there.
 
         Args:
             task: What `parse_custom_task` made of the text.
             text: The YAML text.
             owner: Id of the API key that uploads it, if any.
+            force: Upload a version of another key's task, as an admin may.
 
         Returns:
             Whether it is new.
 
         Raises:
+            NameTakenError: The name is another key's.
             TaskChangedError: The version is there with another title, category, level, indicator
                 or difficulty.
         """
-        added = self._tasks.add(name=task.name, version=task.version, document=text, owner=owner)
+        added = self._tasks.add(
+            name=task.name, version=task.version, document=text, owner=owner, force=force
+        )
         kept = self.exact(task.name, task.version)
         if kept is not None and kept != task:
             fields = ("title", "category", "level", "indicator", "difficulty")
@@ -166,7 +170,9 @@ class TaskCatalog:
         if task is None:
             log.warning("task_unreadable", task=row.name, version=row.version)
             return None
-        self._tasks.add(name=row.name, version=task.version, document=text, owner=row.owner)
+        self._tasks.add(
+            name=row.name, version=task.version, document=text, owner=row.owner, force=True
+        )
         self._keep(task.name, task.version, task)
         return task
 

@@ -18,7 +18,9 @@ from buildarena_pipeline.runtime.notify import notify_waiting
 from buildarena_pipeline.submission.estimates import SweepEstimate, estimate
 from buildarena_store import Job, JobKey, NewJob, NewSweep, Sweep
 from buildarena_store.ids import content_hash, new_id
+from buildarena_store.jobs.job import configuration_hash
 from buildarena_store.states import CONSTRUCT_QUEUE
+from buildarena_store.sweeps.wants import want
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,6 +71,7 @@ class Submissions:
         own = [replace(job, owner=owner) for job in new]
         with self._context.store.lifecycle.submission() as connection:
             added = self._context.store.jobs.add(own, connection=connection)
+            want(own[0].key.job_id, owner, connection=connection)
         notify_waiting(self._context, CONSTRUCT_QUEUE)
         return self._context.store.jobs.get(new[0].key.job_id), added > 0
 
@@ -180,7 +183,7 @@ class Submissions:
         for task_name in dict.fromkeys(tasks.values()):
             for model_name in dict.fromkeys(models.values()):
                 config = model_config(self._registry, model_name, variant.decoding)
-                config_hash = content_hash(config)
+                config_hash = configuration_hash(config, limits)
                 new += [
                     NewJob(
                         key=JobKey(

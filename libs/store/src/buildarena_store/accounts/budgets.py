@@ -13,13 +13,13 @@ from dataclasses import dataclass
 from decimal import Decimal
 from typing import Any
 
-from sqlalchemy import Connection, func, literal, or_, select, update
+from sqlalchemy import Connection, and_, func, literal, or_, select, update
 from sqlalchemy.dialects.postgresql import insert
 
 from buildarena_store.database import Database
 from buildarena_store.jobs.journal import Usage
 from buildarena_store.jobs.leases import Lease
-from buildarena_store.tables import budgets, jobs, reservations
+from buildarena_store.tables import budgets, jobs, journal, reservations, sweep_jobs
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,13 +93,14 @@ class Budgets:
             limits: What may be spent in all, earlier spending included.
             connection: The transaction it is part of.
         """
-        own = or_(jobs.c.payer == budget_id, jobs.c.owner == budget_id)
+        members = select(sweep_jobs.c.job_id).where(sweep_jobs.c.sweep_id == budget_id)
+        of_sweep = and_(journal.c.payer == budget_id, journal.c.job_id.in_(members))
         cost, tokens, requests = connection.execute(
             select(
-                func.coalesce(func.sum(jobs.c.cost_usd), 0),
-                func.coalesce(func.sum(jobs.c.input_tokens + jobs.c.output_tokens), 0),
-                func.coalesce(func.sum(jobs.c.requests), 0),
-            ).where(own)
+                func.coalesce(func.sum(journal.c.cost_usd), 0),
+                func.coalesce(func.sum(journal.c.input_tokens + journal.c.output_tokens), 0),
+                func.count(),
+            ).where(or_(of_sweep, journal.c.owner == budget_id))
         ).one()
         given: dict[str, Any] = {
             name: getattr(limits, name) for name in BudgetLimits.__dataclass_fields__
@@ -165,10 +166,11 @@ class Budgets:
 
     def charge_lost(self, lease: Lease, usage: Usage) -> None:
         """Counts a reply that was paid for but came after the lease had ended."""
+        paying = select(budgets.c.id).join(jobs, _PAYS).where(jobs.c.id == lease.job.id)
         with self._database.transaction() as connection:
             connection.execute(
                 update(budgets)
-                .where(budgets.c.id.in_([lease.job.payer, lease.job.owner]))
+                .where(budgets.c.id.in_(paying))
                 .values(
                     spent_cost_usd=budgets.c.spent_cost_usd + usage.cost_usd,
                     spent_tokens=budgets.c.spent_tokens + usage.input_tokens + usage.output_tokens,

@@ -13,6 +13,15 @@ from buildarena_store.rows import columns_of
 from buildarena_store.tables import jobs
 
 
+def configuration_hash(model_config: Mapping[str, Any], limits: Mapping[str, Any]) -> str:
+    """The content hash of a model's configuration and of the limits of its session, if any.
+
+    Limits can change a result as much as decoding can: a job with other limits is another job, and
+    another row of a leaderboard.
+    """
+    return content_hash({**model_config, "limits": dict(limits)} if limits else model_config)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JobKey:
     """What makes a job unique; two submissions with equal keys are one job.
@@ -20,7 +29,7 @@ class JobKey:
     Attributes:
         task: Task name.
         task_version: Content hash of the task.
-        model_hash: Content hash of the model's configuration, decoding included.
+        model_hash: `configuration_hash` of the model, its decoding and the job's limits.
         track: Track identifier.
         seed: Seed or sample number, 0 or more.
     """
@@ -45,9 +54,9 @@ class NewJob:
     Attributes:
         key: Its unique key.
         model: Model name.
-        model_config: The model's configuration, whose hash is in the key.
+        model_config: The model's configuration, part of the hash in the key.
         track_config: The track's parts, whose spelling is in the key.
-        limits: Token, request, cost and time limits of its session.
+        limits: Token, request, cost and time limits of its session, part of that hash too.
         owner: Id of the API key that submits it, if any.
         payer: Id of the sweep whose budget pays for it, if any.
     """

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import Connection, and_, any_, func, or_, select, update
+from sqlalchemy import ColumnElement, Connection, and_, any_, func, or_, select, update
 from sqlalchemy.dialects.postgresql import insert
 
 from buildarena_store import events
@@ -165,45 +165,67 @@ class Jobs:
         Returns:
             The ids that were cancelled by this call.
         """
+        ended = {"outcome": Outcome.CANCELLED, "finished_at": events.now}
+        return self._revoke(ids, JobState.DONE, ended, connection)
+
+    def hold(self, ids: Sequence[str], *, connection: Connection) -> list[str]:
+        """Puts jobs that have not ended on hold, also those that somebody works on.
+
+        Returns:
+            The ids that were put on hold by this call.
+        """
+        return self._revoke(ids, JobState.ON_HOLD, {"notified_at": None}, connection)
+
+    def _revoke(
+        self, ids: Sequence[str], to: JobState, values: dict[str, Any], connection: Connection
+    ) -> list[str]:
+        """Moves jobs that have not ended, with an end to the lease that somebody may have."""
         rows = connection.execute(
             update(jobs)
-            .where(jobs.c.id == any_(bound_texts(ids)), jobs.c.state != JobState.DONE)
+            .where(jobs.c.id == any_(bound_texts(ids)), jobs.c.state.not_in([JobState.DONE, to]))
             .values(
-                state=JobState.DONE,
-                outcome=Outcome.CANCELLED,
+                state=to,
                 lease_owner=None,
                 lease_expires_at=None,
                 lease_token=jobs.c.lease_token + 1,
-                finished_at=events.now,
+                **values,
             )
-            .returning(jobs.c.id, jobs.c.lease_token)
+            .returning(jobs.c.id, jobs.c.lease_token, jobs.c.outcome)
         )
         endings = [
             Ending(
                 job_id=row.id,
                 token=row.lease_token - 1,
-                state=JobState.DONE,
-                data={"outcome": Outcome.CANCELLED},
+                state=to,
+                data={} if row.outcome is None else {"outcome": row.outcome},
             )
             for row in rows
         ]
         end_attempts(endings, AttemptResult.CANCELLED, None, connection=connection)
         return [ending.job_id for ending in endings]
 
-    def retry(self, ids: Sequence[str], *, connection: Connection) -> list[str]:
+    def retry(
+        self, *which: ColumnElement[bool], connection: Connection, **values: Any
+    ) -> list[str]:
         """Queues errored jobs again at the stage where they failed; never re-rolls a score.
+
+        Args:
+            which: Conditions on the jobs.
+            connection: The transaction it is part of.
+            values: Further columns to set.
 
         Returns:
             The ids that were queued: those that had errored.
         """
         return transition(
-            jobs.c.id == any_(bound_texts(ids)),
+            *which,
             jobs.c.outcome == Outcome.ERRORED,
             to=JobState.QUEUED,
             allowed_from={JobState.DONE},
             data={"why": "retry"},
             connection=connection,
             **REOPENED,
+            **values,
         )
 
 

@@ -106,12 +106,13 @@ _APPEND = text(
     )
     INSERT INTO journal (
         job_id, sequence, token, stage, role, request_hash, reply, input_tokens, output_tokens,
-        cached_tokens, reasoning_tokens, cost_usd, latency_s, tries, provider_request_id
+        cached_tokens, reasoning_tokens, cost_usd, latency_s, tries, provider_request_id,
+        payer, owner
     )
     SELECT
         id, :sequence, :token, :stage, :role, :request_hash, CAST(:reply AS json), :input_tokens,
         :output_tokens, :cached_tokens, :reasoning_tokens, :cost_usd, :latency_s, :tries,
-        CAST(:provider_request_id AS text)
+        CAST(:provider_request_id AS text), payer, owner
     FROM job
     """  # noqa: S608 - the state is our own constant
 )

@@ -1,8 +1,9 @@
 """The life cycle of sweeps: pause, resume, cancel, retry, and the stop when a budget is used up.
 
 Each command is one transaction that moves the sweep, if it is in a state that may be left for the
-new one, and with it the jobs that no other active sweep wants. Commands exclude each other and
-submissions by one lock, so that what one of them decides about a shared job holds until its commit.
+new one, and with it the jobs that it pays for and that nobody else wants: the others are handed
+over to who does. Commands exclude each other and submissions by one lock, so that what one of them
+decides about a shared job holds until its commit.
 """
 
 from __future__ import annotations
@@ -11,16 +12,16 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
-from sqlalchemy import ColumnElement, Connection, Select, func, literal, or_, select, text, update
-from sqlalchemy.dialects.postgresql import distinct_on
+from sqlalchemy import ColumnElement, Connection, Row, or_, select, text, update
 
 from buildarena_store import events
 from buildarena_store.accounts.budgets import BudgetLimits, Budgets
 from buildarena_store.database import Database
-from buildarena_store.errors import TransitionError, UnknownIdError
+from buildarena_store.errors import NotOwnedError, TransitionError, UnknownIdError
 from buildarena_store.jobs.jobs import Jobs
 from buildarena_store.jobs.transitions import transition
 from buildarena_store.states import JobState, Stage, SweepState, sweep_states_before
+from buildarena_store.sweeps import wants
 from buildarena_store.tables import jobs, sweep_jobs, sweeps
 
 LIFECYCLE_LOCK = 0x7377656570  # "sweep"
@@ -51,6 +52,8 @@ class SweepLifecycle:
 
     def pause(self, sweep_id: str) -> None:
         """Puts the sweep's waiting jobs on hold; running jobs continue.
+
+        Jobs that somebody else wants now go on at their expense.
 
         Raises:
             UnknownIdError: There is no such sweep.
@@ -89,7 +92,10 @@ class SweepLifecycle:
         self._release(sweep_id, connection)
 
     def cancel(self, sweep_id: str) -> None:
-        """Ends the sweep's jobs that have not ended and that no other active sweep wants.
+        """Ends the sweep's jobs that have not ended and that nobody else wants.
+
+        The others are handed over: to an active sweep or a key, or to a paused or stopped sweep,
+        where they wait. The sweep never pays again.
 
         Raises:
             UnknownIdError: There is no such sweep.
@@ -97,11 +103,13 @@ class SweepLifecycle:
         """
         with self.command() as connection:
             self._move(sweep_id, SweepState.CANCELLED, connection)
-            own = connection.execute(_own_jobs(sweep_id)).scalars().all()
-            self._jobs.cancel(own, connection=connection)
+            self._drop(jobs.c.payer == sweep_id, connection=connection)
 
     def retry(self, sweep_id: str) -> None:
-        """Queues the sweep's errored jobs again; they wait on hold while the sweep is not active.
+        """Queues the sweep's errored jobs again, at its expense, except those of other keys.
+
+        They wait on hold while the sweep is not active. A job of another key stays with it, as
+        long as that key wants it.
 
         Raises:
             UnknownIdError: There is no such sweep.
@@ -111,16 +119,86 @@ class SweepLifecycle:
             state = self._state(sweep_id, connection)
             if state == SweepState.CANCELLED:
                 raise TransitionError("sweep", sweep_id, state, "retried")
-            members = select(sweep_jobs.c.job_id).where(sweep_jobs.c.sweep_id == sweep_id)
-            self._jobs.retry(connection.execute(members).scalars().all(), connection=connection)
+            owner = self._owner(sweep_id, connection)
+            own = jobs.c.owner.is_not_distinct_from(owner) | ~wants.wanted_by_others(owner)
+            self._jobs.retry(
+                jobs.c.id.in_(wants.members(sweep_id)),
+                own,
+                connection=connection,
+                payer=sweep_id,
+                owner=owner,
+            )
             if state != SweepState.ACTIVE:
                 self._hold(sweep_id, connection)
+
+    def cancel_job(self, job_id: str, *, owner: str | None, force: bool = False) -> bool:
+        """Takes back a key's wants in a job, and ends the job if it is the key's alone.
+
+        Args:
+            job_id: The job.
+            owner: The key.
+            force: End it whoever wants it.
+
+        Returns:
+            False when the job has ended already, and nothing was changed.
+
+        Raises:
+            UnknownIdError: There is no such job.
+            NotOwnedError: The key neither owns nor wants it.
+        """
+        with self.command() as connection:
+            job = self._job(job_id, connection)
+            if force:
+                return bool(self._jobs.cancel([job_id], connection=connection))
+            if job.owner != owner and not wants.is_wanted(job_id, owner, connection=connection):
+                raise NotOwnedError("job", job_id)
+            if job.state == JobState.DONE:
+                return False
+            wants.withdraw(job_id, owner, connection=connection)
+            if job.owner == owner:
+                self._drop(jobs.c.id == job_id, connection=connection, owner=owner)
+        return True
+
+    def retry_job(self, job_id: str, *, owner: str | None, force: bool = False) -> bool:
+        """Queues an errored job again, paid for by an active sweep of its key or by the key.
+
+        Args:
+            job_id: The job.
+            owner: The key that asks.
+            force: Retry also another key's job.
+
+        Returns:
+            False when the job has not errored.
+
+        Raises:
+            UnknownIdError: There is no such job.
+            NotOwnedError: It is another key's.
+        """
+        with self.command() as connection:
+            job = self._job(job_id, connection)
+            if job.owner != owner and not force:
+                raise NotOwnedError("job", job_id)
+            payers = (
+                select(sweeps.c.id)
+                .join(sweep_jobs, sweep_jobs.c.sweep_id == sweeps.c.id)
+                .where(
+                    sweep_jobs.c.job_id == job_id,
+                    sweeps.c.owner.is_not_distinct_from(job.owner),
+                    sweeps.c.state == SweepState.ACTIVE,
+                )
+                .order_by((sweeps.c.id == (job.payer or "")).desc(), sweeps.c.created_at)
+            )
+            payer = connection.execute(payers.limit(1)).scalar()
+            retried = self._jobs.retry(jobs.c.id == job_id, connection=connection, payer=payer)
+            if retried and payer is None:
+                wants.want(job_id, job.owner, connection=connection)
+        return bool(retried)
 
     def exhaust(self, budget_id: str, detail: str, *, connection: Connection) -> list[str]:
         """Stops the sweeps of a used-up budget; nothing new of them starts.
 
-        Waiting jobs that another active sweep with another budget wants go over to that sweep;
-        the others are put on hold.
+        Jobs that somebody else wants who pays now go over to them; the waiting ones among the
+        others are put on hold.
 
         Args:
             budget_id: Id of the sweep or key whose budget it is.
@@ -140,7 +218,7 @@ class SweepLifecycle:
             or_(jobs.c.payer == budget_id, jobs.c.owner == budget_id),
             jobs.c.stage == Stage.CONSTRUCT,
         )
-        _hand_over(*paid, jobs.c.state == JobState.QUEUED, connection=connection)
+        wants.hand_over(*paid, connection=connection, except_owner=budget_id)
         transition(
             *paid,
             to=JobState.ON_HOLD,
@@ -162,20 +240,36 @@ class SweepLifecycle:
         )
 
     def _hold(self, sweep_id: str, connection: Connection) -> None:
-        transition(
-            jobs.c.id.in_(_own_jobs(sweep_id)),
-            to=JobState.ON_HOLD,
-            allowed_from={JobState.QUEUED},
-            connection=connection,
-        )
+        own = jobs.c.payer == sweep_id
+        wants.hand_over(own, connection=connection)
+        transition(own, to=JobState.ON_HOLD, allowed_from={JobState.QUEUED}, connection=connection)
 
     def _release(self, sweep_id: str, connection: Connection) -> None:
+        """Whoever resumes pays, also for jobs that another paused sweep would have paid for."""
         transition(
-            jobs.c.id.in_(_own_jobs(sweep_id)),
+            jobs.c.id.in_(wants.members(sweep_id)),
             to=JobState.QUEUED,
             allowed_from={JobState.ON_HOLD},
             connection=connection,
+            payer=sweep_id,
+            owner=self._owner(sweep_id, connection),
         )
+
+    def _drop(
+        self, which: ColumnElement[bool], *, connection: Connection, **still: str | None
+    ) -> None:
+        """Hands jobs over to who else wants them, and ends those that nobody does.
+
+        Args:
+            which: Conditions on the jobs, which hold for none that was handed over.
+            connection: The transaction.
+            still: Columns that are as they were when a job was not handed over.
+        """
+        waiting = wants.hand_over(which, connection=connection, to_waiting=True)
+        self._jobs.hold(waiting, connection=connection)
+        left = [jobs.c[name].is_not_distinct_from(value) for name, value in still.items()]
+        ids = connection.execute(select(jobs.c.id).where(which, *left)).scalars().all()
+        self._jobs.cancel(ids, connection=connection)
 
     def _move(self, sweep_id: str, to: SweepState, connection: Connection) -> None:
         if not self._transition(sweeps.c.id == sweep_id, to, connection, {}):
@@ -206,35 +300,15 @@ class SweepLifecycle:
             raise UnknownIdError("sweep", sweep_id)
         return state
 
+    def _owner(self, sweep_id: str, connection: Connection) -> str | None:
+        owner: str | None = connection.execute(
+            select(sweeps.c.owner).where(sweeps.c.id == sweep_id)
+        ).scalar()
+        return owner
 
-def _own_jobs(sweep_id: str) -> Select[Any]:
-    """Ids of the sweep's jobs that no other active sweep wants."""
-    other = sweep_jobs.alias("other")
-    wanted = (
-        select(literal(1))
-        .select_from(other.join(sweeps, sweeps.c.id == other.c.sweep_id))
-        .where(
-            other.c.job_id == sweep_jobs.c.job_id,
-            other.c.sweep_id != sweep_id,
-            sweeps.c.state == SweepState.ACTIVE,
-        )
-        .exists()
-    )
-    return select(sweep_jobs.c.job_id).where(sweep_jobs.c.sweep_id == sweep_id, ~wanted)
-
-
-def _hand_over(*which: ColumnElement[bool], connection: Connection) -> None:
-    """Makes another active sweep, where one wants a job, the one that pays for it."""
-    taker = (
-        select(sweeps.c.id, sweeps.c.owner, sweep_jobs.c.job_id)
-        .join(sweep_jobs, sweep_jobs.c.sweep_id == sweeps.c.id)
-        .where(sweeps.c.state == SweepState.ACTIVE)
-        .ext(distinct_on(sweep_jobs.c.job_id))
-        .order_by(sweep_jobs.c.job_id, sweeps.c.created_at)
-        .subquery("taker")
-    )
-    connection.execute(
-        update(jobs)
-        .where(*which, taker.c.job_id == jobs.c.id, taker.c.id != func.coalesce(jobs.c.payer, ""))
-        .values(payer=taker.c.id, owner=taker.c.owner)
-    )
+    def _job(self, job_id: str, connection: Connection) -> Row[Any, Any, Any]:
+        query = select(jobs.c.owner, jobs.c.payer, jobs.c.state).where(jobs.c.id == job_id)
+        row = connection.execute(query).first()
+        if row is None:
+            raise UnknownIdError("job", job_id)
+        return row

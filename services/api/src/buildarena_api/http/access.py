@@ -38,6 +38,11 @@ class Caller:
     key_id: str | None
     scope: str
 
+    @property
+    def is_admin(self) -> bool:
+        """Whether the caller may change what belongs to others."""
+        return self.scope == "admin"
+
     def require(self, scope: str) -> None:
         """Checks what the caller may do.
 
@@ -57,7 +62,7 @@ class Caller:
         Raises:
             ProblemError: 403, when it is somebody else's.
         """
-        if self.scope != "admin" and owner != self.key_id:
+        if not self.is_admin and owner != self.key_id:
             raise ProblemError(403, f"{what} was submitted with another key; only an admin may")
 
 

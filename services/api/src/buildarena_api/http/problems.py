@@ -17,7 +17,14 @@ from starlette.exceptions import HTTPException
 
 from buildarena_benchmark import ValidationIssue
 from buildarena_pipeline.errors import SubmissionError
-from buildarena_store import ArtifactMissingError, TransitionError, UnknownIdError
+from buildarena_store import (
+    ArtifactMissingError,
+    NameTakenError,
+    NotOwnedError,
+    StoreError,
+    TransitionError,
+    UnknownIdError,
+)
 
 PROBLEM_JSON = "application/problem+json"
 QUOTED = re.compile(r"'([^']*)'")
@@ -130,6 +137,11 @@ def _add_store_handlers(app: FastAPI) -> None:
     @app.exception_handler(TransitionError)
     async def on_transition(_: Request, error: TransitionError) -> JSONResponse:
         return _answer(409, str(error))
+
+    @app.exception_handler(NotOwnedError)
+    @app.exception_handler(NameTakenError)
+    async def on_others(_: Request, error: StoreError) -> JSONResponse:
+        return _answer(403, str(error))
 
     @app.exception_handler(UnknownIdError)
     async def on_unknown(_: Request, error: UnknownIdError) -> JSONResponse:

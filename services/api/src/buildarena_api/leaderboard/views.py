@@ -26,8 +26,10 @@ class Row(_View):
     rank_low: int | None = Field(description="Lower end of the place's 95 % bootstrap interval")
     rank_high: int | None
     model: str
-    configuration: str = Field(description="Hash of model and decoding")
-    decoding: dict[str, Any]
+    configuration: str = Field(description="Hash of model, decoding and limits")
+    decoding: dict[str, Any] = Field(
+        description="How replies were sampled, and the limits of the sessions, if any"
+    )
     baseline: bool = Field(description="A built-in model for comparison")
     trials: int = Field(description="Counted jobs: the denominator of the averages")
     ended: int = Field(description="All ended jobs, also errored and cancelled ones")

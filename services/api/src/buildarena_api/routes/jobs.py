@@ -127,11 +127,12 @@ def show_job(job_id: str, context: ContextDep) -> JobDetail:
 
 @router.post("/{job_id}/cancel", responses=problem_responses(404, 409, 503))
 def cancel_job(job_id: str, context: ContextDep, caller: CallerDep) -> JobView:
-    """Ends a job that has not ended; its worker stops before its next model request."""
-    caller.require_owner(context.store.jobs.get(job_id).owner, f"job {job_id}")
-    with context.store.database.transaction() as connection:
-        cancelled = context.store.jobs.cancel([job_id], connection=connection)
-    if not cancelled:
+    """Ends a job that has not ended; the model request that is open ends at once.
+
+    If another key wants the job too, it goes on at that key's expense, and the caller's wish for
+    it ends. An admin ends it whoever wants it.
+    """
+    if not context.store.lifecycle.cancel_job(job_id, owner=caller.key_id, force=caller.is_admin):
         raise ProblemError(409, f"job {job_id} has ended already")
     return JobView.of(context.store.jobs.get(job_id))
 
@@ -139,15 +140,13 @@ def cancel_job(job_id: str, context: ContextDep, caller: CallerDep) -> JobView:
 @router.post("/{job_id}/retry", status_code=202, responses=problem_responses(404, 409, 503))
 def retry_job(job_id: str, context: ContextDep, caller: CallerDep) -> JobView:
     """Queues an errored job again where it failed. A scored job is never run again."""
-    job = context.store.jobs.get(job_id)
-    caller.require_owner(job.owner, f"job {job_id}")
-    with context.store.database.transaction() as connection:
-        again = context.store.jobs.retry([job_id], connection=connection)
-    if not again:
+    if not context.store.lifecycle.retry_job(job_id, owner=caller.key_id, force=caller.is_admin):
+        job = context.store.jobs.get(job_id)
         state = job.outcome or job.state
         raise ProblemError(409, f"only errored jobs are retried; job {job_id} is {state}")
+    job = context.store.jobs.get(job_id)
     notify_waiting(context, job.queue)
-    return JobView.of(context.store.jobs.get(job_id))
+    return JobView.of(job)
 
 
 @router.get("/{job_id}/artifacts", responses=problem_responses(404, 503))

@@ -31,7 +31,13 @@ class OpenSession(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
     task: Name
-    agent: Annotated[str, Field(description="The agent's name on the leaderboard", max_length=80)]
+    agent: Annotated[
+        str,
+        Field(
+            description="Its name on the leaderboard, which belongs to the key that first uses it",
+            max_length=80,
+        ),
+    ]
     seed: Seed = 0
     simulator: Name = SIMULATORS[0]
 
@@ -75,7 +81,7 @@ class ToolOutcome(BaseModel):
     feedback: str = Field(description="The state in words, or what would have been allowed")
 
 
-@router.post("", status_code=201, responses=problem_responses(422, 503))
+@router.post("", status_code=201, responses=problem_responses(403, 422, 503))
 def open_session(
     body: OpenSession,
     response: Response,
@@ -90,6 +96,7 @@ def open_session(
         seed=body.seed,
         simulator=body.simulator,
         owner=caller.key_id,
+        force=caller.is_admin,
     )
     response.headers["Location"] = f"/v1/jobs/{job.id}"
     return SessionOpened(

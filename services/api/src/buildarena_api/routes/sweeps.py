@@ -109,7 +109,10 @@ def estimate_sweep(spec: SweepSpec, submissions: SubmissionsDep) -> SweepEstimat
 
 @router.post("/{sweep_id}/pause", responses=problem_responses(404, 409, 503))
 def pause_sweep(sweep_id: str, context: ContextDep, caller: CallerDep) -> SweepView:
-    """Puts the sweep's waiting jobs on hold; running jobs continue."""
+    """Puts the sweep's waiting jobs on hold; running jobs continue.
+
+    Jobs that another sweep or key wants now go on at its expense.
+    """
     _require_owner(context, caller, sweep_id)
     context.store.lifecycle.pause(sweep_id)
     return _view(context, context.store.sweeps.get(sweep_id))
@@ -131,7 +134,11 @@ def resume_sweep(
 
 @router.post("/{sweep_id}/cancel", responses=problem_responses(404, 409, 503))
 def cancel_sweep(sweep_id: str, context: ContextDep, caller: CallerDep) -> SweepView:
-    """Ends the sweep's jobs that have not ended and that no other active sweep wants."""
+    """Ends the sweep's jobs that have not ended and that nobody else wants.
+
+    The others go on at the expense of who wants them, or wait for them. This sweep never pays
+    again.
+    """
     _require_owner(context, caller, sweep_id)
     context.store.lifecycle.cancel(sweep_id)
     return _view(context, context.store.sweeps.get(sweep_id))
@@ -139,7 +146,10 @@ def cancel_sweep(sweep_id: str, context: ContextDep, caller: CallerDep) -> Sweep
 
 @router.post("/{sweep_id}/retry", status_code=202, responses=problem_responses(404, 409, 503))
 def retry_sweep(sweep_id: str, context: ContextDep, caller: CallerDep) -> SweepView:
-    """Queues the sweep's errored jobs again where they failed; scored ones are never redone."""
+    """Queues the sweep's errored jobs again where they failed; scored ones are never redone.
+
+    The sweep pays for them. A job of another key that still wants it is left to that key.
+    """
     _require_owner(context, caller, sweep_id)
     context.store.lifecycle.retry(sweep_id)
     notify_waiting(context, CONSTRUCT_QUEUE)

@@ -1,0 +1,382 @@
+"""Shared jobs without shared harm: two keys, A and B, that want the same jobs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import pytest
+from pydantic import SecretStr
+from starlette.testclient import TestClient
+from tenants import ADMIN, Tenant, everything, new_tenant, operator
+from working import work
+
+from buildarena_api.app import create_app
+from buildarena_api.routes.tasks import EXAMPLE
+from buildarena_pipeline.catalog.models import load_registry
+from buildarena_pipeline.runtime.context import Context, open_context
+
+JOB = {"task": "support-1", "model": "builtin/idle"}
+SWEEP = {"tasks": ["support-1"], "models": ["builtin/idle"], "seeds": [0]}
+SESSION = {"task": "support-1", "agent": "mason", "seed": 0}
+
+
+@pytest.fixture
+def guarded(context: Context) -> Iterator[TestClient]:
+    """The API with keys asked for."""
+    changes = {"require_keys": True, "admin_key": SecretStr(ADMIN), "rate_limit": "100000/minute"}
+    own = open_context(context.settings.model_copy(update=changes))
+    with TestClient(create_app(own, load_registry()), raise_server_exceptions=False) as client:
+        yield client
+    own.close()
+
+
+@pytest.fixture
+def a(guarded: TestClient) -> Tenant:
+    return new_tenant(guarded, "A")
+
+
+@pytest.fixture
+def b(guarded: TestClient) -> Tenant:
+    return new_tenant(guarded, "B")
+
+
+def sweep_of(who: Tenant, **more: Any) -> str:
+    return who.post("/v1/sweeps", {**SWEEP, **more})["id"]
+
+
+def the_job(who: Tenant) -> dict[str, Any]:
+    (job,) = who.get("/v1/jobs")["jobs"]
+    return job
+
+
+def payer_of(context: Context) -> str | None:
+    (job,) = context.store.jobs.page(limit=10)
+    return job.payer
+
+
+def run_until(context: Context, state: str) -> None:
+    """Brings the one job into a state."""
+    if state == "queued":
+        return
+    lease = context.store.leases.claim("construct", owner="w")
+    assert lease is not None
+    if state == "errored":
+        context.store.leases.give_up(lease, "no key", reason="missing_key")
+
+
+def spent(who: Tenant, guarded: TestClient) -> int:
+    (key,) = [key for key in operator(guarded).get("/v1/keys") if key["id"] == who.id]
+    return key["budget"]["spent_requests"]
+
+
+def budget(who: Tenant, guarded: TestClient, requests: int) -> None:
+    body = {"max_requests": requests}
+    answer = operator(guarded).ask("PUT", f"/v1/keys/{who.id}/budget", json=body)
+    assert answer.is_success, answer.text
+
+
+# Limits
+
+
+@pytest.mark.parametrize(
+    "limits", [{"max_requests": 1}, {"max_tokens": 1}, {"max_seconds": 0.001}, {"max_cost_usd": 1}]
+)
+def test_anothers_limits_never_become_my_result(a, b, context, limits) -> None:
+    tight = b.post("/v1/jobs", {**JOB, "limits": limits})
+    work(context)
+    mine = a.post("/v1/jobs", JOB)
+    assert mine["id"] != tight["id"]
+    assert mine["state"] == "queued"
+    work(context)
+    assert a.get(f"/v1/jobs/{mine['id']}")["outcome"] == "construction_failed"
+    # The same limits are the same job, however they are spelled.
+    spelled = {
+        name: float(value) if name.endswith("d") else value for name, value in limits.items()
+    }
+    assert a.post("/v1/jobs", {**JOB, "limits": spelled})["id"] == tight["id"]
+
+
+def test_jobs_with_limits_have_a_row_of_their_own(a, context) -> None:
+    for seed in range(2):
+        a.post("/v1/jobs", {**JOB, "seed": seed})
+        a.post("/v1/jobs", {**JOB, "seed": seed, "limits": {"max_requests": 1}})
+    work(context)
+    (task,) = [t for t in a.get("/v1/leaderboard")["tasks"] if t["task"] == "support-1"]
+    rows = {row["decoding"].get("max_requests"): row for row in task["rows"]}
+    assert {limit: row["trials"] for limit, row in rows.items()} == {None: 2, 1: 2}
+
+
+# Commands over shared jobs
+
+
+@pytest.mark.parametrize("state", ["queued", "running"])
+@pytest.mark.parametrize("command", ["pause", "cancel"])
+def test_a_command_hands_jobs_over_to_an_active_sweep_of_another_key(
+    a, b, context, command, state
+) -> None:
+    mine, theirs = sweep_of(a), sweep_of(b)
+    run_until(context, state)
+    assert (the_job(a)["owner"], payer_of(context)) == (a.id, mine)
+    a.post(f"/v1/sweeps/{mine}/{command}")
+    assert (the_job(b)["state"], the_job(b)["owner"]) == (state, b.id)
+    assert payer_of(context) == theirs
+
+
+@pytest.mark.parametrize("state", ["queued", "running", "on_hold"])
+def test_a_paused_sweep_wants_its_jobs_and_lets_them_wait(a, b, context, state) -> None:
+    mine, theirs = sweep_of(a), sweep_of(b)
+    b.post(f"/v1/sweeps/{theirs}/pause")
+    run_until(context, "queued" if state == "on_hold" else state)
+    if state == "on_hold":
+        a.post(f"/v1/sweeps/{mine}/pause")
+    assert the_job(a)["state"] == state
+    a.post(f"/v1/sweeps/{mine}/cancel")
+    job = the_job(b)
+    assert (job["state"], job["owner"], payer_of(context)) == ("on_hold", b.id, theirs)
+    b.post(f"/v1/sweeps/{theirs}/resume")
+    assert the_job(b)["state"] == "queued"
+    work(context)
+    assert the_job(b)["outcome"] == "construction_failed"
+
+
+def test_a_lease_ends_when_its_job_goes_to_somebody_who_waits(a, b, context) -> None:
+    mine, theirs = sweep_of(a), sweep_of(b)
+    b.post(f"/v1/sweeps/{theirs}/pause")
+    lease = context.store.leases.claim("construct", owner="w")
+    a.post(f"/v1/sweeps/{mine}/cancel")
+    assert context.store.leases.heartbeat([lease]) == {}
+    assert context.store.jobs.attempts(lease.job.id)[0].ended_at is not None
+
+
+def test_a_sweep_that_ran_out_of_budget_wants_its_jobs(a, b, context) -> None:
+    theirs = sweep_of(b, budget={"max_requests": 1}, models=["builtin/idle", "builtin/expert"])
+    work(context)
+    assert b.get(f"/v1/sweeps/{theirs}")["state"] == "budget_exhausted"
+    mine = sweep_of(a, models=["builtin/expert"])
+    a.post(f"/v1/sweeps/{mine}/cancel")
+    left = b.get(f"/v1/jobs?sweep={theirs}&model=builtin/expert")["jobs"]
+    assert [(job["state"], job["owner"]) for job in left] == [("on_hold", b.id)]
+
+
+def test_nobody_pays_after_cancelling(a, b, guarded, context) -> None:
+    for who in (a, b):
+        budget(who, guarded, 1000)
+    mine, theirs = sweep_of(a, budget={"max_requests": 1000}), sweep_of(b)
+    a.post(f"/v1/sweeps/{mine}/cancel")
+    work(context)
+    assert the_job(b)["outcome"] == "construction_failed"
+    assert spent(a, guarded) == 0
+    assert spent(b, guarded) == the_job(b)["usage"]["requests"] > 0
+    assert b.get(f"/v1/sweeps/{mine}")["budget"]["spent_requests"] == 0
+    assert theirs == payer_of(context)
+
+
+def test_what_was_spent_before_a_hand_over_stays_where_it_was_spent(a, b, guarded, context) -> None:
+    expert = {"models": ["builtin/expert"]}
+    mine, theirs = sweep_of(a, **expert), sweep_of(b, **expert)
+    work(context, steps=1)
+    before = the_job(a)["usage"]["requests"]
+    assert before > 0
+    a.post(f"/v1/sweeps/{mine}/cancel")
+    assert payer_of(context) == theirs
+    # Budgets that are set afterwards count what each did pay.
+    for who in (a, b):
+        budget(who, guarded, 1000)
+    work(context)
+    assert (spent(a, guarded), spent(b, guarded)) == (
+        before,
+        the_job(b)["usage"]["requests"] - before,
+    )
+
+
+def test_a_budget_stop_hands_over_and_costs_the_other_nothing(a, b, guarded, context) -> None:
+    budget(b, guarded, 1000)
+    models = ["builtin/idle", "builtin/expert"]
+    mine = sweep_of(a, models=models, budget={"max_requests": 1})
+    theirs = sweep_of(b, models=models)
+    work(context)
+    assert a.get(f"/v1/sweeps/{mine}")["state"] == "budget_exhausted"
+    assert a.get(f"/v1/sweeps/{mine}")["budget"]["spent_requests"] <= 1
+    jobs = b.get("/v1/jobs")["jobs"]
+    assert {job["state"] for job in jobs} == {"done"}
+    total = sum(job["usage"]["requests"] for job in jobs)
+    assert spent(b, guarded) == total - a.get(f"/v1/sweeps/{mine}")["budget"]["spent_requests"]
+    assert b.get(f"/v1/sweeps/{theirs}")["state"] == "done"
+
+
+def test_a_keys_budget_stop_leaves_the_jobs_that_another_key_wants(a, b, guarded, context) -> None:
+    budget(a, guarded, 1)
+    models = ["builtin/idle", "builtin/expert"]
+    sweep_of(a, models=models)
+    for model in models:
+        b.post("/v1/jobs", {**JOB, "model": model})
+    work(context)
+    assert {job["state"] for job in b.get("/v1/jobs")["jobs"]} == {"done"}
+    assert spent(a, guarded) <= 1
+
+
+# Retry
+
+
+@pytest.mark.parametrize("theirs_is", ["active", "paused"])
+def test_retrying_never_touches_a_job_of_another_key(a, b, guarded, context, theirs_is) -> None:
+    for who in (a, b):
+        budget(who, guarded, 1000)
+    mine, theirs = sweep_of(a), sweep_of(b)
+    run_until(context, "errored")
+    if theirs_is == "paused":
+        a.post(f"/v1/sweeps/{mine}/pause")
+        assert the_job(a)["owner"] == b.id  # who goes on owns also what errored
+        return
+    b.post(f"/v1/sweeps/{theirs}/retry")
+    work(context)
+    assert the_job(a)["outcome"] == "errored"
+    b.post(f"/v1/jobs/{the_job(a)['id']}/retry", status=403)
+    a.post(f"/v1/sweeps/{mine}/retry")
+    work(context)
+    assert the_job(a)["outcome"] == "construction_failed"
+    assert (spent(b, guarded), spent(a, guarded)) == (0, the_job(a)["usage"]["requests"])
+
+
+def test_a_job_that_its_owner_no_longer_wants_is_retried_at_ones_own_expense(
+    a, b, guarded, context
+) -> None:
+    for who in (a, b):
+        budget(who, guarded, 1000)
+    mine = sweep_of(a)
+    run_until(context, "errored")
+    a.post(f"/v1/sweeps/{mine}/cancel")
+    theirs = sweep_of(b)
+    b.post(f"/v1/sweeps/{theirs}/retry")
+    assert payer_of(context) == theirs
+    work(context)
+    assert spent(a, guarded) == 0
+    assert spent(b, guarded) == the_job(b)["usage"]["requests"] > 0
+
+
+def test_a_retried_job_is_never_paid_by_a_cancelled_sweep(a, context) -> None:
+    first, second = sweep_of(a), sweep_of(a)
+    run_until(context, "errored")
+    assert payer_of(context) == first
+    a.post(f"/v1/sweeps/{first}/cancel")
+    a.post(f"/v1/jobs/{the_job(a)['id']}/retry")
+    assert (the_job(a)["state"], payer_of(context)) == ("queued", second)
+
+
+# Single jobs
+
+
+def test_a_job_that_another_key_asked_for_singly_goes_on(a, b, context) -> None:
+    mine = sweep_of(a)
+    b.post("/v1/jobs", JOB)
+    a.post(f"/v1/sweeps/{mine}/cancel")
+    assert (the_job(b)["state"], the_job(b)["owner"]) == ("queued", b.id)
+    assert payer_of(context) is None
+
+
+def test_cancelling_a_shared_job_only_ends_ones_own_wish(a, b) -> None:
+    mine, theirs = sweep_of(a), sweep_of(b)
+    job = the_job(a)["id"]
+    # B takes back its wish, A's stays; so what A cancels later ends.
+    assert b.post(f"/v1/jobs/{job}/cancel")["owner"] == a.id
+    assert the_job(a)["state"] == "queued"
+    b.post("/v1/sweeps", SWEEP)
+    assert a.post(f"/v1/jobs/{job}/cancel")["owner"] == b.id
+    assert the_job(b)["state"] == "queued"
+    # A took its wish back: B's cancel does not bring it back to A.
+    assert b.post(f"/v1/jobs/{job}/cancel")["outcome"] == "cancelled"
+    assert {mine, theirs} <= {sweep["id"] for sweep in a.get("/v1/sweeps")["sweeps"]}
+
+
+def test_an_admin_ends_a_job_whoever_wants_it(a, b, guarded) -> None:
+    sweep_of(a), sweep_of(b)
+    job = operator(guarded).post(f"/v1/jobs/{the_job(a)['id']}/cancel")
+    assert job["outcome"] == "cancelled"
+
+
+def test_who_neither_owns_nor_wants_a_job_may_not_cancel_it(a, b, context) -> None:
+    sweep_of(a)
+    before = everything(context.store.database)
+    b.post(f"/v1/jobs/{the_job(a)['id']}/cancel", status=403)
+    assert everything(context.store.database) == before
+
+
+# Refusals
+
+
+def test_a_refused_request_changes_nothing(a, b, context) -> None:
+    mine = sweep_of(a)
+    session = a.post("/v1/sessions", SESSION)["id"]
+    a.post(f"/v1/jobs/{session}/cancel")
+    task = {"content": EXAMPLE.encode(), "headers": {"Content-Type": "application/yaml"}}
+    assert a.ask("POST", "/v1/tasks", **task).status_code == 201
+    done = a.post("/v1/jobs", {**JOB, "seed": 9})["id"]
+    work(context)
+    before = everything(context.store.database)
+    other = EXAMPLE.replace("final_mass: 200", "final_mass: 300").encode()
+    retitled = EXAMPLE.replace("A bridge over", "My bridge over").encode()
+    refused = [
+        (a, "POST", "/v1/sessions", {"json": SESSION}),
+        (b, "POST", "/v1/sessions", {"json": SESSION}),
+        (b, "POST", "/v1/sessions", {"json": {**SESSION, "seed": 7}}),
+        (a, "POST", "/v1/sessions", {"json": {**SESSION, "agent": "new", "task": "no-task"}}),
+        (a, "POST", "/v1/sessions", {"json": {**SESSION, "agent": "new\n"}}),
+        (b, "POST", "/v1/tasks", {**task, "content": other}),
+        (a, "POST", "/v1/tasks", {**task, "content": retitled}),
+        (b, "POST", f"/v1/sweeps/{mine}/cancel", {}),
+        (b, "POST", f"/v1/jobs/{done}/cancel", {}),
+        (a, "POST", f"/v1/jobs/{done}/cancel", {}),
+        (a, "POST", f"/v1/jobs/{done}/retry", {}),
+        (a, "POST", f"/v1/sweeps/{mine}/resume", {}),
+        (a, "POST", "/v1/sweeps", {"json": {**SWEEP, "models": ["nobody"]}}),
+        (a, "POST", "/v1/jobs", {"json": {**JOB, "task": "none"}}),
+        (a, "POST", f"/v1/sessions/{session}/submit", {}),
+        (a, "POST", f"/v1/sessions/{session}/calls", {"json": {"tool": "start"}}),
+        (a, "PUT", f"/v1/keys/{a.id}/budget", {"json": {"max_requests": 5}}),
+        (a, "POST", f"/v1/keys/{b.id}/revoke", {}),
+    ]
+    for who, method, path, more in refused:
+        answer = who.ask(method, path, **more)
+        assert 400 <= answer.status_code < 500, (path, answer.text)
+    assert everything(context.store.database) == before
+
+
+# Names
+
+
+def test_names_belong_to_the_key_that_first_used_them(a, b, guarded) -> None:
+    a.post("/v1/sessions", SESSION)
+    b.post("/v1/sessions", {**SESSION, "seed": 1, "task": "lift-1"}, status=403)
+    b.post("/v1/sessions", {**SESSION, "agent": "Mason"})
+    a.post("/v1/sessions", {**SESSION, "agent": "Mason", "seed": 1}, status=403)
+    operator(guarded).post("/v1/sessions", {**SESSION, "seed": 2})
+    a.post("/v1/sessions", {**SESSION, "seed": 3})  # an admin's use does not take it
+
+
+def test_of_two_keys_that_use_a_new_name_at_once_one_gets_it(a, b) -> None:
+    def upload(who: Tenant, load: int) -> int:
+        text = EXAMPLE.replace("final_mass: 200", f"final_mass: {load}")
+        headers = {"Content-Type": "application/yaml"}
+        return who.ask("POST", "/v1/tasks", content=text.encode(), headers=headers).status_code
+
+    with ThreadPoolExecutor(8) as pool:
+        tries = [(who, 200 + 10 * number) for number in range(4) for who in (a, b)]
+        found = list(pool.map(lambda each: (each[0].id, upload(*each)), tries))
+        seeds = [(who, number) for number in range(4) for who in (a, b)]
+        opened = list(
+            pool.map(
+                lambda each: (
+                    each[0].id,
+                    each[0]
+                    .ask("POST", "/v1/sessions", json={**SESSION, "seed": each[1]})
+                    .status_code,
+                ),
+                seeds,
+            )
+        )
+    for answers in (found, opened):
+        assert {status for _, status in answers} == {201, 403}
+        assert len({key for key, status in answers if status == 201}) == 1
+        assert sum(status == 201 for _, status in answers) == 4
