@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from buildarena_store import ArtifactMissingError, ArtifactStore
+from buildarena_store import ArtifactDamagedError, ArtifactMissingError, ArtifactStore
 
 
 def test_bytes_come_back_by_their_hash(tmp_path: Path) -> None:
@@ -19,7 +19,7 @@ def test_damage_is_noticed(tmp_path: Path) -> None:
     store = ArtifactStore(tmp_path / "a")
     info = store.put(b"machine", "application/json")
     (tmp_path / "a" / info.hash[:2] / info.hash).write_bytes(b"machinf")
-    with pytest.raises(ArtifactMissingError, match="damaged"):
+    with pytest.raises(ArtifactDamagedError, match="damaged"):
         store.get(info.hash)
 
 

@@ -9,7 +9,7 @@ import boto3
 import pytest
 from moto.server import ThreadedMotoServer
 
-from buildarena_store import ArtifactMissingError, ArtifactStore
+from buildarena_store import ArtifactDamagedError, ArtifactMissingError, ArtifactStore
 
 
 @pytest.fixture
@@ -48,7 +48,7 @@ def test_lost_and_damaged_bytes_are_noticed(bucket) -> None:
     kept = store.put(b"a bridge", "application/json")
     key = f"artifacts/{kept.hash[:2]}/{kept.hash}"
     bucket.put_object(Bucket="arena", Key=key, Body=b"a bridgf")
-    with pytest.raises(ArtifactMissingError, match="damaged"):
+    with pytest.raises(ArtifactDamagedError, match="damaged"):
         store.get(kept.hash)
     bucket.delete_object(Bucket="arena", Key=key)
     with pytest.raises(ArtifactMissingError, match="is not in the store"):

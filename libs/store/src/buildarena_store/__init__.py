@@ -10,7 +10,9 @@ from buildarena_store.artifacts import ArtifactInfo, ArtifactStore
 from buildarena_store.boards import BoardChange, BoardFeed, Boards, Round
 from buildarena_store.database import Database
 from buildarena_store.errors import (
+    ArtifactDamagedError,
     ArtifactMissingError,
+    ArtifactStoreError,
     NameTakenError,
     NotOwnedError,
     SchemaVersionError,
@@ -45,9 +47,11 @@ __all__ = [
     "STAGE_SECONDS",
     "ApiKey",
     "ApiKeys",
+    "ArtifactDamagedError",
     "ArtifactInfo",
     "ArtifactMissingError",
     "ArtifactStore",
+    "ArtifactStoreError",
     "BoardChange",
     "BoardFeed",
     "Boards",

@@ -3,15 +3,26 @@
 from __future__ import annotations
 
 import hashlib
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 import obstore
+from obstore.exceptions import BaseError
 from obstore.store import LocalStore, ObjectStore, from_url
 
-from buildarena_store.errors import ArtifactMissingError
+from buildarena_store.errors import (
+    ArtifactDamagedError,
+    ArtifactMissingError,
+    ArtifactStoreError,
+)
 
-HASH_LENGTH = 64
+HASH_LENGTH: Final = 64
+PROBE_BYTES: Final = 64 * 1024
+"""About what a session keeps: a store that is full to the last block fails already."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,6 +49,7 @@ class ArtifactStore:
 
     def __init__(self, location: str | Path) -> None:
         text = str(location)
+        self._location = text.partition("?")[0]
         self._store: ObjectStore
         if "://" in text:
             self._store = from_url(text)
@@ -45,24 +57,59 @@ class ArtifactStore:
             self._store = LocalStore(prefix=Path(text).absolute(), mkdir=True)
 
     def put(self, data: bytes, media_type: str) -> ArtifactInfo:
-        """Stores bytes; storing the same bytes again changes nothing."""
+        """Stores bytes; storing the same bytes again changes nothing, or mends them.
+
+        Raises:
+            ArtifactStoreError: They can't be stored now: a full disk, a bucket out of reach.
+        """
         digest = hashlib.sha256(data).hexdigest()
-        obstore.put(self._store, _path(digest), data)
+        with self._translated("written"):
+            obstore.put(self._store, _path(digest), data)
         return ArtifactInfo(hash=digest, media_type=media_type, size=len(data))
 
     def get(self, digest: str) -> bytes:
         """The bytes with this hash.
 
         Raises:
-            ArtifactMissingError: They are not there, or they were damaged.
+            ArtifactMissingError: They are not there.
+            ArtifactDamagedError: They are not what was stored.
+            ArtifactStoreError: The store can't be read now.
         """
-        try:
-            data = bytes(obstore.get(self._store, _path(digest)).bytes())
-        except FileNotFoundError as error:
-            raise ArtifactMissingError(f"artifact {digest} is not in the store") from error
+        with self._translated("read"):
+            try:
+                data = bytes(obstore.get(self._store, _path(digest)).bytes())
+            except FileNotFoundError as error:
+                raise ArtifactMissingError(f"artifact {digest} is not in the store") from error
         if hashlib.sha256(data).hexdigest() != digest:
-            raise ArtifactMissingError(f"artifact {digest} is damaged: its bytes changed")
+            raise ArtifactDamagedError(f"artifact {digest} is damaged: its bytes changed")
         return data
+
+    def probe(self) -> None:
+        """Writes and reads something, to see whether the store works.
+
+        Raises:
+            ArtifactStoreError: It does not; the message says why.
+        """
+        path, data = f"probe/{secrets.token_hex(8)}", secrets.token_bytes(PROBE_BYTES)
+        with self._translated("written"):
+            obstore.put(self._store, path, data)
+        try:
+            with self._translated("read"):
+                if bytes(obstore.get(self._store, path).bytes()) != data:
+                    raise ArtifactStoreError(f"{self._location} gives back other bytes than given")
+        finally:
+            with self._translated("written"):
+                obstore.delete(self._store, path)
+
+    @contextmanager
+    def _translated(self, done: str) -> Iterator[None]:
+        try:
+            yield
+        except (BaseError, OSError) as error:
+            reason = (str(error).strip().splitlines() or [type(error).__name__])[0][:300]
+            raise ArtifactStoreError(
+                f"artifacts can't be {done} in {self._location}: {reason}"
+            ) from error
 
 
 def _path(digest: str) -> str:

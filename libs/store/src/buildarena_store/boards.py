@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import Connection, Integer, Row, cast, func, select, text
+from sqlalchemy import Connection, Integer, Row, and_, cast, func, select, text
 
 from buildarena_benchmark.leaderboard import EndedJob
 from buildarena_store.database import Database
@@ -195,6 +195,8 @@ _COLUMNS = [
     jobs.c.actions,
     jobs.c.refused_actions,
     jobs.c.finished_at,
+    jobs.c.imported_from.is_not(None).label("imported"),
+    and_(jobs.c.imported_from.is_not(None), jobs.c.verified_at.is_(None)).label("unverified"),
     jobs.c.id.label("job_id"),
     jobs.c.model_hash.label("configuration"),
     jobs.c.model_config["decoding"].label("decoding"),
@@ -233,6 +235,8 @@ def _trials(connection: Connection, query: Any) -> Iterator[EndedJob]:
             actions=row.actions,
             refused_actions=row.refused_actions,
             finished_at=row.finished_at,
+            imported=row.imported,
+            unverified=row.unverified,
         )
 
 

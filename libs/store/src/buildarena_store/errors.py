@@ -63,7 +63,15 @@ class StaleLeaseError(StoreError):
 
 
 class ArtifactMissingError(StoreError):
-    """The artifact store does not hold, or no longer holds intact, the bytes of a hash."""
+    """The artifact store does not hold the bytes of a hash."""
+
+
+class ArtifactDamagedError(StoreError):
+    """What the artifact store holds under a hash are other bytes: restore it from a backup."""
+
+
+class ArtifactStoreError(StoreError):
+    """The artifact store can't be written or read now: full, out of reach, or not permitted."""
 
 
 class SchemaVersionError(StoreError):

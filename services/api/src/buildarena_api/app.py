@@ -73,6 +73,7 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
     app.add_middleware(BodyLimitMiddleware, unlimited={archives.IMPORT_PATH})
     app.add_middleware(RequestLog, metrics=app.state.metrics)
     app.state.context = context
+    app.state.artifact_probe = health.ArtifactProbe(context.artifacts)
     app.state.hub = EventHub(context)
     app.state.registry = registry
     app.state.boards = BoardCache(context.store.results.boards, context.tasks)

@@ -83,6 +83,11 @@ class JobView(_Answer):
     refused_actions: int
     refusals: dict[str, int] | None = Field(description="Refused actions by class")
     faults: int = Field(description="Infrastructure faults at the current stage")
+    imported_from: str | None = Field(description="The archive it was imported from, if it was")
+    verified_at: datetime | None = Field(
+        description="When an imported job's figures were found again here; until then they are in "
+        "no ranking"
+    )
     created_at: datetime
     started_at: datetime | None
     finished_at: datetime | None

@@ -1,7 +1,8 @@
 """Verification: a finished job is replayed without a model, re-simulated, and compared.
 
 Everything that a score rests on is made again: the session from its journal, the machine it
-built, the trajectory of each rollout, and the score; figures are compared exactly.
+built, the trajectory of each rollout, and the score; figures are compared exactly. The kept bytes
+of every artifact are read and hashed.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from hashlib import sha256
 from typing import Any
 
 import structlog
+from sqlalchemy.exc import OperationalError
 
 from buildarena_benchmark import failed_score, score
 from buildarena_geometry import KeyPress, Machine
@@ -31,7 +33,10 @@ from buildarena_simulation import (
     write_trajectory,
 )
 from buildarena_store import (
+    ArtifactDamagedError,
+    ArtifactMissingError,
     ArtifactStore,
+    ArtifactStoreError,
     ExternalCall,
     Job,
     JobState,
@@ -100,8 +105,32 @@ class Verifier:
             ``{"ok", "checks": [{"name", "ok", "kept", "found"}]}``.
         """
         job = self._store.jobs.get(job_id)
-        checks = self._checks(job)
+        try:
+            made_again = self._checks(job)
+        except (ArtifactMissingError, ArtifactDamagedError) as error:
+            made_again = [_broken_off(str(error))]
+        checks = [*self._kept_checks(job), *made_again]
         return {"ok": all(check.ok for check in checks), "checks": [asdict(c) for c in checks]}
+
+    def _kept_checks(self, job: Job) -> list[Check]:
+        """Whether the bytes of every artifact are those that were kept."""
+        named = {file.name: file.hash for file in self._store.jobs.files(job.id)}
+        for record in self._store.rollouts.read(job.id):
+            named[f"machine of rollout {record.number}"] = record.machine_hash
+            if record.trajectory_hash is not None:
+                named[f"trajectory-{record.number}"] = record.trajectory_hash
+        found: dict[str, str] = {}
+        for digest in set(named.values()):
+            try:
+                found[digest] = _hash(self._artifacts.get(digest))
+            except ArtifactMissingError:
+                found[digest] = "missing"
+            except ArtifactDamagedError:
+                found[digest] = "damaged"
+        return [
+            _compare(f"artifact {name}", digest, found[digest])
+            for name, digest in sorted(named.items())
+        ]
 
     def _checks(self, job: Job) -> list[Check]:
         if job.state != JobState.DONE or job.success is None:
@@ -232,6 +261,10 @@ class VerificationRunner:
             return
         try:
             report = self._verifier.verify(claimed.job_id)
+        except (ArtifactStoreError, OperationalError) as error:
+            # Not the job's fault: another worker does it when this one's claim is too old.
+            log.warning("verification_put_off", job=claimed.job_id, error=str(error))
+            return
         except Exception as error:
             log.exception("verification_failed", job=claimed.job_id)
             failed = Check(name="verification", ok=False, kept=None, found=f"it broke off: {error}")

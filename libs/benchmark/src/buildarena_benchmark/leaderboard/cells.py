@@ -42,6 +42,8 @@ class Cell:
         errored: Jobs that infrastructure faults ended.
         cancelled: Jobs that somebody cancelled.
         flagged: Successes that a flag keeps out of the averages.
+        imported: Jobs that came from another service's archive, unverified ones included.
+        unverified: Those of them that were not found again here: they count in nothing else.
         simulated: Counted trials whose machine was finished and tried.
         success_rate: Successes of counted trials, with its Wilson interval.
         success_rate_of_ended: Successes of all ended jobs.
@@ -67,6 +69,8 @@ class Cell:
     errored: int
     cancelled: int
     flagged: int
+    imported: int
+    unverified: int
     simulated: int
     successes: int
     success_rate: float | None
@@ -110,8 +114,10 @@ def summarise(trials: Sequence[EndedJob], *, include_flagged: bool = False) -> C
 
     The order of the trials does not matter.
     """
+    first, imported = trials[0], sum(trial.imported for trial in trials)
+    given, trials = len(trials), [trial for trial in trials if not trial.unverified]
     counted = counted_trials(trials, include_flagged=include_flagged)
-    first, number = trials[0], len(counted)
+    number = len(counted)
     successes = sum(trial.success for trial in counted)
     outcomes = Counter(trial.outcome for trial in trials)
     low_high = wilson_interval(successes, number) if counted else (None, None)
@@ -135,12 +141,14 @@ def summarise(trials: Sequence[EndedJob], *, include_flagged: bool = False) -> C
         errored=outcomes[Outcome.ERRORED],
         cancelled=outcomes[Outcome.CANCELLED],
         flagged=sum(trial.scored for trial in trials) - number,
+        imported=imported,
+        unverified=given - len(trials),
         simulated=sum(trial.outcome in SIMULATED for trial in counted),
         successes=successes,
         success_rate=successes / number if number else None,
         success_low=low_high[0],
         success_high=low_high[1],
-        success_rate_of_ended=successes / len(trials),
+        success_rate_of_ended=successes / len(trials) if trials else None,
         indicator_mean=mean.of(lambda t: t.indicator),
         indicator_low=indicator_ends[0] if indicator_ends else None,
         indicator_high=indicator_ends[1] if indicator_ends else None,

@@ -40,6 +40,8 @@ class EndedJob:
         actions: Actions, refused ones included.
         refused_actions: Refused actions.
         finished_at: When it ended.
+        imported: Whether it came from another service's archive.
+        unverified: Whether its figures were not found again here since: it counts nowhere.
     """
 
     job_id: str
@@ -64,8 +66,10 @@ class EndedJob:
     actions: int = 0
     refused_actions: int = 0
     finished_at: datetime | None = None
+    imported: bool = False
+    unverified: bool = False
 
     @property
     def scored(self) -> bool:
         """Whether the trial counts in averages."""
-        return self.outcome in SCORED
+        return self.outcome in SCORED and not self.unverified

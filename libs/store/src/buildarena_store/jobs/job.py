@@ -109,6 +109,8 @@ class Job:
     actions: int
     refused_actions: int
     refusals: Mapping[str, int] | None
+    imported_from: str | None
+    verified_at: datetime | None
     created_at: datetime
     started_at: datetime | None
     finished_at: datetime | None

@@ -15,7 +15,7 @@ from buildarena_store.errors import UnknownIdError
 from buildarena_store.ids import new_id
 from buildarena_store.rows import columns_of, value_of
 from buildarena_store.states import VerificationState
-from buildarena_store.tables import verifications
+from buildarena_store.tables import jobs, verifications
 
 ABANDONED_AFTER = timedelta(minutes=10)
 """After so long without an end, a verification is done by another worker: it writes no score."""
@@ -75,13 +75,24 @@ class Verifications:
         return None if row is None else value_of(Verification, row)
 
     def finish(self, verification_id: str, report: Mapping[str, Any]) -> None:
-        """Writes what was found."""
+        """Writes what was found; an imported job whose every figure was found again counts."""
         with self._database.transaction() as connection:
-            connection.execute(
+            checked = connection.execute(
                 update(verifications)
                 .where(verifications.c.id == verification_id)
                 .values(state=VerificationState.DONE, report=dict(report), finished_at=events.now)
-            )
+                .returning(verifications.c.job_id)
+            ).scalar()
+            if report["ok"]:
+                connection.execute(
+                    update(jobs)
+                    .where(
+                        jobs.c.id == checked,
+                        jobs.c.imported_from.is_not(None),
+                        jobs.c.verified_at.is_(None),
+                    )
+                    .values(verified_at=events.now)
+                )
 
     def get(self, verification_id: str) -> Verification:
         """The verification with this id.

@@ -18,7 +18,9 @@ from starlette.exceptions import HTTPException
 from buildarena_benchmark import ValidationIssue
 from buildarena_pipeline.errors import SubmissionError
 from buildarena_store import (
+    ArtifactDamagedError,
     ArtifactMissingError,
+    ArtifactStoreError,
     NameTakenError,
     NotOwnedError,
     StoreError,
@@ -150,6 +152,16 @@ def _add_store_handlers(app: FastAPI) -> None:
     @app.exception_handler(ArtifactMissingError)
     async def on_missing(_: Request, error: ArtifactMissingError) -> JSONResponse:
         return _answer(404, str(error))
+
+    @app.exception_handler(ArtifactDamagedError)
+    async def on_damaged(_: Request, error: ArtifactDamagedError) -> JSONResponse:
+        log.error("artifact_damaged", error=str(error))
+        return _answer(500, f"{error}; it must be restored from a backup")
+
+    @app.exception_handler(ArtifactStoreError)
+    async def on_store(_: Request, error: ArtifactStoreError) -> JSONResponse:
+        log.error("artifact_store_fails", error=str(error))
+        return _answer(503, f"{error}; nothing is lost", headers={"Retry-After": "5"})
 
     @app.exception_handler(DataError)
     async def on_unstorable(_: Request, error: DataError) -> JSONResponse:

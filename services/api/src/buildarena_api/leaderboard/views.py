@@ -36,6 +36,10 @@ class Row(_View):
     errored: int = Field(description="Jobs that infrastructure faults ended: in no average")
     cancelled: int
     flagged: int = Field(description="Successes that a flag keeps out of the averages")
+    imported: int = Field(description="Jobs that came from another service's archive")
+    unverified: int = Field(
+        description="Imported jobs whose figures were not found again here: they count nowhere"
+    )
     simulated: int = Field(description="Counted jobs whose machine was finished and simulated")
     successes: int
     success_rate: float | None = Field(description="null when nothing was scored")

@@ -14,6 +14,7 @@ from starlette.background import BackgroundTask
 from buildarena_api.dependencies import ContextDep
 from buildarena_api.http.access import CallerDep, admin_only
 from buildarena_api.http.problems import ProblemError, problem_responses
+from buildarena_pipeline.catalog.specs import SweepSpec
 from buildarena_store.archives import ArchiveError, read_archive, write_archive
 
 router = APIRouter(prefix="/v1", tags=["archives"])
@@ -32,6 +33,10 @@ class ImportedView(BaseModel):
     sweep_id: str
     jobs: int = Field(description="Jobs it consists of")
     added: int = Field(description="Jobs that were not there before")
+    unverified: int = Field(
+        description="Scores among them: they count when their verification, which was requested, "
+        "has found them again"
+    )
 
 
 @router.get(
@@ -70,12 +75,21 @@ def export_sweep(sweep_id: str, context: ContextDep) -> FileResponse:
 async def import_sweep(
     request: Request, response: Response, context: ContextDep, caller: CallerDep
 ) -> ImportedView:
-    """Imports an exported sweep; jobs that already exist stay as they are. For admins."""
+    """Imports an exported sweep; jobs that already exist stay as they are. For admins.
+
+    Nothing in it is believed: its scores are marked as imported, and are in no ranking until they
+    were found again by replay and simulation.
+    """
     source = _scratch()
     try:
         await _receive(request, source)
         done = await run_in_threadpool(
-            read_archive, context.store.database, context.artifacts, source, owner=caller.key_id
+            read_archive,
+            context.store.database,
+            context.artifacts,
+            source,
+            check_spec=SweepSpec.model_validate,
+            owner=caller.key_id,
         )
     except ArchiveError as error:
         raise ProblemError(422, str(error)) from error

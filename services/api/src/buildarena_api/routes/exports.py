@@ -73,6 +73,8 @@ class Result(BaseModel):
     cost_usd: float
     actions: int
     refused_actions: int
+    imported: bool
+    unverified: bool = Field(description="Imported and not found again here: it counts nowhere")
     rounds: list[RoundView] = Field(description="In order; more than one in a closed loop")
 
 

@@ -3,22 +3,26 @@
 from __future__ import annotations
 
 import shutil
+import threading
+import time
 from pathlib import Path
 from typing import Literal
 
-from fastapi import APIRouter, Response
+from fastapi import APIRouter, Request, Response
 from pydantic import BaseModel, Field
 from sqlalchemy.exc import SQLAlchemyError
 
 from buildarena_api.dependencies import ContextDep
 from buildarena_pipeline.catalog.tracks import SIMULATORS
 from buildarena_pipeline.runtime.context import Context
+from buildarena_store import ArtifactStore, ArtifactStoreError
 from buildarena_store.states import CONSTRUCT_QUEUE, simulate_queue
 
 router = APIRouter(prefix="/v1", tags=["health"])
 
 LOW_DISK_BYTES = 1_000_000_000
 CLOCK_TOLERANCE_S = 5.0
+PROBE_EVERY_S = 5.0
 
 
 class Check(BaseModel):
@@ -41,16 +45,59 @@ class Health(BaseModel):
     "/health",
     responses={503: {"model": Health, "description": "down"}},
 )
-def health(context: ContextDep, response: Response) -> Health:
-    """Checks database, broker, workers and disk. Answers 503 when jobs can't be accepted."""
+def health(context: ContextDep, request: Request, response: Response) -> Health:
+    """Checks database, broker, artifacts, workers and disk.
+
+    Answers 503 when jobs can't be accepted.
+    """
     database = _database(context)
-    checks = [database, _broker(context), *_workers(context, database), _disk(context)]
+    artifacts: ArtifactProbe = request.app.state.artifact_probe
+    checks = [
+        database,
+        _broker(context),
+        artifacts.check(),
+        *_workers(context, database),
+        _disk(context),
+    ]
     if database.ok:
         checks.append(_clocks(context))
     if not database.ok:
         response.status_code = 503
         return Health(status="down", checks=checks)
     return Health(status="ok" if all(c.ok for c in checks) else "degraded", checks=checks)
+
+
+class ArtifactProbe:
+    """Tries the artifact store, at most every few seconds, however often health is asked for.
+
+    Args:
+        store: What artifacts are kept in.
+    """
+
+    def __init__(self, store: ArtifactStore) -> None:
+        self._store = store
+        self._lock = threading.Lock()
+        self._check: Check | None = None
+        self._tried_at = 0.0
+
+    def check(self) -> Check:
+        """Whether artifacts can be written and read, as last tried."""
+        with self._lock:
+            if self._check is None or time.monotonic() - self._tried_at > PROBE_EVERY_S:
+                self._check, self._tried_at = self._try(), time.monotonic()
+            return self._check
+
+    def _try(self) -> Check:
+        try:
+            self._store.probe()
+        except ArtifactStoreError as error:
+            return Check(
+                name="artifacts",
+                ok=False,
+                detail=f"{error}; jobs wait and lose nothing",
+                advice="free space, or correct BUILDARENA_ARTIFACTS and its permissions",
+            )
+        return Check(name="artifacts", ok=True, detail="can be written and read")
 
 
 def _database(context: Context) -> Check:

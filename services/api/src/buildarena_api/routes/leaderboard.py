@@ -198,7 +198,10 @@ def manifest(
 
 @router.post("/leaderboard/verify", status_code=202, responses=problem_responses(422, 503))
 def verify(body: VerifyRequest, context: ContextDep, boards: BoardsDep) -> VerifyAccepted:
-    """Replays and re-simulates all of a model's results on a board, or a sample."""
+    """Replays and re-simulates all of a model's results on a board, or a sample.
+
+    Imported results count when they were verified.
+    """
     tracks = boards.tracks()
     if body.track is not None and body.track not in tracks:
         raise unknown("track", body.track, tracks)
