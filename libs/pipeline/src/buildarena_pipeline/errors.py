@@ -20,13 +20,17 @@ class TransientError(PipelineError):
 
     Attributes:
         reason: Its class, for example ``provider_outage``.
-        delay_s: How long to wait before the next attempt.
+        delay_s: How long to wait before the next attempt; doubles with each fault in a row.
+        endless: Whether the job waits however often it is met, as it is not the job's.
     """
 
-    def __init__(self, message: str, *, reason: str, delay_s: float = 0.0) -> None:
+    def __init__(
+        self, message: str, *, reason: str, delay_s: float = 0.0, endless: bool = False
+    ) -> None:
         super().__init__(message)
         self.reason = reason
         self.delay_s = delay_s
+        self.endless = endless
 
 
 class PermanentError(PipelineError):

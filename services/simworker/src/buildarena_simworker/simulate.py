@@ -27,7 +27,6 @@ from buildarena_simulation import (
 )
 from buildarena_store import (
     ArtifactInfo,
-    ArtifactMissingError,
     ArtifactStore,
     RolloutRecord,
     Stage,
@@ -132,10 +131,7 @@ class SimulateHandler:
         )
 
     def _machine(self, digest: str) -> Machine:
-        try:
-            document: dict[str, Any] = json.loads(self._artifacts.get(digest))
-        except ArtifactMissingError as error:
-            raise TransientError(str(error), reason="artifact_missing", delay_s=5.0) from error
+        document: dict[str, Any] = json.loads(self._artifacts.get(digest))
         return Machine.from_document(document)
 
 

@@ -11,9 +11,19 @@ from sqlalchemy.exc import OperationalError
 from buildarena_pipeline.errors import PermanentError, TransientError
 from buildarena_pipeline.runtime.active_lease import ActiveLease, LeaseKeeper
 from buildarena_pipeline.runtime.tracing import span
-from buildarena_store import Lease, Leases, StaleLeaseError
+from buildarena_store import (
+    ArtifactDamagedError,
+    ArtifactMissingError,
+    ArtifactStoreError,
+    Lease,
+    Leases,
+    StaleLeaseError,
+)
 
 log = structlog.get_logger(__name__)
+
+STORE_DELAY_S = 2.0
+"""How long a job waits after the artifact store failed for the first time."""
 
 
 class StageHandler(Protocol):
@@ -74,6 +84,8 @@ class JobRunner:
                 self._retry_later(lease, error)
             except PermanentError as error:
                 self._give_up(lease, error)
+            except (ArtifactStoreError, ArtifactMissingError, ArtifactDamagedError) as error:
+                self._retry_later(lease, _store_fault(error))
             except OperationalError as error:
                 bound.warning("database_fault", error=str(error).splitlines()[0])
             except Exception as error:  # noqa: BLE001 - a bug must not cost the job; it is logged whole
@@ -86,7 +98,13 @@ class JobRunner:
     def _retry_later(self, lease: Lease, error: TransientError) -> None:
         log.warning("transient_fault", reason=error.reason, detail=str(error))
         try:
-            self._leases.fault(lease, str(error), delay_s=error.delay_s, reason=error.reason)
+            self._leases.fault(
+                lease,
+                str(error),
+                delay_s=error.delay_s,
+                reason=error.reason,
+                endless=error.endless,
+            )
         except (StaleLeaseError, OperationalError) as failure:
             log.warning("fault_not_recorded", error=str(failure))
 
@@ -96,3 +114,14 @@ class JobRunner:
             self._leases.give_up(lease, str(error), reason=error.reason)
         except (StaleLeaseError, OperationalError) as failure:
             log.warning("fault_not_recorded", error=str(failure))
+
+
+def _store_fault(error: Exception) -> TransientError:
+    """A store that fails is waited for; bytes that are gone may come back from a backup."""
+    fails = isinstance(error, ArtifactStoreError)
+    return TransientError(
+        str(error),
+        reason="artifact_store" if fails else "artifact_lost",
+        delay_s=STORE_DELAY_S,
+        endless=fails,
+    )

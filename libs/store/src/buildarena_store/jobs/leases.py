@@ -34,6 +34,8 @@ from buildarena_store.rows import value_of
 from buildarena_store.states import AttemptResult, JobState, Outcome, Stage
 from buildarena_store.tables import budgets, jobs
 
+LONGEST_DELAY_S = 300.0
+"""A job waits no longer than this between two attempts."""
 NOTIFY_AGAIN_AFTER = timedelta(seconds=10)
 """Workers are notified again of a queued job whose message may have been lost."""
 
@@ -213,14 +215,24 @@ class Leases:
                 notified_at=None,
             )
 
-    def fault(self, lease: Lease, detail: str, *, delay_s: float = 0.0, reason: str) -> bool:
+    def fault(
+        self,
+        lease: Lease,
+        detail: str,
+        *,
+        delay_s: float = 0.0,
+        reason: str,
+        endless: bool = False,
+    ) -> bool:
         """Records an infrastructure fault: the job waits for another attempt, or is given up.
 
         Args:
             lease: The lease that ends.
             detail: What happened, for people.
-            delay_s: How long the job waits before it may be claimed again.
+            delay_s: How long the job waits before it may be claimed again, after the first fault;
+                twice as long after each further one, up to LONGEST_DELAY_S.
             reason: The class of the fault, for the dead-letter view.
+            endless: Whether the job is not given up for it.
 
         Returns:
             True when the job will be tried again.
@@ -228,7 +240,8 @@ class Leases:
         with self._database.transaction() as connection:
             met = select(jobs.c.faults).where(jobs.c.id == lease.job.id)
             faults = int(connection.execute(met).scalar_one()) + 1
-            again = faults < self._max_faults
+            again = endless or faults < self._max_faults
+            wait_s = min(delay_s * 2 ** min(faults - 1, 20), LONGEST_DELAY_S)
             if again:
                 self.advance(
                     lease,
@@ -238,7 +251,7 @@ class Leases:
                     note=detail,
                     faults=faults,
                     notified_at=None,
-                    available_at=events.now + timedelta(seconds=delay_s),
+                    available_at=events.now + timedelta(seconds=wait_s),
                     detail=detail,
                 )
             else:

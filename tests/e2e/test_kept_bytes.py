@@ -1,0 +1,128 @@
+"""Kept means kept: a failing artifact store costs time only, and every lost byte is noticed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from starlette.testclient import TestClient
+from working import work
+
+from buildarena_api.app import create_app
+from buildarena_api.routes import health
+from buildarena_pipeline.catalog.models import load_registry
+from buildarena_pipeline.catalog.specs import JobSpec
+from buildarena_pipeline.runtime.context import Context
+from buildarena_worker.wiring import verifier
+
+SPEC = JobSpec(task="lift-1", model="builtin/expert", simulator="mujoco")
+
+
+@pytest.fixture
+def folder(context: Context) -> Path:
+    return Path(context.settings.artifacts_location)
+
+
+def break_store(folder: Path) -> None:
+    """Makes the store fail, for root too: what was its folder is a file."""
+    folder.mkdir(parents=True, exist_ok=True)
+    folder.rename(folder.with_name("aside"))
+    folder.write_text("in the way")
+
+
+def mend_store(folder: Path) -> None:
+    folder.unlink()
+    folder.with_name("aside").rename(folder)
+
+
+def make_due(context: Context) -> None:
+    with context.store.database.transaction() as connection:
+        connection.exec_driver_sql("UPDATE jobs SET available_at = now()")
+
+
+def test_a_failing_store_delays_jobs_and_loses_none(context, submissions, folder) -> None:
+    job, _ = submissions.submit_job(SPEC)
+    break_store(folder)
+    waits = []
+    for _ in range(context.settings.max_faults + 2):
+        work(context, steps=1)
+        with context.store.database.transaction() as connection:
+            left = "SELECT extract(epoch FROM available_at - now()) FROM jobs"
+            waits.append(float(connection.exec_driver_sql(left).scalar_one()))
+        make_due(context)
+    waiting = context.store.jobs.get(job.id)
+    assert waiting.state == "queued"
+    assert "artifacts can't be written" in waiting.detail
+    # It asks less and less often, and its model is never asked again.
+    assert waits[0] < 3 < waits[3] < waits[6]
+    assert waits[-1] == pytest.approx(300, abs=5)
+    asked = waiting.requests
+    mend_store(folder)
+    work(context)
+    done = context.store.jobs.get(job.id)
+    assert done.outcome == "success"
+    assert done.requests == asked
+
+
+def test_health_says_that_the_store_fails_and_that_it_works_again(
+    context, folder, monkeypatch
+) -> None:
+    monkeypatch.setattr(health, "PROBE_EVERY_S", 0.0)
+    with TestClient(create_app(context, load_registry()), base_url="http://127.0.0.1") as api:
+
+        def check() -> dict[str, object]:
+            (found,) = [
+                c for c in api.get("/v1/health").json()["checks"] if c["name"] == "artifacts"
+            ]
+            return found
+
+        assert check()["ok"]
+        break_store(folder)
+        assert not check()["ok"]
+        assert "artifacts can't be written" in check()["detail"]
+        mend_store(folder)
+        assert check()["ok"]
+    assert not list((folder / "probe").iterdir())
+
+
+@pytest.mark.parametrize("damage", ["damaged", "missing"])
+@pytest.mark.parametrize("name", ["machine", "transcript", "trajectory-0"])
+def test_every_lost_byte_is_noticed(context, submissions, folder, name, damage) -> None:
+    job, _ = submissions.submit_job(SPEC)
+    work(context)
+    digest = context.store.jobs.artifacts(job.id)[name]
+    assert verifier(context).verify(job.id)["ok"]
+    file = folder / digest[:2] / digest
+    if damage == "missing":
+        file.unlink()
+    else:
+        data = bytearray(file.read_bytes())
+        data[len(data) // 2] ^= 1
+        file.write_bytes(data)
+    report = verifier(context).verify(job.id)
+    wrong = {check["name"]: check["found"] for check in report["checks"] if not check["ok"]}
+    assert not report["ok"]
+    assert wrong[f"artifact {name}"] == damage
+    with TestClient(
+        create_app(context, load_registry()),
+        base_url="http://127.0.0.1",
+        raise_server_exceptions=False,
+    ) as api:
+        answer = api.get(f"/v1/jobs/{job.id}/artifacts/{name}")
+    assert answer.status_code == {"damaged": 500, "missing": 404}[damage]
+    assert {"damaged": "is damaged", "missing": "not in the store"}[damage] in answer.json()[
+        "detail"
+    ]
+
+
+def test_an_agent_can_submit_again_when_the_store_works(context, folder) -> None:
+    with TestClient(create_app(context, load_registry()), base_url="http://127.0.0.1") as api:
+        body = {"task": "support-1", "agent": "mason"}
+        session = api.post("/v1/sessions", json=body).json()["id"]
+        api.post(f"/v1/sessions/{session}/calls", json={"tool": "start"})
+        break_store(folder)
+        refused = api.post(f"/v1/sessions/{session}/submit")
+        assert refused.status_code == 503
+        assert refused.headers["Retry-After"]
+        mend_store(folder)
+        assert api.post(f"/v1/sessions/{session}/submit").status_code == 202
