@@ -1,0 +1,412 @@
+"""What an adversary tries. Each scenario says what was tried, what came of it, and what is wrong."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+import zipfile
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import floods
+import httpx
+import psutil
+from api_process import Service
+from arena import HOSTILE, Arena, Tenant
+from running import wait_until
+from tenants import everything
+
+from buildarena_api.routes.tasks import EXAMPLE
+from buildarena_cli.local import free_port
+
+YAML = {"Content-Type": "application/yaml"}
+SWEEP = {"tasks": ["support-1"], "models": ["builtin/idle"], "seeds": [0, 1]}
+SESSION = {"task": "support-1", "agent": "mason"}
+ROOM_S = 2.0
+"""Within so long another key's session starts beside forty that hang."""
+END_S = 3.0
+"""Within so long a cancelled session's request ends."""
+
+
+@dataclass
+class Tried:
+    """What came of a scenario.
+
+    Attributes:
+        tried: What was tried, in words.
+        refused: What came of it, in words.
+        wrong: What should not be.
+    """
+
+    tried: str
+    refused: str = ""
+    wrong: list[str] = field(default_factory=list)
+
+    def require(self, condition: object, what: str) -> None:
+        """Notes something that is wrong."""
+        if not condition:
+            self.wrong.append(what)
+
+
+def other_tenants(arena: Arena) -> Tried:
+    """Another key's sweeps, jobs, sessions, names, keys and budgets."""
+    owner, thief = arena.innocent, arena.attacker
+    sweep = owner.post("/v1/sweeps", {**SWEEP, "models": [HOSTILE]}).json()["id"]
+    owner.post(f"/v1/sweeps/{sweep}/pause")
+    session = owner.post("/v1/sessions", SESSION).json()["id"]
+    owner.client.post("/v1/tasks", content=EXAMPLE, headers=YAML)
+    job = arena.operator.get(f"/v1/jobs?sweep={sweep}")["jobs"][0]["id"]
+    tries: list[tuple[str, str, dict[str, Any]]] = [
+        *(("POST", f"/v1/sweeps/{sweep}/{verb}", {}) for verb in ("pause", "resume", "cancel", "retry")),
+        *(("POST", f"/v1/jobs/{job}/{verb}", {}) for verb in ("cancel", "retry")),
+        ("POST", f"/v1/sessions/{session}/calls", {"json": {"tool": "start"}}),
+        ("POST", f"/v1/sessions/{session}/submit", {}),
+        ("POST", "/v1/sessions", {"json": {**SESSION, "seed": 1}}),
+        ("POST", "/v1/sessions", {"json": SESSION}),
+        ("POST", "/v1/tasks", {"content": EXAMPLE.replace("200", "250"), "headers": YAML}),
+        ("POST", "/v1/keys", {"json": {"name": "x", "scopes": ["admin"]}}),
+        ("POST", f"/v1/keys/{owner.id}/revoke", {}),
+        ("PUT", f"/v1/keys/{owner.id}/budget", {"json": {"max_requests": 1}}),
+        ("POST", "/v1/archives", {"content": b"PK"}),
+    ]
+    found = Tried(f"{len(tries)} commands over another key's things")
+    time.sleep(1.5)  # until nothing of the service's own is under way
+    before = everything(arena.database)
+    answers = Counter(thief.client.request(m, path, **more).status_code for m, path, more in tries)
+    found.refused = f"answers {dict(sorted(answers.items()))}"
+    found.require(set(answers) <= {403, 409}, "a command over another key's things was accepted")
+    found.require(everything(arena.database) == before, "a refused command changed something")
+    # Shared jobs: the thief's commands over a sweep of its own, of the same jobs.
+    shared = thief.post("/v1/sweeps", {**SWEEP, "models": [HOSTILE]}).json()["id"]
+    owner.post(f"/v1/sweeps/{sweep}/resume")
+    for verb in ("pause", "resume", "retry", "cancel"):
+        thief.post(f"/v1/sweeps/{shared}/{verb}")
+    jobs = arena.operator.get(f"/v1/jobs?sweep={sweep}")["jobs"]
+    found.require(all(job["outcome"] != "cancelled" for job in jobs), "a shared job was cancelled")
+    found.require({job["owner"] for job in jobs} == {owner.id}, "a shared job changed hands")
+    owner.post(f"/v1/sweeps/{sweep}/cancel")
+    return found
+
+
+def hanging_provider(arena: Arena) -> Tried:
+    """Forty sessions hang; another key's session must start, and cancelling must free all."""
+    found = Tried("40 sessions whose provider hangs or drips, then their cancel")
+    arena.provider.fault = lambda number: ("hang", "drip")[number % 2]
+    thief = arena.attacker
+    wish = {"tasks": ["support-1"], "models": [HOSTILE], "samples": 60}
+    sweep = thief.post("/v1/sweeps", wish).json()["id"]
+
+    def running() -> int:
+        return len(arena.operator.get(f"/v1/jobs?sweep={sweep}&state=running&limit=100")["jobs"])
+
+    wait_until(lambda: running() >= 40, 30, "forty sessions hang")
+    started = time.monotonic()
+    job = arena.innocent.post("/v1/jobs", {"task": "support-1", "model": "builtin/idle", "seed": 77})
+    id_ = job.json()["id"]
+    wait_until(lambda: arena.innocent.get(f"/v1/jobs/{id_}")["state"] == "done", 30, "a session")
+    room = time.monotonic() - started
+    found.require(room <= ROOM_S, f"another key's session took {room:.1f} s")
+    started = time.monotonic()
+    thief.post(f"/v1/sweeps/{sweep}/cancel")
+    wait_until(lambda: _open_requests(arena) == 0, 60, "the provider's requests end")
+    took = time.monotonic() - started
+    found.require(took <= END_S, f"open requests ended after {took:.1f} s")
+    arena.provider.fault = lambda _: None
+    found.refused = f"room for another key in {room:.1f} s, requests ended in {took:.1f} s"
+    return found
+
+
+def _open_requests(arena: Arena) -> int:
+    """Connections between the construct worker and the provider."""
+    port = int(arena.provider.url.rsplit(":", 1)[1])
+    return sum(
+        connection.raddr.port == port and connection.status == psutil.CONN_ESTABLISHED
+        for connection in arena.process("construct worker").net_connections("tcp")
+        if connection.raddr
+    )
+
+
+def lying_provider(arena: Arena) -> Tried:
+    """Garbage, redirects, ten megabytes, absurd depth, and lies about usage."""
+    text = {"choices": [{"message": {"content": "x"}, "finish_reason": "stop"}], "model": "m"}
+    lie = {**text, "id": "1", "usage": {"prompt_tokens": -5, "completion_tokens": 10**30}}
+    garbage: dict[str, str | bytes] = {
+        "not JSON": b"<html>",
+        "another shape": b'{"usage": {"prompt_tokens": 7, "completion_tokens": 1}}',
+        "10 MB": b'{"choices": "' + b"x" * 10_000_000 + b'"}',
+        "nested": b"[" * 200_000,
+        "lies about usage": json.dumps(lie).encode(),
+    }
+    found = Tried(f"{', '.join(garbage)}, redirects")
+    seen = []
+    for number, (name, fault) in enumerate(garbage.items()):
+        arena.provider.fault = lambda _, fault=fault: fault
+        body = {
+            "task": "support-1",
+            "model": HOSTILE,
+            "seed": 1000 + number,
+            "limits": {"max_requests": 3},
+        }
+        id_ = arena.attacker.post("/v1/jobs", body).json()["id"]
+        wait_until(lambda: arena.attacker.get(f"/v1/jobs/{id_}")["state"] == "done", 90, name)  # noqa: B023
+        job = arena.attacker.get(f"/v1/jobs/{id_}")
+        used = job["usage"]
+        seen.append(f"{name}: {job['outcome']}, {used['requests']} requests")
+        found.require(used["requests"] <= 3, f"{name}: {used['requests']} requests of 3")
+        found.require(used["requests"] >= 1, f"{name}: nothing was counted")
+        found.require(used["input_tokens"] >= 0, f"{name}: negative tokens")
+        if name == "another shape":
+            found.require(used["input_tokens"] == 7 * used["requests"], f"{name}: {used}")
+    arena.provider.elsewhere = f"http://127.0.0.1:{free_port()}/"
+    arena.provider.fault = lambda _: "307"
+    id_ = arena.attacker.post(
+        "/v1/jobs", {"task": "support-1", "model": HOSTILE, "seed": 2000}
+    ).json()["id"]
+    wait_until(lambda: arena.attacker.get(f"/v1/jobs/{id_}")["state"] == "done", 60, "redirect")
+    job = arena.attacker.get(f"/v1/jobs/{id_}")
+    found.require(job["reason"] == "request_refused", f"redirect: {job['reason']} {job['detail']}")
+    arena.provider.fault = lambda _: None
+    found.refused = "; ".join([*seen, f"redirect: {job['outcome']}"])
+    return found
+
+
+def flood(kind: str) -> Callable[[Arena], Tried]:
+    """A flood of one kind by one key."""
+
+    def scenario(arena: Arena) -> Tried:
+        count = int(arena.sizes[kind])
+        sweep = _done_sweep(arena, int(arena.sizes["jobs"]))
+        service = Service(
+            url=arena.stack.url,
+            pid=arena.process("api").pid,
+            database_url=arena.stack.environment["BUILDARENA_DATABASE_URL"],
+            broker_pid=arena.process("valkey").pid,
+        )
+        both = floods.Tenants(
+            service=service,
+            attacker=arena.attacker.secret,
+            innocent=arena.innocent.secret,
+            sweep=sweep,
+        )
+        measured = floods.flood(both, kind, count, for_s=arena.sizes["flood_s"])
+        found = Tried(f"{count} {kind} at once over a sweep of {int(arena.sizes['jobs'])} jobs")
+        found.refused = f"answers {measured.answers}"
+        found.require(measured.failed == 0, f"{measured.failed} of another key's requests failed")
+        found.require(not measured.answers.get("500"), "answers with 500")
+        return found
+
+    scenario.__doc__ = f"{kind} at once by one key."
+    return scenario
+
+
+def _done_sweep(arena: Arena, jobs: int) -> str:
+    wish = {"tasks": ["support-1"], "models": ["builtin/idle"], "samples": jobs}
+    sweep = arena.attacker.client.post("/v1/sweeps?resume=true", json=wish).json()["id"]
+    wait_until(lambda: arena.operator.get(f"/v1/sweeps/{sweep}")["state"] == "done", 300, "a sweep")
+    return str(sweep)
+
+
+def truncated_bodies(arena: Arena) -> Tried:
+    """Bodies cut off by a disconnect, for everything that changes something."""
+    sweep = arena.attacker.post("/v1/sweeps", SWEEP).json()["id"]
+    time.sleep(1.5)
+    before = everything(arena.database)
+    paths = {
+        "/v1/sweeps": json.dumps(SWEEP | {"seeds": [5]}),
+        "/v1/jobs": json.dumps({"task": "support-1", "model": "builtin/idle", "seed": 991}),
+        f"/v1/sweeps/{sweep}/cancel": "{}",
+        f"/v1/sweeps/{sweep}/resume": "{}",
+        "/v1/sessions": json.dumps({**SESSION, "agent": "cut"}),
+        "/v1/tasks": EXAMPLE.replace("narrow-gap", "cut-gap"),
+        "/v1/archives": "PK",
+    }
+    number = 0
+    for path, body in paths.items():
+        secret = arena.operator.secret if path == "/v1/archives" else arena.attacker.secret
+        kind = "application/yaml" if path == "/v1/tasks" else "application/json"
+        head = f"POST {path} HTTP/1.1\r\nHost: x\r\nAuthorization: Bearer {secret}\r\nContent-Type: {kind}\r\n"
+        chunk = f"{len(body.encode()):x}\r\n{body}\r\n"
+        for sent in (
+            f"{head}Content-Length: {len(body.encode()) + 1}\r\n\r\n{body}",
+            f"{head}Transfer-Encoding: chunked\r\n\r\n{chunk}",
+            f"{head}Transfer-Encoding: chunked\r\n\r\n{chunk}0\r\n",
+        ):
+            with socket.create_connection((arena.stack.settings.host, arena.stack.settings.port)) as s:
+                s.sendall(sent.encode())
+            number += 1
+    time.sleep(1.0)
+    found = Tried(f"{number} bodies cut off by a disconnect")
+    found.require(everything(arena.database) == before, "a body that was cut off was processed")
+    found.refused = "none was processed"
+    return found
+
+
+def forged_archives(arena: Arena) -> Tried:
+    """Archives that are no archives, bombs, and changed rows."""
+    sweep = arena.operator.post("/v1/sweeps", SWEEP | {"seeds": [40]}).json()["id"]
+    wait_until(lambda: arena.operator.get(f"/v1/sweeps/{sweep}")["state"] == "done", 60, "a sweep")
+    good = arena.operator.client.get(f"/v1/sweeps/{sweep}/archive").content
+
+    def changed(name: str, change: Callable[[bytes], bytes]) -> bytes:
+        out = io.BytesIO()
+        with (
+            zipfile.ZipFile(io.BytesIO(good)) as source,
+            zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as target,
+        ):
+            for member in source.namelist():
+                data = source.read(member)
+                target.writestr(member, change(data) if member.startswith(name) else data)
+        return out.getvalue()
+
+    bomb_bytes = int(arena.sizes["bomb_mib"]) << 20
+    tries = {
+        "no archive": b"PK nonsense",
+        "cut": good[: len(good) // 2],
+        "bomb of rows": changed("rows/jobs", lambda _: b"0" * bomb_bytes),
+        "bomb of an artifact": changed("artifacts/", lambda _: b"0" * bomb_bytes),
+        "depth": changed("rows/jobs", lambda _: b"[" * 1_000_000),
+        "outcome": changed("rows/jobs", lambda d: d.replace(b"construction_failed", b"success")),
+        "id": changed("rows/jobs", lambda d: d.replace(b'"seed": 40', b'"seed": 41')),
+        "media type": changed("rows/artifacts", lambda d: d.replace(b"application/json", b"text/html")),
+        "artifact": changed("artifacts/", lambda d: d + b" "),
+    }
+    before = everything(arena.database)["jobs"]
+    answers = {
+        name: arena.operator.client.post(
+            "/v1/archives", content=data, headers={"Content-Type": "application/zip"}
+        ).status_code
+        for name, data in tries.items()
+    }
+    found = Tried(f"{len(tries)} forged or damaged archives")
+    found.refused = f"answers {dict(Counter(answers.values()))}"
+    wrong = {name: status for name, status in answers.items() if status != 422}
+    found.require(not wrong, f"answers {wrong}")
+    found.require(everything(arena.database)["jobs"] == before, "a forged archive left something")
+    return found
+
+
+def full_disk(arena: Arena) -> Tried:
+    """Artifacts lie on a small disk that is full for a while."""
+    found = Tried("a full disk under the artifacts")
+    place = Path(arena.stack.environment["BUILDARENA_ARTIFACTS_URL"])
+    if not os.path.ismount(place):
+        found.refused = "left out: mounting a small disk needs root"
+        return found
+    filler = place / "filler"
+    with filler.open("wb") as file:
+        try:
+            while file.write(b"x" * 65536):
+                file.flush()
+        except OSError:
+            pass
+    body = {"task": "lift-1", "model": "builtin/expert", "simulator": "mujoco", "seed": 3}
+    id_ = arena.innocent.post("/v1/jobs", body).json()["id"]
+
+    def waits() -> bool:
+        job = arena.innocent.get(f"/v1/jobs/{id_}")
+        return job["faults"] >= 1 and "artifacts can't be written" in (job["detail"] or "")
+
+    wait_until(waits, 30, "the job waits for the disk")
+    checks = httpx.get(f"{arena.stack.url}/v1/health").json()["checks"]
+    found.require(
+        any(check["name"] == "artifacts" and not check["ok"] for check in checks),
+        "health does not show the full disk",
+    )
+    asked = arena.innocent.get(f"/v1/jobs/{id_}")["usage"]["requests"]
+    filler.unlink()
+    wait_until(lambda: arena.innocent.get(f"/v1/jobs/{id_}")["state"] == "done", 90, "it ends")
+    job = arena.innocent.get(f"/v1/jobs/{id_}")
+    found.require(job["outcome"] == "success", f"the job ended as {job['outcome']}")
+    found.require(job["usage"]["requests"] == asked, "its model was asked again")
+    found.refused = "the job waited, and succeeded when there was room"
+    return found
+
+
+def stopped_broker(arena: Arena) -> Tried:
+    """The broker is stopped, not dead: connections hang."""
+    seconds = arena.sizes["broker_s"]
+    found = Tried(f"the broker stopped for {seconds:.0f} s")
+    broker, slowest, number = arena.process("valkey"), 0.0, 0
+    broker.send_signal(signal.SIGSTOP)
+    try:
+        ends = time.monotonic() + seconds
+        ids = []
+        while time.monotonic() < ends:
+            started = time.monotonic()
+            body = {"task": "support-1", "model": "builtin/idle", "seed": 5000 + number}
+            answer = arena.innocent.post("/v1/jobs", body)
+            slowest = max(slowest, time.monotonic() - started)
+            found.require(answer.status_code == 202, f"a submission got {answer.status_code}")
+            ids.append(answer.json()["id"])
+            number += 1
+            time.sleep(0.1)
+    finally:
+        broker.send_signal(signal.SIGCONT)
+    started = time.monotonic()
+    wait_until(
+        lambda: all(arena.innocent.get(f"/v1/jobs/{id_}")["state"] == "done" for id_ in ids),
+        120,
+        "all jobs end",
+    )
+    found.require(slowest < 2.5, f"a submission took {slowest:.1f} s")
+    found.refused = (
+        f"{number} submissions, the slowest {slowest * 1000:.0f} ms; all done "
+        f"{time.monotonic() - started:.0f} s after it went on"
+    )
+    return found
+
+
+def killed_supervisor(arena: Arena) -> Tried:
+    """What `buildarena up` started ends when it is killed."""
+    found = Tried("kill -9 of `buildarena up`")
+    with tempfile.TemporaryDirectory(prefix="buildarena-attack-") as name:
+        port = free_port()
+        environment = {**os.environ, "BUILDARENA_DATA": f"{name}/data", "BUILDARENA_PORT": str(port)}
+        words = [sys.executable, "-m", "buildarena_cli", "up"]
+        with subprocess.Popen(words, env=environment, stdout=-3, stderr=-3, cwd=name) as process:
+            url = f"http://127.0.0.1:{port}/v1/health"
+            wait_until(lambda: _ok(url), 60, "the service is up")
+            family = psutil.Process(process.pid).children(recursive=True)
+            process.kill()
+        started = time.monotonic()
+        _, alive = psutil.wait_procs(family, timeout=15)
+        took = time.monotonic() - started
+        found.require(not alive, f"still alive: {[' '.join(p.cmdline())[:80] for p in alive]}")
+        for left in alive:
+            left.kill()
+        found.refused = f"{len(family)} processes ended within {took:.1f} s"
+    del arena
+    return found
+
+
+def _ok(url: str) -> bool:
+    try:
+        return httpx.get(url, timeout=5).json()["status"] == "ok"
+    except (httpx.TransportError, ValueError):
+        return False
+
+
+SCENARIOS: dict[str, Callable[[Arena], Tried]] = {
+    "tenants": other_tenants,
+    "hanging provider": hanging_provider,
+    "lying provider": lying_provider,
+    "truncated bodies": truncated_bodies,
+    "forged archives": forged_archives,
+    **{kind: flood(kind) for kind in ("streams", "archives", "exports", "boards", "verifications")},
+    "full disk": full_disk,
+    "stopped broker": stopped_broker,
+    "killed supervisor": killed_supervisor,
+}
+
+
+__all__ = ["SCENARIOS", "Tenant", "Tried"]
