@@ -24,8 +24,9 @@ LONGEST_DEAF_S = 1.0
 
 @dataclass(slots=True, eq=False)
 class ActiveLease:
-    """A lease that is worked under, as it was last found; those who wait for something hear at once
-    when it is lost.
+    """A lease that is worked under, as it was last found.
+
+    Those who wait for something under it hear at once when it is lost.
 
     Attributes:
         lease: The lease.

@@ -123,6 +123,9 @@ class Throttle:
                 if await self._eval(store, _TAKE, slot_id, SLOT_TTL_S, self._start, standing):
                     self._add(store, slot_id)
                     return slot_id
+            except asyncio.CancelledError:  # it may have been taken all the same
+                store.execute_nowait("ZREM", self._keys[0], slot_id)
+                raise
             except Exception:  # noqa: BLE001 - the store has logged it
                 return None
             standing = "waiting"

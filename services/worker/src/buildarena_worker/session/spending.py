@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from decimal import Decimal
@@ -29,6 +30,17 @@ class Spending:
         """Counts an answer."""
         self.usage += entry.usage
         self.seconds += entry.latency_s
+
+    @property
+    def seconds_left(self) -> float:
+        """Seconds until the job's limit; infinite without one."""
+        return float(self.limits.get("max_seconds", math.inf)) - self.seconds
+
+    def to_the_end(self, latency_s: float) -> float:
+        """The latency of an answer that did not come in time: at least what reaches the limit."""
+        while self.seconds + latency_s < self.seconds + self.seconds_left:
+            latency_s = max(latency_s, self.seconds_left) + math.ulp(self.seconds + latency_s)
+        return latency_s
 
     def require_room(self) -> None:
         """Checks that the session may ask once more.
