@@ -22,7 +22,7 @@ from buildarena_pipeline.runtime.context import Context, open_context
 from buildarena_pipeline.runtime.job_runner import JobRunner, StageHandler
 from buildarena_pipeline.runtime.logs import set_up_logs
 from buildarena_pipeline.runtime.owner_slots import OwnerSlots
-from buildarena_pipeline.runtime.processes import die_with_parent
+from buildarena_pipeline.runtime.processes import die_with_parent, end_with_parent
 from buildarena_pipeline.runtime.reaper import Reaper
 from buildarena_pipeline.runtime.settings import Settings
 from buildarena_pipeline.runtime.tracing import Tracing
@@ -112,6 +112,7 @@ def run_worker(spec: WorkerSpec, settings: Settings) -> None:
         StartupError: The database has another schema, or the settings are incomplete.
     """
     set_up_logs(settings.log_level)
+    end_with_parent()
     context = _checked_context(settings)
     runtimes: dict[int, _Runtime] = {}
     reaper = Reaper(context)
@@ -119,6 +120,7 @@ def run_worker(spec: WorkerSpec, settings: Settings) -> None:
     def start() -> None:
         if spec.pool == FORKING_POOL:
             die_with_parent(signal.SIGKILL)
+            end_with_parent(os.getppid())
         runtimes[os.getpid()] = runtime = _Runtime(spec, settings)
         runtime.start()
 
