@@ -192,7 +192,7 @@ class LiveHost:
         active: ActiveLease,
         guard: BudgetGuard,
         gate: ConcurrencyGate,
-        first_wait_s: float = FIRST_WAIT_S,
+        first_wait_s: float | None = None,
     ) -> None:
         self._kept = kept
         self._client = client
@@ -200,7 +200,7 @@ class LiveHost:
         self._active = active
         self._budget = guard
         self._gate = gate
-        self._first_wait_s = first_wait_s
+        self._first_wait_s = FIRST_WAIT_S if first_wait_s is None else first_wait_s
 
     def ask(self, request: Request, *, phase: str, role: str) -> JournalEntry:
         """The kept answer to a request if there is one, otherwise the model's.

@@ -34,7 +34,8 @@ class Spending:
     @property
     def seconds_left(self) -> float:
         """Seconds until the job's limit; infinite without one."""
-        return float(self.limits.get("max_seconds", math.inf)) - self.seconds
+        limit = self.limits.get("max_seconds")
+        return math.inf if limit is None else float(limit) - self.seconds
 
     def to_the_end(self, latency_s: float) -> float:
         """The latency of an answer that did not come in time: at least what reaches the limit."""
