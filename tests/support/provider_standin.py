@@ -101,14 +101,7 @@ class _Handler(BaseHTTPRequestHandler):
             counts.requests += 1
             counts.bodies.append(body)
         fault = self.standin.fault(number)
-        if isinstance(fault, bytes):
-            self._send_bytes(200, fault, {})
-            return
-        if fault in {"hang", "drip"}:
-            self._keep_waiting(drips=fault == "drip")
-            return
-        if fault in {"301", "302", "303", "307", "308"}:
-            self._send(int(fault), {}, {"location": self.standin.elsewhere})
+        if self._misbehaves(fault):
             return
         if fault == "drop":
             self.connection.shutdown(socket.SHUT_RDWR)
@@ -146,6 +139,18 @@ class _Handler(BaseHTTPRequestHandler):
             counts.output_tokens += used[1]
             counts.cached_tokens += used[2]
         self._send(200, wire.write(reply, used, number), {})
+
+    def _misbehaves(self, fault: str | bytes | None) -> bool:
+        """Does what no honest provider does, if that is the fault."""
+        if isinstance(fault, bytes):
+            self._send_bytes(200, fault, {})
+        elif fault in {"hang", "drip"}:
+            self._keep_waiting(drips=fault == "drip")
+        elif fault in {"301", "302", "303", "307", "308"}:
+            self._send(int(fault), {}, {"location": self.standin.elsewhere})
+        else:
+            return False
+        return True
 
     def _keep_waiting(self, *, drips: bool) -> None:
         """Never answers, or a byte at a time; notes when the client has gone."""

@@ -15,6 +15,7 @@ from crew import crew, models_file
 from provider_standin import ProviderStandIn
 from running import wait_until
 from sqlalchemy import text
+from working import work
 
 from buildarena_pipeline.catalog.models import load_registry
 from buildarena_pipeline.catalog.specs import JobSpec
@@ -192,8 +193,6 @@ def test_garbage_for_ever_ends_as_errored(context, tmp_path, monkeypatch) -> Non
 
 
 def test_after_garbage_the_session_goes_on_and_is_verified(context, tmp_path) -> None:
-    from working import work
-
     bad_ones = {3, 4, 9}
     with (
         ProviderStandIn(fault=lambda n: GARBAGE["no choices"] if n in bad_ones else None) as bad,

@@ -89,7 +89,7 @@ class JournalEntry:
         return self.reply.get("finish") not in {GARBAGE, OUT_OF_TIME}
 
 
-MOST_USD = 99_999_999
+MAX_USD = 99_999_999
 """Sums stop here: what a provider claims to have used must not make a column overflow."""
 
 # One statement, because it is the one that every turn of every session waits for.
@@ -102,7 +102,7 @@ _APPEND = text(
             output_tokens = output_tokens + :output_tokens,
             cached_tokens = cached_tokens + :cached_tokens,
             reasoning_tokens = reasoning_tokens + :reasoning_tokens,
-            cost_usd = LEAST(cost_usd + :cost_usd, {MOST_USD}),
+            cost_usd = LEAST(cost_usd + :cost_usd, {MAX_USD}),
             faults = CASE WHEN :answers THEN 0 ELSE faults END
         WHERE id = :job_id AND lease_token = :token AND state = '{JobState.RUNNING}'
         RETURNING id, payer, owner
@@ -113,7 +113,7 @@ _APPEND = text(
         ORDER BY budgets.id FOR UPDATE OF budgets
     ), charged AS (
         UPDATE budgets SET
-            spent_cost_usd = LEAST(spent_cost_usd + :cost_usd, {MOST_USD}),
+            spent_cost_usd = LEAST(spent_cost_usd + :cost_usd, {MAX_USD}),
             spent_tokens = spent_tokens + :input_tokens + :output_tokens,
             spent_requests = spent_requests + :requests
         FROM paying WHERE budgets.id = paying.id

@@ -81,7 +81,7 @@ _CLAIM = text(
         ) FROM owners WHERE owners.name IS NOT NULL
     ), turns AS MATERIALIZED (
         SELECT name FROM owners
-        WHERE name <> ALL(CAST(:full AS text[]))
+        WHERE name IS NOT NULL AND name <> ALL(CAST(:full AS text[]))
         ORDER BY
             name IS NOT DISTINCT FROM CAST(:last AS text),
             name < COALESCE(CAST(:last AS text), ''),
@@ -389,10 +389,7 @@ class Leases:
 
 
 _BUDGETED = (
-    select(budgets)
-    .where(budgets.c.id.in_([jobs.c.payer, jobs.c.owner]))
-    .exists()
-    .label("budgeted")
+    select(budgets).where(budgets.c.id.in_([jobs.c.payer, jobs.c.owner])).exists().label("budgeted")
 )
 
 

@@ -97,6 +97,4 @@ class BoundedClient(httpx2.AsyncClient):
         received.require_usable()
         dropped = {"content-encoding", "content-length", "transfer-encoding"}
         headers = [(k, v) for k, v in response.headers.multi_items() if k.lower() not in dropped]
-        return httpx2.Response(
-            response.status_code, headers=headers, content=body, request=request
-        )
+        return httpx2.Response(response.status_code, headers=headers, content=body, request=request)

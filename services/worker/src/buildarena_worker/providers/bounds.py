@@ -1,4 +1,4 @@
-"""What an answer may hold at most: whatever a provider sends can be kept, sent back and added up."""
+"""What an answer may hold at most: all of it can be kept, sent back and added up."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from buildarena_worker.session.messages import Reply, ToolCall
 
 MAX_BODY = 8 * 1024 * 1024
 """Bytes of an answer; the rest is not read."""
-MAX_TEXT = 512 * 1024
+MAX_TEXT = 256 * 1024
 """Characters of a reply's text: more than any model gives in one reply."""
 MAX_ARGUMENTS = 64 * 1024
 """Characters of a tool call's arguments as JSON."""
@@ -46,7 +46,8 @@ def bounded(reply: Reply) -> Reply:
         )
         for call in reply.calls[:MAX_CALLS]
     )
-    return Reply(text=_text(reply.text, MAX_TEXT), calls=calls, finish=reply.finish)
+    text = _text(reply.text, MAX_TEXT)
+    return Reply(text=text, calls=calls, finish=reply.finish if text == reply.text else "length")
 
 
 def arguments_of(raw: Any) -> Any:

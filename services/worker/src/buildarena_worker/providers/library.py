@@ -40,7 +40,7 @@ from buildarena_worker.providers.answered import (
     arguments_text,
 )
 from buildarena_worker.providers.bounded_http import RECEIVED, BoundedClient, Received
-from buildarena_worker.providers.bounds import MAX_NAME, arguments_of, bounded
+from buildarena_worker.providers.bounds import MAX_CALLS, MAX_NAME, arguments_of, bounded
 from buildarena_worker.providers.failures import RETRIED_STATUS, Failure, ProviderError
 from buildarena_worker.session.messages import Message, Reply, Request, Tool, ToolCall
 
@@ -231,7 +231,7 @@ def from_wire(response: ModelResponse) -> Answered:
         ToolCall(id=part.tool_call_id, name=part.tool_name, arguments=arguments_of(part.args))
         for part in response.parts
         if isinstance(part, ToolCallPart)
-    )
+    )[:MAX_CALLS]
     finish, used = response.finish_reason, response.usage
     named = response.provider_response_id
     return Answered(

@@ -16,7 +16,7 @@ from typing import Any
 from genai_prices.data_snapshot import get_snapshot
 
 from buildarena_worker.providers.answered import Answered, TokenCounts
-from buildarena_worker.providers.bounds import MAX_NAME, arguments_of, bounded
+from buildarena_worker.providers.bounds import MAX_CALLS, MAX_NAME, arguments_of, bounded
 from buildarena_worker.providers.failures import (
     Failure,
     ProviderError,
@@ -137,7 +137,7 @@ def _reply(choice: Mapping[str, Any]) -> Reply:
         return Reply(text="", finish="content_filter")
     return Reply(
         text=_spoken(_content(message.get("content") or "")),
-        calls=tuple(_call(call) for call in message.get("tool_calls") or ()),
+        calls=tuple(_call(call) for call in (message.get("tool_calls") or ())[:MAX_CALLS]),
         finish=FINISH.get(finish or "stop", "stop"),
     )
 
@@ -157,14 +157,15 @@ def _content(content: Any) -> str:
 
 def _spoken(text: str) -> str:
     """The text without the thoughts that are marked in it; thoughts without an end are text."""
-    spoken = ""
-    while THINKING in text:
-        before, text = text.split(THINKING, 1)
-        spoken += before
-        if THOUGHT not in text:
-            return spoken + text
-        text = text.split(THOUGHT, 1)[1]
-    return spoken + text
+    spoken, place = [], 0
+    while (start := text.find(THINKING, place)) >= 0:
+        spoken.append(text[place:start])
+        place = start + len(THINKING)
+        end = text.find(THOUGHT, place)
+        if end < 0:
+            break
+        place = end + len(THOUGHT)
+    return "".join(spoken) + text[place:]
 
 
 def _call(call: Mapping[str, Any]) -> ToolCall:

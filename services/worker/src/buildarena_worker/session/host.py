@@ -30,6 +30,7 @@ GARBAGE_IN_A_ROW = 6
 FIRST_WAIT_S = 0.25
 OUTAGE_DELAY_S = 30.0
 
+
 class SessionHost(Protocol):
     """Where a session's answers come from."""
 
@@ -257,7 +258,7 @@ class LiveHost:
         """Waits after so many answers that can't be read; returns how long."""
         if not failures:
             return 0.0
-        wait_s = min(self._first_wait_s * 2 ** (failures - 1), self._kept.spending.seconds_left)
+        wait_s: float = min(self._first_wait_s * 2 ** (failures - 1), self._kept.spending.seconds_left)
         self._active.wait(wait_s)
         return wait_s
 
