@@ -32,7 +32,7 @@ end_with_parent()
 print("ready", flush=True)
 time.sleep(60)
 """
-DEAF = "signal.signal(signal.SIGTERM, lambda *_: None)"
+STALLED = "signal.signal(signal.SIGTERM, lambda *_: None)"
 
 
 @pytest.mark.parametrize(
@@ -42,7 +42,7 @@ DEAF = "signal.signal(signal.SIGTERM, lambda *_: None)"
         ("watching", WATCHING.format(extra=""), 4),
         (
             "watching",
-            WATCHING.format(extra=DEAF).replace(
+            WATCHING.format(extra=STALLED).replace(
                 "time.sleep(60)", "[time.sleep(1) for _ in range(60)]"
             ),
             9,

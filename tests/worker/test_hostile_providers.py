@@ -182,7 +182,7 @@ def test_garbage_is_counted_charged_and_bounded(context, tmp_path, name) -> None
     assert report["ok"], [check for check in report["checks"] if not check["ok"]]
 
 
-def test_garbage_for_ever_ends_as_errored(context, tmp_path, monkeypatch) -> None:
+def test_garbage_forever_ends_as_errored(context, tmp_path, monkeypatch) -> None:
     monkeypatch.setattr("buildarena_worker.session.host.OUTAGE_DELAY_S", 0.0)
     monkeypatch.setattr("buildarena_worker.session.host.FIRST_WAIT_S", 0.001)
     context.store.leases._max_faults = 3

@@ -25,6 +25,7 @@ from buildarena_pipeline.runtime.owner_slots import OwnerSlots
 from buildarena_pipeline.runtime.processes import die_with_parent, end_with_parent
 from buildarena_pipeline.runtime.reaper import Reaper
 from buildarena_pipeline.runtime.settings import Settings
+from buildarena_pipeline.runtime.side_work import SideWork
 from buildarena_pipeline.runtime.tracing import Tracing
 from buildarena_store import SchemaVersionError
 
@@ -64,7 +65,9 @@ class _Runtime:
         self.id = f"{spec.kind}@{socket.gethostname()}:{os.getpid()}"
         self._spec = spec
         self.keeper = LeaseKeeper(self.context.store.leases, self.report)
-        self.others = spec.make_others(self.context)
+        self.others = {
+            queue: SideWork(work) for queue, work in spec.make_others(self.context).items()
+        }
         self.runner = JobRunner(
             self.context.store.leases,
             spec.make_handler(self.context),
@@ -95,6 +98,8 @@ class _Runtime:
     def begin_stop(self) -> None:
         """Takes no further job and breaks off those at hand, so that the process can end."""
         self.runner.stop()
+        for other in self.others.values():
+            other.stop()
         self.keeper.stop()
 
     def stop(self) -> None:
@@ -137,7 +142,7 @@ def run_worker(spec: WorkerSpec, settings: Settings) -> None:
     def process_next(queue: str, job_id: str) -> None:
         runtime = runtimes[os.getpid()]
         if queue in runtime.others:
-            runtime.others[queue](job_id)
+            runtime.others[queue].do(job_id)
         elif spec.pool == THREADS:
             runtime.runner.process_all(queue, job_id)
         else:

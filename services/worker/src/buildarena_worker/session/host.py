@@ -258,7 +258,9 @@ class LiveHost:
         """Waits after so many answers that can't be read; returns how long."""
         if not failures:
             return 0.0
-        wait_s: float = min(self._first_wait_s * 2 ** (failures - 1), self._kept.spending.seconds_left)
+        wait_s: float = min(
+            self._first_wait_s * 2 ** (failures - 1), self._kept.spending.seconds_left
+        )
         self._active.wait(wait_s)
         return wait_s
 
