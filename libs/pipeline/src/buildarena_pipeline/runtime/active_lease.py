@@ -18,7 +18,7 @@ log = structlog.get_logger(__name__)
 
 BEATS_PER_LEASE = 4
 """A lease outlives this many heartbeats less one that got lost."""
-LONGEST_DEAF_S = 1.0
+LONGEST_UNAWARE_S = 1.0
 """So long after its job was cancelled a worker knows, although it sends heartbeats more rarely."""
 
 
@@ -91,7 +91,7 @@ class LeaseKeeper:
         self._lock = threading.Lock()
         self._stopped = False
         beat_s = leases.duration.total_seconds() / BEATS_PER_LEASE
-        self._looks_per_beat = math.ceil(beat_s / LONGEST_DEAF_S)
+        self._looks_per_beat = math.ceil(beat_s / LONGEST_UNAWARE_S)
         self._looks = 0
         period_s = beat_s / self._looks_per_beat
         self._thread = Periodic(self._look_safely, name="leases", period_s=period_s)

@@ -18,6 +18,9 @@ from buildarena_store.jobs.leases import OPERATOR
 
 log = structlog.get_logger(__name__)
 
+INTERNAL_DELAY_S = 2.0
+"""A thread takes its next job at once: without a delay it would meet a short trouble again and
+again, until the job is given up."""
 LONGEST_DETAIL = 2000
 """Characters of what is kept of a fault; some of them quote what strangers sent."""
 
@@ -139,7 +142,8 @@ class JobRunner:
             except Exception as error:  # noqa: BLE001 - a bug must not cost the job; it is logged whole
                 bound.exception("handler_failed")
                 text = f"{type(error).__name__}: {error}"
-                self._retry_later(lease, TransientError(text, reason="internal_error"))
+                fault = TransientError(text, reason="internal_error", delay_s=INTERNAL_DELAY_S)
+                self._retry_later(lease, fault)
             else:
                 bound.info("stage_done", seconds=round(time.perf_counter() - started, 3))
 
