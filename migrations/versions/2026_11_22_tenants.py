@@ -63,6 +63,7 @@ def upgrade() -> None:
     op.create_index(
         "ix_journal_owner", "journal", ["owner"], postgresql_where=sa.text("owner IS NOT NULL")
     )
+    _index_waiting_jobs("queue", sa.text("COALESCE(owner, '')"), "created_at", "id")
     op.create_index(
         "ix_verifications_open",
         "verifications",
@@ -79,6 +80,7 @@ def upgrade() -> None:
 def downgrade() -> None:
     _write_triggers(counts="", columns=COMPARED)
     op.drop_index("ix_verifications_open", "verifications")
+    _index_waiting_jobs("queue", "created_at", "id")
     op.drop_index("ix_journal_owner", "journal")
     op.drop_table("names")
     op.drop_table("job_wants")
@@ -91,6 +93,13 @@ def downgrade() -> None:
         ("jobs", "imported_from"),
     ):
         op.drop_column(table, column)
+
+
+def _index_waiting_jobs(*columns: str | sa.TextClause) -> None:
+    op.drop_index("ix_jobs_waiting", "jobs")
+    op.create_index(
+        "ix_jobs_waiting", "jobs", list(columns), postgresql_where=sa.text("state = 'queued'")
+    )
 
 
 def _backfill() -> None:

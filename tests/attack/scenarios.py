@@ -67,7 +67,10 @@ def other_tenants(arena: Arena) -> Tried:
     owner.client.post("/v1/tasks", content=EXAMPLE, headers=YAML)
     job = arena.operator.get(f"/v1/jobs?sweep={sweep}")["jobs"][0]["id"]
     tries: list[tuple[str, str, dict[str, Any]]] = [
-        *(("POST", f"/v1/sweeps/{sweep}/{verb}", {}) for verb in ("pause", "resume", "cancel", "retry")),
+        *(
+            ("POST", f"/v1/sweeps/{sweep}/{verb}", {})
+            for verb in ("pause", "resume", "cancel", "retry")
+        ),
         *(("POST", f"/v1/jobs/{job}/{verb}", {}) for verb in ("cancel", "retry")),
         ("POST", f"/v1/sessions/{session}/calls", {"json": {"tool": "start"}}),
         ("POST", f"/v1/sessions/{session}/submit", {}),
@@ -111,7 +114,9 @@ def hanging_provider(arena: Arena) -> Tried:
 
     wait_until(lambda: running() >= 40, 30, "forty sessions hang")
     started = time.monotonic()
-    job = arena.innocent.post("/v1/jobs", {"task": "support-1", "model": "builtin/idle", "seed": 77})
+    job = arena.innocent.post(
+        "/v1/jobs", {"task": "support-1", "model": "builtin/idle", "seed": 77}
+    )
     id_ = job.json()["id"]
     wait_until(lambda: arena.innocent.get(f"/v1/jobs/{id_}")["state"] == "done", 30, "a session")
     room = time.monotonic() - started
@@ -234,14 +239,19 @@ def truncated_bodies(arena: Arena) -> Tried:
     for path, body in paths.items():
         secret = arena.operator.secret if path == "/v1/archives" else arena.attacker.secret
         kind = "application/yaml" if path == "/v1/tasks" else "application/json"
-        head = f"POST {path} HTTP/1.1\r\nHost: x\r\nAuthorization: Bearer {secret}\r\nContent-Type: {kind}\r\n"
+        head = (
+            f"POST {path} HTTP/1.1\r\nHost: x\r\n"
+            f"Authorization: Bearer {secret}\r\nContent-Type: {kind}\r\n"
+        )
         chunk = f"{len(body.encode()):x}\r\n{body}\r\n"
         for sent in (
             f"{head}Content-Length: {len(body.encode()) + 1}\r\n\r\n{body}",
             f"{head}Transfer-Encoding: chunked\r\n\r\n{chunk}",
             f"{head}Transfer-Encoding: chunked\r\n\r\n{chunk}0\r\n",
         ):
-            with socket.create_connection((arena.stack.settings.host, arena.stack.settings.port)) as s:
+            with socket.create_connection(
+                (arena.stack.settings.host, arena.stack.settings.port)
+            ) as s:
                 s.sendall(sent.encode())
             number += 1
     time.sleep(1.0)
@@ -277,7 +287,9 @@ def forged_archives(arena: Arena) -> Tried:
         "depth": changed("rows/jobs", lambda _: b"[" * 1_000_000),
         "outcome": changed("rows/jobs", lambda d: d.replace(b"construction_failed", b"success")),
         "id": changed("rows/jobs", lambda d: d.replace(b'"seed": 40', b'"seed": 41')),
-        "media type": changed("rows/artifacts", lambda d: d.replace(b"application/json", b"text/html")),
+        "media type": changed(
+            "rows/artifacts", lambda d: d.replace(b"application/json", b"text/html")
+        ),
         "artifact": changed("artifacts/", lambda d: d + b" "),
     }
     before = everything(arena.database)["jobs"]
@@ -371,7 +383,11 @@ def killed_supervisor(arena: Arena) -> Tried:
     found = Tried("kill -9 of `buildarena up`")
     with tempfile.TemporaryDirectory(prefix="buildarena-attack-") as name:
         port = free_port()
-        environment = {**os.environ, "BUILDARENA_DATA": f"{name}/data", "BUILDARENA_PORT": str(port)}
+        environment = {
+            **os.environ,
+            "BUILDARENA_DATA": f"{name}/data",
+            "BUILDARENA_PORT": str(port),
+        }
         words = [sys.executable, "-m", "buildarena_cli", "up"]
         with subprocess.Popen(words, env=environment, stdout=-3, stderr=-3, cwd=name) as process:
             url = f"http://127.0.0.1:{port}/v1/health"

@@ -1,12 +1,15 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from decimal import Decimal
 
 import pytest
+from sqlalchemy import text
 from sqlalchemy.exc import IntegrityError
 
 from buildarena_pipeline.runtime.context import Context
-from buildarena_store import JournalEntry, Usage
+from buildarena_store import BudgetLimits, JournalEntry, Usage
+from buildarena_store.jobs.journal import MAX_USD
 
 USAGE = Usage(
     requests=1, input_tokens=100, output_tokens=10, cached_tokens=40, cost_usd=Decimal("0.25")
@@ -40,3 +43,40 @@ def test_a_reply_and_its_cost_are_written_together(context: Context, add) -> Non
     assert [e.sequence for e in read] == [0, 1]
     assert read[0].reply == {"text": "ü"}
     assert read[0].usage == USAGE
+
+
+def met_faults(context: Context, job_id: str, faults: int) -> None:
+    with context.store.database.transaction() as connection:
+        connection.execute(
+            text("UPDATE jobs SET faults = :faults WHERE id = :id"),
+            {"faults": faults, "id": job_id},
+        )
+
+
+@pytest.mark.parametrize("finish", ["garbage", "out_of_time"])
+def test_what_is_no_answer_is_paid_for_and_no_progress(context: Context, add, finish) -> None:
+    (job_id,) = add(1)
+    lease = context.store.leases.claim("construct", owner="w")
+    assert lease is not None
+    met_faults(context, job_id, 3)
+    context.store.journal.append(lease, replace(entry(0), reply={"text": "", "finish": finish}))
+    job = context.store.jobs.get(job_id)
+    assert (job.faults, job.requests, job.cost_usd) == (3, 1, Decimal("0.25"))
+    context.store.journal.append(lease, replace(entry(1), reply={"text": "", "finish": "stop"}))
+    assert context.store.jobs.get(job_id).faults == 0
+
+
+def test_sums_that_a_provider_claims_never_overflow(context: Context, add) -> None:
+    (job_id,) = add(1)
+    with context.store.database.transaction() as connection:
+        connection.execute(text("UPDATE jobs SET payer = 'sweep_x'"))
+        context.store.budgets.set("sweep_x", BudgetLimits(max_requests=99), connection=connection)
+    lease = context.store.leases.claim("construct", owner="w")
+    assert lease is not None
+    most = Usage(requests=1, input_tokens=10**7, cost_usd=Decimal(60_000_000))
+    for sequence in range(3):
+        context.store.journal.append(lease, replace(entry(sequence), usage=most))
+    context.store.budgets.charge_lost(lease, most)
+    assert context.store.jobs.get(job_id).cost_usd == MAX_USD
+    budget = context.store.budgets.get("sweep_x")
+    assert (budget.spent_cost_usd, budget.spent_requests) == (MAX_USD, 4)

@@ -5,6 +5,7 @@ import time
 from datetime import timedelta
 
 import pytest
+from sqlalchemy import text
 
 from buildarena_pipeline.runtime.context import Context
 from buildarena_store import JobScore, JournalEntry, Leases, StaleLeaseError, Usage
@@ -170,3 +171,60 @@ def test_a_job_that_gets_on_is_not_given_up(context: Context, add) -> None:
         expire(context)
         leases.recover()
     assert context.store.jobs.get(job_id).state == "queued"
+
+
+def owned(context: Context, add, owners: list[str | None]) -> list[str]:
+    ids: list[str] = add(*range(len(owners)))
+    with context.store.database.transaction() as connection:
+        for job_id, owner in zip(ids, owners, strict=True):
+            connection.execute(
+                text("UPDATE jobs SET owner = :owner WHERE id = :id"),
+                {"owner": owner, "id": job_id},
+            )
+    return ids
+
+
+def test_owners_take_turns(context: Context, add) -> None:
+    owned(context, add, ["a"] * 4 + ["b"] * 2 + [None, "c"])
+    taken, last = [], None
+    for _ in range(8):
+        lease = context.store.leases.claim("construct", owner="w", last=last)
+        assert lease is not None
+        last = lease.job.owner or ""
+        taken.append(last)
+    assert taken == ["", "a", "b", "c", "a", "b", "a", "a"]
+    assert context.store.leases.claim("construct", owner="w", last="a") is None
+
+
+def test_a_hint_does_not_jump_the_turn_of_another_owner(context: Context, add) -> None:
+    mine = owned(context, add, ["a", "a", "a", "b"])
+    claim = context.store.leases.claim
+    assert claim("construct", owner="w", hint=mine[2], last="b").job.id == mine[2]
+    assert claim("construct", owner="w", hint=mine[1], last="a").job.id == mine[3]
+    assert claim("construct", owner="w", hint=mine[1], last="a").job.id == mine[1]
+
+
+@pytest.mark.parametrize("faults", [0, 1])
+def test_jobs_of_full_owners_wait_whatever_names_them(context: Context, add, faults) -> None:
+    a, b, operators = owned(context, add, ["a", "b", None])
+    with context.store.database.transaction() as connection:
+        connection.execute(text("UPDATE jobs SET faults = :faults"), {"faults": faults})
+    claim = context.store.leases.claim
+    assert claim("construct", owner="w", hint=a, full=["a", ""]).job.id == b
+    assert claim("construct", owner="w", hint=operators, full=["a", ""]) is None
+    assert claim("construct", owner="w", full=["a"]).job.id == operators
+
+
+def test_looking_at_leases_says_what_a_heartbeat_says_and_renews_nothing(context, add) -> None:
+    add(1, 2)
+    first, second = claim(context), claim(context)
+    with context.store.database.transaction() as connection:
+        context.store.jobs.cancel([second.job.id], connection=connection)
+    expires = text("SELECT lease_expires_at FROM jobs WHERE id = :id")
+    with context.store.database.transaction() as connection:
+        before = connection.execute(expires, {"id": first.job.id}).scalar_one()
+    assert context.store.leases.held([first, second]) == {first.job.id: False}
+    with context.store.database.transaction() as connection:
+        assert connection.execute(expires, {"id": first.job.id}).scalar_one() == before
+    assert context.store.leases.heartbeat([first, second]) == {first.job.id: False}
+    assert context.store.leases.held([]) == {}

@@ -111,6 +111,7 @@ class Player:
                 active=active,
                 guard=BudgetGuard(budgets, active, lambda *_: Decimal()),
                 gate=gate,
+                first_wait_s=0.001,
             )
         session = Session(
             task=builtin_tasks()[task] if isinstance(task, str) else task,

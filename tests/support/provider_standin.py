@@ -20,8 +20,10 @@ from typing import Any, Self
 from buildarena_worker.builtin import MODELS
 from buildarena_worker.session.messages import Message, Reply, Request, Tool, ToolCall
 
-Fault = Callable[[int], str | None]
-"""From the number of a request to what goes wrong: '429', '500', 'drop', 'slow', …."""
+Fault = Callable[[int], str | bytes | None]
+"""From the number of a request to what goes wrong: '429', '500', 'drop', 'slow', 'hang', 'drip',
+…; bytes are a body that is sent with 200."""
+DRIP_S = 0.05
 
 
 @dataclass
@@ -43,6 +45,7 @@ class ProviderStandIn:
         model: Built-in model that answers.
         fault: What goes wrong with each request.
         latency_s: Time each answer takes.
+        elsewhere: Where redirects lead.
         respond: Answers in the built-in model's place.
         raw: The body of every answer, in the place of one that is made.
     """
@@ -53,10 +56,12 @@ class ProviderStandIn:
         *,
         fault: Fault = lambda _: None,
         latency_s: float = 0.0,
+        elsewhere: str = "http://127.0.0.1:9/",
         respond: Callable[[Request], Reply] | None = None,
         raw: Any = None,
     ) -> None:
         self.raw = raw
+        self.elsewhere = elsewhere
         self.counts = Counts()
         self.lock = threading.Lock()
         self.respond = respond or MODELS[model]
@@ -67,12 +72,15 @@ class ProviderStandIn:
         self._server.daemon_threads = True
         self.url = f"http://127.0.0.1:{self._server.server_port}"
         self._thread = threading.Thread(target=self._server.serve_forever, args=(0.05,))
+        self.closing = threading.Event()
+        self.left = 0
 
     def __enter__(self) -> Self:
         self._thread.start()
         return self
 
     def __exit__(self, *_: object) -> None:
+        self.closing.set()
         self._server.shutdown()
         self._server.server_close()
         self._thread.join()
@@ -93,6 +101,8 @@ class _Handler(BaseHTTPRequestHandler):
             counts.requests += 1
             counts.bodies.append(body)
         fault = self.standin.fault(number)
+        if self._misbehaves(fault):
+            return
         if fault == "drop":
             self.connection.shutdown(socket.SHUT_RDWR)
             self.close_connection = True
@@ -130,8 +140,40 @@ class _Handler(BaseHTTPRequestHandler):
             counts.cached_tokens += used[2]
         self._send(200, wire.write(reply, used, number), {})
 
+    def _misbehaves(self, fault: str | bytes | None) -> bool:
+        """Does what no honest provider does, if that is the fault."""
+        if isinstance(fault, bytes):
+            self._send_bytes(200, fault, {})
+        elif fault in {"hang", "drip"}:
+            self._keep_waiting(drips=fault == "drip")
+        elif fault in {"301", "302", "303", "307", "308"}:
+            self._send(int(fault), {}, {"location": self.standin.elsewhere})
+        else:
+            return False
+        return True
+
+    def _keep_waiting(self, *, drips: bool) -> None:
+        """Never answers, or a byte at a time; notes when the client has gone."""
+        with contextlib.suppress(ConnectionError):
+            if drips:
+                self.send_response(200)
+                self.send_header("content-length", "1000000")
+                self.end_headers()
+            self.connection.settimeout(DRIP_S)
+            while not self.standin.closing.is_set():
+                if drips:
+                    self.wfile.write(b" ")
+                with contextlib.suppress(TimeoutError):
+                    if not self.connection.recv(1):
+                        break
+        with self.standin.lock:
+            self.standin.left += 1
+        self.close_connection = True
+
     def _send(self, status: int, body: dict[str, Any], headers: dict[str, str]) -> None:
-        data = json.dumps(body).encode()
+        self._send_bytes(status, json.dumps(body).encode(), headers)
+
+    def _send_bytes(self, status: int, data: bytes, headers: dict[str, str]) -> None:
         if headers.get("content-encoding") == "gzip":
             data = gzip.compress(data)
         self.send_response(status)

@@ -14,7 +14,8 @@ class Scripted:
         self.last = last or Reply(text="TERMINATE")
         self.requests: list[Request] = []
 
-    def complete(self, request: Request) -> Answer:
+    def complete(self, request: Request, patience: object = None) -> Answer:
+        del patience
         self.requests.append(request)
         reply = self.replies.pop(0) if self.replies else self.last
         usage = Usage(requests=1, input_tokens=10, output_tokens=5)

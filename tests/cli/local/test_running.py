@@ -62,8 +62,9 @@ def test_the_life_of_a_service_in_the_background(data) -> None:
         assert (wrong.returncode, "did you mean api?" in wrong.stderr) == (1, True)
 
         pids = [process["pid"] for process in shown["processes"]]
+        pids += [child.pid for child in psutil.Process(run.pid).children(recursive=True)]
         os.kill(run.pid, signal.SIGKILL)
-        wait_until(lambda: gone(pids), 30, "children end with their parent")
+        wait_until(lambda: gone(pids), 15, "children end with their parent")
         after = piped("status", *where)
         assert (after.returncode, f"process {run.pid}" in after.stdout) == (1, True)
         over = piped("down", *where)

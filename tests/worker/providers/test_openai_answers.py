@@ -1,4 +1,7 @@
-"""Answers mean what they meant to pydantic-ai and OpenAI's SDK when they were kept."""
+"""Answers mean what they meant to pydantic-ai and OpenAI's SDK when they were kept.
+
+Except for what those let pass: redirects, and names and counts that are none.
+"""
 
 from __future__ import annotations
 

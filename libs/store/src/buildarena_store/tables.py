@@ -104,6 +104,7 @@ jobs = Table(
 Index(
     "ix_jobs_waiting",
     jobs.c.queue,
+    func.coalesce(jobs.c.owner, text("''")),
     jobs.c.created_at,
     jobs.c.id,
     postgresql_where=jobs.c.state == JobState.QUEUED,

@@ -13,6 +13,7 @@ from buildarena_pipeline.catalog.models import load_registry
 from buildarena_pipeline.errors import StartupError
 from buildarena_pipeline.runtime.context import open_context
 from buildarena_pipeline.runtime.logs import set_up_logs
+from buildarena_pipeline.runtime.processes import end_with_parent
 from buildarena_pipeline.runtime.settings import Settings
 from buildarena_pipeline.runtime.tracing import Tracing
 from buildarena_store import SchemaVersionError
@@ -24,6 +25,7 @@ def main() -> None:
     """Serves the API until it is asked to stop."""
     settings = Settings()
     set_up_logs(settings.log_level)
+    end_with_parent()
     try:
         check_binding(settings)
         tracing = Tracing("api", settings.otlp_endpoint)

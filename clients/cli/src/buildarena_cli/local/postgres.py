@@ -30,7 +30,7 @@ from buildarena_cli.local.server import (
     wait_until_ready,
 )
 from buildarena_pipeline.errors import StartupError
-from buildarena_pipeline.runtime.processes import die_with_parent
+from buildarena_pipeline.runtime.processes import dying_with_me
 
 ADVICE = (
     "choose another folder with --data or BUILDARENA_DATA, "
@@ -197,7 +197,7 @@ class EmbeddedPostgres:
                 start_new_session=True,
                 pass_fds=files,
                 **run_as(self._account),
-                preexec_fn=lambda: die_with_parent(signal.SIGINT),  # noqa: PLW1509 - one system call
+                preexec_fn=dying_with_me(signal.SIGINT),  # noqa: PLW1509 - one system call
             )
 
     def _serves(self, process: subprocess.Popen[bytes]) -> bool:

@@ -29,7 +29,7 @@ from buildarena_cli.local.service import LOCK, READY, RUN, log_name, unwritable
 from buildarena_cli.wire import Failure, Wire
 from buildarena_pipeline.catalog.tracks import SIMULATORS
 from buildarena_pipeline.errors import StartupError
-from buildarena_pipeline.runtime.processes import die_with_parent, tree_memory_bytes
+from buildarena_pipeline.runtime.processes import PARENT, dying_with_me, tree_memory_bytes
 from buildarena_pipeline.runtime.settings import Settings
 from buildarena_store import Database
 from buildarena_store.accounts.keys import new_secret
@@ -205,12 +205,12 @@ class Stack:
             with log_file.open("ab") as log:
                 return subprocess.Popen(
                     [sys.executable, "-m", *module],
-                    env=environment,
+                    env={**environment, PARENT: str(os.getpid())},
                     stdin=subprocess.DEVNULL,
                     stdout=log,
                     stderr=subprocess.STDOUT,
                     start_new_session=True,
-                    preexec_fn=die_with_parent,  # noqa: PLW1509 - one system call
+                    preexec_fn=dying_with_me(),  # noqa: PLW1509 - one system call
                 )
 
         self.supervisor.launch(ManagedProcess(name=name, start=start))

@@ -20,7 +20,7 @@ from buildarena_cli.local.server import (
     wait_until_ready,
 )
 from buildarena_pipeline.errors import StartupError
-from buildarena_pipeline.runtime.processes import die_with_parent
+from buildarena_pipeline.runtime.processes import dying_with_me
 
 
 class EmbeddedValkey:
@@ -57,7 +57,7 @@ class EmbeddedValkey:
                 stdout=log,
                 stderr=subprocess.STDOUT,
                 start_new_session=True,
-                preexec_fn=die_with_parent,  # noqa: PLW1509 - one system call
+                preexec_fn=dying_with_me(),  # noqa: PLW1509 - one system call
             )
         wait_until_ready(
             self.name, process, lambda: self._serves(process), self._log_file, since=since

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from celery.signals import worker_process_init, worker_process_shutdown, worker_ready
+from celery.signals import (
+    worker_process_init,
+    worker_process_shutdown,
+    worker_ready,
+    worker_shutting_down,
+)
 
 from buildarena_pipeline.broker.queues import PROCESS_NEXT, Queues
 from buildarena_pipeline.broker.watchdog import ConsumerWatchdog
 
 FORKING_POOL = "prefork"
+THREADS = "threads"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,12 +29,15 @@ class Callbacks:
         process_next: For each message, with its queue and job id.
         start: At the start of each process that works on messages.
         stop: At its end.
+        stopping: Once, from a thread, when the process is asked to stop: what is being worked on
+            should end soon.
         ready: Once, when messages are received.
     """
 
     process_next: Callable[[str, str], None]
     start: Callable[[], None]
     stop: Callable[[], None]
+    stopping: Callable[[], None]
     ready: Callable[[], None]
 
 
@@ -61,7 +71,12 @@ def consume(
     def stop(**_: Any) -> None:
         callbacks.stop()
 
+    def stopping(**_: Any) -> None:
+        # Celery calls this inside its signal handler, where no lock may be waited for.
+        threading.Thread(target=callbacks.stopping, name="stopping", daemon=True).start()
+
     worker_ready.connect(ready, weak=False)
+    worker_shutting_down.connect(stopping, weak=False)
     if forks:
         worker_process_init.connect(start, weak=False)
         worker_process_shutdown.connect(stop, weak=False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from typing import Protocol
 
@@ -10,6 +11,7 @@ from sqlalchemy.exc import OperationalError
 
 from buildarena_pipeline.errors import PermanentError, TransientError
 from buildarena_pipeline.runtime.active_lease import ActiveLease, LeaseKeeper
+from buildarena_pipeline.runtime.owner_slots import OwnerSlots
 from buildarena_pipeline.runtime.tracing import span
 from buildarena_store import (
     ArtifactDamagedError,
@@ -18,12 +20,19 @@ from buildarena_store import (
     Lease,
     Leases,
     StaleLeaseError,
+    clean,
 )
+from buildarena_store.jobs.leases import OPERATOR
 
 log = structlog.get_logger(__name__)
 
+INTERNAL_DELAY_S = 2.0
+"""A thread takes its next job at once: without a delay it would meet a short trouble again and
+again, until the job is given up."""
 STORE_DELAY_S = 2.0
 """How long a job waits after the artifact store failed for the first time."""
+LONGEST_DETAIL = 2000
+"""Characters of what is kept of a fault; some of them quote what strangers sent."""
 
 
 class StageHandler(Protocol):
@@ -50,25 +59,79 @@ class JobRunner:
         handler: Does the work.
         keeper: Keeps leases alive.
         owner: The worker's id.
+        slots: What the owners of its jobs share; for a worker of one job at a time, one slot.
     """
 
     def __init__(
-        self, leases: Leases, handler: StageHandler, keeper: LeaseKeeper, owner: str
+        self,
+        leases: Leases,
+        handler: StageHandler,
+        keeper: LeaseKeeper,
+        owner: str,
+        slots: OwnerSlots | None = None,
     ) -> None:
         self._leases = leases
         self._handler = handler
         self._keeper = keeper
         self._owner = owner
+        self._slots = slots or OwnerSlots(1)
+        self._claiming = threading.Lock()
+        self._last: str | None = None
+        self._stopping = False
 
-    def process_next(self, queue: str, job_id: str) -> None:
-        """Takes one waiting job of the queue, the named one if possible, and does its stage."""
-        try:
-            lease = self._leases.claim(queue, owner=self._owner, hint=job_id)
-        except OperationalError as error:
-            log.warning("claim_failed", job=job_id, error=str(error).splitlines()[0])
-            return
+    def stop(self) -> None:
+        """Takes no further job."""
+        self._stopping = True
+
+    def process_all(self, queue: str, job_id: str) -> None:
+        """Does waiting jobs of the queue, the named one first if possible, until none is left.
+
+        A slot that comes free is so taken at once, although messages that found no slot are gone.
+        """
+        while self.process_next(queue, job_id):
+            pass
+
+    def process_next(self, queue: str, job_id: str) -> bool:
+        """Takes one waiting job of the queue, the named one if possible, and does its stage.
+
+        Jobs of another owner than the last one's come first, those of owners without a free slot
+        wait.
+
+        Returns:
+            Whether there was one.
+        """
+        lease = self._claimed(queue, job_id)
         if lease is None:
-            return
+            return False
+        try:
+            self._do_stage(lease)
+        finally:
+            with self._claiming:
+                self._slots.give_back(lease.job.owner or OPERATOR)
+        return True
+
+    def _claimed(self, queue: str, job_id: str) -> Lease | None:
+        # One at a time: what an owner has must not change between looking and taking.
+        with self._claiming:
+            if self._stopping or not self._slots.free:
+                return None
+            try:
+                lease = self._leases.claim(
+                    queue,
+                    owner=self._owner,
+                    hint=job_id,
+                    full=self._slots.full(),
+                    last=self._last,
+                )
+            except OperationalError as error:
+                log.warning("claim_failed", job=job_id, error=str(error).splitlines()[0])
+                return None
+            if lease is not None:
+                self._last = lease.job.owner or OPERATOR
+                self._slots.take(self._last)
+            return lease
+
+    def _do_stage(self, lease: Lease) -> None:
         started = time.perf_counter()
         bound = log.bind(stage=lease.job.stage, token=lease.token)
         with (
@@ -91,16 +154,18 @@ class JobRunner:
             except Exception as error:  # noqa: BLE001 - a bug must not cost the job; it is logged whole
                 bound.exception("handler_failed")
                 text = f"{type(error).__name__}: {error}"
-                self._retry_later(lease, TransientError(text, reason="internal_error"))
+                fault = TransientError(text, reason="internal_error", delay_s=INTERNAL_DELAY_S)
+                self._retry_later(lease, fault)
             else:
                 bound.info("stage_done", seconds=round(time.perf_counter() - started, 3))
 
     def _retry_later(self, lease: Lease, error: TransientError) -> None:
-        log.warning("transient_fault", reason=error.reason, detail=str(error))
+        detail = _kept(error)
+        log.warning("transient_fault", reason=error.reason, detail=detail)
         try:
             self._leases.fault(
                 lease,
-                str(error),
+                detail,
                 delay_s=error.delay_s,
                 reason=error.reason,
                 endless=error.endless,
@@ -109,9 +174,10 @@ class JobRunner:
             log.warning("fault_not_recorded", error=str(failure))
 
     def _give_up(self, lease: Lease, error: PermanentError) -> None:
-        log.error("permanent_fault", reason=error.reason, detail=str(error))
+        detail = _kept(error)
+        log.error("permanent_fault", reason=error.reason, detail=detail)
         try:
-            self._leases.give_up(lease, str(error), reason=error.reason)
+            self._leases.give_up(lease, detail, reason=error.reason)
         except (StaleLeaseError, OperationalError) as failure:
             log.warning("fault_not_recorded", error=str(failure))
 
@@ -125,3 +191,7 @@ def _store_fault(error: Exception) -> TransientError:
         delay_s=STORE_DELAY_S,
         endless=fails,
     )
+
+
+def _kept(error: Exception) -> str:
+    return str(clean(str(error)))[:LONGEST_DETAIL]

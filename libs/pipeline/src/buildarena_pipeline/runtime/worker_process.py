@@ -15,15 +15,17 @@ from typing import Any
 import structlog
 from sqlalchemy.exc import OperationalError
 
-from buildarena_pipeline.broker.consumer import FORKING_POOL, Callbacks, consume
+from buildarena_pipeline.broker.consumer import FORKING_POOL, THREADS, Callbacks, consume
 from buildarena_pipeline.errors import StartupError
 from buildarena_pipeline.runtime.active_lease import LeaseKeeper
 from buildarena_pipeline.runtime.context import Context, open_context
 from buildarena_pipeline.runtime.job_runner import JobRunner, StageHandler
 from buildarena_pipeline.runtime.logs import set_up_logs
-from buildarena_pipeline.runtime.processes import die_with_parent
+from buildarena_pipeline.runtime.owner_slots import OwnerSlots
+from buildarena_pipeline.runtime.processes import die_with_parent, end_with_parent
 from buildarena_pipeline.runtime.reaper import Reaper
 from buildarena_pipeline.runtime.settings import Settings
+from buildarena_pipeline.runtime.side_work import SideWork
 from buildarena_pipeline.runtime.tracing import Tracing
 from buildarena_store import SchemaVersionError
 
@@ -38,7 +40,7 @@ class WorkerSpec:
         kind: ``construct`` or ``simulate``.
         queues: Queues it serves.
         pool: Celery pool: ``threads``, ``prefork`` or ``solo``.
-        concurrency: Jobs at once.
+        concurrency: Jobs at once; in a pool of threads, of one owner (see `owner_slots`).
         make_handler: Makes the stage handler from a process' connections.
         make_others: Makes what else it does: functions of an id, by queue.
         versions: Versions of what it runs.
@@ -63,9 +65,15 @@ class _Runtime:
         self.id = f"{spec.kind}@{socket.gethostname()}:{os.getpid()}"
         self._spec = spec
         self.keeper = LeaseKeeper(self.context.store.leases, self.report)
-        self.others = spec.make_others(self.context)
+        self.others = {
+            queue: SideWork(work) for queue, work in spec.make_others(self.context).items()
+        }
         self.runner = JobRunner(
-            self.context.store.leases, spec.make_handler(self.context), self.keeper, self.id
+            self.context.store.leases,
+            spec.make_handler(self.context),
+            self.keeper,
+            self.id,
+            OwnerSlots(spec.concurrency if spec.pool == THREADS else 1),
         )
 
     def report(self) -> None:
@@ -87,6 +95,13 @@ class _Runtime:
         self.report()
         self.keeper.start()
 
+    def begin_stop(self) -> None:
+        """Takes no further job and breaks off those at hand, so that the process can end."""
+        self.runner.stop()
+        for other in self.others.values():
+            other.stop()
+        self.keeper.stop()
+
     def stop(self) -> None:
         """Hands leases back, leaves the register and closes the connections."""
         self.keeper.stop()
@@ -102,6 +117,7 @@ def run_worker(spec: WorkerSpec, settings: Settings) -> None:
         StartupError: The database has another schema, or the settings are incomplete.
     """
     set_up_logs(settings.log_level)
+    end_with_parent()
     context = _checked_context(settings)
     runtimes: dict[int, _Runtime] = {}
     reaper = Reaper(context)
@@ -109,6 +125,7 @@ def run_worker(spec: WorkerSpec, settings: Settings) -> None:
     def start() -> None:
         if spec.pool == FORKING_POOL:
             die_with_parent(signal.SIGKILL)
+            end_with_parent(os.getppid())
         runtimes[os.getpid()] = runtime = _Runtime(spec, settings)
         runtime.start()
 
@@ -117,20 +134,34 @@ def run_worker(spec: WorkerSpec, settings: Settings) -> None:
         if runtime is not None:
             runtime.stop()
 
+    def stopping() -> None:
+        runtime = runtimes.get(os.getpid())
+        if runtime is not None:
+            runtime.begin_stop()
+
     def process_next(queue: str, job_id: str) -> None:
         runtime = runtimes[os.getpid()]
         if queue in runtime.others:
-            runtime.others[queue](job_id)
+            runtime.others[queue].do(job_id)
+        elif spec.pool == THREADS:
+            runtime.runner.process_all(queue, job_id)
         else:
             runtime.runner.process_next(queue, job_id)
 
-    callbacks = Callbacks(process_next=process_next, start=start, stop=stop, ready=reaper.start)
+    callbacks = Callbacks(
+        process_next=process_next,
+        start=start,
+        stop=stop,
+        stopping=stopping,
+        ready=reaper.start,
+    )
+    threads = spec.pool == THREADS
     try:
         code = consume(
             context.queues,
             spec.queues,
             pool=spec.pool,
-            concurrency=spec.concurrency,
+            concurrency=OwnerSlots(spec.concurrency).total if threads else spec.concurrency,
             callbacks=callbacks,
         )
     finally:

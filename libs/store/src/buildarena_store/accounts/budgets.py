@@ -17,7 +17,7 @@ from sqlalchemy import Connection, and_, func, literal, or_, select, update
 from sqlalchemy.dialects.postgresql import insert
 
 from buildarena_store.database import Database
-from buildarena_store.jobs.journal import Usage
+from buildarena_store.jobs.journal import MAX_USD, Usage
 from buildarena_store.jobs.leases import Lease
 from buildarena_store.tables import budgets, jobs, journal, reservations, sweep_jobs
 
@@ -172,7 +172,7 @@ class Budgets:
                 update(budgets)
                 .where(budgets.c.id.in_(paying))
                 .values(
-                    spent_cost_usd=budgets.c.spent_cost_usd + usage.cost_usd,
+                    spent_cost_usd=func.least(budgets.c.spent_cost_usd + usage.cost_usd, MAX_USD),
                     spent_tokens=budgets.c.spent_tokens + usage.input_tokens + usage.output_tokens,
                     spent_requests=budgets.c.spent_requests + usage.requests,
                 )

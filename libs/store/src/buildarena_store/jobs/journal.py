@@ -49,6 +49,12 @@ class Usage:
         )
 
 
+GARBAGE = "garbage"
+"""Finish word of an answer that can't be read."""
+OUT_OF_TIME = "out_of_time"
+"""Finish word of a request that was broken off because the job's time was over."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JournalEntry:
     """One model request and its reply.
@@ -77,6 +83,14 @@ class JournalEntry:
     provider_request_id: str | None = None
     created_at: datetime | None = None
 
+    @property
+    def answers(self) -> bool:
+        """Whether a session goes on with its reply; otherwise it only counts and was paid for."""
+        return self.reply.get("finish") not in {GARBAGE, OUT_OF_TIME}
+
+
+MAX_USD = 99_999_999
+"""Sums stop here: what a provider claims to have used must not make a column overflow."""
 
 # One statement, because it is the one that every turn of every session waits for.
 _APPEND = text(
@@ -88,8 +102,8 @@ _APPEND = text(
             output_tokens = output_tokens + :output_tokens,
             cached_tokens = cached_tokens + :cached_tokens,
             reasoning_tokens = reasoning_tokens + :reasoning_tokens,
-            cost_usd = cost_usd + :cost_usd,
-            faults = 0
+            cost_usd = LEAST(cost_usd + :cost_usd, {MAX_USD}),
+            faults = CASE WHEN :answers THEN 0 ELSE faults END
         WHERE id = :job_id AND lease_token = :token AND state = '{JobState.RUNNING}'
         RETURNING id, payer, owner
     ), settled AS (
@@ -99,7 +113,7 @@ _APPEND = text(
         ORDER BY budgets.id FOR UPDATE OF budgets
     ), charged AS (
         UPDATE budgets SET
-            spent_cost_usd = spent_cost_usd + :cost_usd,
+            spent_cost_usd = LEAST(spent_cost_usd + :cost_usd, {MAX_USD}),
             spent_tokens = spent_tokens + :input_tokens + :output_tokens,
             spent_requests = spent_requests + :requests
         FROM paying WHERE budgets.id = paying.id
@@ -132,7 +146,8 @@ class Journal:
     def append(self, lease: Lease, entry: JournalEntry) -> None:
         """Writes a reply and charges its usage to the job and its budgets, all or nothing.
 
-        A job that makes progress is not given up for the faults it met before.
+        A job that makes progress is not given up for the faults it met before; what is no answer
+        is no progress.
 
         Raises:
             StaleLeaseError: The lease is over; nothing was written.
@@ -144,6 +159,7 @@ class Journal:
                 {
                     "job_id": lease.job.id,
                     "token": lease.token,
+                    "answers": entry.answers,
                     "sequence": entry.sequence,
                     "stage": entry.stage,
                     "role": entry.role,

@@ -16,6 +16,7 @@ from sqlalchemy import (
     Boolean,
     ColumnElement,
     Connection,
+    and_,
     case,
     column,
     literal,
@@ -62,11 +63,32 @@ class Lease:
         return self.token == 1
 
 
-# One statement each, because every stage of every job waits for them.
-_WAITS = f"state = '{JobState.QUEUED}' AND queue = :queue AND available_at <= clock_timestamp()"
+OPERATOR = ""
+"""Who owns the jobs that no API key submitted."""
+
+# One statement each, because every stage of every job waits for them. The distinct owners of a
+# queue are found in steps along the index, one probe each, however many jobs an owner has.
+_OWNER = "COALESCE(owner, '')"
+_QUEUED = f"state = '{JobState.QUEUED}' AND queue = :queue"
+_WAITS = f"{_QUEUED} AND available_at <= clock_timestamp()"
+_ROOM = f"{_OWNER} <> ALL(CAST(:full AS text[]))"
 _CLAIM = text(
     f"""
-    WITH taken AS (
+    WITH RECURSIVE owners (name) AS (
+        (SELECT {_OWNER} FROM jobs WHERE {_QUEUED} ORDER BY {_OWNER} LIMIT 1)
+        UNION ALL
+        SELECT (
+            SELECT {_OWNER} FROM jobs WHERE {_QUEUED} AND {_OWNER} > owners.name
+            ORDER BY {_OWNER} LIMIT 1
+        ) FROM owners WHERE owners.name IS NOT NULL
+    ), turns AS MATERIALIZED (
+        SELECT name FROM owners
+        WHERE name IS NOT NULL AND name <> ALL(CAST(:full AS text[]))
+        ORDER BY
+            name IS NOT DISTINCT FROM CAST(:last AS text),
+            name < COALESCE(CAST(:last AS text), ''),
+            name
+    ), taken AS (
         UPDATE jobs SET
             state = '{JobState.RUNNING}',
             lease_owner = :owner,
@@ -74,12 +96,16 @@ _CLAIM = text(
             lease_expires_at = clock_timestamp() + :duration,
             started_at = COALESCE(started_at, clock_timestamp())
         WHERE id = COALESCE(
-            (SELECT id FROM jobs WHERE {_WAITS} AND faults > 0
+            (SELECT id FROM jobs WHERE {_WAITS} AND faults > 0 AND {_ROOM}
              ORDER BY created_at, id LIMIT 1 FOR UPDATE SKIP LOCKED),
-            (SELECT id FROM jobs WHERE {_WAITS} AND id = CAST(:hint AS text)
+            (SELECT id FROM jobs WHERE {_WAITS} AND id = CAST(:hint AS text) AND {_ROOM}
+             AND ({_OWNER} IS DISTINCT FROM CAST(:last AS text)
+                  OR NOT EXISTS (SELECT FROM turns WHERE name IS DISTINCT FROM :last))
              FOR UPDATE SKIP LOCKED),
-            (SELECT id FROM jobs WHERE {_WAITS}
-             ORDER BY created_at, id LIMIT 1 FOR UPDATE SKIP LOCKED)
+            (SELECT oldest.id FROM turns CROSS JOIN LATERAL (
+                SELECT id FROM jobs WHERE {_WAITS} AND {_OWNER} = turns.name
+                ORDER BY created_at, id LIMIT 1 FOR UPDATE SKIP LOCKED
+             ) AS oldest LIMIT 1)
         )
         RETURNING *
     ), attempted AS (
@@ -112,18 +138,38 @@ class Leases:
         self.duration = timedelta(seconds=duration_s)
         self._max_faults = max_faults
 
-    def claim(self, queue: str, *, owner: str, hint: str | None = None) -> Lease | None:
+    def claim(
+        self,
+        queue: str,
+        *,
+        owner: str,
+        hint: str | None = None,
+        full: Sequence[str] = (),
+        last: str | None = None,
+    ) -> Lease | None:
         """Takes a waiting job of a queue: a recovered one first, then the hinted, then the oldest.
+
+        Owners take turns: a job of the owner that had the last turn is only taken when no other
+        owner has one.
 
         Args:
             queue: Queue name.
             owner: The worker's id.
             hint: The job that a message named.
+            full: Owners whose jobs may not be taken now.
+            last: The owner whose job was taken last.
 
         Returns:
             The lease, or None when nothing waits.
         """
-        given = {"queue": queue, "owner": owner, "hint": hint, "duration": self.duration}
+        given = {
+            "queue": queue,
+            "owner": owner,
+            "hint": hint,
+            "duration": self.duration,
+            "full": list(full),
+            "last": last,
+        }
         with self._database.statement() as connection:
             row = connection.execute(_CLAIM, given).first()
         if row is None:
@@ -140,18 +186,21 @@ class Leases:
         """
         if not leases:
             return {}
-        pairs = [(lease.job.id, lease.token) for lease in leases]
-        paying = select(budgets).where(budgets.c.id.in_([jobs.c.payer, jobs.c.owner]))
         with self._database.statement() as connection:
             rows = connection.execute(
                 update(jobs)
-                .where(
-                    jobs.c.state == JobState.RUNNING,
-                    tuple_(jobs.c.id, jobs.c.lease_token).in_(pairs),
-                )
+                .where(_among(leases))
                 .values(lease_expires_at=events.now + self.duration)
-                .returning(jobs.c.id, paying.exists().label("budgeted"))
+                .returning(jobs.c.id, _BUDGETED)
             )
+            return {row.id: row.budgeted for row in rows}
+
+    def held(self, leases: Sequence[Lease]) -> dict[str, bool]:
+        """Says what `heartbeat` says, without renewing anything: it only reads."""
+        if not leases:
+            return {}
+        with self._database.statement() as connection:
+            rows = connection.execute(select(jobs.c.id, _BUDGETED).where(_among(leases)))
             return {row.id: row.budgeted for row in rows}
 
     def advance(
@@ -350,6 +399,16 @@ class Leases:
                 .returning(jobs.c.id)
             )
             return [row.id for row in rows]
+
+
+_BUDGETED = (
+    select(budgets).where(budgets.c.id.in_([jobs.c.payer, jobs.c.owner])).exists().label("budgeted")
+)
+
+
+def _among(leases: Sequence[Lease]) -> ColumnElement[bool]:
+    pairs = [(lease.job.id, lease.token) for lease in leases]
+    return and_(jobs.c.state == JobState.RUNNING, tuple_(jobs.c.id, jobs.c.lease_token).in_(pairs))
 
 
 def _valid(lease: Lease) -> tuple[ColumnElement[bool], ...]:

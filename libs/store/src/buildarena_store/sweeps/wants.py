@@ -28,11 +28,10 @@ from sqlalchemy import (
 )
 from sqlalchemy.dialects.postgresql import distinct_on, insert
 
+from buildarena_store.jobs.leases import OPERATOR
 from buildarena_store.states import JobState, Outcome, SweepState
 from buildarena_store.tables import job_wants, jobs, sweep_jobs, sweeps
 
-OPERATOR: Final = ""
-"""How the operator, who has no key, is written in a primary key."""
 UNSCORED: Final = (jobs.c.state != JobState.DONE) | (jobs.c.outcome == Outcome.ERRORED)
 """Jobs that may still cost something: those that go on, and those that can be retried."""
 

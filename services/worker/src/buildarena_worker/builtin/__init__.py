@@ -12,6 +12,7 @@ from buildarena_pipeline.errors import PermanentError
 from buildarena_store import Usage
 from buildarena_worker.builtin import expert, idle, random_builder
 from buildarena_worker.session.messages import Answer, Reply, Request
+from buildarena_worker.session.patience import ENDLESS, Patience
 
 MODELS = {"expert": expert.reply, "random": random_builder.reply, "idle": idle.reply}
 CHARACTERS_PER_TOKEN = 4
@@ -35,8 +36,9 @@ class BuiltinClient:
             )
         self._reply = MODELS[name]
 
-    def complete(self, request: Request) -> Answer:
+    def complete(self, request: Request, patience: Patience = ENDLESS) -> Answer:
         """The model's reply; tokens are estimated from the length of the texts, at no cost."""
+        del patience
         reply = self._reply(request)
         usage = Usage(
             requests=1,

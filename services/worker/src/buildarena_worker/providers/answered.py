@@ -6,6 +6,7 @@ import json
 from dataclasses import dataclass
 from typing import Any
 
+from buildarena_worker.providers.bounds import count_of
 from buildarena_worker.session.messages import Reply, ToolCall
 
 
@@ -24,6 +25,20 @@ class TokenCounts:
     output: int = 0
     cached: int = 0
     reasoning: int = 0
+
+    @staticmethod
+    def bounded(sent: Any, received: Any, cached: Any, reasoning: Any) -> TokenCounts:
+        """Counts as a provider gave them: what is none is 0, a part is at most its whole.
+
+        Reasoning is the exception: some providers do not count it as output.
+        """
+        whole = count_of(sent)
+        return TokenCounts(
+            input=whole,
+            output=count_of(received),
+            cached=count_of(cached, whole),
+            reasoning=count_of(reasoning),
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,13 +63,3 @@ def arguments_text(call: ToolCall) -> str:
     """
     arguments = call.arguments if isinstance(call.arguments, dict) else {"text": call.arguments}
     return json.dumps(arguments, ensure_ascii=False, separators=(",", ":"))
-
-
-def arguments_of(raw: Any) -> Any:
-    """What a model gave as a call's arguments: an object, or text that is not valid JSON."""
-    if not isinstance(raw, str):
-        return {} if raw is None else raw
-    try:
-        return json.loads(raw) if raw.strip() else {}
-    except ValueError:
-        return raw

@@ -5,12 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from enum import StrEnum
 
+from buildarena_worker.providers.answered import TokenCounts
+
 
 class Failure(StrEnum):
     """Kinds of failures; what follows from each is decided in `provider`."""
 
     OUTAGE = "outage"
-    """The provider can't be reached, is overloaded, or answers nonsense: worth another try."""
+    """The provider can't be reached or is overloaded: worth another try."""
+    GARBAGE = "garbage"
+    """The provider says that it answered, and may charge for it, but the answer can't be read."""
     CONTEXT_OVERFLOW = "context_overflow"
     """The conversation is longer than the model's context: the model's own failure."""
     CONTENT_FILTER = "content_filter"
@@ -27,6 +31,8 @@ RETRIED_STATUS = frozenset({408, 409, 425, 429, 500, 502, 503, 504, 520, 522, 52
 
 def failure_of_status(status: int) -> Failure:
     """What an HTTP status means when nothing else is known."""
+    if 300 <= status < 400:  # noqa: PLR2004 - HTTP's redirects
+        return Failure.REQUEST_REFUSED
     if status in {401, 403}:
         return Failure.BAD_CREDENTIALS
     if status == 404:  # noqa: PLR2004 - HTTP's not found
@@ -43,6 +49,7 @@ class ProviderError(Exception):
         failure: What kind of failure it is.
         overloaded: Whether the provider said that it gets too many requests.
         headers: The answer's headers in lower case, if there was an answer.
+        tokens: What the answer says it used, as far as that can be read.
     """
 
     def __init__(
@@ -52,8 +59,19 @@ class ProviderError(Exception):
         *,
         overloaded: bool = False,
         headers: Mapping[str, str] | None = None,
+        tokens: TokenCounts | None = None,
     ) -> None:
         super().__init__(message)
         self.failure = failure
         self.overloaded = overloaded
         self.headers = headers
+        self.tokens = tokens or TokenCounts()
+
+
+def redirected(status: int, location: str | None) -> ProviderError:
+    """A redirect, which is never followed: the API key is for the configured address alone."""
+    return ProviderError(
+        f"HTTP {status}: the provider redirects to {location or 'nowhere'}, which is not followed: "
+        "set its base_url to where its API is",
+        Failure.REQUEST_REFUSED,
+    )

@@ -37,9 +37,10 @@ from buildarena_pipeline.catalog.models import ModelEntry, ProviderEntry
 from buildarena_worker.providers.answered import (
     Answered,
     TokenCounts,
-    arguments_of,
     arguments_text,
 )
+from buildarena_worker.providers.bounded_http import RECEIVED, BoundedClient, Received
+from buildarena_worker.providers.bounds import MAX_CALLS, MAX_NAME, arguments_of, bounded
 from buildarena_worker.providers.failures import RETRIED_STATUS, Failure, ProviderError
 from buildarena_worker.session.messages import Message, Reply, Request, Tool, ToolCall
 
@@ -78,6 +79,8 @@ class LibrarySender:
         Raises:
             ProviderError: The provider says no, can't be reached, or answers nonsense.
         """
+        received = Received()
+        RECEIVED.set(received)
         try:
             response = await model_request(
                 next(self._models),
@@ -85,9 +88,10 @@ class LibrarySender:
                 model_settings=self._settings(request),
                 model_request_parameters=request_parameters(request.tools),
             )
+            return from_wire(response)
         except Exception as error:
-            raise _translated(error) from error
-        return from_wire(response)
+            received.require_usable()
+            raise _translated(error, received) from error
 
     async def close(self) -> None:
         """Closes the connections."""
@@ -125,23 +129,34 @@ def _anthropic(entry: ModelEntry, provider: ProviderEntry, key: str) -> Connecte
     from pydantic_ai.models.anthropic import AnthropicModel
     from pydantic_ai.providers.anthropic import AnthropicProvider
 
-    client = AsyncAnthropic(base_url=provider.base_url, api_key=key, max_retries=0)
+    client = AsyncAnthropic(
+        base_url=provider.base_url,
+        api_key=key,
+        max_retries=0,
+        http_client=BoundedClient(timeout=None),  # the retry policy's own timeout rules
+        timeout=None,
+    )
     model = AnthropicModel(entry.model, provider=AnthropicProvider(anthropic_client=client))
     return model, client.close
 
 
 def _google(entry: ModelEntry, provider: ProviderEntry, key: str) -> Connected:
-    from httpx2 import AsyncClient
     from pydantic_ai.models.google import GoogleModel
     from pydantic_ai.providers.google import GoogleProvider
 
-    http = AsyncClient(timeout=None)  # the retry policy's own timeout rules
+    http = BoundedClient(timeout=None)  # the retry policy's own timeout rules
     google = GoogleProvider(api_key=key, base_url=provider.base_url, http_client=http)
     return GoogleModel(entry.model, provider=google), http.aclose
 
 
-def _translated(error: Exception) -> ProviderError:
-    """A library's error in our words."""
+def _translated(error: Exception, received: Received) -> ProviderError:
+    """A library's error in our words; where there was an answer, it could not be read."""
+    if received.succeeded and not isinstance(error, tuple(kind for kind, _ in FAILURES)):
+        return ProviderError(
+            f"the answer can't be read: {type(error).__name__}: {error}",
+            Failure.GARBAGE,
+            tokens=received.tokens(),
+        )
     status = error.status_code if isinstance(error, ModelHTTPError) else None
     named = [failure for kind, failure in FAILURES if isinstance(error, kind)]
     refused = status is not None and status not in RETRIED_STATUS
@@ -216,15 +231,16 @@ def from_wire(response: ModelResponse) -> Answered:
         ToolCall(id=part.tool_call_id, name=part.tool_name, arguments=arguments_of(part.args))
         for part in response.parts
         if isinstance(part, ToolCallPart)
-    )
+    )[:MAX_CALLS]
     finish, used = response.finish_reason, response.usage
+    named = response.provider_response_id
     return Answered(
-        reply=Reply(text=text, calls=calls, finish=FINISH.get(finish, finish or "stop")),
-        tokens=TokenCounts(
-            input=used.input_tokens,
-            output=used.output_tokens,
-            cached=used.cache_read_tokens,
-            reasoning=int(used.details.get("reasoning_tokens", 0)) if used.details else 0,
+        reply=bounded(Reply(text=text, calls=calls, finish=FINISH.get(finish, finish or "stop"))),
+        tokens=TokenCounts.bounded(
+            used.input_tokens,
+            used.output_tokens,
+            used.cache_read_tokens,
+            used.details.get("reasoning_tokens") if used.details else 0,
         ),
-        response_id=response.provider_response_id,
+        response_id=None if named is None else str(named)[:MAX_NAME],
     )

@@ -15,10 +15,17 @@ from typing import Any
 
 from genai_prices.data_snapshot import get_snapshot
 
-from buildarena_worker.providers.answered import Answered, TokenCounts, arguments_of
-from buildarena_worker.providers.failures import Failure, ProviderError, failure_of_status
+from buildarena_worker.providers.answered import Answered, TokenCounts
+from buildarena_worker.providers.bounds import MAX_CALLS, MAX_NAME, arguments_of, bounded
+from buildarena_worker.providers.failures import (
+    Failure,
+    ProviderError,
+    failure_of_status,
+    redirected,
+)
 from buildarena_worker.session.messages import Reply, ToolCall
 
+UNREADABLE = (ValueError, KeyError, IndexError, TypeError, AttributeError, RecursionError)
 FINISH = {"length": "length", "content_filter": "content_filter"}
 """Reasons to stop that say more than that the model was done."""
 THINKING, THOUGHT = "<think>", "</think>"
@@ -65,15 +72,20 @@ class AnswerReader:
         Raises:
             ProviderError: It is an error, or not an answer to a chat.
         """
+        if HTTPStatus.MULTIPLE_CHOICES <= status < HTTPStatus.BAD_REQUEST:
+            raise redirected(status, headers.get("location"))
         if status >= HTTPStatus.BAD_REQUEST:
             raise read_error(status, headers, text)
+        answer = None
         try:
-            return self._answered(json.loads(text))
-        except (ValueError, KeyError, IndexError, TypeError, AttributeError) as error:
+            answer = json.loads(text)
+            return self._answered(answer)
+        except UNREADABLE as error:
             raise ProviderError(
                 f"the answer (HTTP {status}) is not a chat completion: "
                 f"{type(error).__name__}: {error}",
-                Failure.OUTAGE,
+                Failure.GARBAGE,
+                tokens=self._used_in(answer),
             ) from error
 
     def _answered(self, answer: Any) -> Answered:
@@ -81,25 +93,31 @@ class AnswerReader:
             raise KeyError("model")
         response_id = answer["id"]
         return Answered(
-            reply=_reply(answer["choices"][0]),
-            tokens=self._tokens(answer.get("usage") or {}),
-            response_id=None if response_id is None else str(response_id),
+            reply=bounded(_reply(answer["choices"][0])),
+            tokens=self._used_in(answer),
+            response_id=None if response_id is None else str(response_id)[:MAX_NAME],
         )
+
+    def _used_in(self, answer: Any) -> TokenCounts:
+        usage = answer.get("usage") if isinstance(answer, dict) else None
+        try:
+            return self._tokens(usage) if isinstance(usage, dict) else TokenCounts()
+        except UNREADABLE:
+            return TokenCounts()
 
     def _tokens(self, usage: Mapping[str, Any]) -> TokenCounts:
         """What was used; nothing where the provider's figures can't be read."""
-        details = usage.get("completion_tokens_details") or {}
-        reasoning = details.get("reasoning_tokens")
-        reasoning = reasoning if isinstance(reasoning, int) else 0
+        details = usage.get("completion_tokens_details")
+        reasoning = details.get("reasoning_tokens") if isinstance(details, dict) else 0
         given = {"model": "", "usage": _without_nulls(usage)}
         for counter in self._counters:
             # Not every provider that is known is known to speak this wire.
             with suppress(ValueError, LookupError, TypeError):
                 _, used = counter.extract_usage(given, api_flavor="chat")
-                counts = used.input_tokens, used.output_tokens, used.cache_read_tokens
-                sent, received, cached = (n if isinstance(n, int) else 0 for n in counts)
-                return TokenCounts(input=sent, output=received, cached=cached, reasoning=reasoning)
-        return TokenCounts(reasoning=reasoning)
+                return TokenCounts.bounded(
+                    used.input_tokens, used.output_tokens, used.cache_read_tokens, reasoning
+                )
+        return TokenCounts()
 
 
 def _without_nulls(usage: Mapping[str, Any]) -> dict[str, Any]:
@@ -119,7 +137,7 @@ def _reply(choice: Mapping[str, Any]) -> Reply:
         return Reply(text="", finish="content_filter")
     return Reply(
         text=_spoken(_content(message.get("content") or "")),
-        calls=tuple(_call(call) for call in message.get("tool_calls") or ()),
+        calls=tuple(_call(call) for call in (message.get("tool_calls") or ())[:MAX_CALLS]),
         finish=FINISH.get(finish or "stop", "stop"),
     )
 
@@ -139,14 +157,15 @@ def _content(content: Any) -> str:
 
 def _spoken(text: str) -> str:
     """The text without the thoughts that are marked in it; thoughts without an end are text."""
-    spoken = ""
-    while THINKING in text:
-        before, text = text.split(THINKING, 1)
-        spoken += before
-        if THOUGHT not in text:
-            return spoken + text
-        text = text.split(THOUGHT, 1)[1]
-    return spoken + text
+    spoken, place = [], 0
+    while (start := text.find(THINKING, place)) >= 0:
+        spoken.append(text[place:start])
+        place = start + len(THINKING)
+        end = text.find(THOUGHT, place)
+        if end < 0:
+            break
+        place = end + len(THOUGHT)
+    return "".join(spoken) + text[place:]
 
 
 def _call(call: Mapping[str, Any]) -> ToolCall:
@@ -165,7 +184,7 @@ def read_error(status: int, headers: Mapping[str, str], text: bytes) -> Provider
     words = text.decode(errors="replace")
     try:
         body = json.loads(words)
-    except ValueError:
+    except (ValueError, RecursionError):
         body = None
     error = body.get("error", body) if isinstance(body, dict) else None
     error = error if isinstance(error, dict) else {}

@@ -7,6 +7,7 @@ A construct process sends hundreds of requests a second, for which a general lib
 from __future__ import annotations
 
 import os
+from http import HTTPStatus
 from urllib.parse import urlsplit
 from urllib.request import getproxies, proxy_bypass
 
@@ -14,6 +15,7 @@ import aiohttp
 
 from buildarena_pipeline import __version__
 from buildarena_worker.providers.answered import Answered
+from buildarena_worker.providers.bounds import MAX_BODY
 from buildarena_worker.providers.failures import Failure, ProviderError
 from buildarena_worker.providers.openai_answer import AnswerReader
 from buildarena_worker.providers.openai_request import RequestWriter
@@ -64,9 +66,12 @@ class OpenAIChat:
         """
         try:
             async with self._session().post(
-                self._endpoint, data=self._writer.body(request), headers=self._headers
+                self._endpoint,
+                data=self._writer.body(request),
+                headers=self._headers,
+                allow_redirects=False,
             ) as answer:
-                text = await answer.read()
+                text = await _body(answer)
         except (aiohttp.ClientError, OSError) as error:
             detail = str(error) or type(error).__name__
             raise ProviderError(f"no connection: {detail}", Failure.OUTAGE) from error
@@ -87,6 +92,19 @@ class OpenAIChat:
                 proxy=self._proxy,
             )
         return self._http
+
+
+async def _body(answer: aiohttp.ClientResponse) -> bytes:
+    parts, size = [], 0
+    async for part in answer.content.iter_any():
+        parts.append(part)
+        size += len(part)
+        if size > MAX_BODY:
+            answer.close()
+            if answer.status >= HTTPStatus.MULTIPLE_CHOICES:
+                break
+            raise ProviderError(f"the answer is longer than {MAX_BODY:,} bytes", Failure.GARBAGE)
+    return b"".join(parts)
 
 
 def _proxy_for(url: str) -> str | None:

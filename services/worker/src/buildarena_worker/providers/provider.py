@@ -7,6 +7,7 @@ threads, wait for their answers there.
 from __future__ import annotations
 
 import asyncio
+import math
 import os
 import random
 import time
@@ -17,13 +18,15 @@ from buildarena_pipeline.catalog.models import ModelEntry, ProviderEntry
 from buildarena_pipeline.catalog.prices import price_usd
 from buildarena_pipeline.errors import PermanentError, TransientError
 from buildarena_store import Usage
-from buildarena_worker.providers.answered import Answered
+from buildarena_store.jobs.journal import GARBAGE, OUT_OF_TIME
+from buildarena_worker.providers.answered import Answered, TokenCounts
 from buildarena_worker.providers.failures import Failure, ProviderError
 from buildarena_worker.providers.request_loop import RequestLoop
 from buildarena_worker.providers.retries import RetryPolicy
 from buildarena_worker.providers.senders import sender_for
 from buildarena_worker.providers.throttle import Throttle
 from buildarena_worker.session.messages import Answer, Reply, Request
+from buildarena_worker.session.patience import ENDLESS, Patience
 
 log = structlog.get_logger(__name__)
 
@@ -59,14 +62,19 @@ class ProviderClient:
         self._sender = sender_for(entry, provider, self._key)
         self._rng = random.Random()  # noqa: S311 - spreads retries, guards nothing
 
-    def complete(self, request: Request) -> Answer:
+    def complete(self, request: Request, patience: Patience = ENDLESS) -> Answer:
         """Asks the model, with the policy's retries.
 
+        Args:
+            request: What is asked.
+            patience: How long to wait, with all retries.
+
         Raises:
+            CancelledError: The lease was lost.
             TransientError: The provider failed through all tries.
             PermanentError: The provider refuses the key, the model or the account.
         """
-        return REQUESTS.run(self._complete(request))
+        return REQUESTS.run(self._in_time(request, patience.within_s), patience.active)
 
     def close(self) -> None:
         """Closes the connections to the provider."""
@@ -77,6 +85,15 @@ class ProviderClient:
 
         REQUESTS.run(close())
 
+    async def _in_time(self, request: Request, within_s: float) -> Answer:
+        started = time.monotonic()
+        try:
+            async with asyncio.timeout(within_s if math.isfinite(within_s) else None):
+                return await self._complete(request)
+        except TimeoutError:
+            detail = f"the job's time was over after {within_s:.3g} s"
+            return _empty(OUT_OF_TIME, detail, time.monotonic() - started, 1)
+
     async def _complete(self, request: Request) -> Answer:
         started = time.monotonic()
         for tries in range(1, self._policy.tries + 1):
@@ -85,8 +102,12 @@ class ProviderClient:
             except (ProviderError, TimeoutError) as error:
                 failure = error.failure if isinstance(error, ProviderError) else Failure.OUTAGE
                 detail = _first_line(error, self._key)
+                latency_s = time.monotonic() - started
                 if failure in OWN_FAILURES:
-                    return _own_failure(failure, detail, time.monotonic() - started, tries)
+                    return _empty(failure.value, "", latency_s, tries, detail=detail)
+                if isinstance(error, ProviderError) and failure is Failure.GARBAGE:
+                    usage = self._usage(error.tokens)
+                    return _empty(GARBAGE, detail, latency_s, tries, usage=usage)
                 if failure is not Failure.OUTAGE:
                     message = f"{self._entry.name}: {detail}"
                     raise PermanentError(message, reason=failure.value) from error
@@ -118,8 +139,16 @@ class ProviderClient:
             return answered
 
     def _answer(self, answered: Answered, latency_s: float, tries: int) -> Answer:
-        tokens = answered.tokens
-        usage = Usage(
+        return Answer(
+            reply=answered.reply,
+            usage=self._usage(answered.tokens),
+            latency_s=latency_s,
+            tries=tries,
+            provider_request_id=answered.response_id,
+        )
+
+    def _usage(self, tokens: TokenCounts) -> Usage:
+        return Usage(
             requests=1,
             input_tokens=tokens.input,
             output_tokens=tokens.output,
@@ -131,13 +160,6 @@ class ProviderClient:
                 output_tokens=tokens.output,
                 cached_tokens=tokens.cached,
             ),
-        )
-        return Answer(
-            reply=answered.reply,
-            usage=usage,
-            latency_s=latency_s,
-            tries=tries,
-            provider_request_id=answered.response_id,
         )
 
 
@@ -152,10 +174,20 @@ def _key_of(entry: ModelEntry, provider: ProviderEntry) -> str:
     return key
 
 
-def _own_failure(failure: Failure, detail: str, latency_s: float, tries: int) -> Answer:
-    log.info("model_failure", finish=failure.value, detail=detail)
-    reply = Reply(text="", finish=failure.value)
-    return Answer(reply=reply, usage=Usage(requests=1), latency_s=latency_s, tries=tries)
+def _empty(
+    finish: str,
+    text: str,
+    latency_s: float,
+    tries: int,
+    *,
+    usage: Usage = Usage(requests=1),  # noqa: B008 - frozen
+    detail: str | None = None,
+) -> Answer:
+    """An answer without a reply that a session could go on with."""
+    log.info("model_failure", finish=finish, detail=detail or text)
+    return Answer(
+        reply=Reply(text=text, finish=finish), usage=usage, latency_s=latency_s, tries=tries
+    )
 
 
 def _first_line(error: Exception, key: str) -> str:

@@ -5,7 +5,10 @@ from __future__ import annotations
 import asyncio
 import threading
 from collections.abc import Coroutine
+from contextlib import nullcontext
 from typing import Any, TypeVar
+
+from buildarena_pipeline.runtime.active_lease import ActiveLease
 
 Result = TypeVar("Result")
 
@@ -19,9 +22,19 @@ class RequestLoop:
         # fail because their locks belong to another loop.
         self._starting = threading.Lock()
 
-    def run(self, work: Coroutine[Any, Any, Result]) -> Result:
-        """The result of work on the loop; the calling thread waits for it."""
-        return asyncio.run_coroutine_threadsafe(work, self._started()).result()
+    def run(self, work: Coroutine[Any, Any, Result], active: ActiveLease | None = None) -> Result:
+        """The result of work on the loop; the calling thread waits for it.
+
+        Args:
+            work: What is to be done.
+            active: The lease that it is done under.
+
+        Raises:
+            CancelledError: The lease was lost; the work ends at once, wherever it waits.
+        """
+        future = asyncio.run_coroutine_threadsafe(work, self._started())
+        with nullcontext() if active is None else active.calling(future.cancel):
+            return future.result()
 
     def _started(self) -> asyncio.AbstractEventLoop:
         with self._starting:

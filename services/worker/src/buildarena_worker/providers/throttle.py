@@ -86,6 +86,7 @@ class Throttle:
         self._taken: set[str] = set()
         self._spare: deque[tuple[str, float]] = deque()
         self._renewing: asyncio.Task[None] | None = None
+        self._closed = False
 
     @asynccontextmanager
     async def slot(self) -> AsyncIterator[Slot]:
@@ -107,6 +108,7 @@ class Throttle:
         """Gives all slots back and closes the connection."""
         if self._store is None:
             return
+        self._closed = True
         if self._renewing is not None:
             self._renewing.cancel()
             with suppress(asyncio.CancelledError):
@@ -123,6 +125,9 @@ class Throttle:
                 if await self._eval(store, _TAKE, slot_id, SLOT_TTL_S, self._start, standing):
                     self._add(store, slot_id)
                     return slot_id
+            except asyncio.CancelledError:  # it may have been taken all the same
+                store.execute_nowait("ZREM", self._keys[0], slot_id)
+                raise
             except Exception:  # noqa: BLE001 - the store has logged it
                 return None
             standing = "waiting"
@@ -145,6 +150,8 @@ class Throttle:
 
     def _return_spares(self, store: BatchedRedis) -> None:
         """Gives back the slots that nobody has wanted for a while."""
+        if self._closed:
+            return
         oldest = asyncio.get_running_loop().time() - SPARE_S
         while self._spare and self._spare[0][1] <= oldest:
             slot_id, _ = self._spare.popleft()

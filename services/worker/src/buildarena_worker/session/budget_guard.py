@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from decimal import Decimal
 
@@ -50,7 +49,7 @@ class BudgetGuard:
                 raise SessionEnded(BudgetExhausted(shortage=shortage))
             if self._active.lost:
                 raise SessionEnded(Superseded())
-            time.sleep(WAIT_S)
+            self._active.wait(WAIT_S)
 
     def charge_lost(self, usage: Usage) -> None:
         """Counts a reply that was paid for but came after the lease had ended."""

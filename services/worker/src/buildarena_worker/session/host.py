@@ -8,18 +8,27 @@ again: it gets the kept answers first.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import CancelledError
 from typing import Any, Protocol
 
 from buildarena_geometry import KeyPress, Machine
+from buildarena_pipeline.errors import TransientError
 from buildarena_pipeline.runtime.active_lease import ActiveLease
 from buildarena_pipeline.runtime.tracing import span
 from buildarena_simulation import Trajectory
 from buildarena_store import Journal, JournalEntry, RolloutRecord, StaleLeaseError, Usage, clean
+from buildarena_store.jobs.journal import OUT_OF_TIME
 from buildarena_worker.session.budget_guard import BudgetGuard
 from buildarena_worker.session.concurrency_gate import ConcurrencyGate
-from buildarena_worker.session.messages import ModelClient, Request
+from buildarena_worker.session.messages import Answer, ModelClient, Request
+from buildarena_worker.session.patience import Patience
 from buildarena_worker.session.results import Diverged, SessionEnded, Superseded, Suspended
 from buildarena_worker.session.spending import Spending
+
+GARBAGE_IN_A_ROW = 6
+"""After so many answers in a row that can't be read, the provider is taken to be out of order."""
+FIRST_WAIT_S = 0.25
+OUTAGE_DELAY_S = 30.0
 
 
 class SessionHost(Protocol):
@@ -80,14 +89,14 @@ class ReplayHost:
         return self._sequence
 
     @property
-    def exhausted(self) -> bool:
-        """Whether all kept replies were given."""
-        return self._sequence >= len(self._entries)
-
-    @property
     def usage(self) -> Usage:
         """What the given answers cost together."""
         return self._spending.usage
+
+    @property
+    def spending(self) -> Spending:
+        """What was used, and the limits on it."""
+        return self._spending
 
     def ask(self, request: Request, *, phase: str, role: str) -> JournalEntry:
         """The kept answer to a request.
@@ -97,19 +106,34 @@ class ReplayHost:
                 belongs to another request.
         """
         del phase, role
-        self.require_room()
-        if self.exhausted:
+        entry = self.kept(request)
+        if entry is None:
+            self.require_room()
             raise SessionEnded(Diverged(detail=f"the journal ends at entry {self._sequence}"))
-        entry = self._entries[self._sequence]
-        if entry.request_hash != request.hash:
-            raise SessionEnded(
-                Diverged(
-                    detail=f"entry {self._sequence} ({entry.stage}, {entry.role}) was asked "
-                    "otherwise: the session's code or prompts have changed since"
-                )
-            )
-        self.count(entry)
         return entry
+
+    def kept(self, request: Request) -> JournalEntry | None:
+        """The kept answer to a request, if there is one.
+
+        Entries that hold no answer are counted and passed over: it was asked again after them.
+
+        Raises:
+            SessionEnded: A limit is reached, or the answer belongs to another request.
+        """
+        while self._sequence < len(self._entries):
+            self.require_room()
+            entry = self._entries[self._sequence]
+            if entry.request_hash != request.hash:
+                raise SessionEnded(
+                    Diverged(
+                        detail=f"entry {self._sequence} ({entry.stage}, {entry.role}) was asked "
+                        "otherwise: the session's code or prompts have changed since"
+                    )
+                )
+            self.count(entry)
+            if entry.answers:
+                return entry
+        return None
 
     def require_room(self) -> None:
         """Checks that the job's limits allow one more request.
@@ -157,6 +181,7 @@ class LiveHost:
         active: The lease under which the session runs.
         guard: Reserves what a request may cost before it is sent.
         gate: Where the session gives up its place while it waits for a reply.
+        first_wait_s: Seconds to wait after an answer that can't be read; doubles with each.
     """
 
     def __init__(
@@ -168,6 +193,7 @@ class LiveHost:
         active: ActiveLease,
         guard: BudgetGuard,
         gate: ConcurrencyGate,
+        first_wait_s: float | None = None,
     ) -> None:
         self._kept = kept
         self._client = client
@@ -175,6 +201,7 @@ class LiveHost:
         self._active = active
         self._budget = guard
         self._gate = gate
+        self._first_wait_s = FIRST_WAIT_S if first_wait_s is None else first_wait_s
 
     def ask(self, request: Request, *, phase: str, role: str) -> JournalEntry:
         """The kept answer to a request if there is one, otherwise the model's.
@@ -183,18 +210,35 @@ class LiveHost:
             SessionEnded: The limits or the budget allow no more, the lease ended, or the kept
                 answer belongs to another request.
         """
-        if not self._kept.exhausted:
-            return self._kept.ask(request, phase=phase, role=role)
+        kept = self._kept.kept(request)
+        if kept is not None:
+            return kept
+        for failures in range(GARBAGE_IN_A_ROW):
+            self._kept.require_room()
+            entry = self._asked(request, failures, phase=phase, role=role)
+            if entry.answers:
+                return entry
         self._kept.require_room()
-        if self._active.lost:
-            raise SessionEnded(Superseded())
+        raise TransientError(
+            f"{GARBAGE_IN_A_ROW} answers in a row can't be read, the last: {entry.reply['text']}",
+            reason="provider_outage",
+            delay_s=OUTAGE_DELAY_S,
+        )
+
+    def _asked(self, request: Request, failures: int, *, phase: str, role: str) -> JournalEntry:
+        """What the model answered, kept; after answers that can't be read, a wait comes first."""
         sequence = self._kept.sequence
         with (
             span("model request", stage=phase, role=role, sequence=sequence),
             self._gate.released(),
         ):
+            waited_s = self._wait(failures)
+            self._require_held()
             self._budget.reserve(request)
-            answer = self._client.complete(request)
+            answer = self._answer(request, waited_s)
+        latency_s = waited_s + answer.latency_s
+        if answer.reply.finish == OUT_OF_TIME:
+            latency_s = self._kept.spending.to_the_end(latency_s)
         entry = JournalEntry(
             sequence=sequence,
             stage=phase,
@@ -202,13 +246,36 @@ class LiveHost:
             request_hash=request.hash,
             reply=clean(answer.reply.to_json()),
             usage=answer.usage,
-            latency_s=answer.latency_s,
+            latency_s=latency_s,
             tries=answer.tries,
-            provider_request_id=answer.provider_request_id,
+            provider_request_id=clean(answer.provider_request_id),
         )
         self._keep(entry)
         self._kept.count(entry)
         return entry
+
+    def _wait(self, failures: int) -> float:
+        """Waits after so many answers that can't be read; returns how long."""
+        if not failures:
+            return 0.0
+        wait_s: float = min(
+            self._first_wait_s * 2 ** (failures - 1), self._kept.spending.seconds_left
+        )
+        self._active.wait(wait_s)
+        return wait_s
+
+    def _answer(self, request: Request, waited_s: float) -> Answer:
+        left_s = self._kept.spending.seconds_left - waited_s
+        patience = Patience(within_s=left_s, active=self._active)
+        try:
+            return self._client.complete(request, patience)
+        except CancelledError:
+            self._require_held()
+            raise
+
+    def _require_held(self) -> None:
+        if self._active.lost:
+            raise SessionEnded(Superseded())
 
     def _keep(self, entry: JournalEntry) -> None:
         try:

@@ -12,6 +12,7 @@ from typing import Any, Protocol
 
 from buildarena_store import Usage
 from buildarena_store.ids import content_hash
+from buildarena_worker.session.patience import ENDLESS, Patience
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -99,7 +100,8 @@ class Reply:
     Attributes:
         text: What it said.
         calls: Tools it wants to use.
-        finish: Why it stopped: ``stop``, ``length``, ``tool_call``, ``content_filter``, ``error``.
+        finish: Why it stopped: ``stop``, ``length``, ``tool_call``, ``content_filter``, ``error``;
+            ``garbage`` and ``out_of_time`` stand for answers that can't be read or did not come.
     """
 
     text: str
@@ -146,10 +148,17 @@ class Answer:
 class ModelClient(Protocol):
     """Something that answers requests: a provider, a built-in model, a fake."""
 
-    def complete(self, request: Request) -> Answer:
+    def complete(self, request: Request, patience: Patience = ENDLESS) -> Answer:
         """Asks the model.
 
+        Args:
+            request: What is asked.
+            patience: How long to wait for the answer. When its seconds are over, the answer is an
+                empty one with the finish word ``out_of_time``; one that can't be read is an empty
+                one with ``garbage``.
+
         Raises:
+            CancelledError: The lease was lost.
             TransientError: The provider failed, after the declared retries.
             PermanentError: The provider will never answer, for example a bad key.
         """

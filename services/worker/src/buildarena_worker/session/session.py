@@ -14,6 +14,10 @@ from buildarena_worker.session.host import SessionHost
 from buildarena_worker.session.messages import Message, Reply, Request, Tool
 from buildarena_worker.session.results import ConstructionFailedError
 
+MAX_CONVERSATION = 2_000_000
+"""Characters of all messages together, some 500,000 tokens: with 40 sessions in a process, their
+conversations fit into its memory."""
+
 
 class Session:
     """The state that a workflow's steps share.
@@ -60,8 +64,14 @@ class Session:
         """The model's reply to a conversation.
 
         Raises:
-            ConstructionFailedError: The conversation outgrew the model's context.
+            ConstructionFailedError: The conversation outgrew the model's context, or what a worker
+                can send again and again.
         """
+        if sum(len(message.text) for message in messages) > MAX_CONVERSATION:
+            raise ConstructionFailedError(
+                "context_overflow",
+                f"the {role}'s conversation is longer than {MAX_CONVERSATION:,} characters",
+            )
         request = Request(
             model_config=self._model_config, messages=messages, tools=tools, seed=self.seed
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from decimal import Decimal
@@ -29,6 +30,22 @@ class Spending:
         """Counts an answer."""
         self.usage += entry.usage
         self.seconds += entry.latency_s
+
+    @property
+    def seconds_left(self) -> float:
+        """Seconds until the job's limit; infinite without one."""
+        return self._most_seconds - self.seconds
+
+    def to_the_end(self, latency_s: float) -> float:
+        """The latency of an answer that did not come in time: at least what reaches the limit."""
+        while self.seconds + latency_s < self._most_seconds < math.inf:
+            latency_s = max(latency_s, self.seconds_left) + math.ulp(self.seconds + latency_s)
+        return latency_s
+
+    @property
+    def _most_seconds(self) -> float:
+        limit = self.limits.get("max_seconds")
+        return math.inf if limit is None else float(limit)
 
     def require_room(self) -> None:
         """Checks that the session may ask once more.

@@ -124,7 +124,7 @@ def _json_object(text: str) -> dict[str, Any]:
         raise _ProgramError("the answer holds no JSON object")
     try:
         data = json.loads(text[start : end + 1])
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise _ProgramError(f"the answer's JSON can't be read: {error}") from error
     if not isinstance(data, dict):
         raise _ProgramError("the answer must be one JSON object")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -50,7 +50,7 @@ def read_plan(text: str) -> Plan:
     body = _last(text, "building_plan")
     if body is None:
         raise PlanError("there is no <building_plan> … </building_plan>")
-    blocks = re.findall(r"<sub_structure>(.*?)</sub_structure>", body, re.DOTALL)
+    blocks = _all(body, "sub_structure")
     if not blocks:
         raise PlanError("there is no <sub_structure> … </sub_structure> in it")
     overall = _last(body, "overall_structure")
@@ -66,13 +66,30 @@ def read_plan(text: str) -> Plan:
         if not lines:
             raise PlanError(f"sub-structure {name!r} says nothing but its name")
         found.append(SubStructure(name=name, text="\n".join(lines)))
-    names = [sub_structure.name for sub_structure in found]
-    twice = sorted({name for name in names if names.count(name) > 1})
+    names = Counter(sub_structure.name for sub_structure in found)
+    twice = sorted(name for name, times in names.items() if times > 1)
     if twice:
         raise PlanError(f"the name {twice[0]!r} stands for several sub-structures")
     return Plan(overall=overall, sub_structures=tuple(found))
 
 
 def _last(text: str, tag: str) -> str | None:
-    found = re.findall(rf"<{tag}>(.*?)</{tag}>", text, re.DOTALL)
+    found = _all(text, tag)
     return found[-1].strip() if found else None
+
+
+def _all(text: str, tag: str) -> list[str]:
+    """What stands between a tag's openings and their next ends.
+
+    Not a regular expression: openings without an end would take it the square of their number.
+    """
+    opening, ending = f"<{tag}>", f"</{tag}>"
+    found, place = [], 0
+    while (start := text.find(opening, place)) >= 0:
+        start += len(opening)
+        end = text.find(ending, start)
+        if end < 0:
+            break
+        found.append(text[start:end])
+        place = end + len(ending)
+    return found

@@ -1,0 +1,100 @@
+"""The HTTP client under the providers' own libraries: bounded answers, and no redirects."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from contextvars import ContextVar
+from dataclasses import dataclass
+from http import HTTPStatus
+from typing import Any
+
+import httpx2
+
+from buildarena_worker.providers.answered import TokenCounts
+from buildarena_worker.providers.bounds import MAX_BODY
+from buildarena_worker.providers.failures import Failure, ProviderError, redirected
+
+USAGE = {
+    "usage": ("input_tokens", "output_tokens", "cache_read_input_tokens"),
+    "usageMetadata": ("promptTokenCount", "candidatesTokenCount", "cachedContentTokenCount"),
+}
+"""Where Anthropic's and Google's answers say what they used."""
+
+
+@dataclass(slots=True)
+class Received:
+    """The answer to the request that is at hand, as it came.
+
+    Attributes:
+        status: HTTP status; None as long as there is no whole answer.
+        body: Its beginning up to the bound.
+        location: Where a redirect leads.
+    """
+
+    status: int | None = None
+    body: bytes = b""
+    location: str | None = None
+
+    def require_usable(self) -> None:
+        """Checks what the libraries do not.
+
+        Raises:
+            ProviderError: It is a redirect, or too long.
+        """
+        if self.status is None:
+            return
+        if HTTPStatus.MULTIPLE_CHOICES <= self.status < HTTPStatus.BAD_REQUEST:
+            raise redirected(self.status, self.location)
+        if self.succeeded and len(self.body) > MAX_BODY:
+            raise ProviderError(f"the answer is longer than {MAX_BODY:,} bytes", Failure.GARBAGE)
+
+    @property
+    def succeeded(self) -> bool:
+        """Whether the provider says that it answered."""
+        return self.status is not None and self.status < HTTPStatus.MULTIPLE_CHOICES
+
+    def tokens(self) -> TokenCounts:
+        """What the answer says it used, as far as that can be read."""
+        try:
+            answer = json.loads(self.body)
+        except (ValueError, RecursionError):
+            return TokenCounts()
+        for name, (sent, received, cached) in USAGE.items():
+            usage = answer.get(name) if isinstance(answer, dict) else None
+            if isinstance(usage, Mapping):
+                return TokenCounts.bounded(
+                    usage.get(sent), usage.get(received), usage.get(cached), 0
+                )
+        return TokenCounts()
+
+
+RECEIVED: ContextVar[Received] = ContextVar("received")
+"""Where the client notes what it receives, for the one who waits for the library's view of it."""
+
+
+class BoundedClient(httpx2.AsyncClient):
+    """Reads no more of an answer than the bound, and goes nowhere else."""
+
+    async def send(self, request: httpx2.Request, **options: Any) -> httpx2.Response:
+        """Sends a request and reads its answer."""
+        options |= {"stream": True, "follow_redirects": False}
+        response = await super().send(request, **options)
+        body = b""
+        try:
+            parts, size = [], 0
+            async for part in response.aiter_bytes():
+                parts.append(part)
+                size += len(part)
+                if size > MAX_BODY:
+                    break
+            body = b"".join(parts)
+        finally:
+            await response.aclose()
+        received = RECEIVED.get(Received())
+        received.status, received.body = response.status_code, body
+        received.location = response.headers.get("location")
+        received.require_usable()
+        dropped = {"content-encoding", "content-length", "transfer-encoding"}
+        headers = [(k, v) for k, v in response.headers.multi_items() if k.lower() not in dropped]
+        return httpx2.Response(response.status_code, headers=headers, content=body, request=request)

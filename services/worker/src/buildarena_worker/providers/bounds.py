@@ -1,0 +1,104 @@
+"""What an answer may hold at most: all of it can be kept, sent back and added up."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from buildarena_worker.session.messages import Reply, ToolCall
+
+MAX_BODY = 8 * 1024 * 1024
+"""Bytes of an answer; the rest is not read."""
+MAX_TEXT = 256 * 1024
+"""Characters of a reply's text: more than any model gives in one reply."""
+MAX_ARGUMENTS = 64 * 1024
+"""Characters of a tool call's arguments as JSON."""
+MAX_DEPTH = 32
+"""Objects and lists within each other in a tool call's arguments."""
+MAX_CALLS = 16
+"""Tool calls of one reply: of more than one, all are refused."""
+MAX_NAME = 256
+"""Characters of a tool's name, and of ids."""
+MAX_TOKENS = 10_000_000
+"""Tokens of one answer: more than any model's context."""
+
+
+def count_of(value: Any, most: int = MAX_TOKENS) -> int:
+    """A provider's count as one that can be added up; nothing when it is no count."""
+    if isinstance(value, bool) or not isinstance(value, int):
+        return 0
+    return min(max(value, 0), most)
+
+
+def bounded(reply: Reply) -> Reply:
+    """A reply without what exceeds the bounds.
+
+    Raises:
+        TypeError: A text or name is none.
+    """
+    calls = tuple(
+        ToolCall(
+            id=_text(str(call.id) if isinstance(call.id, int) else call.id, MAX_NAME),
+            name=_text(call.name, MAX_NAME),
+            arguments=bounded_arguments(call.arguments),
+        )
+        for call in reply.calls[:MAX_CALLS]
+    )
+    text = _text(reply.text, MAX_TEXT)
+    return Reply(text=text, calls=calls, finish=reply.finish if text == reply.text else "length")
+
+
+def arguments_of(raw: Any) -> Any:
+    """What a model gave as a call's arguments: an object, or text that is not valid JSON."""
+    if not isinstance(raw, str):
+        return {} if raw is None else raw
+    if len(raw) > MAX_ARGUMENTS:
+        return raw[:MAX_ARGUMENTS]
+    try:
+        return json.loads(raw) if raw.strip() else {}
+    except (ValueError, RecursionError):
+        return raw
+
+
+def bounded_arguments(arguments: Any) -> Any:
+    """Arguments that can be kept as JSON; the beginning of their spelling when they can't."""
+    if isinstance(arguments, str):
+        return arguments[:MAX_ARGUMENTS]
+    if not _shallow(arguments):
+        return f"(more than {MAX_DEPTH} levels deep, or not JSON)"
+    spelled = json.dumps(arguments, ensure_ascii=False)
+    return arguments if len(spelled) <= MAX_ARGUMENTS else spelled[:MAX_ARGUMENTS]
+
+
+def _shallow(arguments: Any) -> bool:
+    """Whether arguments are JSON of a few levels, without figures that JSON has no word for."""
+    level: Sequence[Any] = [arguments]
+    for _ in range(MAX_DEPTH + 1):
+        inner: list[Any] = []
+        for value in level:
+            if isinstance(value, dict):
+                if not all(isinstance(key, str) for key in value):
+                    return False
+                inner += value.values()
+            elif isinstance(value, list | tuple):
+                inner += value
+            elif not _plain(value):
+                return False
+        if not inner:
+            return True
+        level = inner
+    return False
+
+
+def _plain(value: Any) -> bool:
+    if isinstance(value, float):
+        return math.isfinite(value)
+    return value is None or isinstance(value, str | bool | int)
+
+
+def _text(value: Any, most: int) -> str:
+    if not isinstance(value, str):
+        raise TypeError(f"{type(value).__name__} in the place of text")
+    return value[:most]

@@ -1,0 +1,24 @@
+"""Patience: how long a session waits for an answer."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from buildarena_pipeline.runtime.active_lease import ActiveLease
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Patience:
+    """What ends the wait for an answer; nothing by default.
+
+    Attributes:
+        within_s: The seconds that the job's limit leaves for it.
+        active: The lease that it is wanted under.
+    """
+
+    within_s: float = math.inf
+    active: ActiveLease | None = None
+
+
+ENDLESS = Patience()

@@ -1,0 +1,262 @@
+"""No shape of answer makes a session's worker fail, whichever wire it comes over."""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+from provider_standin import ProviderStandIn
+from scripted import Scripted
+
+from buildarena_pipeline.catalog.models import ModelEntry, Price, ProviderEntry
+from buildarena_pipeline.errors import PermanentError, TransientError
+from buildarena_store import clean
+from buildarena_worker.providers import bounds
+from buildarena_worker.providers.failures import ProviderError
+from buildarena_worker.providers.openai_answer import AnswerReader
+from buildarena_worker.providers.provider import ProviderClient
+from buildarena_worker.providers.retries import RetryPolicy
+from buildarena_worker.session.messages import Message, Reply, Request, ToolCall
+from buildarena_worker.session.results import Failed
+from buildarena_worker.workflow.plan import PlanError, read_plan
+
+WIRES = ["openai", "anthropic", "google"]
+READER = AnswerReader("http://127.0.0.1:1/v1")
+ASK = Request(
+    model_config={"decoding": {}},
+    messages=[Message(role="system", text="# Role: x"), Message(role="user", text="hello")],
+)
+LIES: list[Any] = [-5, True, 1.5, 10**30, "many", None, [1], {"a": 1}]
+
+
+@pytest.fixture
+def client(monkeypatch) -> Iterator[Callable[..., ProviderClient]]:
+    """Makes clients of a stand-in and closes them."""
+    monkeypatch.setenv("STANDIN_KEY", "secret")
+    made: list[ProviderClient] = []
+
+    def make(standin: ProviderStandIn, wire: str = "openai") -> ProviderClient:
+        base = f"{standin.url}/v1" if wire == "openai" else standin.url
+        price = Price(input=2.0, output=8.0, cached=0.5)
+        entry = ModelEntry(name=f"{wire}/x", provider=wire, model="x", price=price)
+        provider = ProviderEntry(wire=wire, base_url=base, key="STANDIN_KEY")
+        policy = RetryPolicy(tries=2, first_wait_s=0.01, timeout_s=2.0)
+        made.append(ProviderClient(entry, provider, policy))
+        return made[-1]
+
+    yield make
+    for one in made:
+        one.close()
+
+
+@pytest.mark.parametrize("status", ["301", "307"])
+@pytest.mark.parametrize("wire", WIRES)
+def test_no_wire_follows_a_redirect(client, wire, status) -> None:
+    with (
+        ProviderStandIn() as thief,
+        ProviderStandIn(fault=lambda _: status, elsewhere=thief.url) as bad,
+    ):
+        with pytest.raises(PermanentError, match=f"HTTP {status}: the provider redirects") as said:
+            client(bad, wire).complete(ASK)
+        assert (bad.counts.requests, thief.counts.requests) == (1, 0)
+    assert said.value.reason == "request_refused"
+
+
+GARBAGE = {
+    "no json": b"<html>",
+    "a list": b"[]",
+    "deep": b"[" * 100_000,
+    "nine megabytes": b'{"a": "' + b"x" * (9 * 1024 * 1024) + b'"}',
+}
+
+
+# A list is a legal answer to Google's library: an empty reply.
+@pytest.mark.parametrize(
+    ("wire", "name"), sorted({(w, n) for w in WIRES for n in GARBAGE} - {("google", "a list")})
+)
+def test_every_wire_counts_garbage_once_per_request(client, wire, name) -> None:
+    with ProviderStandIn(fault=lambda _: GARBAGE[name]) as bad:
+        answer = client(bad, wire).complete(ASK)
+        assert bad.counts.requests == 1
+    assert (answer.reply.finish, answer.usage.requests) == ("garbage", 1)
+
+
+@pytest.mark.parametrize(
+    ("wire", "body"),
+    [
+        ("openai", {"usage": {"prompt_tokens": 100, "completion_tokens": 50}}),
+        ("anthropic", {"content": 5, "usage": {"input_tokens": 100, "output_tokens": 50}}),
+        (
+            "google",
+            {
+                "candidates": 5,
+                "usageMetadata": {"promptTokenCount": 100, "candidatesTokenCount": 50},
+            },
+        ),
+    ],
+)
+def test_every_wire_charges_what_garbage_reports(client, wire, body) -> None:
+    with ProviderStandIn(fault=lambda _: json.dumps(body).encode()) as bad:
+        answer = client(bad, wire).complete(ASK)
+    assert answer.reply.finish == "garbage"
+    assert (answer.usage.input_tokens, answer.usage.output_tokens) == (100, 50)
+
+
+def read(message: dict[str, Any], usage: Any = None) -> Any:
+    answer = {"id": "r", "model": "m", "choices": [{"message": message}], "usage": usage}
+    return READER.read(200, {}, json.dumps(answer).encode())
+
+
+@pytest.mark.parametrize("lie", LIES)
+@pytest.mark.parametrize(
+    "name", ["prompt_tokens", "completion_tokens", "cached_tokens", "reasoning_tokens"]
+)
+def test_lies_about_usage_are_nothing_or_bounded(name, lie) -> None:
+    usage: dict[str, Any] = {"prompt_tokens": 100, "completion_tokens": 50}
+    if name in usage:
+        usage[name] = lie
+    else:
+        part = "prompt" if name == "cached_tokens" else "completion"
+        usage[f"{part}_tokens_details"] = {name: lie}
+    tokens = read({"content": "x"}, usage).tokens
+    for count in (tokens.input, tokens.output, tokens.cached, tokens.reasoning):
+        assert type(count) is int
+        assert 0 <= count <= bounds.MAX_TOKENS
+    assert tokens.cached <= tokens.input
+
+
+@pytest.mark.parametrize("lie", LIES)
+@pytest.mark.parametrize("wire", ["anthropic", "google"])
+def test_lies_over_other_wires_end_as_answers(client, wire, lie) -> None:
+    bodies = {
+        "anthropic": {
+            "id": "r",
+            "type": "message",
+            "role": "assistant",
+            "model": "m",
+            "stop_reason": "end_turn",
+            "content": [{"type": "text", "text": "x"}],
+            "usage": {"input_tokens": lie, "output_tokens": lie, "cache_read_input_tokens": lie},
+        },
+        "google": {
+            "candidates": [{"content": {"role": "model", "parts": [{"text": "x"}]}}],
+            "usageMetadata": {"promptTokenCount": lie, "candidatesTokenCount": lie},
+        },
+    }
+    with ProviderStandIn(fault=lambda _: json.dumps(bodies[wire]).encode()) as bad:
+        usage = client(bad, wire).complete(ASK).usage
+        assert bad.counts.requests == 1
+    assert usage.requests == 1
+    assert 0 <= usage.input_tokens <= bounds.MAX_TOKENS
+    assert 0 <= usage.output_tokens <= bounds.MAX_TOKENS
+    assert 0 <= usage.cost_usd <= 100
+
+
+def calling(*arguments: Any, name: Any = "start", id_: Any = "c") -> dict[str, Any]:
+    return {
+        "tool_calls": [
+            {"id": id_, "type": "function", "function": {"name": name, "arguments": given}}
+            for given in arguments
+        ]
+    }
+
+
+ARGUMENTS = {
+    "deep list": "[" * 100_000,
+    "deep closed": "[" * 5000 + "]" * 5000,
+    "deep object": '{"a":' * 40 + "1" + "}" * 40,
+    "nan": '{"note": NaN}',
+    "infinite": '{"note": 1e999}',
+    "many digits": '{"note": ' + "9" * 5000 + "}",
+    "long": json.dumps({"note": "x" * 1_000_000}),
+    "wide": json.dumps({"note": list(range(100_000))}),
+    "nul": '{"note": "\\u0000"}',
+    "surrogate": '{"note": "\\ud800", "\\udfff": 1}',
+    "object": {"note": [[[[1]]]]},
+    "number": 7,
+}
+
+
+@pytest.mark.parametrize("name", ARGUMENTS)
+def test_arguments_of_any_shape_can_be_kept_and_sent_back(name, play) -> None:
+    reply = read(calling(ARGUMENTS[name])).reply
+    kept = json.dumps(clean(reply.to_json()), allow_nan=False)
+    assert len(kept) < 2 * bounds.MAX_ARGUMENTS
+    kept.encode()
+    assert "\\u0000" not in kept
+
+    played = play(workflow="builder", client=Scripted(reply))
+    assert isinstance(played.failure, Failed), played.failure
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        calling("{}", name=7),
+        calling("{}", name=None),
+        calling("{}", name=["a"]),
+        calling("{}", id_=None),
+        calling("{}", id_={"a": 1}),
+        {"content": {"a": 1}},
+        {"tool_calls": "many"},
+        {"tool_calls": {"a": 1}},
+        {"tool_calls": [None]},
+    ],
+)
+def test_what_is_no_reply_is_garbage(message) -> None:
+    with pytest.raises(ProviderError) as caught:
+        read(message)
+    assert caught.value.failure == "garbage"
+
+
+def test_a_reply_is_cut_to_what_can_be_kept() -> None:
+    reply = read({"content": "x" * 5_000_000, **calling(*["{}"] * 50_000, name="n" * 9999)}).reply
+    assert len(reply.text) == bounds.MAX_TEXT
+    assert reply.finish == "length"
+    assert len(reply.calls) == bounds.MAX_CALLS
+    assert len(reply.calls[0].name) == bounds.MAX_NAME
+
+
+@pytest.mark.parametrize("text", ["<think>" * 10**6, "<think></think>" * 400_000])
+def test_many_thoughts_take_no_time(text) -> None:
+    started = time.process_time()
+    read({"content": text})
+    assert time.process_time() - started < 1
+
+
+def test_many_openings_of_a_plan_take_no_time() -> None:
+    body = "<sub_structure>" * 17_000
+    started = time.process_time()
+    with pytest.raises(PlanError):
+        read_plan(f"<building_plan>{body}</building_plan>")
+    same = "<sub_structure><name>a</name><function>b</function></sub_structure>" * 3800
+    with pytest.raises(PlanError, match="stands for several"):
+        read_plan(f"<building_plan><overall_structure>x</overall_structure>{same}</building_plan>")
+    assert time.process_time() - started < 1
+
+
+def test_a_conversation_that_grows_without_end_fails(play) -> None:
+    played = play(workflow="builder", client=Scripted(last=Reply(text="x" * bounds.MAX_TEXT)))
+    assert isinstance(played.failure, Failed)
+    assert played.failure.reason == "context_overflow"
+    assert len(played.entries) < 12
+
+
+def test_an_error_of_any_shape_is_an_error(client) -> None:
+    body = json.dumps({"error": {"message": "\x00\ud800" * 9000, "code": ["x"]}}).encode()
+    for text in (body, b"[" * 100_000, b"\xff", b"{" * 10):
+        with pytest.raises(ProviderError, match="HTTP 500"):
+            READER.read(500, {"retry-after": "nan"}, text)
+    with ProviderStandIn(fault=lambda _: "500") as bad, pytest.raises(TransientError):
+        client(bad).complete(ASK)
+
+
+def test_bounded_arguments_are_plain() -> None:
+    for given in (math.nan, {"a": math.inf}, {1: 2}, {"a": {"b": object()}}):
+        assert isinstance(bounds.bounded_arguments(given), str)
+    call = ToolCall(id="c", name="n", arguments={"a": [1, "x", None, True, 1.5]})
+    assert bounds.bounded(Reply(text="", calls=(call,))).calls == (call,)
