@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
+from live_api import LOOPBACK
 from pydantic import SecretStr
 from starlette.testclient import TestClient
 
@@ -34,7 +35,9 @@ def guarded(context: Context) -> Iterator[TestClient]:
     """The API with keys asked for; requests carry none by themselves."""
     changes = {"require_keys": True, "admin_key": SecretStr(ADMIN)}
     own = open_context(context.settings.model_copy(update=changes))
-    with TestClient(create_app(own, load_registry()), raise_server_exceptions=False) as client:
+    with TestClient(
+        create_app(own, load_registry()), base_url=LOOPBACK, raise_server_exceptions=False
+    ) as client:
         yield client
     own.close()
 
@@ -152,7 +155,7 @@ def test_settings_do_not_print_the_operators_key(context) -> None:
 
 def test_too_many_requests_are_reported_when_to_come_back(context) -> None:
     own = open_context(context.settings.model_copy(update={"rate_limit": "5/minute"}))
-    with TestClient(create_app(own, load_registry())) as client:
+    with TestClient(create_app(own, load_registry()), base_url=LOOPBACK) as client:
         answers = [client.get("/v1/models") for _ in range(7)]
         assert [answer.status_code for answer in answers][:5] == [200] * 5
         assert answers[-1].status_code == 429
@@ -164,7 +167,7 @@ def test_too_many_requests_are_reported_when_to_come_back(context) -> None:
 def test_guessing_keys_is_limited(context) -> None:
     changes = {"rate_limit": "3/minute", "require_keys": True, "admin_key": SecretStr(ADMIN)}
     own = open_context(context.settings.model_copy(update=changes))
-    with TestClient(create_app(own, load_registry())) as client:
+    with TestClient(create_app(own, load_registry()), base_url=LOOPBACK) as client:
         tried = [client.get("/v1/tasks", headers=bearer(f"ba_{n}")).status_code for n in range(5)]
         assert tried == [401, 401, 401, 429, 429]
         assert client.get("/v1/tasks", headers=bearer(ADMIN)).status_code == 200

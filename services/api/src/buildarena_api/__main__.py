@@ -9,6 +9,7 @@ from sqlalchemy.exc import OperationalError
 
 from buildarena_api.app import create_app
 from buildarena_api.http.access import check_binding
+from buildarena_api.http.own_pool import POOL_TIMEOUT_S
 from buildarena_pipeline.catalog.models import load_registry
 from buildarena_pipeline.errors import StartupError
 from buildarena_pipeline.runtime.context import open_context
@@ -28,7 +29,7 @@ def main() -> None:
         check_binding(settings)
         tracing = Tracing("api", settings.otlp_endpoint)
         registry = load_registry(settings.models_file)
-        context = open_context(settings, pool_size=POOL_SIZE)
+        context = open_context(settings, pool_size=POOL_SIZE, pool_timeout_s=POOL_TIMEOUT_S)
         context.store.database.require_schema()
     except (StartupError, SchemaVersionError, ValueError) as error:
         sys.exit(f"api: {error}")
@@ -42,6 +43,8 @@ def main() -> None:
             log_config=None,
             access_log=False,
             timeout_graceful_shutdown=5,
+            proxy_headers=bool(settings.trusted_proxies),
+            forwarded_allow_ips=settings.trusted_proxies,
         )
     finally:
         context.close()

@@ -13,7 +13,6 @@ from buildarena_api.http.etags import conditional
 from buildarena_api.http.problems import problem_responses
 from buildarena_api.leaderboard.filters import BoardsDep, SelectionDep, unknown
 from buildarena_api.leaderboard.views import Board, ChangePage, ChangeView, board_view
-from buildarena_api.routes import exports
 from buildarena_benchmark.leaderboard import SCORED, BoardQuery, TaskComparison, compare_models
 from buildarena_store.states import VERIFY_QUEUE
 
@@ -215,6 +214,3 @@ def verify(body: VerifyRequest, context: ContextDep, boards: BoardsDep) -> Verif
     asked = [context.store.verifications.request(job_id) for job_id in chosen]
     context.queues.notify(VERIFY_QUEUE, asked)
     return VerifyAccepted(scored=len(scored), verifications=asked)
-
-
-router.include_router(exports.router)
