@@ -108,7 +108,7 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
 
 def _add_routes(app: FastAPI) -> None:
     app.include_router(health.router)
-    for route in (*ORDINARY, *LIMITED_THEMSELVES):
+    for route in (*LIMITED_THEMSELVES, *ORDINARY):
         own = [] if route in LIMITED_THEMSELVES else [limited("ordinary")]
         app.include_router(
             route.router,
