@@ -19,11 +19,14 @@ from buildarena_pipeline.runtime.tracing import Tracing
 from buildarena_store import SchemaVersionError
 
 POOL_SIZE = 10
+SWITCH_S = 0.0005
+"""How long a thread may keep the interpreter: exports must not delay the event loop."""
 
 
 def main() -> None:
     """Serves the API until it is asked to stop."""
     settings = Settings()
+    sys.setswitchinterval(SWITCH_S)
     set_up_logs(settings.log_level)
     try:
         check_binding(settings)

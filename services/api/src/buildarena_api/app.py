@@ -18,6 +18,7 @@ from buildarena_api.http.locality import LocalOnlyMiddleware
 from buildarena_api.http.log import RequestLog
 from buildarena_api.http.methods import MethodMiddleware
 from buildarena_api.http.metrics import ServiceMetrics
+from buildarena_api.http.overload import OverloadMiddleware
 from buildarena_api.http.own_pool import OwnPool
 from buildarena_api.http.problems import add_problem_handlers, problem_responses
 from buildarena_api.http.rate_limits import RateLimits
@@ -132,3 +133,4 @@ def _add_middleware(app: FastAPI) -> None:
     if not app.state.context.settings.require_keys:
         app.add_middleware(LocalOnlyMiddleware)
     app.add_middleware(RequestLog, metrics=app.state.metrics)
+    app.add_middleware(OverloadMiddleware)
