@@ -7,7 +7,6 @@ import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
-from dataclasses import replace
 
 import httpx
 import pytest
@@ -18,6 +17,7 @@ from sqlalchemy import text
 
 from buildarena_pipeline.agents import sessions as agent_sessions
 from buildarena_pipeline.catalog.specs import SweepSpec
+from buildarena_pipeline.runtime.context import open_context
 from buildarena_store.jobs import verifications
 
 ADMIN = "operator-secret-that-is-long-enough"
@@ -27,9 +27,11 @@ START = {"tool": "start", "arguments": {"init_shift": [0, 0, 0], "init_rotation"
 @pytest.fixture
 def url(context):
     changes = {"require_keys": True, "admin_key": SecretStr(ADMIN), "rate_limit": "100000/minute"}
-    guarded = replace(context, settings=context.settings.model_copy(update=changes))
+    # As many connections as the API process has.
+    guarded = open_context(context.settings.model_copy(update=changes), pool_size=10)
     with live_api(guarded) as found:
         yield found
+    guarded.close()
 
 
 @pytest.fixture
@@ -184,10 +186,14 @@ def test_an_audit_takes_the_room_there_is_and_names_the_rest(
     assert sweep_id
 
 
-def test_a_busy_database_pool_is_503(as_key, context, monkeypatch) -> None:
-    client = as_key()
-    assert client.get("/v1/sweeps").status_code == 200
+def test_a_busy_database_pool_is_503(context, monkeypatch) -> None:
     engine = context.store.database.engine
+    with live_api(context) as url, httpx.Client(base_url=url, timeout=20) as client:
+        assert client.get("/v1/sweeps").status_code == 200
+        _check_busy_pool(client, engine, monkeypatch)
+
+
+def _check_busy_pool(client, engine, monkeypatch) -> None:
     monkeypatch.setattr(engine.pool, "_timeout", 0.2)
     with ExitStack() as taken:
         for _ in range(engine.pool.size() + engine.pool._max_overflow):
