@@ -3,6 +3,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
+from live_api import LOOPBACK
 from starlette.testclient import TestClient
 
 from buildarena_api.app import create_app
@@ -13,7 +14,9 @@ from buildarena_pipeline.runtime.context import Context
 @pytest.fixture
 def api(context: Context) -> Iterator[TestClient]:
     """The API in this process, on the real database and broker."""
-    with TestClient(create_app(context, load_registry()), raise_server_exceptions=False) as client:
+    with TestClient(
+        create_app(context, load_registry()), base_url=LOOPBACK, raise_server_exceptions=False
+    ) as client:
         yield client
 
 

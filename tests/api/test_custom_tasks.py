@@ -6,6 +6,7 @@ import csv
 import io
 
 import pytest
+from live_api import LOOPBACK
 from pydantic import SecretStr
 from starlette.testclient import TestClient
 
@@ -96,7 +97,7 @@ def test_a_task_that_is_added_later_is_known_at_once(api, context, end_all) -> N
     end_all(1.0)
     assert list(board_of(api)) == ["support-1"]
     other = open_context(context.settings)
-    with TestClient(create_app(other, load_registry())) as elsewhere:
+    with TestClient(create_app(other, load_registry()), base_url=LOOPBACK) as elsewhere:
         upload(elsewhere, OWN)
     other.close()
     assert api.get("/v1/leaderboard", params={"task": "narrow-gap"}).status_code == 200
@@ -141,7 +142,7 @@ def test_only_its_owner_changes_a_task(context) -> None:
     secret = "operator-secret-that-is-long-enough"
     changes = {"require_keys": True, "admin_key": SecretStr(secret)}
     own = open_context(context.settings.model_copy(update=changes))
-    with TestClient(create_app(own, load_registry())) as api:
+    with TestClient(create_app(own, load_registry()), base_url=LOOPBACK) as api:
 
         def key(*scopes: str) -> dict[str, str]:
             body = {"name": "somebody", "scopes": list(scopes)}

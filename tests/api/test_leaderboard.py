@@ -4,6 +4,7 @@ import json
 from datetime import UTC, datetime, timedelta
 
 import pytest
+from live_api import LOOPBACK
 from sqlalchemy import delete, text, update
 from starlette.testclient import TestClient
 
@@ -134,7 +135,7 @@ def test_a_reader_who_has_the_answer_gets_none_until_something_changes(api, cont
 
 def test_a_board_kept_up_to_date_equals_one_that_is_made_anew(api, context, finish) -> None:
     def fresh() -> bytes:
-        with TestClient(create_app(context, load_registry())) as other:
+        with TestClient(create_app(context, load_registry()), base_url=LOOPBACK) as other:
             return other.get("/v1/leaderboard").content
 
     ids = finish(7)

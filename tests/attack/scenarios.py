@@ -1,4 +1,4 @@
-"""What an adversary tries. Each scenario says what was tried, what came of it, and what is wrong."""
+"""What an adversary tries: each scenario says what was tried, what came of it, what is wrong."""
 
 from __future__ import annotations
 

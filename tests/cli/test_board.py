@@ -244,11 +244,12 @@ def test_an_audit_tells_every_difference(url, context) -> None:
         """Stands in for the worker: every second check finds another indicator."""
         number = 0
         while not stopping.is_set():
-            for id_ in context.store.verifications.to_notify(10):
-                context.store.verifications.claim(id_)
+            while (claimed := context.store.verifications.claim_next()) is not None:
                 number += 1
                 check = {"name": "score: indicator", "ok": number % 2 == 0, "kept": 1, "found": 2}
-                context.store.verifications.finish(id_, {"ok": check["ok"], "checks": [check]})
+                context.store.verifications.finish(
+                    claimed.id, {"ok": check["ok"], "checks": [check]}
+                )
             time.sleep(0.05)
 
     worker = threading.Thread(target=verify)

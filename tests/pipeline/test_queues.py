@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from running import wait_until
+
 from buildarena_cli.local import EmbeddedValkey
 from buildarena_pipeline.broker.queues import ENOUGH_WAITING, Queues
 
@@ -15,8 +17,8 @@ def test_messages_are_sent_again_when_the_broker_is_back(tmp_path) -> None:
         assert not queues.notify("construct", ["job_2"])
         assert queues.waiting("construct") is None
         process = valkey.start()
+        wait_until(lambda: queues.waiting("construct") is not None, 10, "the broker is back")
         before = queues.waiting("construct")
-        assert before is not None
         for _ in range(2):
             assert queues.notify("construct", ["job_3"])
         assert queues.waiting("construct") == before + 2
@@ -27,7 +29,9 @@ def test_messages_are_sent_again_when_the_broker_is_back(tmp_path) -> None:
 
 def test_a_message_is_left_out_where_enough_wait(context) -> None:
     context.queues.notify_one("construct", "job_1")
+    assert context.queues.settle()
     assert context.queues.waiting("construct") == 1
     context.queues.notify("construct", ["job_2"] * ENOUGH_WAITING)
     context.queues.notify_one("construct", "job_3")
+    assert context.queues.settle()
     assert context.queues.waiting("construct") == ENOUGH_WAITING + 1

@@ -4,10 +4,16 @@ from buildarena_pipeline.catalog.specs import SweepSpec
 from buildarena_pipeline.runtime.reaper import Reaper
 
 
-def submit(submissions, samples: int) -> None:
+def submit(context, submissions, samples: int) -> None:
     submissions.submit_sweep(
         SweepSpec(tasks=["support-1"], models=["builtin/idle"], samples=samples)
     )
+    assert context.queues.settle()
+
+
+def reap(context) -> None:
+    Reaper(context).reap()
+    assert context.queues.settle()
 
 
 def drain(context) -> None:
@@ -16,47 +22,47 @@ def drain(context) -> None:
 
 
 def test_lost_messages_are_sent_again(context, submissions) -> None:
-    submit(submissions, 5)
+    submit(context, submissions, 5)
     drain(context)
     with context.store.database.transaction() as connection:
         connection.exec_driver_sql("UPDATE jobs SET notified_at = now() - interval '1 min'")
-    Reaper(context).reap()
+    reap(context)
     assert context.queues.waiting("construct") == 5
 
 
 def test_fresh_messages_are_not_doubled(context, submissions) -> None:
-    submit(submissions, 5)
-    Reaper(context).reap()
+    submit(context, submissions, 5)
+    reap(context)
     assert context.queues.waiting("construct") == 5
 
 
 def test_a_long_queue_is_filled_little_by_little(context, submissions) -> None:
-    submit(submissions, 450)
+    submit(context, submissions, 450)
     assert context.queues.waiting("construct") == 200
-    Reaper(context).reap()
+    reap(context)
     assert context.queues.waiting("construct") == 200
     drain(context)
-    Reaper(context).reap()
+    reap(context)
     assert context.queues.waiting("construct") == 200
 
 
 def test_a_dead_workers_job_waits_again(context, submissions) -> None:
-    submit(submissions, 1)
+    submit(context, submissions, 1)
     lease = context.store.leases.claim("construct", owner="dead")
     with context.store.database.transaction() as connection:
         connection.exec_driver_sql("UPDATE jobs SET lease_expires_at = now() - interval '1 s'")
     drain(context)
-    Reaper(context).reap()
+    reap(context)
     assert context.store.jobs.get(lease.job.id).state == "queued"
     assert context.queues.waiting("construct") == 1
 
 
 def test_one_reaper_works_at_a_time(context, submissions) -> None:
-    submit(submissions, 1)
+    submit(context, submissions, 1)
     drain(context)
     with context.store.database.transaction() as connection:
         connection.exec_driver_sql("UPDATE jobs SET notified_at = NULL")
         connection.exec_driver_sql(f"SELECT pg_advisory_xact_lock({0x726561706572})")
         # The lock is held here; the update above is not visible to others until the end.
-        Reaper(context).reap()
+        reap(context)
         assert context.queues.waiting("construct") == 0

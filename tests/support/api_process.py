@@ -6,8 +6,9 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 import httpx
@@ -17,15 +18,33 @@ from buildarena_cli.local import EmbeddedPostgres, EmbeddedValkey, free_port
 from buildarena_store import Database
 
 
+@dataclass(frozen=True, kw_only=True)
+class Service:
+    """An API process."""
+
+    url: str
+    pid: int
+    database_url: str
+    broker_pid: int
+
+
 @contextmanager
 def api_process() -> Iterator[tuple[str, int]]:
     """Runs one in a folder of its own; yields its URL and process id."""
+    with api_service({}) as service:
+        yield service.url, service.pid
+
+
+@contextmanager
+def api_service(settings: Mapping[str, str]) -> Iterator[Service]:
+    """As api_process, with settings as environment variables."""
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
         postgres = EmbeddedPostgres(folder / "pg", folder / "pg.log")
         stack.callback(postgres.stop, postgres.start())
         valkey = EmbeddedValkey(folder / "valkey", folder / "valkey.log")
-        stack.callback(valkey.stop, valkey.start())
+        broker = valkey.start()
+        stack.callback(valkey.stop, broker)
         database = Database(postgres.url)
         database.migrate()
         database.close()
@@ -36,6 +55,7 @@ def api_process() -> Iterator[tuple[str, int]]:
             "BUILDARENA_BROKER_URL": valkey.url,
             "BUILDARENA_DATA": str(folder / "data"),
             "BUILDARENA_PORT": str(port),
+            **settings,
         }
         with (folder / "api.log").open("wb") as log:
             process = subprocess.Popen(
@@ -45,11 +65,11 @@ def api_process() -> Iterator[tuple[str, int]]:
         stack.callback(process.terminate)
         url = f"http://127.0.0.1:{port}"
         wait_until(lambda: _answers(url), 60, "the API answers")
-        yield url, process.pid
+        yield Service(url=url, pid=process.pid, database_url=postgres.url, broker_pid=broker.pid)
 
 
 def _answers(url: str) -> bool:
     try:
-        return httpx.get(f"{url}/v1/models").is_success
+        return httpx.get(f"{url}/v1/health").is_success
     except httpx.TransportError:
         return False

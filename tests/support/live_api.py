@@ -16,6 +16,9 @@ from buildarena_cli.local import free_port
 from buildarena_pipeline.catalog.models import load_registry
 from buildarena_pipeline.runtime.context import Context
 
+LOOPBACK = "http://127.0.0.1"
+"""What a client in the test's process calls the API: a service without keys has no other name."""
+
 
 @contextmanager
 def live_api(context: Context) -> Iterator[str]:

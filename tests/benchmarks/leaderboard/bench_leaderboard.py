@@ -21,6 +21,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from live_api import LOOPBACK
 from sqlalchemy import insert, text, update
 from starlette.testclient import TestClient
 
@@ -131,7 +132,7 @@ def measure(url: str, requests: int) -> dict[str, object]:
     """Asks an API in this process; its peak memory is that of an API process."""
     context = open_context(settings_of(url))
     # No lifespan: the reaper would look for a broker.
-    api = TestClient(create_app(context, load_registry()))
+    api = TestClient(create_app(context, load_registry()), base_url=LOOPBACK)
     tasks = list(builtin_tasks())
 
     def ask(params: dict[str, object] | None = None, **headers: str) -> None:
@@ -164,7 +165,7 @@ def measure(url: str, requests: int) -> dict[str, object]:
     known = timed(lambda _: ask(**{"If-None-Match": etag}), requests)
     mixed = sorted(resting + changed + filtered + known)
     kept = api.get("/v1/leaderboard").content
-    other = TestClient(create_app(context, load_registry()))
+    other = TestClient(create_app(context, load_registry()), base_url=LOOPBACK)
     start = time.perf_counter()
     equal = other.get("/v1/leaderboard").content == kept
     again = time.perf_counter() - start

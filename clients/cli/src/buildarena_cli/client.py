@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import re
 import time
 from collections.abc import Generator, Iterator, Mapping
 from pathlib import Path
@@ -23,6 +24,12 @@ PATIENCE_S = 60.0
 """How long a watching command waits for a service that is being restarted."""
 STATE_POLL_S = 0.3
 HEALTH = "/v1/health"
+BUSY_PATIENCE_S = 10.0
+"""How long a command that only reads waits for a service that is too busy."""
+LONGEST_PAUSE_S = 10.0
+"""How long a refused request waits at most before it is sent again, whatever the service asks."""
+PATH = re.compile(r"/v1(?:/(?!\.{1,2}(?:/|\?|$))[A-Za-z0-9._~%-]+)+(?:\?[!-\"$-~]*)?")
+"""Every path that is asked for: its parts are quoted, and none leads elsewhere."""
 CHUNK_BYTES = 1 << 20
 
 
@@ -34,9 +41,15 @@ def at(*parts: str) -> str:
     """
     for part in parts:
         # A server takes %2F for a slash.
-        if part in {"", ".", ".."} or "/" in part:
+        if part in {"", ".", ".."} or "/" in part or not part.isprintable():
             raise CommandError(f"{part!r} is not a name")
     return "/v1/" + "/".join(quote(part, safe="") for part in parts)
+
+
+def _checked(path: str) -> str:
+    if PATH.fullmatch(path) is None:
+        raise CommandError(f"{path!r} is not a path of the service")
+    return path
 
 
 class Client:
@@ -91,7 +104,7 @@ class Client:
     def download(self, path: str, target: Path) -> None:
         """Writes the answer to a GET into a file, which is there whole or not at all."""
         partial = target.with_name(target.name + ".partial")
-        with contextlib.closing(self._chunks(path)) as chunks:
+        with contextlib.closing(self._patient_chunks(path)) as chunks:
             first = next(chunks)
             with partial.open("wb") as file:
                 file.write(first)
@@ -127,9 +140,21 @@ class Client:
             time.sleep(STATE_POLL_S)
         return answer
 
+    def _patient_chunks(self, path: str) -> Generator[bytes, None, None]:
+        """As _chunks, but waits while the service has too much going on."""
+        patience = _Patience("GET")
+        while True:
+            try:
+                yield from self._chunks(path)
+            except RefusedError as error:
+                if not patience.waits(error.response):
+                    raise
+            else:
+                return
+
     def _chunks(self, path: str) -> Generator[bytes, None, None]:
         """The pieces of an answer; at least one, and all of them or an error."""
-        with self._sending(), self._wire.opened("GET", path, timeout_s=None) as answer:
+        with self._sending(), self._wire.opened("GET", _checked(path), timeout_s=None) as answer:
             if answer.status != 200:  # noqa: PLR2004 - OK
                 raise RefusedError(self._wire.read(path, answer))
             chunk = answer.read(CHUNK_BYTES)
@@ -148,8 +173,14 @@ class Client:
     def _answer(
         self, method: str, path: str, *, timeout_s: float | None = TIMEOUT_S, **options: Any
     ) -> Response:
-        with self._sending():
-            response = self._wire.send(method, path, timeout_s=timeout_s, **options)
+        patience = _Patience(method)
+        while True:
+            with self._sending():
+                response = self._wire.send(method, _checked(path), timeout_s=timeout_s, **options)
+            if path == HEALTH or not patience.waits(response):
+                break
+            if hasattr(options.get("body"), "seek"):
+                options["body"].seek(0)
         if path == HEALTH:
             return response
         if response.status == 503:  # noqa: PLR2004 - Service Unavailable
@@ -178,16 +209,40 @@ class RefusedError(CommandError):
         response: What it answered.
 
     Attributes:
+        response: What it answered.
         status: The HTTP status.
         errors: Its field errors: ``field``, ``message``, ``line`` and ``choices`` of each.
     """
 
     def __init__(self, response: Response) -> None:
         super().__init__(_problem(response))
+        self.response = response
         self.status = response.status
         self.errors: list[dict[str, Any]] = []
         with contextlib.suppress(ValueError, KeyError, TypeError):
             self.errors = list(response.json()["errors"])
+
+
+class _Patience:
+    """Waits as the service asks, when it has too much going on, and gives up in the end."""
+
+    def __init__(self, method: str) -> None:
+        started = time.monotonic()
+        self._until = {429: started + PATIENCE_S}
+        if method == "GET":
+            # A change may have been made before the service became unavailable.
+            self._until[503] = started + BUSY_PATIENCE_S
+
+    def waits(self, response: Response) -> bool:
+        """Waits before a request is sent again; False when it is not to be."""
+        asked = response.retry_after
+        if response.status not in self._until or not asked.isdecimal():
+            return False
+        pause_s = min(float(asked), LONGEST_PAUSE_S)
+        if time.monotonic() + pause_s > self._until[response.status]:
+            return False
+        time.sleep(pause_s)
+        return True
 
 
 class UnreachableError(CommandError):

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
 DIGITS: Final = 20
 """Hex digits of a whole id."""
+EXAMPLE: Final = "0a1b2c3d4e5f60718293"
 KINDS: Final = ("job", "sweep", "key")
 MAX_CANDIDATES: Final = 10
 LISTED: Final = {"job": "jobs", "sweep": "sweeps"}
@@ -43,6 +44,17 @@ def whole_id(client: Client, kind: str, given: str) -> str:
     return found[0]
 
 
+def checked_id(kind: str, given: object) -> str:
+    """An id that is whole, as a program gives it.
+
+    Raises:
+        CommandError: It is no id of this kind.
+    """
+    if not isinstance(given, str) or not re.fullmatch(rf"{kind}_[0-9a-f]{{{DIGITS}}}", given):
+        raise CommandError(f"{given!r} is not the id of a {kind}, such as {kind}_{EXAMPLE}")
+    return given
+
+
 def checked_prefix(kind: str, given: str) -> str:
     """The beginning of an id, with its ``kind_``.
 
@@ -54,7 +66,7 @@ def checked_prefix(kind: str, given: str) -> str:
         wrong = given.partition("_")[0]
         hint = did_you_mean(wrong, KINDS) if "_" in given and wrong not in KINDS else ""
         raise CommandError(
-            f"{given!r} is not the id of a {kind} (such as {kind}_{'0a1b2c3d4e5f60718293'}, "
+            f"{given!r} is not the id of a {kind} (such as {kind}_{EXAMPLE}, "
             f"or its beginning){hint}"
         )
     return f"{kind}_{match[1]}"

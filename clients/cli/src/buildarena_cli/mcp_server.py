@@ -17,6 +17,7 @@ from mcp.server.stdio import stdio_server
 
 from buildarena_cli.client import Client, at
 from buildarena_cli.errors import CommandError
+from buildarena_cli.ids import checked_id
 from buildarena_geometry import tool_definitions
 
 GROUPS = ("build", "refine", "assemble", "control", "query")
@@ -131,7 +132,7 @@ def _object(properties: Mapping[str, Any], required: list[str]) -> dict[str, Any
 def _act(client: Client, tool: str, given: dict[str, Any]) -> types.CallToolResult:
     session, machine = given.pop("session"), given.pop("machine", "main")
     body = {"tool": tool, "arguments": given, "machine": machine}
-    done = client.post(at("sessions", str(session), "calls"), body)
+    done = client.post(at("sessions", checked_id("job", session), "calls"), body)
     return _result(done["feedback"], failed=not done["ok"])
 
 
@@ -143,10 +144,10 @@ def _manage(client: Client, tool: str, given: Arguments) -> types.CallToolResult
         opened = client.post("/v1/sessions", given)
         return _result(f"session: {opened['id']}\n\n{opened['statement']}")
     if tool == "submit":
-        job = client.post(at("sessions", str(given["session"]), "submit"), {})
+        job = client.post(at("sessions", checked_id("job", given["session"]), "submit"), {})
         return _result(_ended(job))
     if tool == "get_result":
-        return _result(_ended(client.get(at("jobs", str(given["session"])))))
+        return _result(_ended(client.get(at("jobs", checked_id("job", given["session"])))))
     return _result(f"there is no tool {tool!r}", failed=True)
 
 

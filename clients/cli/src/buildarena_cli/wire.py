@@ -24,6 +24,7 @@ class Response:
     url: str
     status: int
     body: bytes
+    retry_after: str = ""
 
     @property
     def failed(self) -> bool:
@@ -79,7 +80,12 @@ class Wire:
     def read(self, path: str, answer: HTTPResponse) -> Response:
         """The rest of an answer."""
         url = f"{self._parts.scheme}://{self._parts.netloc}{path}"
-        return Response(url=url, status=answer.status, body=answer.read())
+        return Response(
+            url=url,
+            status=answer.status,
+            body=answer.read(),
+            retry_after=answer.getheader("Retry-After", ""),
+        )
 
     @contextmanager
     def opened(

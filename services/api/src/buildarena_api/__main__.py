@@ -9,6 +9,7 @@ from sqlalchemy.exc import OperationalError
 
 from buildarena_api.app import create_app
 from buildarena_api.http.access import check_binding
+from buildarena_api.http.own_pool import POOL_TIMEOUT_S
 from buildarena_pipeline.catalog.models import load_registry
 from buildarena_pipeline.errors import StartupError
 from buildarena_pipeline.runtime.context import open_context
@@ -19,18 +20,21 @@ from buildarena_pipeline.runtime.tracing import Tracing
 from buildarena_store import SchemaVersionError
 
 POOL_SIZE = 10
+SWITCH_S = 0.0005
+"""How long a thread may keep the interpreter: exports must not delay the event loop."""
 
 
 def main() -> None:
     """Serves the API until it is asked to stop."""
     settings = Settings()
+    sys.setswitchinterval(SWITCH_S)
     set_up_logs(settings.log_level)
     end_with_parent()
     try:
         check_binding(settings)
         tracing = Tracing("api", settings.otlp_endpoint)
         registry = load_registry(settings.models_file)
-        context = open_context(settings, pool_size=POOL_SIZE)
+        context = open_context(settings, pool_size=POOL_SIZE, pool_timeout_s=POOL_TIMEOUT_S)
         context.store.database.require_schema()
     except (StartupError, SchemaVersionError, ValueError) as error:
         sys.exit(f"api: {error}")
@@ -44,6 +48,8 @@ def main() -> None:
             log_config=None,
             access_log=False,
             timeout_graceful_shutdown=5,
+            proxy_headers=bool(settings.trusted_proxies),
+            forwarded_allow_ips=settings.trusted_proxies,
         )
     finally:
         context.close()

@@ -7,12 +7,19 @@ from contextlib import asynccontextmanager
 
 from fastapi import Depends, FastAPI
 from fastapi_offline import FastAPIOffline
+from starlette.routing import Route
 
 from buildarena_api.events.hub import EventHub
 from buildarena_api.http.access import caller_of
+from buildarena_api.http.concurrency import limited, usual_limits
+from buildarena_api.http.key_checks import KeyChecks
 from buildarena_api.http.limits import BodyLimitMiddleware
+from buildarena_api.http.locality import LocalOnlyMiddleware
 from buildarena_api.http.log import RequestLog
+from buildarena_api.http.methods import MethodMiddleware
 from buildarena_api.http.metrics import ServiceMetrics
+from buildarena_api.http.overload import OverloadMiddleware
+from buildarena_api.http.own_pool import OwnPool
 from buildarena_api.http.problems import add_problem_handlers, problem_responses
 from buildarena_api.http.rate_limits import RateLimits
 from buildarena_api.leaderboard.cache import BoardCache
@@ -20,6 +27,7 @@ from buildarena_api.routes import (
     archives,
     catalogue,
     events,
+    exports,
     health,
     jobs,
     keys,
@@ -37,6 +45,13 @@ from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.reaper import Reaper
 from buildarena_pipeline.submission.submission import Submissions
 
+WATCHERS = 3
+"""Threads and connections for key checks and event streams."""
+EXPORTERS = 6
+"""Threads and connections for exports and archives: as many as may go on at once."""
+ORDINARY = (verifications, sessions, jobs, sweeps, leaderboard, tasks, catalogue, keys, metrics)
+LIMITED_THEMSELVES = (events, exports, archives)
+"""Routes whose requests take long, and don't count among a caller's ordinary ones."""
 DESCRIPTION = """Find out whether language models can engineer: submit task x model x seed jobs,
 watch machines being built and simulated, and read the leaderboard. Errors are RFC 9457 problem
 details that name the field and the valid choices."""
@@ -50,12 +65,18 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
         registry: The models that jobs can name.
     """
     reaper = Reaper(context)
+    watching = OwnPool(context, size=WATCHERS, name="watching")
+    exporting = OwnPool(context, size=EXPORTERS, name="exporting")
+    rate_limits = RateLimits(context.settings.required_broker_url(), context.settings.rate_limit)
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
         reaper.start()
         yield
         reaper.stop()
+        await rate_limits.close()
+        watching.close()
+        exporting.close()
 
     # Its documentation page needs nothing from elsewhere.
     app = FastAPIOffline(
@@ -70,36 +91,47 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
         license_info={"name": "Apache-2.0", "identifier": "Apache-2.0"},
     )
     app.state.metrics = ServiceMetrics(context)
-    app.add_middleware(BodyLimitMiddleware, unlimited={archives.IMPORT_PATH})
-    app.add_middleware(RequestLog, metrics=app.state.metrics)
     app.state.context = context
     app.state.artifact_probe = health.ArtifactProbe(context.artifacts)
-    app.state.hub = EventHub(context)
+    app.state.exporting = exporting
+    app.state.hub = EventHub(watching)
+    app.state.key_checks = KeyChecks(watching)
+    app.state.concurrency = usual_limits()
     app.state.registry = registry
     app.state.boards = BoardCache(context.store.results.boards, context.tasks)
     app.state.submissions = Submissions(context, registry)
     app.state.external = ExternalSessions(context)
-    app.state.rate_limits = RateLimits(
-        context.settings.required_broker_url(), context.settings.rate_limit
-    )
+    app.state.rate_limits = rate_limits
     add_problem_handlers(app)
+    _add_routes(app)
+    _add_middleware(app)
+    return app
+
+
+def _add_routes(app: FastAPI) -> None:
     app.include_router(health.router)
-    for route in (
-        verifications,
-        sessions,
-        events,
-        jobs,
-        sweeps,
-        leaderboard,
-        tasks,
-        catalogue,
-        keys,
-        metrics,
-        archives,
-    ):
+    for route in (*LIMITED_THEMSELVES, *ORDINARY):
+        own = [] if route in LIMITED_THEMSELVES else [limited("ordinary")]
         app.include_router(
             route.router,
-            dependencies=[Depends(caller_of)],
+            dependencies=[Depends(caller_of), *own],
             responses=problem_responses(401, 403, 429),
         )
-    return app
+
+
+def _add_middleware(app: FastAPI) -> None:
+    """The last one added is the first that a request meets."""
+    app.add_middleware(
+        BodyLimitMiddleware, unlimited={archives.IMPORT_PATH}, documents={tasks.PATH}
+    )
+    routes = [
+        (found.path, found.methods or ())
+        for part in (health, *ORDINARY, *LIMITED_THEMSELVES)
+        for found in part.router.routes
+        if isinstance(found, Route)
+    ]
+    app.add_middleware(MethodMiddleware, routes=routes)
+    if not app.state.context.settings.require_keys:
+        app.add_middleware(LocalOnlyMiddleware)
+    app.add_middleware(RequestLog, metrics=app.state.metrics)
+    app.add_middleware(OverloadMiddleware)

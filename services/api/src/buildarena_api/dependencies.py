@@ -6,32 +6,39 @@ from typing import Annotated
 
 from fastapi import Depends, Query, Request
 
+from buildarena_api.http.own_pool import OwnPool
 from buildarena_pipeline.agents.sessions import ExternalSessions
 from buildarena_pipeline.catalog.models import ModelRegistry
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.submission.submission import Submissions
 
 
-def _context(request: Request) -> Context:
+async def _context(request: Request) -> Context:
     context: Context = request.app.state.context
     return context
 
 
-def _registry(request: Request) -> ModelRegistry:
+async def _registry(request: Request) -> ModelRegistry:
     registry: ModelRegistry = request.app.state.registry
     return registry
 
 
+async def _exporting(request: Request) -> OwnPool:
+    pool: OwnPool = request.app.state.exporting
+    return pool
+
+
+ExportingDep = Annotated[OwnPool, Depends(_exporting)]
 ContextDep = Annotated[Context, Depends(_context)]
 RegistryDep = Annotated[ModelRegistry, Depends(_registry)]
 
 
-def _submissions(request: Request) -> Submissions:
+async def _submissions(request: Request) -> Submissions:
     submissions: Submissions = request.app.state.submissions
     return submissions
 
 
-def _external(request: Request) -> ExternalSessions:
+async def _external(request: Request) -> ExternalSessions:
     sessions: ExternalSessions = request.app.state.external
     return sessions
 

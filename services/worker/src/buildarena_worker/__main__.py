@@ -27,7 +27,7 @@ def main() -> None:
             return construct_handler(context, registry)
 
         def make_others(context: Context) -> Mapping[str, Callable[[str], None]]:
-            return {VERIFY_QUEUE: verification_runner(context).process}
+            return {VERIFY_QUEUE: verification_runner(context).wake}
 
         run_worker(
             WorkerSpec(

@@ -9,8 +9,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from hashlib import sha256
+from threading import Lock
 from typing import Any
 
 import structlog
@@ -68,6 +71,9 @@ class Check:
     kept: Any
     found: Any
 
+
+AT_ONCE = 2
+"""Verifications of one process at once, however many wait."""
 
 log = structlog.get_logger(__name__)
 
@@ -243,7 +249,9 @@ class Verifier:
 
 
 class VerificationRunner:
-    """Does the verifications that messages speak of.
+    """Does the verifications that messages speak of, in threads of its own.
+
+    Messages arrive in the threads of sessions: they only wake it, and take no session's place.
 
     Args:
         verifications: What was asked for.
@@ -253,12 +261,22 @@ class VerificationRunner:
     def __init__(self, verifications: Verifications, verifier: Verifier) -> None:
         self._verifications = verifications
         self._verifier = verifier
+        self._threads = ThreadPoolExecutor(AT_ONCE, thread_name_prefix="verifying")
+        self._lock = Lock()
+        self._active = 0
 
-    def process(self, verification_id: str) -> None:
-        """Does a verification, unless another worker has it."""
-        claimed = self._verifications.claim(verification_id)
+    def wake(self, _: str) -> None:
+        """Has waiting verifications done, unless as many as may be are being done."""
+        with self._lock:
+            if self._active < AT_ONCE:
+                self._active += 1
+                self._threads.submit(self._do_next)
+
+    def process_one(self) -> bool:
+        """Does the verification that waits longest; False when none waits."""
+        claimed = self._verifications.claim_next()
         if claimed is None:
-            return
+            return False
         try:
             report = self._verifier.verify(claimed.job_id)
         except (ArtifactStoreError, OperationalError) as error:
@@ -269,7 +287,22 @@ class VerificationRunner:
             log.exception("verification_failed", job=claimed.job_id)
             failed = Check(name="verification", ok=False, kept=None, found=f"it broke off: {error}")
             report = {"ok": False, "checks": [asdict(failed)]}
-        self._verifications.finish(verification_id, report)
+        self._verifications.finish(claimed.id, report)
+        return True
+
+    def _do_next(self) -> None:
+        try:
+            again = self.process_one()
+        except Exception:
+            # The reaper notifies again.
+            log.exception("verifications_unreadable")
+            again = False
+        with self._lock, suppress(RuntimeError):
+            if again:
+                self._threads.submit(self._do_next)  # refused when the process ends
+                return
+        with self._lock:
+            self._active -= 1
 
 
 SCORED = ("success", "indicator", "metrics", "flags")

@@ -9,7 +9,7 @@ from threading import Lock
 from typing import Any
 
 from buildarena_benchmark import Task, ValidationIssue, broken_constraint
-from buildarena_pipeline.agents.workbench import Workbench, rebuild
+from buildarena_pipeline.agents.workbench import Workbench, check_arguments, rebuild
 from buildarena_pipeline.catalog.tracks import SIMULATORS, external_track
 from buildarena_pipeline.errors import PipelineError, SubmissionError
 from buildarena_pipeline.runtime.context import Context
@@ -33,6 +33,8 @@ from buildarena_store.states import simulate_queue
 
 AGENT_NAME = re.compile(r"[A-Za-z0-9_.-]{1,80}")
 MAX_CALLS = 2000
+MAX_SESSION_BYTES = 8 << 20
+"""What a session's arguments and feedback may have together: 4 kB for each of its calls."""
 CACHED_BENCHES = 256
 JSON = "application/json"
 
@@ -111,8 +113,10 @@ class ExternalSessions:
         """Carries out one tool call and keeps it.
 
         Raises:
-            SessionClosedError: The session is not open, or it made too many calls.
+            SessionClosedError: The session is not open, or its calls are too many or too large.
+            SubmissionError: The arguments are too large or too deep.
         """
+        check_arguments(arguments)
         with self._context.store.database.transaction() as connection:
             lease = self._open_lease(job_id, connection)
             count = lease.job.actions
@@ -121,6 +125,12 @@ class ExternalSessions:
                     f"session {job_id} has made {MAX_CALLS} calls, the most it may make: submit it"
                 )
             bench = self._bench(job_id, count, connection)
+            if bench.size >= MAX_SESSION_BYTES:
+                self._keep_bench(job_id, count, bench)
+                raise SessionClosedError(
+                    f"session {job_id} has {bench.size:,} bytes of arguments and feedback, of "
+                    f"{MAX_SESSION_BYTES:,} that it may have: submit it"
+                )
             done = bench.call(machine, tool, arguments)
             self._context.store.external_calls.append(lease, count, done, connection=connection)
         self._keep_bench(job_id, count + 1, bench)
@@ -180,7 +190,7 @@ class ExternalSessions:
                     refusals=refusals,
                 )
         if engine is not None:
-            context.queues.notify(simulate_queue(engine), [job_id])
+            context.queues.announce(simulate_queue(engine), [job_id])
         return context.store.jobs.get(job_id)
 
     def _check(self, task: str, agent: str, simulator: str) -> Task:

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from typing import Any
 
+from buildarena_benchmark import ValidationIssue
 from buildarena_geometry import Machine, Refused, ToolDefinition, tool_definitions
+from buildarena_pipeline.errors import SubmissionError
 from buildarena_store import ExternalCall, clean
 
 MAIN = "main"
 ASSEMBLY = "assembly"
+MAX_DEPTH = 20
+MAX_BYTES = 64 << 10
+"""What the arguments of one call may have as JSON; real ones have some hundred bytes."""
 GROUPS = ("build", "refine", "assemble", "control", "query")
 
 
@@ -18,15 +24,21 @@ class Workbench:
 
     The machine called ``assembly`` is put together from copies of all others, as they are when
     the first call to it is made.
+
+    Attributes:
+        machines: What was built, by name.
+        size: Bytes of all arguments and feedback so far.
     """
 
     def __init__(self) -> None:
         self.machines: dict[str, Machine] = {}
+        self.size = 0
 
     def call(self, machine: str, tool: str, arguments: Any) -> ExternalCall:
         """Carries out an action and returns its result; no argument makes it raise."""
         tool, arguments = clean(tool), clean(arguments)
         outcome = self._machine(machine).act(tool, arguments)
+        self.size += _size(tool) + _size(arguments) + len(outcome.text.encode())
         return ExternalCall(
             machine=machine,
             tool=tool,
@@ -49,6 +61,38 @@ class Workbench:
             available = dict(self.machines) if name == ASSEMBLY else {}
             self.machines[name] = Machine(available=available) if available else Machine()
         return self.machines[name]
+
+
+def check_arguments(arguments: Any) -> None:
+    """Checks that a call's arguments are bounded.
+
+    Raises:
+        SubmissionError: They are too deep or too large.
+    """
+    level, depth = [arguments], 0
+    while level:
+        depth += 1
+        if depth > MAX_DEPTH:
+            raise _refused(f"more than {MAX_DEPTH} lists or objects inside each other")
+        inner: list[Any] = []
+        for value in level:
+            if isinstance(value, dict):
+                inner += value.values()
+            elif isinstance(value, list):
+                inner += value
+        level = [value for value in inner if isinstance(value, dict | list)]
+    size = _size(arguments)
+    if size > MAX_BYTES:
+        raise _refused(f"{size:,} bytes; a call's arguments have at most {MAX_BYTES:,}")
+
+
+def _size(value: Any) -> int:
+    """Bytes of a JSON value."""
+    return len(json.dumps(value, separators=(",", ":")))
+
+
+def _refused(message: str) -> SubmissionError:
+    return SubmissionError([ValidationIssue(path="arguments", message=message)])
 
 
 def rebuild(calls: Sequence[ExternalCall]) -> Workbench:

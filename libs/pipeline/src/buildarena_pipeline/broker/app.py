@@ -5,8 +5,13 @@ from __future__ import annotations
 from celery import Celery
 
 
-def celery_app(broker_url: str) -> Celery:
-    """The Celery application of every process, without a result backend."""
+def celery_app(broker_url: str, *, timeout_s: float = 10.0) -> Celery:
+    """The Celery application of every process, without a result backend.
+
+    Args:
+        broker_url: ``redis://…``.
+        timeout_s: How long the broker may take for an answer.
+    """
     app = Celery("buildarena", broker=broker_url)
     app.conf.update(
         task_ignore_result=True,
@@ -20,8 +25,8 @@ def celery_app(broker_url: str) -> Celery:
         broker_connection_retry_on_startup=True,
         broker_connection_max_retries=None,
         broker_transport_options={
-            "socket_connect_timeout": 2,
-            "socket_timeout": 10,
+            "socket_connect_timeout": min(2.0, timeout_s),
+            "socket_timeout": timeout_s,
             "max_retries": 1,
             "interval_start": 0,
             "interval_max": 0.2,

@@ -13,14 +13,20 @@ import structlog
 from celery import Celery
 from kombu.exceptions import OperationalError
 from redis import Redis
+from redis.backoff import NoBackoff
 from redis.exceptions import RedisError
+from redis.retry import Retry
 
+from buildarena_pipeline.broker.announcer import Announcer
 from buildarena_pipeline.broker.app import celery_app
+from buildarena_pipeline.broker.breaker import CircuitBreaker
 
 PROCESS_NEXT = "buildarena.process_next"
 """Name of the one message kind; its arguments are the queue's name and a job id."""
 MAX_WAITING = 200
 """Messages kept waiting per queue; more are sent as workers take them."""
+TIMEOUT_S = 0.8
+"""How long the broker may take for an answer: it has what it is asked for in memory."""
 ENOUGH_WAITING = 50
 """Messages that are enough for a queue until the reaper runs again, a second later."""
 
@@ -30,17 +36,28 @@ log = structlog.get_logger(__name__)
 class Queues:
     """Sends messages and counts those that wait.
 
+    A broker that fails to answer is left alone until a probe in the background finds it well:
+    nobody pays for its time-outs again and again.
+
     Args:
         broker_url: ``redis://…`` of a Redis or Valkey server.
     """
 
     def __init__(self, broker_url: str) -> None:
         self.app = celery_app(broker_url)
-        self._sender = celery_app(broker_url)
+        self._sender = celery_app(broker_url, timeout_s=TIMEOUT_S)
         self._broker_url = broker_url
         self._lock = threading.Lock()
         # Celery's queues are lists of the same name.
-        self._redis = Redis.from_url(broker_url, socket_connect_timeout=2, socket_timeout=10)
+        self._redis = Redis.from_url(
+            broker_url,
+            socket_connect_timeout=TIMEOUT_S,
+            socket_timeout=TIMEOUT_S,
+            retry=Retry(NoBackoff(), 0),
+        )
+        self._breaker = CircuitBreaker(self._answers)
+        self._announcer = Announcer(self.notify, most=MAX_WAITING)
+        self._topper = Announcer(self._top_up, most=ENOUGH_WAITING)
 
     def notify(self, queue: str, job_ids: Sequence[str]) -> bool:
         """Sends a queue's workers a message for each job, if the broker can be reached.
@@ -48,6 +65,8 @@ class Queues:
         Returns:
             False when the broker could not be reached; the reaper will try again.
         """
+        if self._breaker.is_open:
+            return False
         sender = self._sender
         try:
             with sender.producer_pool.acquire(block=True) as producer:
@@ -60,28 +79,51 @@ class Queues:
                         retry=False,
                     )
         except (OperationalError, RedisError, OSError) as error:
-            log.warning("broker_unreachable", queue=queue, error=str(error))
+            self._note_failure(queue, error)
             self._renew_sender(sender)
             return False
         return True
 
     def notify_one(self, queue: str, job_id: str) -> None:
-        """Sends a message for one more job, unless so many wait that workers will come anyway.
+        """Sends a message for one more job soon, unless enough wait for workers to come anyway.
 
         Any message makes a worker take whatever waits, and the reaper adds messages as they are
         taken; asking how many wait costs a tenth of sending one.
         """
+        self._topper.announce(queue, [job_id])
+
+    def announce(self, queue: str, job_ids: Sequence[str]) -> None:
+        """As notify, but soon and in the background; returns at once."""
+        self._announcer.announce(queue, job_ids)
+
+    def settle(self) -> bool:
+        """Waits until what was announced is sent or given up; returns whether that came to be."""
+        return self._topper.wait() and self._announcer.wait()
+
+    def _top_up(self, queue: str, job_ids: Sequence[str]) -> None:
         waiting = self.waiting(queue)
         if waiting is not None and waiting < ENOUGH_WAITING:
-            self.notify(queue, [job_id])
+            self.notify(queue, job_ids[: ENOUGH_WAITING - waiting])
 
     def waiting(self, queue: str) -> int | None:
         """Messages that no worker has taken, or None when the broker can't be reached."""
+        if self._breaker.is_open:
+            return None
         try:
             return int(self._redis.llen(queue))
         except (RedisError, OSError) as error:
-            log.warning("broker_unreachable", queue=queue, error=str(error))
+            self._note_failure(queue, error)
             return None
+
+    def _note_failure(self, queue: str, error: Exception) -> None:
+        log.warning("broker_unreachable", queue=queue, error=str(error))
+        self._breaker.failed()
+
+    def _answers(self) -> bool:
+        try:
+            return bool(self._redis.ping())
+        except (RedisError, OSError):
+            return False
 
     def _renew_sender(self, failed: Celery) -> None:
         """Takes a fresh sender: a pool's connections to a server that is gone stay in its way."""
@@ -90,7 +132,10 @@ class Queues:
                 self._sender = celery_app(self._broker_url)
 
     def close(self) -> None:
-        """Closes the connections to the broker."""
+        """Ends announcements and closes the connections to the broker."""
+        self._announcer.close()
+        self._topper.close()
+        self._breaker.close()
         self._redis.close()
         self._sender.close()
         self.app.close()

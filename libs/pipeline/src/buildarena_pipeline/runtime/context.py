@@ -26,9 +26,13 @@ class Context:
         self.store.database.close()
 
 
-def open_context(settings: Settings, *, pool_size: int = 5) -> Context:
+def open_context(
+    settings: Settings, *, pool_size: int = 5, pool_timeout_s: float = 30.0
+) -> Context:
     """Connects to what the settings name; nothing is contacted before it is used."""
-    database = Database(settings.required_database_url(), pool_size=pool_size)
+    database = Database(
+        settings.required_database_url(), pool_size=pool_size, pool_timeout_s=pool_timeout_s
+    )
     store = open_store(database, lease_s=settings.lease_s, max_faults=settings.max_faults)
     return Context(
         settings=settings,

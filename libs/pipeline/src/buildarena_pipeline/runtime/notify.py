@@ -16,10 +16,13 @@ class Notifier(Protocol):
 
 
 def notify_waiting(context: Context, queue: str) -> None:
-    """Keeps up to MAX_WAITING messages in a queue, for the jobs that no message names."""
+    """Keeps up to MAX_WAITING messages in a queue, for the jobs that no message names.
+
+    The messages are sent in the background.
+    """
     waiting = context.queues.waiting(queue)
     if waiting is None or waiting >= MAX_WAITING:
         return
     job_ids = context.store.leases.to_notify(queue, MAX_WAITING - waiting)
     if job_ids:
-        context.queues.notify(queue, job_ids)
+        context.queues.announce(queue, job_ids)

@@ -65,4 +65,4 @@ class Reaper:
             self._context.store.external_calls.abandon_idle()
             checks = self._context.store.verifications.to_notify(MAX_WAITING)
             if checks:
-                self._context.queues.notify(VERIFY_QUEUE, checks)
+                self._context.queues.announce(VERIFY_QUEUE, checks)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from ipaddress import ip_network
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import Field, SecretStr
+from pydantic import Field, SecretStr, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 DEFAULT_PORT = 8321
@@ -38,6 +39,13 @@ class Settings(BaseSettings):
     rate_limit: Annotated[
         str, Field(description="Requests a caller may send, for example 600/minute")
     ] = "6000/minute"
+    trusted_proxies: Annotated[
+        str,
+        Field(
+            description="Addresses or networks of proxies whose X-Forwarded-For counts, "
+            "separated by commas; none by default"
+        ),
+    ] = ""
     models_file: Annotated[
         Path | None, Field(description="YAML of further models, added to the built-in registry")
     ] = None
@@ -65,6 +73,19 @@ class Settings(BaseSettings):
         str | None, Field(description="OTLP/HTTP collector of traces; none are made without")
     ] = None
     log_level: Annotated[str, Field(description="debug, info, warning or error")] = "info"
+
+    @field_validator("trusted_proxies")
+    @classmethod
+    def _only_addresses(cls, value: str) -> str:
+        named = [part.strip() for part in value.split(",") if part.strip()]
+        for part in named:
+            try:
+                ip_network(part)
+            except ValueError as error:
+                raise ValueError(
+                    f"{part!r} is neither an address nor a network such as 10.0.0.0/8"
+                ) from error
+        return ",".join(named)
 
     @property
     def artifacts_location(self) -> str:

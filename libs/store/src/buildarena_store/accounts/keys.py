@@ -8,13 +8,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 
-from sqlalchemy import func, insert, select, update
+from sqlalchemy import any_, func, insert, or_, select, update
 
 from buildarena_store import events
 from buildarena_store.database import Database
 from buildarena_store.errors import UnknownIdError
 from buildarena_store.ids import new_id
-from buildarena_store.rows import columns_of, value_of
+from buildarena_store.rows import bound_texts, columns_of, value_of
 from buildarena_store.tables import api_keys
 
 SECRET_PREFIX = "ba_"  # noqa: S105 - what secrets begin with, for scanners that look for leaks
@@ -115,6 +115,15 @@ class ApiKeys:
                     update(api_keys).where(api_keys.c.id == key.id).values(used_at=events.now)
                 )
         return KeyCheck(key=key, refusal=None)
+
+    def ended(self, key_ids: Sequence[str]) -> set[str]:
+        """Those of the keys that were revoked or have expired."""
+        query = select(api_keys.c.id).where(
+            api_keys.c.id == any_(bound_texts(key_ids)),
+            or_(api_keys.c.revoked_at.is_not(None), api_keys.c.expires_at <= events.now),
+        )
+        with self._database.transaction() as connection:
+            return set(connection.execute(query).scalars())
 
     def all(self) -> list[ApiKey]:
         """Every key, oldest first, including revoked and expired ones."""

@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Any
 
-from sqlalchemy import insert, or_, select, update
+from sqlalchemy import ColumnElement, Connection, any_, func, or_, select, update
+from sqlalchemy.dialects.postgresql import insert
 
 from buildarena_store import events
 from buildarena_store.database import Database
 from buildarena_store.errors import UnknownIdError
 from buildarena_store.ids import new_id
-from buildarena_store.rows import columns_of, value_of
+from buildarena_store.rows import bound_texts, columns_of, value_of
 from buildarena_store.states import VerificationState
 from buildarena_store.tables import jobs, verifications
 
 ABANDONED_AFTER = timedelta(minutes=10)
 """After so long without an end, a verification is done by another worker: it writes no score."""
+MAX_OPEN = 200
+"""Verifications that one owner may have waiting or running."""
+OWNER_LOCK = 0x766572  # "ver"
+QUEUED = VerificationState.QUEUED
 NOTIFY_AGAIN_AFTER = timedelta(seconds=10)
 
 
@@ -39,36 +44,75 @@ class Verification:
     finished_at: datetime | None
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Requested:
+    """What came of a request for verifications.
+
+    Attributes:
+        ids: Ids of open verifications, by job.
+        left: Jobs that found no room, as the owner has as many open as one may.
+    """
+
+    ids: Mapping[str, str]
+    left: Sequence[str]
+
+
 class Verifications:
     """Asks for, claims and ends verifications."""
 
     def __init__(self, database: Database) -> None:
         self._database = database
 
-    def request(self, job_id: str) -> str:
-        """Asks for a job to be verified; returns the verification's id."""
-        verification_id = new_id("check")
-        with self._database.transaction() as connection:
-            connection.execute(
-                insert(verifications).values(
-                    id=verification_id, job_id=job_id, state=VerificationState.QUEUED
-                )
-            )
-        return verification_id
+    def request(self, job_ids: Sequence[str], *, owner: str | None = None) -> Requested:
+        """Asks for jobs to be verified, as many as the owner may have open at once.
 
-    def claim(self, verification_id: str) -> Verification | None:
-        """Takes a verification that waits or was abandoned."""
+        A job whose verification is open already is not verified twice: whoever asks gets that one.
+
+        Args:
+            job_ids: The jobs, in the order in which they find room.
+            owner: The key that asks; None for the operator.
+        """
+        with self._database.transaction() as connection:
+            # Two requests of one owner must not both find the last places free.
+            lock = func.pg_advisory_xact_lock(OWNER_LOCK, func.hashtext(owner or ""))
+            connection.execute(select(lock))
+            known = self._open_ones(job_ids, connection)
+            mine = verifications.c.owner.is_not_distinct_from(owner) & _OPEN
+            count = select(func.count()).where(mine)
+            room = max(0, MAX_OPEN - connection.execute(count).scalar_one())
+            fresh = [job_id for job_id in dict.fromkeys(job_ids) if job_id not in known]
+            if fresh[:room]:
+                rows = [
+                    {"id": new_id("check"), "job_id": id_, "owner": owner, "state": QUEUED}
+                    for id_ in fresh[:room]
+                ]
+                # Another owner may ask for the same at this moment.
+                connection.execute(insert(verifications).on_conflict_do_nothing(), rows)
+                known = self._open_ones(job_ids, connection)
+        ids = {job_id: known[job_id] for job_id in dict.fromkeys(job_ids) if job_id in known}
+        return Requested(ids=ids, left=tuple(one for one in fresh[room:] if one not in ids))
+
+    @staticmethod
+    def _open_ones(job_ids: Sequence[str], connection: Connection) -> dict[str, str]:
+        """Ids of open verifications, by job."""
+        query = select(verifications.c.job_id, verifications.c.id).where(
+            verifications.c.job_id == any_(bound_texts(job_ids)), _OPEN
+        )
+        return {row.job_id: row.id for row in connection.execute(query)}
+
+    def claim_next(self) -> Verification | None:
+        """Takes the verification that waits longest, or one that was abandoned."""
+        waiting = (
+            select(verifications.c.id)
+            .where(_claimable())
+            .order_by(verifications.c.created_at)
+            .limit(1)
+            .with_for_update(skip_locked=True)
+        )
         with self._database.transaction() as connection:
             row = connection.execute(
                 update(verifications)
-                .where(
-                    verifications.c.id == verification_id,
-                    or_(
-                        verifications.c.state == VerificationState.QUEUED,
-                        (verifications.c.state == VerificationState.RUNNING)
-                        & (verifications.c.claimed_at < events.now - ABANDONED_AFTER),
-                    ),
-                )
+                .where(verifications.c.id == waiting.scalar_subquery())
                 .values(state=VerificationState.RUNNING, claimed_at=events.now)
                 .returning(*_COLUMNS)
             ).first()
@@ -113,11 +157,7 @@ class Verifications:
         unnotified = (
             select(verifications.c.id)
             .where(
-                or_(
-                    verifications.c.state == VerificationState.QUEUED,
-                    (verifications.c.state == VerificationState.RUNNING)
-                    & (verifications.c.claimed_at < events.now - ABANDONED_AFTER),
-                ),
+                _claimable(),
                 verifications.c.notified_at.is_(None)
                 | (verifications.c.notified_at < events.now - NOTIFY_AGAIN_AFTER),
             )
@@ -135,4 +175,13 @@ class Verifications:
             return [row.id for row in rows]
 
 
+def _claimable() -> ColumnElement[bool]:
+    return or_(
+        verifications.c.state == QUEUED,
+        (verifications.c.state == VerificationState.RUNNING)
+        & (verifications.c.claimed_at < events.now - ABANDONED_AFTER),
+    )
+
+
+_OPEN = verifications.c.state != VerificationState.DONE
 _COLUMNS = columns_of(Verification, verifications)

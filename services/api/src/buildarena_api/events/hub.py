@@ -1,103 +1,209 @@
-"""The event hub: reads new events once for all who listen, and passes them on."""
+"""The event hub: reads new events once for all who listen, and passes them on.
+
+Who listens to the same sweep or job shares everything: which jobs are meant, what happened before,
+and each event's text.
+"""
 
 from __future__ import annotations
 
 import asyncio
-import contextlib
+import json
 from collections.abc import AsyncIterator
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 
 import structlog
 from sqlalchemy.exc import SQLAlchemyError
+from sse_starlette import ServerSentEvent
 
-from buildarena_pipeline.runtime.context import Context
+from buildarena_api.http.own_pool import OwnPool
 from buildarena_store import Event
 
 log = structlog.get_logger(__name__)
 
 POLL_S = 0.5
+KEYS_EVERY_S = 2.0
+"""How long a stream may outlive the key that it was opened with."""
 SETTLED_AFTER = timedelta(seconds=5)
 """Ids are given out before their transactions end, so an event may appear behind later ones:
 reading goes back this far."""
+PAGE = 1000
 BACKLOG = 10_000
 """Events kept for a slow listener; one that falls further behind is cut off and may come again."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """Some events as they are sent, and the ids of those they are."""
+
+    ids: tuple[int, ...]
+    text: bytes
+
+
+@dataclass(slots=True, eq=False)
 class _Listener:
-    sweep_id: str | None
-    job_ids: frozenset[str]
-    queue: asyncio.Queue[Event | None] = field(
+    key_id: str | None
+    ended: bool = False
+    queue: asyncio.Queue[Piece | None] = field(
         default_factory=lambda: asyncio.Queue(maxsize=BACKLOG)
     )
 
+    def put(self, piece: Piece) -> None:
+        if self.queue.full():
+            self.end()
+        elif not self.ended:
+            self.queue.put_nowait(piece)
+
+    def end(self) -> None:
+        self.ended = True
+        while not self.queue.empty():
+            self.queue.get_nowait()
+        self.queue.put_nowait(None)
+
+
+@dataclass(slots=True, eq=False)
+class Channel:
+    """A sweep or a job, with those who listen to it."""
+
+    id: str
+    is_sweep: bool
+    job_ids: frozenset[str]
+    listeners: set[_Listener] = field(default_factory=set)
+    pages: dict[int, asyncio.Task[Piece]] = field(default_factory=dict)
+
     def wants(self, event: Event) -> bool:
-        return event.job_id in self.job_ids or (
-            self.sweep_id is not None and event.sweep_id == self.sweep_id
-        )
+        """Whether an event is of what it is about."""
+        return event.job_id in self.job_ids or (self.is_sweep and event.sweep_id == self.id)
 
 
 class EventHub:
     """Polls the events table while anybody listens.
 
     Args:
-        context: The process' connections.
+        pool: Threads and database connections to read with.
     """
 
-    def __init__(self, context: Context) -> None:
-        self._context = context
-        self._listeners: set[_Listener] = set()
+    def __init__(self, pool: OwnPool) -> None:
+        self._pool = pool
+        self._store = pool.context.store
+        self._channels: dict[str, Channel] = {}
+        self._opening: dict[str, asyncio.Task[Channel]] = {}
         self._task: asyncio.Task[None] | None = None
         self._floor: int | None = None
         self._seen: set[int] = set()
+        self._keys_checked_at = 0.0
+
+    async def open_job(self, job_id: str) -> Channel:
+        """The channel of a job.
+
+        Raises:
+            UnknownIdError: There is no such job.
+        """
+        return await self._open(job_id, sweep=False)
+
+    async def open_sweep(self, sweep_id: str) -> Channel:
+        """The channel of a sweep and its jobs.
+
+        Raises:
+            UnknownIdError: There is no such sweep.
+        """
+        return await self._open(sweep_id, sweep=True)
 
     async def listen(
-        self, *, last_id: int, sweep_id: str | None, job_ids: frozenset[str]
-    ) -> AsyncIterator[Event]:
+        self, channel: Channel, *, last_id: int, key_id: str | None
+    ) -> AsyncIterator[bytes]:
         """Events after an id, those that happened already first, then new ones as they come.
 
         Args:
+            channel: What is listened to.
             last_id: Only events with greater ids.
-            sweep_id: A sweep whose own events are wanted, if any.
-            job_ids: Jobs whose events are wanted.
+            key_id: The key that listens; the stream ends when it is no longer good.
         """
-        listener = _Listener(sweep_id, job_ids)
-        await self._join(listener)
+        listener = _Listener(key_id)
+        channel, floor = await self._join(channel, listener)
         sent: set[int] = set()
         try:
-            while True:
-                page = await asyncio.to_thread(self._before, last_id, sweep_id, job_ids)
-                for event in page:
-                    sent.add(event.id)
-                    yield event
-                if not page:
+            while not listener.ended:
+                page = await self._before(channel, last_id)
+                if not page.ids:
                     break
-                last_id = page[-1].id
-            while (new := await listener.queue.get()) is not None:
-                if new.id not in sent:
-                    yield new
+                # Older ones can't come again.
+                sent.update(id_ for id_ in page.ids if id_ > floor)
+                yield page.text
+                last_id = page.ids[-1]
+            while (piece := await listener.queue.get()) is not None:
+                if piece.ids[0] not in sent:
+                    yield piece.text
         finally:
-            self._listeners.discard(listener)
+            self._leave(channel, listener)
 
-    def _before(self, last_id: int, sweep_id: str | None, job_ids: frozenset[str]) -> list[Event]:
-        if sweep_id is not None:
-            return self._context.store.events.after(last_id, sweep_id=sweep_id)
-        (job_id,) = job_ids
-        return self._context.store.events.after(last_id, job_id=job_id)
+    async def _open(self, id_: str, *, sweep: bool) -> Channel:
+        """One channel for all that listen to the same, found by one look at the database."""
+        known = self._channels.get(id_)
+        if known is not None:
+            return known
+        opening = self._opening.get(id_)
+        if opening is None:
+            opening = asyncio.create_task(self._find(id_, sweep=sweep))
+            self._opening[id_] = opening
+            opening.add_done_callback(lambda _: self._opening.pop(id_, None))
+        return await asyncio.shield(opening)
 
-    async def _join(self, listener: _Listener) -> None:
+    async def _find(self, id_: str, *, sweep: bool) -> Channel:
+        def job_ids() -> frozenset[str]:
+            if not sweep:
+                return frozenset({self._store.jobs.get(id_).id})
+            self._store.sweeps.get(id_)
+            return frozenset(self._store.sweeps.job_ids(id_))
+
+        channel = Channel(id_, is_sweep=sweep, job_ids=await self._pool.run(job_ids))
+        for left in [one for one in self._channels.values() if not one.listeners]:
+            del self._channels[left.id]
+        return self._channels.setdefault(id_, channel)
+
+    async def _before(self, channel: Channel, last_id: int) -> Piece:
+        """A page of what happened; those who ask for it within a moment share it."""
+        reading = channel.pages.get(last_id)
+        if reading is None:
+            reading = asyncio.create_task(self._read(channel, last_id))
+            channel.pages[last_id] = reading
+            asyncio.get_running_loop().call_later(POLL_S, channel.pages.pop, last_id)
+        return await asyncio.shield(reading)
+
+    async def _read(self, channel: Channel, last_id: int) -> Piece:
+        about = {"sweep_id" if channel.is_sweep else "job_id": channel.id}
+
+        def read() -> Piece:
+            found = self._store.events.after(last_id, limit=PAGE, **about)
+            return Piece(tuple(event.id for event in found), b"".join(map(_text, found)))
+
+        return await self._pool.run(read)
+
+    async def _join(self, channel: Channel, listener: _Listener) -> tuple[Channel, int]:
+        """The channel that passes events on, and the id up to which none come any more."""
         if self._floor is None:
-            self._floor = await asyncio.to_thread(self._context.store.events.newest)
-        self._listeners.add(listener)
+            self._floor = await self._pool.run(self._store.events.newest)
+        # The one that was opened may have been dropped since.
+        channel = self._channels.setdefault(channel.id, channel)
+        channel.listeners.add(listener)
         if self._task is None or self._task.done():
             self._task = asyncio.create_task(self._poll())
+        return channel, self._floor
+
+    def _leave(self, channel: Channel, listener: _Listener) -> None:
+        channel.listeners.discard(listener)
+        if not channel.listeners and self._channels.get(channel.id) is channel:
+            del self._channels[channel.id]
+
+    def _listening(self) -> list[_Listener]:
+        return [one for channel in self._channels.values() for one in channel.listeners]
 
     async def _poll(self) -> None:
-        while self._listeners:
+        while self._listening():
             await asyncio.sleep(POLL_S)
             try:
-                events = await asyncio.to_thread(self._context.store.events.after, self._floor or 0)
+                await self._end_streams_of_bad_keys()
+                events = await self._new_events()
             except SQLAlchemyError as error:
                 log.warning("events_unreadable", error=str(error).splitlines()[0])
                 continue
@@ -109,17 +215,38 @@ class EventHub:
         self._floor = None
         self._seen.clear()
 
+    async def _new_events(self) -> list[Event]:
+        """Everything after what is settled, however much it is."""
+        found: list[Event] = []
+        last_id = self._floor or 0
+        while True:
+            page = await self._pool.run(self._store.events.after, last_id, limit=PAGE)
+            found += page
+            if len(page) < PAGE:
+                return found
+            last_id = page[-1].id
+
+    async def _end_streams_of_bad_keys(self) -> None:
+        now = asyncio.get_running_loop().time()
+        if now - self._keys_checked_at < KEYS_EVERY_S:
+            return
+        self._keys_checked_at = now
+        listening = self._listening()
+        keys = sorted({one.key_id for one in listening if one.key_id is not None})
+        if not keys:
+            return
+        bad = await self._pool.run(self._store.keys.ended, keys)
+        for one in listening:
+            if one.key_id in bad:
+                one.end()
+
     def _pass_on(self, event: Event) -> None:
-        for listener in list(self._listeners):
-            if not listener.wants(event):
-                continue
-            try:
-                listener.queue.put_nowait(event)
-            except asyncio.QueueFull:
-                self._listeners.discard(listener)
-                with contextlib.suppress(asyncio.QueueEmpty):
-                    listener.queue.get_nowait()
-                listener.queue.put_nowait(None)
+        piece: Piece | None = None
+        for channel in self._channels.values():
+            if channel.wants(event):
+                piece = piece or Piece((event.id,), _text(event))
+                for listener in channel.listeners:
+                    listener.put(piece)
 
     def _settle(self, events: list[Event]) -> None:
         """Forgets events that are too old for another to appear before them."""
@@ -130,3 +257,14 @@ class EventHub:
         if settled:
             self._floor = max(settled)
             self._seen = {id_ for id_ in self._seen if id_ > max(settled)}
+
+
+def _text(event: Event) -> bytes:
+    """An event as it is sent to all who listen."""
+    data = {
+        "job": event.job_id,
+        "sweep": event.sweep_id,
+        "at": event.at.isoformat(),
+        **event.data,
+    }
+    return ServerSentEvent(json.dumps(data), event=event.kind, id=str(event.id)).encode()

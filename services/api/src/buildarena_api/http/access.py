@@ -14,9 +14,9 @@ from typing import Annotated
 from fastapi import Depends, Request
 from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
 
+from buildarena_api.http.key_checks import KeyChecks
 from buildarena_api.http.problems import ProblemError
 from buildarena_api.http.rate_limits import RateLimits
-from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.settings import Settings
 
 SCOPES = ("read", "submit", "admin")
@@ -84,7 +84,7 @@ def check_binding(settings: Settings) -> None:
         )
 
 
-def caller_of(
+async def caller_of(
     request: Request,
     given: Annotated[HTTPAuthorizationCredentials | None, Depends(_bearer)],
 ) -> Caller:
@@ -95,29 +95,41 @@ def caller_of(
             requests.
     """
     limits: RateLimits = request.app.state.rate_limits
-    address = "unknown" if request.client is None else request.client.host
+    checks: KeyChecks = request.app.state.key_checks
     try:
-        caller = _identify(request.app.state.context, given)
+        caller = await _identify(request.app.state.context.settings, checks, given)
     except ProblemError:
         # Guessing keys is limited too.
-        _count(limits, f"refused:{address}")
+        await _count(limits, f"refused:{_address(request)}")
         raise
-    _count(limits, caller.key_id or f"address:{address}")
     request.state.caller = caller
+    await _count(limits, who_asks(request))
     caller.require("read" if request.method in READING else "submit")
     return caller
+
+
+def who_asks(request: Request) -> str:
+    """Whose share a request is taken from: the key's, or the address' where there is none."""
+    caller: Caller | None = getattr(request.state, "caller", None)
+    if caller is None or caller.key_id is None:
+        return f"address:{_address(request)}"
+    return caller.key_id
+
+
+def _address(request: Request) -> str:
+    return "unknown" if request.client is None else request.client.host
 
 
 CallerDep = Annotated[Caller, Depends(caller_of)]
 
 
-def admin_only(caller: CallerDep) -> None:
+async def admin_only(caller: CallerDep) -> None:
     """Lets admins pass only."""
     caller.require("admin")
 
 
-def _count(limits: RateLimits, who: str) -> None:
-    wait_s = limits.hit(who)
+async def _count(limits: RateLimits, who: str) -> None:
+    wait_s = await limits.hit(who)
     if wait_s is not None:
         raise ProblemError(
             429,
@@ -126,8 +138,9 @@ def _count(limits: RateLimits, who: str) -> None:
         )
 
 
-def _identify(context: Context, given: HTTPAuthorizationCredentials | None) -> Caller:
-    settings = context.settings
+async def _identify(
+    settings: Settings, checks: KeyChecks, given: HTTPAuthorizationCredentials | None
+) -> Caller:
     if given is None:
         if settings.require_keys:
             raise _unauthorized("an API key is needed: send `Authorization: Bearer KEY`")
@@ -137,7 +150,7 @@ def _identify(context: Context, given: HTTPAuthorizationCredentials | None) -> C
         secret.encode(), settings.admin_key.get_secret_value().encode()
     ):
         return Caller(key_id=None, scope="admin")
-    found = context.store.keys.check(secret)
+    found = await checks.check(secret)
     if found is None:
         raise _unauthorized("unknown API key")
     if found.refusal is not None:

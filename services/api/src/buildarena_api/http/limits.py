@@ -1,18 +1,22 @@
-"""What every request passes: a limit on its size, and headers that make browsers careful."""
+"""What every request passes: bounds on its body, and headers that make browsers careful."""
 
 from __future__ import annotations
 
-import json
+import re
 from collections.abc import Collection
-from http import HTTPStatus
 
+import structlog
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from buildarena_api.http.problems import PROBLEM_JSON
+from buildarena_api.http.problems import send_problem
 
 MAX_BYTES = 4 * 1024 * 1024
 """Largest request body: a sweep of 100,000 seeds has less than a megabyte."""
+MAX_DEPTH = 64
+"""Arrays and objects inside each other: what the API reads has less than ten."""
+STRINGS = re.compile(rb'"[^"\\]*(?:\\.[^"\\]*)*"', re.DOTALL)
+NO_BRACKETS = bytes(set(range(256)) - set(b"[]{}"))
 SECURITY_HEADERS = {
     "X-Content-Type-Options": "nosniff",
     "X-Frame-Options": "DENY",
@@ -20,25 +24,34 @@ SECURITY_HEADERS = {
     "Cross-Origin-Resource-Policy": "same-origin",
 }
 
+log = structlog.get_logger(__name__)
+
 
 class BodyLimitMiddleware:
-    """Middleware around the application.
+    """Middleware around the application: only whole and bounded bodies reach it.
 
     Args:
         app: The application.
         unlimited: Paths of routes that read their bodies in pieces, and bound them.
+        documents: Paths of routes that read something else than JSON, and bound its depth.
         max_bytes: Largest request body accepted.
     """
 
     def __init__(
-        self, app: ASGIApp, *, unlimited: Collection[str] = (), max_bytes: int = MAX_BYTES
+        self,
+        app: ASGIApp,
+        *,
+        unlimited: Collection[str] = (),
+        documents: Collection[str] = (),
+        max_bytes: int = MAX_BYTES,
     ) -> None:
         self._app = app
         self._unlimited = frozenset(unlimited)
+        self._documents = frozenset(documents)
         self._max_bytes = max_bytes
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Passes a request on, or refuses it for its size."""
+        """Passes a request on, refuses it for its size or depth, or drops one that was cut off."""
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
@@ -50,19 +63,30 @@ class BodyLimitMiddleware:
         if length is not None and length.isdigit() and int(length) > self._max_bytes:
             await self._refuse(safe_send)
             return
-        body = await self._read(receive)
+        try:
+            body = await self._read(receive)
+        except ConnectionError:
+            log.info("body_cut_off", path=scope["path"])
+            return
         if body is None:
             await self._refuse(safe_send)
-            return
-        await self._app(scope, _replay(body, receive), safe_send)
+        elif scope["path"] not in self._documents and is_too_deep(body):
+            detail = f"the body has more than {MAX_DEPTH} arrays or objects inside each other"
+            await send_problem(safe_send, 422, detail)
+        else:
+            await self._app(scope, _replay(body, receive), safe_send)
 
     async def _read(self, receive: Receive) -> bytes | None:
-        """The whole body, or None when it is too large, whatever its length header says."""
+        """The whole body, or None when it is too large, whatever its length header says.
+
+        Raises:
+            ConnectionError: The client left before the body's end.
+        """
         body = bytearray()
         while True:
             message = await receive()
             if message["type"] != "http.request":
-                return bytes(body)
+                raise ConnectionError("the client left")
             body += message.get("body", b"")
             if len(body) > self._max_bytes:
                 return None
@@ -70,18 +94,24 @@ class BodyLimitMiddleware:
                 return bytes(body)
 
     async def _refuse(self, send: Send) -> None:
-        status = HTTPStatus.REQUEST_ENTITY_TOO_LARGE
-        problem: dict[str, object] = {
-            "type": "about:blank",
-            "title": status.phrase,
-            "status": status.value,
-            "detail": f"the request is larger than {self._max_bytes:,} bytes",
-            "errors": [],
-        }
-        data = json.dumps(problem).encode()
-        headers = [(b"content-type", PROBLEM_JSON.encode()), (b"connection", b"close")]
-        await send({"type": "http.response.start", "status": status.value, "headers": headers})
-        await send({"type": "http.response.body", "body": data})
+        detail = f"the request is larger than {self._max_bytes:,} bytes"
+        await send_problem(send, 413, detail, headers={"Connection": "close"})
+
+
+def is_too_deep(body: bytes, max_depth: int = MAX_DEPTH) -> bool:
+    """Whether a JSON text has more arrays and objects inside each other than that.
+
+    A text that is not JSON may be taken for too deep; it would be refused anyway.
+    """
+    if body.count(b"[") + body.count(b"{") <= max_depth:
+        return False
+    rest = STRINGS.sub(b"", body).translate(None, NO_BRACKETS)
+    # Each round removes the innermost level.
+    for _ in range(max_depth):
+        if not rest:
+            return False
+        rest = rest.replace(b"[]", b"").replace(b"{}", b"")
+    return bool(rest)
 
 
 def _with_headers(send: Send) -> Send:

@@ -13,7 +13,10 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from pydantic import BaseModel, Field
 from sqlalchemy.exc import DataError, OperationalError
+from sqlalchemy.exc import TimeoutError as PoolTimeoutError
 from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
+from starlette.types import Send
 
 from buildarena_benchmark import ValidationIssue
 from buildarena_pipeline.errors import SubmissionError
@@ -101,6 +104,16 @@ def _answer(
     )
 
 
+async def send_problem(
+    send: Send, status: int, detail: str, *, headers: Mapping[str, str] | None = None
+) -> None:
+    """Answers a request that no route was asked for with a problem."""
+    answer = _answer(status, detail, headers=dict(headers or {}))
+    start = {"type": "http.response.start", "status": status, "headers": answer.raw_headers}
+    await send(start)
+    await send({"type": "http.response.body", "body": answer.body})
+
+
 def add_problem_handlers(app: FastAPI) -> None:
     """Makes every error of the app a problem."""
 
@@ -167,6 +180,18 @@ def _add_store_handlers(app: FastAPI) -> None:
     async def on_unstorable(_: Request, error: DataError) -> JSONResponse:
         log.info("unstorable", error=str(error.orig))
         return _answer(422, "a text or number of the request is none that can be stored or found")
+
+    @app.exception_handler(PoolTimeoutError)
+    async def on_busy(_: Request, error: PoolTimeoutError) -> JSONResponse:
+        log.warning("database_connections_in_use", error=str(error).splitlines()[0])
+        detail = "all connections to the database are in use; nothing was stored"
+        return _answer(503, detail, headers={"Retry-After": "2"})
+
+    @app.exception_handler(ClientDisconnect)
+    async def on_cut_off(request: Request, _: ClientDisconnect) -> JSONResponse:
+        # Nobody reads it: the body broke off because the client left.
+        log.info("body_cut_off", path=request.url.path)
+        return _answer(400, "the body was cut off")
 
     @app.exception_handler(OperationalError)
     async def on_database(_: Request, error: OperationalError) -> JSONResponse:

@@ -2,14 +2,27 @@
 
 from __future__ import annotations
 
+import asyncio
 import math
 import time
+from contextlib import suppress
+from typing import Any
 
 import structlog
 from limits import parse
-from limits.storage import storage_from_string
-from limits.strategies import SlidingWindowCounterRateLimiter
+from limits.aio.storage import RedisStorage
+from limits.aio.strategies import SlidingWindowCounterRateLimiter as SharedLimiter
+from limits.storage import MemoryStorage
+from limits.strategies import SlidingWindowCounterRateLimiter as OwnLimiter
+from redis.asyncio import ConnectionPool
+from redis.asyncio.retry import Retry
+from redis.backoff import NoBackoff
 from redis.exceptions import RedisError
+
+TIMEOUT_S = 0.3
+"""How long a request waits for its count; the store is not asked again until it answers."""
+PROBE_S = 1.0
+GROUP = "buildarena"
 
 log = structlog.get_logger(__name__)
 
@@ -18,32 +31,69 @@ class RateLimits:
     """Counts requests per caller.
 
     Args:
-        broker_url: Where counts are kept.
+        broker_url: Where counts are kept; while it does not answer, this process counts alone.
         rate: For example ``600/minute``.
     """
 
     def __init__(self, broker_url: str, rate: str) -> None:
         self._item = parse(rate)
-        self._limiter = SlidingWindowCounterRateLimiter(
-            storage_from_string(broker_url, socket_timeout=1, socket_connect_timeout=1)
+        self._pool = ConnectionPool.from_url(
+            broker_url,
+            socket_timeout=TIMEOUT_S,
+            socket_connect_timeout=TIMEOUT_S,
+            retry=Retry(NoBackoff(), 0),
         )
+        # Its signature names fewer types than it hands on to redis.
+        handed_on: dict[str, Any] = {"connection_pool": self._pool}
+        self._storage = RedisStorage(f"async+{broker_url}", implementation="redispy", **handed_on)
+        self._shared = SharedLimiter(self._storage)
+        self._own = OwnLimiter(MemoryStorage())
+        self._probe: asyncio.Task[None] | None = None
         self.spelled = rate.replace("/", " per ")
 
-    def hit(self, who: str) -> int | None:
+    async def hit(self, who: str) -> int | None:
         """Counts a request.
 
         Args:
             who: The caller.
 
         Returns:
-            None when it may pass, otherwise after how many seconds the next one may. Without the
-            key-value store all requests pass.
+            None when it may pass, otherwise after how many seconds the next one may.
         """
-        try:
-            if self._limiter.hit(self._item, "buildarena", who):
-                return None
-            reset = self._limiter.get_window_stats(self._item, "buildarena", who).reset_time
-        except (RedisError, OSError) as error:
-            log.warning("rate_limits_unreachable", error=str(error))
+        if self._probe is None:
+            try:
+                if await self._shared.hit(self._item, GROUP, who):
+                    return None
+                stats = await self._shared.get_window_stats(self._item, GROUP, who)
+            except (RedisError, OSError) as error:
+                self._leave_alone(error)
+            else:
+                return _seconds_until(stats.reset_time)
+        if self._own.hit(self._item, GROUP, who):
             return None
-        return max(1, math.ceil(reset - time.time()))
+        return _seconds_until(self._own.get_window_stats(self._item, GROUP, who).reset_time)
+
+    async def close(self) -> None:
+        """Closes the connections."""
+        if self._probe is not None:
+            self._probe.cancel()
+            with suppress(asyncio.CancelledError):
+                await self._probe
+        await self._pool.aclose()
+
+    def _leave_alone(self, error: Exception) -> None:
+        """Asks the store no more, but for one probe a second."""
+        if self._probe is None:
+            log.warning("rate_limits_unreachable", error=str(error))
+            self._probe = asyncio.create_task(self._return_when_it_answers())
+
+    async def _return_when_it_answers(self) -> None:
+        while True:
+            await asyncio.sleep(PROBE_S)
+            if await self._storage.check():
+                self._probe = None
+                return
+
+
+def _seconds_until(moment: float) -> int:
+    return max(1, math.ceil(moment - time.time()))

@@ -14,7 +14,7 @@ from buildarena_benchmark import ValidationIssue, builtin_tasks
 from buildarena_benchmark.leaderboard import BoardQuery
 
 
-def _boards(request: Request) -> BoardCache:
+async def _boards(request: Request) -> BoardCache:
     boards: BoardCache = request.app.state.boards
     return boards
 

@@ -6,18 +6,21 @@ import tempfile
 from pathlib import Path
 
 from fastapi import APIRouter, Depends, Request, Response
-from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import FileResponse
 from pydantic import BaseModel, ConfigDict, Field
 from starlette.background import BackgroundTask
 
-from buildarena_api.dependencies import ContextDep
+from buildarena_api.dependencies import ExportingDep
 from buildarena_api.http.access import CallerDep, admin_only
+from buildarena_api.http.concurrency import limited
+from buildarena_api.http.own_pool import OwnPool
 from buildarena_api.http.problems import ProblemError, problem_responses
 from buildarena_pipeline.catalog.specs import SweepSpec
 from buildarena_store.archives import ArchiveError, read_archive, write_archive
 
-router = APIRouter(prefix="/v1", tags=["archives"])
+router = APIRouter(
+    prefix="/v1", tags=["archives"], dependencies=[limited("archives", until="request")]
+)
 
 IMPORT_PATH = "/v1/archives"
 MAX_BYTES = 8 << 30
@@ -44,11 +47,14 @@ class ImportedView(BaseModel):
     response_class=FileResponse,
     responses={200: {"content": {ZIP: {}}}, **problem_responses(404, 503)},
 )
-def export_sweep(sweep_id: str, context: ContextDep) -> FileResponse:
+async def export_sweep(sweep_id: str, exporting: ExportingDep) -> FileResponse:
     """A sweep with its jobs, journals, rollouts and artifacts, as one ZIP file."""
+    context = exporting.context
     target = _scratch()
     try:
-        write_archive(context.store.database, context.artifacts, sweep_id, target)
+        await exporting.run(
+            write_archive, context.store.database, context.artifacts, sweep_id, target
+        )
     except BaseException:
         target.unlink()
         raise
@@ -73,17 +79,18 @@ def export_sweep(sweep_id: str, context: ContextDep) -> FileResponse:
     },
 )
 async def import_sweep(
-    request: Request, response: Response, context: ContextDep, caller: CallerDep
+    request: Request, response: Response, exporting: ExportingDep, caller: CallerDep
 ) -> ImportedView:
     """Imports an exported sweep; jobs that already exist stay as they are. For admins.
 
     Nothing in it is believed: its scores are marked as imported, and are in no ranking until they
     were found again by replay and simulation.
     """
+    context = exporting.context
     source = _scratch()
     try:
-        await _receive(request, source)
-        done = await run_in_threadpool(
+        await _receive(request, source, exporting)
+        done = await exporting.run(
             read_archive,
             context.store.database,
             context.artifacts,
@@ -99,14 +106,14 @@ async def import_sweep(
     return ImportedView.model_validate(done)
 
 
-async def _receive(request: Request, target: Path) -> None:
+async def _receive(request: Request, target: Path, exporting: OwnPool) -> None:
     received = 0
     with target.open("wb") as file:
         async for chunk in request.stream():
             received += len(chunk)
             if received > MAX_BYTES:
                 raise ProblemError(413, f"the archive is larger than {MAX_BYTES:,} bytes")
-            file.write(chunk)
+            await exporting.run(file.write, chunk)
 
 
 def _scratch() -> Path:

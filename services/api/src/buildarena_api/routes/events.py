@@ -2,25 +2,26 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import AsyncIterator
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Header, Request
-from fastapi.concurrency import run_in_threadpool
-from sse_starlette import EventSourceResponse, ServerSentEvent
+from sse_starlette import EventSourceResponse
 
-from buildarena_api.dependencies import ContextDep
-from buildarena_api.events.hub import EventHub
+from buildarena_api.events.hub import Channel, EventHub
+from buildarena_api.http.access import CallerDep
+from buildarena_api.http.concurrency import limited
 from buildarena_api.http.problems import problem_responses
-from buildarena_store import Event
 
-router = APIRouter(prefix="/v1", tags=["events"])
+router = APIRouter(
+    prefix="/v1", tags=["events"], dependencies=[limited("streams", until="request")]
+)
 
 STREAM: dict[int | str, dict[str, Any]] = {
     200: {"content": {"text/event-stream": {}}, "description": "Events as they happen"}
 }
 PING_S = 15
+SEND_TIMEOUT_S = 60
+"""How long a client may take for one piece before its stream ends."""
 LastEventId = Annotated[
     int,
     Header(
@@ -38,13 +39,11 @@ LastEventId = Annotated[
     responses=STREAM | problem_responses(404, 422, 503),
 )
 async def stream_job(
-    job_id: str, context: ContextDep, request: Request, last_event_id: LastEventId = 0
+    job_id: str, request: Request, caller: CallerDep, last_event_id: LastEventId = 0
 ) -> EventSourceResponse:
     """Streams the events of a job, from the beginning or after a given one."""
-    await run_in_threadpool(context.store.jobs.get, job_id)
-    hub: EventHub = request.app.state.hub
-    events = hub.listen(last_id=last_event_id, sweep_id=None, job_ids=frozenset({job_id}))
-    return EventSourceResponse(_sent(events), ping=PING_S)
+    hub = _hub(request)
+    return _streamed(hub, await hub.open_job(job_id), last_event_id, caller.key_id)
 
 
 @router.get(
@@ -53,22 +52,20 @@ async def stream_job(
     responses=STREAM | problem_responses(404, 422, 503),
 )
 async def stream_sweep(
-    sweep_id: str, context: ContextDep, request: Request, last_event_id: LastEventId = 0
+    sweep_id: str, request: Request, caller: CallerDep, last_event_id: LastEventId = 0
 ) -> EventSourceResponse:
     """Streams the events of a sweep and its jobs, from the beginning or after a given one."""
-    await run_in_threadpool(context.store.sweeps.get, sweep_id)
-    job_ids = frozenset(await run_in_threadpool(context.store.sweeps.job_ids, sweep_id))
+    hub = _hub(request)
+    return _streamed(hub, await hub.open_sweep(sweep_id), last_event_id, caller.key_id)
+
+
+def _hub(request: Request) -> EventHub:
     hub: EventHub = request.app.state.hub
-    events = hub.listen(last_id=last_event_id, sweep_id=sweep_id, job_ids=job_ids)
-    return EventSourceResponse(_sent(events), ping=PING_S)
+    return hub
 
 
-async def _sent(events: AsyncIterator[Event]) -> AsyncIterator[ServerSentEvent]:
-    async for event in events:
-        data = {
-            "job": event.job_id,
-            "sweep": event.sweep_id,
-            "at": event.at.isoformat(),
-            **event.data,
-        }
-        yield ServerSentEvent(json.dumps(data), event=event.kind, id=str(event.id))
+def _streamed(
+    hub: EventHub, channel: Channel, last_id: int, key_id: str | None
+) -> EventSourceResponse:
+    texts = hub.listen(channel, last_id=last_id, key_id=key_id)
+    return EventSourceResponse(texts, ping=PING_S, send_timeout=SEND_TIMEOUT_S)

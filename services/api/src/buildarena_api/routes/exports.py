@@ -10,9 +10,10 @@ from types import UnionType
 from typing import Annotated, Any, Literal, get_args, get_origin
 
 from fastapi import APIRouter, Query, Response
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 
-from buildarena_api.dependencies import ContextDep, RegistryDep
+from buildarena_api.dependencies import ExportingDep, RegistryDep
+from buildarena_api.http.concurrency import limited
 from buildarena_api.http.problems import problem_responses
 from buildarena_api.leaderboard.filters import BoardsDep, SelectionDep
 from buildarena_api.leaderboard.views import Board, PublishedView, Row, board_view
@@ -24,8 +25,9 @@ from buildarena_benchmark.leaderboard import (
     plain_table,
     published_rows,
 )
+from buildarena_store import Store
 
-router = APIRouter()
+router = APIRouter(prefix="/v1", tags=["leaderboard"], dependencies=[limited("exports")])
 
 MEDIA_TYPES = {
     "csv": "text/csv; charset=utf-8",
@@ -78,6 +80,9 @@ class Result(BaseModel):
     rounds: list[RoundView] = Field(description="In order; more than one in a closed loop")
 
 
+RESULTS = TypeAdapter(list[Result])
+
+
 @router.get(
     "/leaderboard/export",
     response_class=Response,
@@ -86,11 +91,12 @@ class Result(BaseModel):
         **problem_responses(422, 503),
     },
 )
-def export(
+async def export(
+    exporting: ExportingDep,
     boards: BoardsDep,
     selection: SelectionDep,
     registry: RegistryDep,
-    context: ContextDep,
+    *,
     format: Annotated[Literal["csv", "parquet", "latex"], Query()] = "csv",  # noqa: A002 - its name in the URL
 ) -> Response:
     """The leaderboard as a file; the paper's figures are in it as rows of source `published`."""
@@ -105,25 +111,34 @@ def export(
                 track=track or "",
                 tracks=tracks,
                 registry=registry,
-                catalogue=context.tasks,
+                catalogue=exporting.context.tasks,
             ),
         )
 
     if track is None:
-        body = render(RankedBoard(tasks=(), overall=()))
+        body = await exporting.run(render, RankedBoard(tasks=(), overall=()))
     else:
         kind = f"{format} {' '.join(tracks)}"
-        body = boards.answer(track, selection.query, kind, render).body
+        body = (await exporting.run(boards.answer, track, selection.query, kind, render)).body
     name = f"leaderboard.{'tex' if format == 'latex' else format}"
     headers = {"Content-Disposition": f'attachment; filename="{name}"'}
     return Response(body, media_type=MEDIA_TYPES[format], headers=headers)
 
 
-@router.get("/sweeps/{sweep_id}/results", responses=problem_responses(404, 503))
-def sweep_results(sweep_id: str, context: ContextDep) -> list[Result]:
+@router.get(
+    "/sweeps/{sweep_id}/results",
+    response_model=list[Result],
+    responses=problem_responses(404, 503),
+)
+async def sweep_results(sweep_id: str, exporting: ExportingDep) -> Response:
     """All ended jobs of a sweep with their rounds: what a report is made of."""
-    context.store.sweeps.get(sweep_id)
-    return [
+    body = await exporting.run(_results, exporting.context.store, sweep_id)
+    return Response(body, media_type="application/json")
+
+
+def _results(store: Store, sweep_id: str) -> bytes:
+    store.sweeps.get(sweep_id)
+    found = [
         Result.model_validate(
             {
                 **{name: getattr(trial, name) for name in Result.model_fields if name != "rounds"},
@@ -131,8 +146,9 @@ def sweep_results(sweep_id: str, context: ContextDep) -> list[Result]:
                 "rounds": rounds,
             }
         )
-        for trial, rounds in context.store.results.boards.of_sweep(sweep_id)
+        for trial, rounds in store.results.boards.of_sweep(sweep_id)
     ]
+    return RESULTS.dump_json(found)
 
 
 def _rendered(kind: str, ranked: RankedBoard, as_view: Callable[[RankedBoard], Board]) -> bytes:

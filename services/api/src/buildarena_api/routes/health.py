@@ -8,17 +8,20 @@ import time
 from pathlib import Path
 from typing import Literal
 
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, Depends, Request, Response
 from pydantic import BaseModel, Field
 from sqlalchemy.exc import SQLAlchemyError
 
 from buildarena_api.dependencies import ContextDep
+from buildarena_api.http.concurrency import anybodys_turn
 from buildarena_pipeline.catalog.tracks import SIMULATORS
 from buildarena_pipeline.runtime.context import Context
 from buildarena_store import ArtifactStore, ArtifactStoreError
 from buildarena_store.states import CONSTRUCT_QUEUE, simulate_queue
 
-router = APIRouter(prefix="/v1", tags=["health"])
+router = APIRouter(
+    prefix="/v1", tags=["health"], dependencies=[Depends(anybodys_turn, scope="function")]
+)
 
 LOW_DISK_BYTES = 1_000_000_000
 CLOCK_TOLERANCE_S = 5.0

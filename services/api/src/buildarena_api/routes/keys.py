@@ -5,11 +5,12 @@ from __future__ import annotations
 from datetime import datetime, timedelta
 from typing import Annotated, Literal
 
-from fastapi import APIRouter, Depends, Response
+from fastapi import APIRouter, Depends, Request, Response
 from pydantic import BaseModel, ConfigDict, Field
 
 from buildarena_api.dependencies import ContextDep
 from buildarena_api.http.access import admin_only
+from buildarena_api.http.key_checks import KeyChecks
 from buildarena_api.http.problems import problem_responses
 from buildarena_api.schemas import BudgetView
 from buildarena_pipeline.catalog.specs import Budget, Title
@@ -78,9 +79,12 @@ def list_keys(context: ContextDep) -> list[KeyView]:
 
 
 @router.post("/{key_id}/revoke", responses=problem_responses(404, 503))
-def revoke_key(key_id: str, context: ContextDep) -> KeyView:
+def revoke_key(key_id: str, context: ContextDep, request: Request) -> KeyView:
     """Revokes a key at once; its jobs continue."""
-    return _view(context, context.store.keys.revoke(key_id))
+    revoked = _view(context, context.store.keys.revoke(key_id))
+    checks: KeyChecks = request.app.state.key_checks
+    checks.forget()
+    return revoked
 
 
 @router.put("/{key_id}/budget", responses=problem_responses(404, 422, 503))

@@ -9,13 +9,13 @@ from fastapi import APIRouter, Query, Request
 from pydantic import BaseModel, ConfigDict, Field
 
 from buildarena_api.dependencies import ContextDep, RegistryDep
+from buildarena_api.http.access import CallerDep
 from buildarena_api.http.etags import conditional
 from buildarena_api.http.problems import problem_responses
 from buildarena_api.leaderboard.filters import BoardsDep, SelectionDep, unknown
 from buildarena_api.leaderboard.views import Board, ChangePage, ChangeView, board_view
-from buildarena_api.routes import exports
+from buildarena_api.routes.verifications import request_verifications
 from buildarena_benchmark.leaderboard import SCORED, BoardQuery, TaskComparison, compare_models
-from buildarena_store.states import VERIFY_QUEUE
 
 router = APIRouter(prefix="/v1", tags=["leaderboard"])
 MAX_DISTINCT = 20
@@ -86,6 +86,10 @@ class VerifyAccepted(BaseModel):
 
     scored: int = Field(description="Scored jobs of the model")
     verifications: list[str] = Field(description="Ids; see /v1/verifications/{id}")
+    left: list[str] = Field(
+        description="Jobs that found no room, as a key has a number of verifications open at "
+        "most: ask for them one by one when some have ended"
+    )
 
 
 @router.get("/leaderboard", response_model=Board, responses=problem_responses(422, 503))
@@ -197,7 +201,9 @@ def manifest(
 
 
 @router.post("/leaderboard/verify", status_code=202, responses=problem_responses(422, 503))
-def verify(body: VerifyRequest, context: ContextDep, boards: BoardsDep) -> VerifyAccepted:
+def verify(
+    body: VerifyRequest, context: ContextDep, boards: BoardsDep, caller: CallerDep
+) -> VerifyAccepted:
     """Replays and re-simulates all of a model's results on a board, or a sample.
 
     Imported results count when they were verified.
@@ -215,9 +221,7 @@ def verify(body: VerifyRequest, context: ContextDep, boards: BoardsDep) -> Verif
     if body.sample is not None and body.sample < len(scored):
         # Whoever names the seed gets the same sample again; nothing secret hangs on it.
         chosen = random.Random(body.seed).sample(scored, body.sample)  # noqa: S311
-    asked = [context.store.verifications.request(job_id) for job_id in chosen]
-    context.queues.notify(VERIFY_QUEUE, asked)
-    return VerifyAccepted(scored=len(scored), verifications=asked)
-
-
-router.include_router(exports.router)
+    asked = request_verifications(context, chosen, caller)
+    return VerifyAccepted(
+        scored=len(scored), verifications=list(asked.ids.values()), left=list(asked.left)
+    )

@@ -16,7 +16,8 @@ from buildarena_benchmark import TaskError, ValidationIssue, parse_custom_task
 from buildarena_benchmark.tasks.sources import MAX_BYTES
 from buildarena_pipeline.catalog.tasks import CatalogueEntry, TaskChangedError
 
-router = APIRouter(prefix="/v1/tasks", tags=["tasks"])
+PATH = "/v1/tasks"
+router = APIRouter(prefix=PATH, tags=["tasks"])
 
 YAML = "application/yaml"
 YAML_TYPES = frozenset({YAML, "application/x-yaml", "text/yaml", "text/x-yaml"})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from datetime import datetime
 from typing import Any, Literal
 
@@ -9,10 +10,16 @@ from fastapi import APIRouter, Response
 from pydantic import BaseModel, ConfigDict, Field
 
 from buildarena_api.dependencies import ContextDep
+from buildarena_api.http.access import Caller, CallerDep
 from buildarena_api.http.problems import ProblemError, problem_responses
+from buildarena_pipeline.runtime.context import Context
+from buildarena_store.jobs.verifications import MAX_OPEN, Requested
 from buildarena_store.states import VERIFY_QUEUE, VerificationState
 
 router = APIRouter(prefix="/v1", tags=["verification"])
+
+RETRY_S = 5
+"""When a caller may come back whose verifications found no room."""
 
 
 class VerificationView(BaseModel):
@@ -30,16 +37,40 @@ class VerificationView(BaseModel):
     finished_at: datetime | None
 
 
-@router.post("/jobs/{job_id}/verify", status_code=202, responses=problem_responses(404, 409, 503))
-def verify_job(job_id: str, context: ContextDep, response: Response) -> VerificationView:
-    """Replays a scored job without a model, re-simulates it, and compares every figure."""
+@router.post(
+    "/jobs/{job_id}/verify", status_code=202, responses=problem_responses(404, 409, 429, 503)
+)
+def verify_job(
+    job_id: str, context: ContextDep, response: Response, caller: CallerDep
+) -> VerificationView:
+    """Replays a scored job without a model, re-simulates it, and compares every figure.
+
+    While an equal verification is open, that one is the answer.
+    """
     job = context.store.jobs.get(job_id)
     if job.success is None:
         raise ProblemError(409, f"job {job_id} has no score to verify")
-    verification_id = context.store.verifications.request(job_id)
-    context.queues.notify(VERIFY_QUEUE, [verification_id])
+    (verification_id,) = request_verifications(context, [job_id], caller).ids.values()
     response.headers["Location"] = f"/v1/verifications/{verification_id}"
     return VerificationView.model_validate(context.store.verifications.get(verification_id))
+
+
+def request_verifications(context: Context, job_ids: Sequence[str], caller: Caller) -> Requested:
+    """Asks for verifications of jobs and notifies a worker.
+
+    Raises:
+        ProblemError: 429, when there is no room for any.
+    """
+    requested = context.store.verifications.request(job_ids, owner=caller.key_id)
+    if not requested.ids:
+        raise ProblemError(
+            429,
+            f"{MAX_OPEN} verifications are open, as many as one key may have: wait for some to end",
+            headers={"Retry-After": str(RETRY_S)},
+        )
+    # Any message makes a worker do all that wait.
+    context.queues.announce(VERIFY_QUEUE, list(requested.ids.values())[:1])
+    return requested
 
 
 @router.get("/verifications/{verification_id}", responses=problem_responses(404, 503))

@@ -6,13 +6,20 @@ A message costs more than what it asks for, and hundreds of requests want someth
 from __future__ import annotations
 
 import asyncio
+from contextlib import suppress
 from typing import Any
 
 import structlog
 from redis.asyncio import Redis
+from redis.asyncio.retry import Retry
+from redis.backoff import NoBackoff
+from redis.exceptions import RedisError
 
 log = structlog.get_logger(__name__)
 
+TIMEOUT_S = 1.0
+PROBE_S = 1.0
+"""How often a store that failed is asked whether it is back."""
 BATCH_S = 0.005
 """How long commands are collected: little beside a model's seconds."""
 
@@ -20,18 +27,30 @@ BATCH_S = 0.005
 class BatchedRedis:
     """Sends the commands of one event loop in batches over one connection, in their order.
 
+    After a failure commands fail at once, until a probe in the background is answered: a store
+    that was stopped costs one time-out, not one for each command.
+
     Args:
         url: ``redis://…``.
     """
 
     def __init__(self, url: str) -> None:
-        self._redis: Any = Redis.from_url(url, socket_timeout=5)
+        self._redis: Any = Redis.from_url(
+            url,
+            socket_timeout=TIMEOUT_S,
+            socket_connect_timeout=TIMEOUT_S,
+            retry=Retry(NoBackoff(), 0),
+        )
+        self._probe: asyncio.Task[None] | None = None
         self._waiting: list[tuple[tuple[Any, ...], asyncio.Future[Any]]] = []
         self._sender: asyncio.Task[None] | None = None
 
     def execute(self, *command: Any) -> asyncio.Future[Any]:
         """The store's answer to a command; failures are logged here and raised there."""
         answer: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
+        if self._probe is not None:
+            answer.set_exception(ConnectionError("the store does not answer"))
+            return answer
         self._waiting.append((command, answer))
         if self._sender is None or self._sender.done():
             self._sender = asyncio.create_task(self._send())
@@ -45,6 +64,10 @@ class BatchedRedis:
         """Closes the connection, after what is still to be sent."""
         if self._sender is not None:
             await self._sender
+        if self._probe is not None:
+            self._probe.cancel()
+            with suppress(asyncio.CancelledError):
+                await self._probe
         await self._redis.aclose()
 
     async def _send(self) -> None:
@@ -65,10 +88,20 @@ class BatchedRedis:
             answers: list[Any] = await pipeline.execute(raise_on_error=False)
         except Exception as error:  # noqa: BLE001 - raised where the answers are waited for
             answers = [error] * len(commands)
+            if self._probe is None:
+                self._probe = asyncio.create_task(self._return_when_it_answers())
         errors = [answer for answer in answers if isinstance(answer, Exception)]
         if errors:
             log.warning("store_failed", commands=len(errors), error=str(errors[0]))
         return answers
+
+    async def _return_when_it_answers(self) -> None:
+        while True:
+            await asyncio.sleep(PROBE_S)
+            with suppress(RedisError, OSError):
+                await self._redis.ping()
+                self._probe = None
+                return
 
 
 def _deliver(waiting: list[asyncio.Future[Any]], answers: list[Any]) -> None:

@@ -1,0 +1,156 @@
+"""How much of something a caller may have going on at once.
+
+Decided in the event loop, before a request takes a thread or a database connection.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager, suppress
+from dataclasses import dataclass, field
+from typing import Any
+
+from fastapi import Depends, Request
+
+from buildarena_api.http.access import CallerDep, who_asks
+from buildarena_api.http.problems import ProblemError
+
+MAX_WAITING = 64
+"""Requests of one caller that wait for their turn; more are refused."""
+
+
+@dataclass(slots=True)
+class _Share:
+    used: int = 0
+    waiting: deque[asyncio.Future[None]] = field(default_factory=deque)
+
+
+class ConcurrencyLimit:
+    """A limit on what goes on at once.
+
+    Args:
+        what: What it limits, for messages.
+        per_caller: How many one caller may have.
+        total: How many all callers together may have.
+        wait_s: How long one that finds its caller's share used up waits for its turn.
+        retry_s: When a refused caller may come back.
+    """
+
+    def __init__(
+        self, what: str, *, per_caller: int, total: int, wait_s: float = 0.0, retry_s: int = 2
+    ) -> None:
+        self._what = what
+        self._per_caller = per_caller
+        self._total = total
+        self._wait_s = wait_s
+        self._retry_s = retry_s
+        self._used = 0
+        self._shares: dict[str, _Share] = {}
+
+    @asynccontextmanager
+    async def slot(self, who: str) -> AsyncIterator[None]:
+        """Keeps a place inside the block.
+
+        Raises:
+            ProblemError: 429 when the caller has as many as one may, 503 when all together have.
+        """
+        share = self._shares.setdefault(who, _Share())
+        try:
+            await self._enter(share)
+            try:
+                yield
+            finally:
+                self._leave(share)
+        finally:
+            if not share.used and not share.waiting:
+                self._shares.pop(who, None)
+
+    async def _enter(self, share: _Share) -> None:
+        if share.used >= self._per_caller:
+            await self._wait(share)  # the place of one that left is handed on
+            return
+        if self._used >= self._total:
+            message = f"the service has {self._total} {self._what} going on, as many as it may"
+            raise self._refusal(503, message)
+        share.used += 1
+        self._used += 1
+
+    async def _wait(self, share: _Share) -> None:
+        if not self._wait_s or len(share.waiting) >= MAX_WAITING:
+            raise self._refusal(429, self._share_is_used())
+        turn: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        share.waiting.append(turn)
+        try:
+            async with asyncio.timeout(self._wait_s):
+                await turn
+        except BaseException as error:
+            if turn.done() and not turn.cancelled():
+                self._leave(share)  # the place came just as this one gave up
+            with suppress(ValueError):
+                share.waiting.remove(turn)
+            if isinstance(error, TimeoutError):
+                raise self._refusal(429, self._share_is_used()) from error
+            raise
+
+    def _leave(self, share: _Share) -> None:
+        while share.waiting:
+            turn = share.waiting.popleft()
+            if not turn.done():
+                turn.set_result(None)
+                return
+        share.used -= 1
+        self._used -= 1
+
+    def _share_is_used(self) -> str:
+        return f"{self._per_caller} {self._what} are going on, as many as one caller may have"
+
+    def _refusal(self, status: int, detail: str) -> ProblemError:
+        return ProblemError(status, detail, headers={"Retry-After": str(self._retry_s)})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ConcurrencyLimits:
+    """The limits of one API process."""
+
+    ordinary: ConcurrencyLimit
+    streams: ConcurrencyLimit
+    archives: ConcurrencyLimit
+    exports: ConcurrencyLimit
+
+
+def usual_limits() -> ConcurrencyLimits:
+    """What `docs/security.md` says."""
+    return ConcurrencyLimits(
+        # Fewer than there are threads and connections, so that one caller leaves some.
+        ordinary=ConcurrencyLimit("requests", per_caller=8, total=1000, wait_s=30.0, retry_s=1),
+        streams=ConcurrencyLimit("event streams", per_caller=32, total=512, retry_s=5),
+        archives=ConcurrencyLimit("archive transfers", per_caller=1, total=2, retry_s=5),
+        exports=ConcurrencyLimit("exports", per_caller=2, total=4),
+    )
+
+
+def limited(kind: str, *, until: str = "function") -> Any:
+    """A dependency: the caller's place among those of a kind.
+
+    Args:
+        kind: A field of `ConcurrencyLimits`.
+        until: ``function``, or ``request`` to keep the place until the answer was sent.
+    """
+
+    async def take_place(request: Request, _: CallerDep) -> AsyncIterator[None]:
+        limits: ConcurrencyLimits = request.app.state.concurrency
+        limit: ConcurrencyLimit = getattr(limits, kind)
+        async with limit.slot(who_asks(request)):
+            yield
+
+    scope: Any = until
+    return Depends(take_place, scope=scope)
+
+
+async def anybodys_turn(request: Request) -> AsyncIterator[None]:
+    """The turn of a request that needs no key, among those of its address."""
+    limits: ConcurrencyLimits = request.app.state.concurrency
+    async with limits.ordinary.slot(who_asks(request)):
+        yield

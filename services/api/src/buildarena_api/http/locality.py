@@ -1,0 +1,62 @@
+"""Who may ask a service without keys: programs and pages of this machine, nobody else's pages.
+
+A browser lets any page send requests to loopback. Without keys nothing in such a request says that
+its sender may, so the names in it must be this machine's own (DNS rebinding has a foreign `Host`),
+and it must not come from a foreign page (`Origin`, `Sec-Fetch-Site`).
+"""
+
+from __future__ import annotations
+
+import re
+
+from starlette.types import ASGIApp, Receive, Scope, Send
+
+from buildarena_api.http.problems import send_problem
+
+OCTET = r"(?:25[0-5]|2[0-4][0-9]|1[0-9]{2}|[1-9]?[0-9])"
+LOOPBACK_HOST = re.compile(
+    rf"(?:localhost|127\.{OCTET}\.{OCTET}\.{OCTET}|\[::1\])(?::[0-9]{{1,5}})?", re.IGNORECASE
+)
+
+
+class LocalOnlyMiddleware:
+    """Middleware around an application that asks for no keys.
+
+    Args:
+        app: The application.
+    """
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Passes a request on, or refuses it for where it comes from."""
+        refusal = _refusal(scope) if scope["type"] in {"http", "websocket"} else None
+        if refusal is None:
+            await self._app(scope, receive, send)
+        elif scope["type"] == "http":
+            status, detail = refusal
+            await send_problem(send, status, detail)
+        else:
+            await send({"type": "websocket.close", "code": 1008})
+
+
+def _refusal(scope: Scope) -> tuple[int, str] | None:
+    """The status and the reason, if the request is not to be served."""
+    hosts, origins = _values(scope, b"host"), _values(scope, b"origin")
+    if len(hosts) != 1 or LOOPBACK_HOST.fullmatch(hosts[0]) is None:
+        named = ", ".join(map(repr, hosts)) or "nothing"
+        return 421, (
+            f"Host names {named[:200]}: without keys this service answers only to localhost, "
+            "127.0.0.0/8 and [::1] (BUILDARENA_REQUIRE_KEYS=true lets it have other names)"
+        )
+    own = {f"{scheme}://{hosts[0].lower()}" for scheme in ("http", "https")}
+    if len(origins) > 1 or any(origin.lower() not in own for origin in origins):
+        return 403, "requests of other origins' pages are not served without keys"
+    if "cross-site" in _values(scope, b"sec-fetch-site"):
+        return 403, "requests that a foreign site makes are not served without keys"
+    return None
+
+
+def _values(scope: Scope, name: bytes) -> list[str]:
+    return [value.decode("latin-1") for key, value in scope["headers"] if key == name]

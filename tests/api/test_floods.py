@@ -1,0 +1,248 @@
+"""One caller cannot take the API down: bounds per key, through real HTTP with two keys."""
+
+from __future__ import annotations
+
+import json
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
+
+import httpx
+import pytest
+from live_api import live_api
+from pydantic import SecretStr
+from running import wait_until
+from sqlalchemy import text
+
+from buildarena_pipeline.agents import sessions as agent_sessions
+from buildarena_pipeline.catalog.specs import SweepSpec
+from buildarena_pipeline.runtime.context import open_context
+from buildarena_store.jobs import verifications
+
+ADMIN = "operator-secret-that-is-long-enough"
+START = {"tool": "start", "arguments": {"init_shift": [0, 0, 0], "init_rotation": [0, 0, 0]}}
+
+
+@pytest.fixture
+def url(context):
+    changes = {"require_keys": True, "admin_key": SecretStr(ADMIN), "rate_limit": "100000/minute"}
+    # As many connections as the API process has.
+    guarded = open_context(context.settings.model_copy(update=changes), pool_size=10)
+    with live_api(guarded) as found:
+        yield found
+    guarded.close()
+
+
+@pytest.fixture
+def as_key(url, context):
+    with ExitStack() as stack:
+
+        def make() -> httpx.Client:
+            key, secret = context.store.keys.create(name="somebody", scopes=["submit"])
+            headers = {"Authorization": f"Bearer {secret}"}
+            client = httpx.Client(base_url=url, headers=headers, timeout=20)
+            client.key_id = key.id
+            return stack.enter_context(client)
+
+        yield make
+
+
+@pytest.fixture
+def sweep_id(submissions) -> str:
+    return submissions.submit_sweep(
+        SweepSpec(tasks=["support-1"], models=["builtin/idle"], samples=20)
+    ).sweep.id
+
+
+def score_all(context) -> None:
+    with context.store.database.transaction() as connection:
+        connection.execute(
+            text(
+                "UPDATE jobs SET state = 'done', outcome = 'unsuccessful', success = false,"
+                " indicator = 0, metrics = '{}', finished_at = now()"
+            )
+        )
+
+
+def test_streams_are_bounded_per_key_and_share_what_they_read(as_key, sweep_id) -> None:
+    greedy, other = as_key(), as_key()
+    path = f"/v1/sweeps/{sweep_id}/events"
+    with ExitStack() as open_streams:
+        answers = [open_streams.enter_context(greedy.stream("GET", path)) for _ in range(40)]
+        assert [answer.status_code for answer in answers] == [200] * 32 + [429] * 8
+        assert int(answers[-1].headers["retry-after"]) >= 1
+        first = [line for line in read_lines(answers[0], 21 * 4) if line.startswith("id")]
+        last = [line for line in read_lines(answers[31], 21 * 4) if line.startswith("id")]
+        assert first == last
+        with other.stream("GET", path) as mine:
+            assert mine.status_code == 200
+        assert other.get("/v1/jobs").status_code == 200
+
+    # Streams that ended leave room.
+    def opened() -> bool:
+        with other.stream("GET", path) as again, greedy.stream("GET", path) as mine:
+            return again.status_code == mine.status_code == 200
+
+    wait_until(opened, 15, "ended streams leave room")
+
+
+def read_lines(answer: httpx.Response, count: int) -> list[str]:
+    lines = answer.iter_lines()
+    return [next(lines) for _ in range(count)]
+
+
+@pytest.mark.parametrize("ending", ["revoked_at", "expires_at"])
+def test_the_stream_of_a_key_that_ended_ends(as_key, context, sweep_id, ending) -> None:
+    gone, other = as_key(), as_key()
+    path = f"/v1/sweeps/{sweep_id}/events"
+    ended = threading.Event()
+
+    def read_to_the_end() -> None:
+        with gone.stream("GET", path) as answer:
+            for _ in answer.iter_lines():
+                pass
+        ended.set()
+
+    with ThreadPoolExecutor(1) as threads, other.stream("GET", path) as staying:
+        reading = threads.submit(read_to_the_end)
+        assert read_lines(staying, 4)
+        time.sleep(0.3)
+        assert not ended.is_set()
+        with context.store.database.transaction() as connection:
+            statement = f"UPDATE api_keys SET {ending} = now() WHERE id = :id"
+            connection.execute(text(statement), {"id": gone.key_id})
+        assert ended.wait(8)
+        reading.result()
+        assert staying.status_code == 200
+        assert gone.get("/v1/jobs").status_code == 401
+
+
+def test_archives_and_exports_are_bounded_per_key(as_key, sweep_id, context) -> None:
+    greedy, other = as_key(), as_key()
+    paths = {f"/v1/sweeps/{sweep_id}/archive": 1, f"/v1/sweeps/{sweep_id}/results": 2}
+    for path, most in paths.items():
+        # While the tables are locked, what reads them stays open.
+        with context.store.database.transaction() as locking, ThreadPoolExecutor(9) as threads:
+            locking.execute(text("LOCK TABLE sweeps, jobs IN ACCESS EXCLUSIVE MODE"))
+            asked = [threads.submit(greedy.get, path) for _ in range(8)]
+            wait_until(lambda a=asked, m=most: sum(one.done() for one in a) == 8 - m, 10, path)
+            refused = [one.result() for one in asked if one.done()]
+            assert {answer.status_code for answer in refused} == {429}
+            assert all(int(answer.headers["retry-after"]) >= 1 for answer in refused)
+            assert other.get("/v1/tasks").status_code == 200
+            locking.rollback()
+            allowed = [one.result().status_code for one in asked if one.result() not in refused]
+        assert allowed == [200] * most
+
+
+def test_a_callers_ordinary_requests_take_turns(as_key, sweep_id, context) -> None:
+    greedy, other = as_key(), as_key()
+    for client in (greedy, other):
+        client.get("/v1/tasks")
+    with context.store.database.transaction() as locking, ThreadPoolExecutor(40) as threads:
+        locking.execute(text("LOCK TABLE sweeps IN ACCESS EXCLUSIVE MODE"))
+        asked = [threads.submit(greedy.get, f"/v1/sweeps/{sweep_id}") for _ in range(40)]
+        time.sleep(0.5)
+        assert not any(one.done() for one in asked)
+        assert other.get("/v1/jobs").status_code == 200
+        locking.rollback()
+        assert {one.result().status_code for one in asked} == {200}
+
+
+def test_equal_verifications_are_one_and_open_ones_are_bounded(
+    as_key, context, sweep_id, monkeypatch
+) -> None:
+    monkeypatch.setattr(verifications, "MAX_OPEN", 3)
+    greedy, other = as_key(), as_key()
+    score_all(context)
+    ids = [job.id for job in context.store.jobs.page(limit=20, sweep_id=sweep_id)]
+    with ThreadPoolExecutor(8) as threads:
+        same = list(threads.map(lambda _: greedy.post(f"/v1/jobs/{ids[0]}/verify"), range(8)))
+    assert {answer.status_code for answer in same} == {202}
+    assert len({answer.json()["id"] for answer in same}) == 1
+    with ThreadPoolExecutor(4) as threads:
+        rest = list(threads.map(lambda id_: greedy.post(f"/v1/jobs/{id_}/verify"), ids[1:8]))
+    assert sorted(answer.status_code for answer in rest) == [202, 202, 429, 429, 429, 429, 429]
+    # Another's equal wish is the same verification; its own has room.
+    assert other.post(f"/v1/jobs/{ids[0]}/verify").json()["id"] == same[0].json()["id"]
+    assert other.post(f"/v1/jobs/{ids[9]}/verify").status_code == 202
+    # One that ended leaves room, and the same job can be verified again.
+    context.store.verifications.finish(same[0].json()["id"], {"ok": True, "checks": []})
+    wait_until(
+        lambda: greedy.post(f"/v1/jobs/{ids[0]}/verify").status_code == 202, 15, "there is room"
+    )
+
+
+def test_an_audit_takes_the_room_there_is_and_names_the_rest(
+    as_key, context, sweep_id, monkeypatch
+) -> None:
+    monkeypatch.setattr(verifications, "MAX_OPEN", 3)
+    score_all(context)
+    greedy = as_key()
+    accepted = greedy.post("/v1/leaderboard/verify", json={"model": "builtin/idle"}).json()
+    assert (len(accepted["verifications"]), len(accepted["left"])) == (3, 17)
+    assert greedy.post(f"/v1/jobs/{accepted['left'][0]}/verify").status_code == 429
+    assert sweep_id
+
+
+def test_a_busy_database_pool_is_503(context, monkeypatch) -> None:
+    engine = context.store.database.engine
+    with live_api(context) as url, httpx.Client(base_url=url, timeout=20) as client:
+        assert client.get("/v1/sweeps").status_code == 200
+        _check_busy_pool(client, engine, monkeypatch)
+
+
+def _check_busy_pool(client, engine, monkeypatch) -> None:
+    monkeypatch.setattr(engine.pool, "_timeout", 0.2)
+    with ExitStack() as taken:
+        for _ in range(engine.pool.size() + engine.pool._max_overflow):
+            taken.enter_context(engine.connect())
+        answer = client.get("/v1/sweeps")
+        assert answer.status_code == 503
+        assert int(answer.headers["retry-after"]) >= 1
+        # Key checks and streams have connections of their own.
+        assert client.get("/v1/models").status_code == 200
+    assert client.get("/v1/sweeps").status_code == 200
+
+
+@pytest.fixture
+def session(as_key) -> tuple[httpx.Client, str]:
+    client = as_key()
+    opened = client.post("/v1/sessions", json={"task": "support-1", "agent": "me"}).json()["id"]
+    assert client.post(f"/v1/sessions/{opened}/calls", json=START).status_code == 200
+    return client, opened
+
+
+def test_a_session_has_a_total_size(session, context, monkeypatch) -> None:
+    client, id_ = session
+    monkeypatch.setattr(agent_sessions, "MAX_SESSION_BYTES", 150_000)
+    call = {"tool": "get_machine_summary", "arguments": {"note": "x" * 60_000}}
+    answers = [client.post(f"/v1/sessions/{id_}/calls", json=call) for _ in range(5)]
+    assert [answer.status_code for answer in answers] == [200, 200, 200, 409, 409]
+    assert "submit it" in answers[-1].json()["detail"]
+    # Another process, which has to build the machine again, counts the same.
+    other = agent_sessions.ExternalSessions(context)
+    with pytest.raises(agent_sessions.SessionClosedError, match="of 150,000"):
+        other.call(id_, machine="main", tool="start", arguments={})
+    assert client.post(f"/v1/sessions/{id_}/submit").status_code == 202
+
+
+@pytest.mark.parametrize(
+    ("arguments", "bound"),
+    [
+        ({"note": "x" * 65_536}, "65,536"),
+        ([0] * 40_000, "65,536"),
+        (json.loads("[" * 21 + "]" * 21), "more than 20"),
+        (json.loads('{"a":' * 25 + "1" + "}" * 25), "more than 20"),
+    ],
+)
+def test_a_calls_arguments_are_bounded(session, context, arguments, bound) -> None:
+    client, id_ = session
+    answer = client.post(
+        f"/v1/sessions/{id_}/calls", json={"tool": "start", "arguments": arguments}
+    )
+    assert answer.status_code == 422
+    assert answer.json()["errors"][0]["field"] == "arguments"
+    assert bound in answer.json()["detail"]
+    assert context.store.jobs.get(id_).actions == 1
