@@ -111,10 +111,12 @@ def _backfill() -> None:
             "AND (jobs.payer IS NOT NULL OR jobs.owner IS NOT NULL)"
         ),
         # A cancelled sweep no longer pays.
-        "UPDATE jobs SET payer = taker.id, owner = taker.owner FROM sweep_jobs, sweeps AS taker, "
-        "sweeps AS payer WHERE jobs.state <> 'done' AND payer.id = jobs.payer "
-        "AND payer.state = 'cancelled' AND sweep_jobs.job_id = jobs.id "
-        "AND taker.id = sweep_jobs.sweep_id AND taker.state <> 'cancelled'",
+        (
+            "UPDATE jobs SET payer = taker.id, owner = taker.owner FROM sweep_jobs, sweeps AS taker, "
+            "sweeps AS payer WHERE jobs.state <> 'done' AND payer.id = jobs.payer "
+            "AND payer.state = 'cancelled' AND sweep_jobs.job_id = jobs.id "
+            "AND taker.id = sweep_jobs.sweep_id AND taker.state <> 'cancelled'"
+        ),
         "INSERT INTO job_wants SELECT id, COALESCE(owner, '') FROM jobs WHERE payer IS NULL",
         (
             "INSERT INTO names SELECT DISTINCT ON (name) 'task', name, owner FROM tasks "

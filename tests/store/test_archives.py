@@ -338,7 +338,7 @@ def test_imported_scores_count_when_they_were_verified(archive, elsewhere) -> No
     feed = other.store.results.boards.feed(None)
     assert [(t.imported, t.unverified, t.scored) for t in feed.put] == [(True, True, False)] * 2
     runner = verification_runner(other)
-    runner.process(waiting[0].id)
+    assert runner.process_one()
     changed_since = other.store.results.boards.feed(feed.mark)
     assert sorted(t.unverified for t in changed_since.put if t.scored) == [False]
     board = summarise(other.store.results.boards.feed(None).put)
@@ -350,14 +350,15 @@ def test_a_forged_score_never_counts(archive, elsewhere) -> None:
     other = elsewhere()
     better = forge(file, "jobs", lambda row: row.update(indicator=1e6))
     read_archive(other, forge(better, "rollouts", lambda row: row.update(indicator=1e6)))
-    for id_ in other.store.verifications.to_notify(10):
-        verification_runner(other).process(id_)
+    while verification_runner(other).process_one():
+        pass
     counted = [t.indicator for t in other.store.results.boards.feed(None).put if t.scored]
     assert len(counted) == 1
     assert max(counted) < 1e6
     # Asking again does not help.
     (forged,) = [job for job in other.store.jobs.page(limit=9) if job.verified_at is None]
-    verification_runner(other).process(other.store.verifications.request(forged.id))
+    other.store.verifications.request([forged.id], owner=None)
+    assert verification_runner(other).process_one()
     assert other.store.jobs.get(forged.id).verified_at is None
 
 

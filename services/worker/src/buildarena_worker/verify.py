@@ -282,7 +282,7 @@ class VerificationRunner:
         except (ArtifactStoreError, OperationalError) as error:
             # Not the job's fault: another worker does it when this one's claim is too old.
             log.warning("verification_put_off", job=claimed.job_id, error=str(error))
-            return
+            return False
         except Exception as error:
             log.exception("verification_failed", job=claimed.job_id)
             failed = Check(name="verification", ok=False, kept=None, found=f"it broke off: {error}")

@@ -146,6 +146,7 @@ def add_problem_handlers(app: FastAPI) -> None:
         return _answer(500, "something went wrong here; it is in the log")
 
     _add_store_handlers(app)
+    _add_artifact_handlers(app)
 
 
 def _add_store_handlers(app: FastAPI) -> None:
@@ -161,20 +162,6 @@ def _add_store_handlers(app: FastAPI) -> None:
     @app.exception_handler(UnknownIdError)
     async def on_unknown(_: Request, error: UnknownIdError) -> JSONResponse:
         return _answer(404, str(error))
-
-    @app.exception_handler(ArtifactMissingError)
-    async def on_missing(_: Request, error: ArtifactMissingError) -> JSONResponse:
-        return _answer(404, str(error))
-
-    @app.exception_handler(ArtifactDamagedError)
-    async def on_damaged(_: Request, error: ArtifactDamagedError) -> JSONResponse:
-        log.error("artifact_damaged", error=str(error))
-        return _answer(500, f"{error}; it must be restored from a backup")
-
-    @app.exception_handler(ArtifactStoreError)
-    async def on_store(_: Request, error: ArtifactStoreError) -> JSONResponse:
-        log.error("artifact_store_fails", error=str(error))
-        return _answer(503, f"{error}; nothing is lost", headers={"Retry-After": "5"})
 
     @app.exception_handler(DataError)
     async def on_unstorable(_: Request, error: DataError) -> JSONResponse:
@@ -199,6 +186,22 @@ def _add_store_handlers(app: FastAPI) -> None:
         return _answer(
             503, "the database can't be reached; nothing was stored", headers={"Retry-After": "2"}
         )
+
+
+def _add_artifact_handlers(app: FastAPI) -> None:
+    @app.exception_handler(ArtifactMissingError)
+    async def on_missing(_: Request, error: ArtifactMissingError) -> JSONResponse:
+        return _answer(404, str(error))
+
+    @app.exception_handler(ArtifactDamagedError)
+    async def on_damaged(_: Request, error: ArtifactDamagedError) -> JSONResponse:
+        log.error("artifact_damaged", error=str(error))
+        return _answer(500, f"{error}; it must be restored from a backup")
+
+    @app.exception_handler(ArtifactStoreError)
+    async def on_store(_: Request, error: ArtifactStoreError) -> JSONResponse:
+        log.error("artifact_store_fails", error=str(error))
+        return _answer(503, f"{error}; nothing is lost", headers={"Retry-After": "5"})
 
 
 def _issue(entry: Mapping[str, Any]) -> ValidationIssue:
