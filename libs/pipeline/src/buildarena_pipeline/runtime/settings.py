@@ -63,7 +63,10 @@ class Settings(BaseSettings):
         int, Field(description="Faults without progress before a job is given up", ge=1)
     ] = 8
     sessions_per_worker: Annotated[
-        int, Field(description="Construction sessions one worker runs at once", ge=1)
+        int,
+        Field(
+            description="Construction sessions of one API key that one worker runs at once", ge=1
+        ),
     ] = 32
     simulations_per_worker: Annotated[
         int, Field(description="Simulations one worker runs at once", ge=1)
