@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import socket
 import time
 from pathlib import Path
@@ -245,6 +246,43 @@ def test_names_are_matched_whole(api, path, body, field) -> None:
 @pytest.mark.parametrize("path", ["/v1/jobs?id_prefix=job_0%0A", "/v1/tasks/lift-1?version=0%0A"])
 def test_parameters_are_matched_whole(api, path) -> None:
     assert api.get(path).status_code == 422
+
+
+UNKNOWN = "0a1b2c3d4e5f60718293"
+
+
+@pytest.mark.parametrize(
+    "name", ["x", "UPPER", "a_b", "job_" + UNKNOWN, "x" * 300, "%20", "%C3%BC", "%22", "..%2F"]
+)
+@pytest.mark.parametrize("template", sorted(t for t in CONTRACT["paths"] if "{" in t))
+def test_what_nobody_has_in_a_path_is_404(api, template, name) -> None:
+    bodies = {"budget": {}, "calls": {"tool": "start"}}
+    for method in CONTRACT["paths"][template]:
+        path = re.sub(r"\{[a-z_]+\}", name, template)
+        answer = api.request(method.upper(), path, json=bodies.get(path.rpartition("/")[2]))
+        assert answer.status_code in {404, 405}, (method, path, answer.text)
+        assert answer.status_code == 404 or "%2F" in name
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "body"),
+    [
+        ("GET", "/v1/jobs?task=x", None),
+        ("GET", "/v1/jobs?model=x", None),
+        ("GET", "/v1/leaderboard?track=x", None),
+        ("GET", "/v1/leaderboard?task=x", None),
+        ("GET", "/v1/leaderboard/export?level=99", None),
+        ("POST", "/v1/leaderboard/verify", {"model": "x"}),
+        ("POST", "/v1/jobs", {"task": "x", "model": "builtin/idle"}),
+        ("POST", "/v1/sweeps", {"tasks": ["support-1"], "models": ["x"]}),
+        ("POST", "/v1/sweeps/estimate", {"tasks": ["x"], "models": ["builtin/idle"]}),
+        ("POST", "/v1/sessions", {"task": "x", "agent": "me"}),
+    ],
+)
+def test_unknown_names_in_a_query_or_a_body_are_422(api, method, path, body) -> None:
+    answer = api.request(method, path, json=body)
+    assert answer.status_code == 422
+    assert "x" in answer.json()["errors"][0]["message"] or "99" in answer.text
 
 
 @pytest.mark.parametrize("given", ["*", "proxy.example", "10.0.0.0/8,*", "127.0.0.1:80"])

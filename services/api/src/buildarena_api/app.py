@@ -69,11 +69,14 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
     exporting = OwnPool(context, size=EXPORTERS, name="exporting")
     rate_limits = RateLimits(context.settings.required_broker_url(), context.settings.rate_limit)
 
+    hub = EventHub(watching)
+
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
         reaper.start()
         yield
         reaper.stop()
+        await hub.close()
         await rate_limits.close()
         watching.close()
         exporting.close()
@@ -94,7 +97,7 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
     app.state.context = context
     app.state.artifact_probe = health.ArtifactProbe(context.artifacts)
     app.state.exporting = exporting
-    app.state.hub = EventHub(watching)
+    app.state.hub = hub
     app.state.key_checks = KeyChecks(watching)
     app.state.concurrency = usual_limits()
     app.state.registry = registry

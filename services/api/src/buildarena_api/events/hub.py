@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import json
 from collections.abc import AsyncIterator
+from contextlib import suppress
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 
@@ -92,6 +93,13 @@ class EventHub:
         self._floor: int | None = None
         self._seen: set[int] = set()
         self._keys_checked_at = 0.0
+
+    async def close(self) -> None:
+        """Stops reading."""
+        if self._task is not None:
+            self._task.cancel()
+            with suppress(asyncio.CancelledError):
+                await self._task
 
     async def open_job(self, job_id: str) -> Channel:
         """The channel of a job.

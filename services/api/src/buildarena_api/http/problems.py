@@ -129,7 +129,9 @@ def add_problem_handlers(app: FastAPI) -> None:
     async def on_invalid(_: Request, error: RequestValidationError) -> JSONResponse:
         errors = [_issue(entry) for entry in error.errors()]
         detail = "; ".join(map(_described, errors))
-        return _answer(422, detail, errors)
+        # A path that nothing can have is as unknown as one that nothing has.
+        in_path = any(entry["loc"][0] == "path" for entry in error.errors())
+        return _answer(404 if in_path else 422, detail, errors)
 
     @app.exception_handler(HTTPException)
     async def on_http(_: Request, error: HTTPException) -> JSONResponse:
