@@ -113,7 +113,8 @@ def _backfill() -> None:
         # A cancelled sweep no longer pays.
         (
             "UPDATE jobs SET payer = taker.id, owner = taker.owner "
-            "FROM sweep_jobs, sweeps AS taker, sweeps AS payer WHERE jobs.state <> 'done' AND payer.id = jobs.payer "
+            "FROM sweep_jobs, sweeps AS taker, sweeps AS payer "
+            "WHERE jobs.state <> 'done' AND payer.id = jobs.payer "
             "AND payer.state = 'cancelled' AND sweep_jobs.job_id = jobs.id "
             "AND taker.id = sweep_jobs.sweep_id AND taker.state <> 'cancelled'"
         ),

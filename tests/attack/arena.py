@@ -143,10 +143,12 @@ def arena(folder: Path, sizes: Mapping[str, float], **settings: Any) -> Iterator
             )
         )
         operator = Tenant(stack.url, ADMIN)
+        running.callback(operator.client.close)
         tenants = []
         for name in ("attacker", "innocent"):
             made = operator.post("/v1/keys", {"name": name, "scopes": ["submit"]}).json()
             tenants.append(Tenant(stack.url, made["secret"], made["id"]))
+            running.callback(tenants[-1].client.close)
         database = Database(stack.environment["BUILDARENA_DATABASE_URL"])
         running.callback(database.close)
         found = Arena(
@@ -159,7 +161,9 @@ def arena(folder: Path, sizes: Mapping[str, float], **settings: Any) -> Iterator
             sizes=sizes,
             folder=folder,
         )
-        found.bystander = Bystander(Tenant(stack.url, tenants[1].secret))
+        beside = Tenant(stack.url, tenants[1].secret)
+        running.callback(beside.client.close)
+        found.bystander = Bystander(beside)
         found.bystander.start()
         running.callback(found.bystander.stop)
         yield found

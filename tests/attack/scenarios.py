@@ -14,6 +14,7 @@ import time
 import zipfile
 from collections import Counter
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -112,7 +113,8 @@ def hanging_provider(arena: Arena) -> Tried:
     def running() -> int:
         return len(arena.operator.get(f"/v1/jobs?sweep={sweep}&state=running&limit=100")["jobs"])
 
-    wait_until(lambda: running() >= 40, 30, "forty sessions hang")
+    wait_until(lambda: running() >= 40, 30, "forty sessions run")
+    wait_until(lambda: _open_requests(arena) >= 40, 30, "forty requests hang")
     started = time.monotonic()
     job = arena.innocent.post(
         "/v1/jobs", {"task": "support-1", "model": "builtin/idle", "seed": 77}
@@ -318,11 +320,8 @@ def full_disk(arena: Arena) -> Tried:
         found.refused = "left out: mounting a small disk needs root"
         return found
     filler = place / "filler"
-    with filler.open("wb") as file:
-        try:
-            while file.write(b"x" * 65536):
-                file.flush()
-        except OSError:
+    with filler.open("wb", buffering=0) as file, suppress(OSError):
+        while file.write(b"x" * 65536):
             pass
     body = {"task": "lift-1", "model": "builtin/expert", "simulator": "mujoco", "seed": 3}
     id_ = arena.innocent.post("/v1/jobs", body).json()["id"]
@@ -332,11 +331,12 @@ def full_disk(arena: Arena) -> Tried:
         return job["faults"] >= 1 and "artifacts can't be written" in (job["detail"] or "")
 
     wait_until(waits, 30, "the job waits for the disk")
-    checks = httpx.get(f"{arena.stack.url}/v1/health").json()["checks"]
-    found.require(
-        any(check["name"] == "artifacts" and not check["ok"] for check in checks),
-        "health does not show the full disk",
-    )
+
+    def shows() -> bool:
+        checks = httpx.get(f"{arena.stack.url}/v1/health").json()["checks"]
+        return any(check["name"] == "artifacts" and not check["ok"] for check in checks)
+
+    wait_until(shows, 15, "health shows the full disk")
     asked = arena.innocent.get(f"/v1/jobs/{id_}")["usage"]["requests"]
     filler.unlink()
     wait_until(lambda: arena.innocent.get(f"/v1/jobs/{id_}")["state"] == "done", 90, "it ends")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 from buildarena_geometry import FEEDBACK_VERSION
 from buildarena_geometry import __version__ as geometry_version
@@ -12,7 +12,7 @@ from buildarena_pipeline.errors import StartupError
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.job_runner import StageHandler
 from buildarena_pipeline.runtime.settings import Settings
-from buildarena_pipeline.runtime.worker_process import WorkerSpec, run_worker
+from buildarena_pipeline.runtime.worker_process import SideWork, WorkerSpec, run_worker
 from buildarena_store.states import CONSTRUCT_QUEUE, VERIFY_QUEUE
 from buildarena_worker.wiring import construct_handler, verification_runner
 
@@ -26,8 +26,8 @@ def main() -> None:
         def make_handler(context: Context) -> StageHandler:
             return construct_handler(context, registry)
 
-        def make_others(context: Context) -> Mapping[str, Callable[[str], None]]:
-            return {VERIFY_QUEUE: verification_runner(context).wake}
+        def make_others(context: Context) -> Mapping[str, SideWork]:
+            return {VERIFY_QUEUE: verification_runner(context)}
 
         run_worker(
             WorkerSpec(

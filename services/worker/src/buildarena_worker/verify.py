@@ -264,13 +264,18 @@ class VerificationRunner:
         self._threads = ThreadPoolExecutor(AT_ONCE, thread_name_prefix="verifying")
         self._lock = Lock()
         self._active = 0
+        self._stopping = False
 
     def wake(self, _: str) -> None:
         """Has waiting verifications done, unless as many as may be are being done."""
         with self._lock:
-            if self._active < AT_ONCE:
+            if self._active < AT_ONCE and not self._stopping:
                 self._active += 1
                 self._threads.submit(self._do_next)
+
+    def stop(self) -> None:
+        """Begins no further verification."""
+        self._stopping = True
 
     def process_one(self) -> bool:
         """Does the verification that waits longest; False when none waits."""
@@ -298,7 +303,7 @@ class VerificationRunner:
             log.exception("verifications_unreadable")
             again = False
         with self._lock, suppress(RuntimeError):
-            if again:
+            if again and not self._stopping:
                 self._threads.submit(self._do_next)  # refused when the process ends
                 return
         with self._lock:

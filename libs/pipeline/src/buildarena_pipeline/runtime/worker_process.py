@@ -10,7 +10,7 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import Any
+from typing import Any, Protocol
 
 import structlog
 from sqlalchemy.exc import OperationalError
@@ -25,11 +25,20 @@ from buildarena_pipeline.runtime.owner_slots import OwnerSlots
 from buildarena_pipeline.runtime.processes import die_with_parent, end_with_parent
 from buildarena_pipeline.runtime.reaper import Reaper
 from buildarena_pipeline.runtime.settings import Settings
-from buildarena_pipeline.runtime.side_work import SideWork
 from buildarena_pipeline.runtime.tracing import Tracing
 from buildarena_store import SchemaVersionError
 
 log = structlog.get_logger(__name__)
+
+
+class SideWork(Protocol):
+    """What a worker does besides jobs, in threads of its own: it takes no job's slot."""
+
+    def wake(self, id_: str, /) -> None:
+        """Has what waits done, the id among it; returns at once."""
+
+    def stop(self) -> None:
+        """Begins nothing more."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,7 +51,7 @@ class WorkerSpec:
         pool: Celery pool: ``threads``, ``prefork`` or ``solo``.
         concurrency: Jobs at once; in a pool of threads, of one owner (see `owner_slots`).
         make_handler: Makes the stage handler from a process' connections.
-        make_others: Makes what else it does: functions of an id, by queue.
+        make_others: Makes what else it does, by queue.
         versions: Versions of what it runs.
     """
 
@@ -51,7 +60,7 @@ class WorkerSpec:
     pool: str
     concurrency: int
     make_handler: Callable[[Context], StageHandler]
-    make_others: Callable[[Context], Mapping[str, Callable[[str], None]]] = lambda _: {}
+    make_others: Callable[[Context], Mapping[str, SideWork]] = lambda _: {}
     versions: Mapping[str, Any]
 
 
@@ -65,9 +74,7 @@ class _Runtime:
         self.id = f"{spec.kind}@{socket.gethostname()}:{os.getpid()}"
         self._spec = spec
         self.keeper = LeaseKeeper(self.context.store.leases, self.report)
-        self.others = {
-            queue: SideWork(work) for queue, work in spec.make_others(self.context).items()
-        }
+        self.others = spec.make_others(self.context)
         self.runner = JobRunner(
             self.context.store.leases,
             spec.make_handler(self.context),
@@ -142,7 +149,7 @@ def run_worker(spec: WorkerSpec, settings: Settings) -> None:
     def process_next(queue: str, job_id: str) -> None:
         runtime = runtimes[os.getpid()]
         if queue in runtime.others:
-            runtime.others[queue].do(job_id)
+            runtime.others[queue].wake(job_id)
         elif spec.pool == THREADS:
             runtime.runner.process_all(queue, job_id)
         else:
