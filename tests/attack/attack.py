@@ -37,7 +37,7 @@ FULL: Mapping[str, float] = {
 P99_BOUND_S = 0.25
 QUIET = frozenset({"streams", "archives", "verifications"})
 """Floods beside which an innocent caller's 99th percentile has a bar."""
-MOST_MIB = 400
+MAX_MIB = 400
 DISK_MIB = 64
 
 
@@ -67,7 +67,7 @@ def attack(found: Arena, name: str) -> dict[str, object]:
     tried.require(failed == 0, f"{failed} of an innocent caller's requests failed")
     if name in QUIET:
         tried.require(high <= P99_BOUND_S, f"innocent p99 {high * 1000:.0f} ms")
-    large = {process: size for process, size in memory.items() if size > MOST_MIB}
+    large = {process: size for process, size in memory.items() if size > MAX_MIB}
     tried.require(not large, f"memory {large}")
     return {
         "scenario": name,
