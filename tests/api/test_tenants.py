@@ -104,7 +104,7 @@ def test_jobs_with_limits_have_a_row_of_their_own(a, context) -> None:
         a.post("/v1/jobs", {**JOB, "seed": seed, "limits": {"max_requests": 1}})
     work(context)
     (task,) = [t for t in a.get("/v1/leaderboard")["tasks"] if t["task"] == "support-1"]
-    rows = {row["decoding"].get("max_requests"): row for row in task["rows"]}
+    rows = {row["decoding"].get("limits", {}).get("max_requests"): row for row in task["rows"]}
     assert {limit: row["trials"] for limit, row in rows.items()} == {None: 2, 1: 2}
 
 

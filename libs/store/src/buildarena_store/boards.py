@@ -217,9 +217,7 @@ def _trials(connection: Connection, query: Any) -> Iterator[EndedJob]:
             task_version=sys.intern(row.task_version),
             model=sys.intern(row.model),
             configuration=sys.intern(row.configuration),
-            decoding=decodings.setdefault(
-                row.configuration, {**(row.decoding or {}), **row.limits}
-            ),
+            decoding=decodings.setdefault(row.configuration, _decoding(row.decoding, row.limits)),
             seed=row.seed,
             outcome=sys.intern(row.outcome),
             reason=None if row.reason is None else sys.intern(row.reason),
@@ -238,6 +236,10 @@ def _trials(connection: Connection, query: Any) -> Iterator[EndedJob]:
             imported=row.imported,
             unverified=row.unverified,
         )
+
+
+def _decoding(decoding: Mapping[str, Any] | None, limits: Mapping[str, Any]) -> dict[str, Any]:
+    return {**(decoding or {}), **({"limits": limits} if limits else {})}
 
 
 def _add_rollout(rounds: list[Round], row: Row[Any]) -> None:

@@ -15,7 +15,7 @@ from buildarena_cli.errors import DONE, FAILED
 from buildarena_cli.ids import whole_id
 from buildarena_cli.lazy import new_group
 from buildarena_cli.options import DEFAULT_URL, JobId, JsonOption, ModelName, TaskName, UrlOption
-from buildarena_cli.terminal.output import number, print_json, say
+from buildarena_cli.terminal.output import minute_of, number, print_json, say
 
 app = new_group("Submit and look at jobs.")
 app.command("list")(list_jobs)
@@ -119,6 +119,10 @@ def _show(job: dict[str, Any], *, as_json: bool) -> None:
     if job["flags"]:
         say(f"flags     {', '.join(job['flags'])}")
     say(f"indicator {number(job['indicator'], 3)}")
+    if job["imported_from"]:
+        verified = job["verified_at"]
+        state = f"verified here at {minute_of(verified)}" if verified else "not verified here"
+        say(f"imported  from {job['imported_from']}; {state}")
     usage = job["usage"]
     say(
         f"usage     {usage['requests']} requests, {usage['input_tokens']:,} tokens in, "

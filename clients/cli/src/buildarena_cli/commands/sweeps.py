@@ -232,6 +232,11 @@ def import_sweep(
         print_json(done)
     else:
         say(f"{done['sweep_id']}: {done['jobs']} jobs, {done['added']} of them new")
+        if done["unverified"]:
+            say(
+                f"{done['unverified']} scores count when they were found again here: their "
+                "verification was requested (`buildarena job show` says how it went)"
+            )
 
 
 def _row(sweep: dict[str, Any]) -> list[str]:

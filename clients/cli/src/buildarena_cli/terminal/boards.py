@@ -63,14 +63,11 @@ def overview(board: Mapping[str, Any], *, published: bool = False) -> None:
     """
     ranks = {(row["model"], row["configuration"]): row["rank"] for row in board["overall"]}
     rows: dict[tuple[str, str], dict[str, Any]] = {}
-    baselines = set()
     for task in board["tasks"]:
         for row in task["rows"]:
             rows.setdefault((row["model"], row["configuration"]), {})[task["task"]] = row
-            if row["baseline"]:
-                baselines.add(row["model"])
     ordered = sorted(rows, key=lambda key: (ranks.get(key) is None, ranks.get(key), key[0]))
-    names = [model + ("*" if model in baselines else "") for model, _ in ordered]
+    names = [_marked(list(rows[key].values())) for key in ordered]
     tasks = [task["task"] for task in board["tasks"]]
     _print_matrix(
         tasks,
@@ -95,7 +92,7 @@ def task_table(task: Mapping[str, Any]) -> None:
         [
             (
                 _rank(row["rank"]),
-                row["model"] + ("*" if row["baseline"] else ""),
+                _marked([row]),
                 *_figures(row),
                 number(row["cost_usd_mean"], 2),
             )
@@ -105,6 +102,7 @@ def task_table(task: Mapping[str, Any]) -> None:
         notes=[
             "* baseline; # is shared by statistically tied models",
             "95 % is the Wilson interval of the success rate",
+            *_imports(task["rows"]),
         ],
     )
 
@@ -267,4 +265,27 @@ def _legend(board: Mapping[str, Any]) -> list[str]:
         "Successes of jobs, the rate's 95 % Wilson interval, and the mean indicator:",
         *(f"  {', '.join(tasks)}: {name}" for name, tasks in indicators.items()),
         "* baseline; # is the overall rank, shared by statistically tied models",
+        *_imports([row for task in board["tasks"] for row in task["rows"]]),
     ]
+
+
+def _marked(rows: Sequence[Mapping[str, Any]]) -> str:
+    """A row's model with its marks, and the limits of its sessions, if they had any.
+
+    Args:
+        rows: One model configuration, on one task or several.
+    """
+    first = rows[0]
+    limits = first["decoding"].get("limits", {})
+    spelled = ", ".join(f"{name} {value}" for name, value in limits.items())
+    marks = ("*" if first["baseline"] else "") + ("†" if any(r["imported"] for r in rows) else "")
+    return first["model"] + marks + (f" ({spelled})" if spelled else "")
+
+
+def _imports(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """What the mark of imported results means, if there are any."""
+    imported, waiting = (sum(row[name] for row in rows) for name in ("imported", "unverified"))
+    if not imported:
+        return []
+    text = f"{imported} were imported, {waiting} of them are not verified and count nowhere"
+    return [f"† with results of other services: {text}"]
