@@ -134,6 +134,49 @@ def test_a_busy_worker_leaves_slots_to_others(context, broker_url) -> None:
     del context
 
 
+def test_an_owner_without_an_open_request_may_send_one_whoever_hangs(context, broker_url) -> None:
+    """Forty and more requests of one key hang; each other key may send one, over all workers."""
+
+    async def main() -> tuple[list[float], int, int]:
+        first, second = (Throttle(broker_url, "p", start=4) for _ in range(2))
+        hang, waits = asyncio.Event(), []
+
+        async def hanging(throttle: Throttle) -> None:
+            async with throttle.slot("key_a"):
+                await hang.wait()
+
+        held = [asyncio.create_task(hanging(throttle)) for throttle in (first, second) * 6]
+        await asyncio.sleep(0.3)
+        others = []
+        for number, throttle in enumerate((first, second)):
+            started = time.monotonic()
+            slot = throttle.slot(f"key_{number}")
+            await slot.__aenter__()
+            others.append(slot)
+            waits.append(time.monotonic() - started)
+        most = open_slots(broker_url)
+        # A second request of such a key waits like everybody's.
+        refused = 0
+        try:
+            async with asyncio.timeout(0.5), second.slot("key_0"):
+                pass
+        except TimeoutError:
+            refused += 1
+        for slot in others:
+            await slot.__aexit__(None, None, None)
+        hang.set()
+        await asyncio.gather(*held)
+        for throttle in (first, second):
+            await throttle.close()
+        return waits, most, refused
+
+    waits, most, refused = asyncio.run(main())
+    assert max(waits) < 2
+    assert (most, refused) == (6, 1)
+    assert open_slots(broker_url) == 0
+    del context
+
+
 def test_slots_of_a_dead_worker_are_free_again_soon(context, broker_url, monkeypatch) -> None:
     monkeypatch.setattr(throttle_module, "SLOT_TTL_S", 1)
 

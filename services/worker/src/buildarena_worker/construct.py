@@ -118,6 +118,7 @@ class ConstructHandler:
             active=active,
             guard=BudgetGuard(self._store.budgets, active, self._price_of(job)),
             gate=self._gate,
+            owner=job.owner or "",
         )
 
     def _move_on(self, lease: Lease, session: Session, result: SessionResult) -> None:

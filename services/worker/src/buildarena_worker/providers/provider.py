@@ -74,7 +74,7 @@ class ProviderClient:
             TransientError: The provider failed through all tries.
             PermanentError: The provider refuses the key, the model or the account.
         """
-        return REQUESTS.run(self._in_time(request, patience.within_s), patience.active)
+        return REQUESTS.run(self._in_time(request, patience), patience.active)
 
     def close(self) -> None:
         """Closes the connections to the provider."""
@@ -85,20 +85,20 @@ class ProviderClient:
 
         REQUESTS.run(close())
 
-    async def _in_time(self, request: Request, within_s: float) -> Answer:
-        started = time.monotonic()
+    async def _in_time(self, request: Request, patience: Patience) -> Answer:
+        started, within_s = time.monotonic(), patience.within_s
         try:
             async with asyncio.timeout(within_s if math.isfinite(within_s) else None):
-                return await self._complete(request)
+                return await self._complete(request, patience.owner)
         except TimeoutError:
             detail = f"the job's time was over after {within_s:.3g} s"
             return _empty(OUT_OF_TIME, detail, time.monotonic() - started, 1)
 
-    async def _complete(self, request: Request) -> Answer:
+    async def _complete(self, request: Request, owner: str) -> Answer:
         started = time.monotonic()
         for tries in range(1, self._policy.tries + 1):
             try:
-                answered = await self._send(request)
+                answered = await self._send(request, owner)
             except (ProviderError, TimeoutError) as error:
                 failure = error.failure if isinstance(error, ProviderError) else Failure.OUTAGE
                 detail = _first_line(error, self._key)
@@ -125,9 +125,9 @@ class ProviderClient:
                 return self._answer(answered, time.monotonic() - started, tries)
         raise AssertionError("the last try returns or raises")
 
-    async def _send(self, request: Request) -> Answered:
+    async def _send(self, request: Request, owner: str) -> Answered:
         """Sends a request once, when the provider's shared limit lets it."""
-        async with self._throttle.slot() as slot:
+        async with self._throttle.slot(owner) as slot:
             try:
                 async with asyncio.timeout(self._policy.timeout_s):
                     answered = await self._sender.send(request)

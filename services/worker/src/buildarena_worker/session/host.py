@@ -182,6 +182,7 @@ class LiveHost:
         guard: Reserves what a request may cost before it is sent.
         gate: Where the session gives up its place while it waits for a reply.
         first_wait_s: Seconds to wait after an answer that can't be read; doubles with each.
+        owner: Whose session it is; empty for the operator's.
     """
 
     def __init__(
@@ -194,6 +195,7 @@ class LiveHost:
         guard: BudgetGuard,
         gate: ConcurrencyGate,
         first_wait_s: float | None = None,
+        owner: str = "",
     ) -> None:
         self._kept = kept
         self._client = client
@@ -201,6 +203,7 @@ class LiveHost:
         self._active = active
         self._budget = guard
         self._gate = gate
+        self._owner = owner
         self._first_wait_s = FIRST_WAIT_S if first_wait_s is None else first_wait_s
 
     def ask(self, request: Request, *, phase: str, role: str) -> JournalEntry:
@@ -266,7 +269,7 @@ class LiveHost:
 
     def _answer(self, request: Request, waited_s: float) -> Answer:
         left_s = self._kept.spending.seconds_left - waited_s
-        patience = Patience(within_s=left_s, active=self._active)
+        patience = Patience(within_s=left_s, active=self._active, owner=self._owner)
         try:
             return self._client.complete(request, patience)
         except CancelledError:

@@ -15,10 +15,12 @@ class Patience:
     Attributes:
         within_s: The seconds that the job's limit leaves for it.
         active: The lease that it is wanted under.
+        owner: Whose request it is; empty for the operator's.
     """
 
     within_s: float = math.inf
     active: ActiveLease | None = None
+    owner: str = ""
 
 
 ENDLESS = Patience()
