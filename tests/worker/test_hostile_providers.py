@@ -20,6 +20,7 @@ from working import work
 from buildarena_pipeline.catalog.models import load_registry
 from buildarena_pipeline.catalog.specs import JobSpec
 from buildarena_pipeline.submission.submission import Submissions
+from buildarena_store import BudgetLimits
 from buildarena_worker.wiring import verifier
 
 SOON_S = 3.0
@@ -79,8 +80,37 @@ def test_a_job_s_seconds_end_its_request_and_are_verified(context, tmp_path, how
     seconds = sum(entry["latency_s"] for entry in entries)
     assert 1.5 <= seconds < 4
     assert job.requests == len(entries)
+    # What was sent and broken off costs what was sent.
+    assert (job.input_tokens > 100) == (how in {"hang", "drip"})
+    assert (job.cost_usd > 0) == (how in {"hang", "drip"})
     report = verifier(context).verify(job.id)
     assert report["ok"], [check for check in report["checks"] if not check["ok"]]
+
+
+def test_nobody_has_free_requests_by_cancelling(context, tmp_path) -> None:
+    limits = BudgetLimits(max_cost_usd=Decimal(100))
+    with context.store.database.transaction() as connection:
+        context.store.budgets.set("key_a", limits, connection=connection)
+    with stuck("hang") as bad, crew(context, tmp_path, bad=bad) as workers:
+        job_id = workers.submit("bad", owner="key_a")
+        wait_until(lambda: bad.counts.requests, 10, "the request is sent")
+        cancel(context, job_id)
+        wait_until(lambda: workers.slots.free == workers.slots.total, SOON_S, "the slot is free")
+    spent = context.store.budgets.get("key_a")
+    assert spent is not None
+    assert spent.spent_requests == 1
+    assert spent.spent_tokens > 100
+    assert spent.spent_cost_usd > 0
+    # A provider that can't be reached got nothing.
+    with (
+        ProviderStandIn(fault=lambda _: "500") as bad,
+        crew(context, tmp_path, bad=bad) as workers,
+    ):
+        job_id = workers.submit("bad", owner="key_a", seed=1)
+        wait_until(lambda: bad.counts.requests >= 2, 20, "tries")
+        cancel(context, job_id)
+        wait_until(lambda: workers.slots.free == workers.slots.total, SOON_S, "the slot is free")
+    assert context.store.budgets.get("key_a") == spent
 
 
 def test_shutdown_ends_open_requests(context, settings, tmp_path) -> None:

@@ -89,16 +89,16 @@ class ProviderClient:
         started, within_s = time.monotonic(), patience.within_s
         try:
             async with asyncio.timeout(within_s if math.isfinite(within_s) else None):
-                return await self._complete(request, patience.owner)
+                return await self._complete(request, patience)
         except TimeoutError:
             detail = f"the job's time was over after {within_s:.3g} s"
             return _empty(OUT_OF_TIME, detail, time.monotonic() - started, 1)
 
-    async def _complete(self, request: Request, owner: str) -> Answer:
+    async def _complete(self, request: Request, patience: Patience) -> Answer:
         started = time.monotonic()
         for tries in range(1, self._policy.tries + 1):
             try:
-                answered = await self._send(request, owner)
+                answered = await self._send(request, patience)
             except (ProviderError, TimeoutError) as error:
                 failure = error.failure if isinstance(error, ProviderError) else Failure.OUTAGE
                 detail = _first_line(error, self._key)
@@ -125,13 +125,15 @@ class ProviderClient:
                 return self._answer(answered, time.monotonic() - started, tries)
         raise AssertionError("the last try returns or raises")
 
-    async def _send(self, request: Request, owner: str) -> Answered:
+    async def _send(self, request: Request, patience: Patience) -> Answered:
         """Sends a request once, when the provider's shared limit lets it."""
-        async with self._throttle.slot(owner) as slot:
+        async with self._throttle.slot(patience.owner) as slot:
+            patience.sent.set()
             try:
                 async with asyncio.timeout(self._policy.timeout_s):
                     answered = await self._sender.send(request)
             except ProviderError as error:
+                patience.sent.clear()
                 if error.overloaded:
                     slot.rejected()
                 raise

@@ -51,6 +51,11 @@ class BudgetGuard:
                 raise SessionEnded(Superseded())
             self._active.wait(WAIT_S)
 
+    def sent(self, request: Request) -> Usage:
+        """What a request that was broken off cost, as far as can be said: what was sent."""
+        tokens = _sent_tokens(request)
+        return Usage(requests=1, input_tokens=tokens, cost_usd=self._price(tokens, 0))
+
     def charge_lost(self, usage: Usage) -> None:
         """Counts a reply that was paid for but came after the lease had ended."""
         self._budgets.charge_lost(self._active.lease, usage)
@@ -58,7 +63,12 @@ class BudgetGuard:
     def _need(self, request: Request) -> Need:
         given = request.model_config["decoding"].get("max_tokens")
         output = OUTPUT_TOKENS if given is None else int(given)
-        characters = sum(len(message.text) for message in request.messages)
-        characters += sum(len(f"{tool.description}{tool.parameters}") for tool in request.tools)
-        sent = characters // CHARACTERS_PER_TOKEN
+        sent = _sent_tokens(request)
         return Need(cost_usd=self._price(sent, output), tokens=sent + output)
+
+
+def _sent_tokens(request: Request) -> int:
+    """About how many tokens a request has."""
+    characters = sum(len(message.text) for message in request.messages)
+    characters += sum(len(f"{tool.description}{tool.parameters}") for tool in request.tools)
+    return characters // CHARACTERS_PER_TOKEN

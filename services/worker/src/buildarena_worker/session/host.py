@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import CancelledError
+from dataclasses import replace
 from typing import Any, Protocol
 
 from buildarena_geometry import KeyPress, Machine
@@ -271,10 +272,15 @@ class LiveHost:
         left_s = self._kept.spending.seconds_left - waited_s
         patience = Patience(within_s=left_s, active=self._active, owner=self._owner)
         try:
-            return self._client.complete(request, patience)
+            answer = self._client.complete(request, patience)
         except CancelledError:
+            if self._active.lost and patience.sent.is_set():
+                self._budget.charge_lost(self._budget.sent(request))
             self._require_held()
             raise
+        if answer.reply.finish == OUT_OF_TIME and patience.sent.is_set():
+            return replace(answer, usage=self._budget.sent(request))
+        return answer
 
     def _require_held(self) -> None:
         if self._active.lost:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+import threading
+from dataclasses import dataclass, field
 
 from buildarena_pipeline.runtime.active_lease import ActiveLease
 
@@ -16,11 +17,13 @@ class Patience:
         within_s: The seconds that the job's limit leaves for it.
         active: The lease that it is wanted under.
         owner: Whose request it is; empty for the operator's.
+        sent: Set as soon as the request may cost something.
     """
 
     within_s: float = math.inf
     active: ActiveLease | None = None
     owner: str = ""
+    sent: threading.Event = field(default_factory=threading.Event)
 
 
 ENDLESS = Patience()
