@@ -48,7 +48,7 @@ def upgrade() -> None:
         "job_wants",
         sa.Column("job_id", sa.Text(), nullable=False),
         sa.Column("owner", sa.Text(), nullable=False),
-        sa.ForeignKeyConstraint(["job_id"], ["jobs.id"], name=op.f("fk_job_wants_job_id_jobs")),
+        sa.ForeignKeyConstraint(["job_id"], ["jobs.id"], name=op.f("fk_job_wants_job_id")),
         sa.PrimaryKeyConstraint("job_id", "owner", name=op.f("pk_job_wants")),
     )
     op.create_table(
@@ -151,8 +151,9 @@ def _rekey_limited_jobs() -> None:
         moved.append({"old": row.id, "new": "job_" + content_hash(key)[:20], "hash": config})
     if not moved:
         return
-    for table in KEYED:
-        op.drop_constraint(f"fk_{table}_job_id_jobs", table, type_="foreignkey")
+    known = {table: _job_key_of(table) for table in KEYED}
+    for table, name in known.items():
+        op.drop_constraint(name, table, type_="foreignkey")
     connection.execute(
         sa.text("UPDATE jobs SET id = :new, model_hash = :hash WHERE id = :old"), moved
     )
@@ -161,9 +162,15 @@ def _rekey_limited_jobs() -> None:
             sa.text(f"UPDATE {table} SET job_id = :new WHERE job_id = :old"),
             moved,
         )
-    for table in KEYED:
-        op.create_foreign_key(f"fk_{table}_job_id_jobs", table, "jobs", ["job_id"], ["id"])
+    for table, name in known.items():
+        op.create_foreign_key(name, table, "jobs", ["job_id"], ["id"])
     _rehash_sweeps(connection, [row["new"] for row in moved])
+
+
+def _job_key_of(table: str) -> str:
+    """The name of a table's foreign key to jobs."""
+    keys = sa.inspect(op.get_bind()).get_foreign_keys(table)
+    return str(next(key["name"] for key in keys if key["referred_table"] == "jobs"))
 
 
 def _rehash_sweeps(connection: sa.Connection, job_ids: list[str]) -> None:

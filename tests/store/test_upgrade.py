@@ -14,11 +14,12 @@ from sqlalchemy import create_engine, text
 from working import work
 
 from buildarena_pipeline.catalog.models import load_registry
-from buildarena_pipeline.catalog.specs import Budget
+from buildarena_pipeline.catalog.specs import Budget, SweepSpec
 from buildarena_pipeline.runtime.context import Context, open_context
 from buildarena_pipeline.submission.submission import Submissions
 from buildarena_store import ArtifactStore, SweepState
 from buildarena_store.database import Database, alembic_config
+from buildarena_store.ids import new_id
 from buildarena_worker.wiring import verifier
 
 BEFORE = Path(__file__).parents[1] / "data" / "store" / "before-states"
@@ -120,3 +121,40 @@ def test_stopped_sweeps_go_on(upgraded: Context) -> None:
     for name in ("paused", "limited", "finished"):
         progress = upgraded.store.sweeps.progress(sweep_id(name))
         assert progress.done == progress.total, name
+
+
+def test_jobs_with_limits_move_to_the_ids_that_follow_from_them(
+    old_database: str, settings
+) -> None:
+    limits = {"max_requests": 500}
+    database = Database(old_database)
+    with database.transaction() as connection:
+        ended = [row["id"] for row in ROWS["jobs"] if row["state"] == "done"]
+        connection.execute(
+            text("UPDATE jobs SET limits = :limits WHERE id = ANY(:ids)"),
+            {"limits": json.dumps(limits), "ids": ended},
+        )
+        for job_id in (ended[0], ended[0], ended[1]):  # equal verifications were possible
+            connection.execute(
+                text("INSERT INTO verifications (id, job_id, state) VALUES (:id, :job, 'queued')"),
+                {"id": new_id("check"), "job": job_id},
+            )
+    database.close()
+    context = open_context(settings.model_copy(update={"database_url": old_database}))
+    context.store.database.migrate()
+    moved = [job for job in context.store.jobs.page(limit=100) if job.limits]
+    assert len(moved) == len(ended)
+    assert not {job.id for job in moved} & set(ended)
+    asked = {row["id"]: row["requests"] for row in ROWS["jobs"]}
+    assert sorted(job.requests for job in moved) == sorted(asked[id_] for id_ in ended)
+    for job in moved:
+        assert len(context.store.journal.read(job.id)) == job.requests
+    # Submitted again they are the same jobs, and the sweep of before goes on.
+    spec = next(row["spec"] for row in ROWS["sweeps"] if row["name"] == "finished")
+    wish = SweepSpec.model_validate({**spec, "limits": limits})
+    again = Submissions(context, load_registry()).submit_sweep(wish, resume=True)
+    assert (again.resumed, again.sweep.id) == (True, sweep_id("finished"))
+    with context.store.database.transaction() as connection:
+        open_ones = connection.execute(text("SELECT job_id FROM verifications")).scalars().all()
+    assert len(open_ones) == len(set(open_ones)) == 2
+    context.close()
