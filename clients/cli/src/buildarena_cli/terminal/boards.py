@@ -279,7 +279,7 @@ def _marked(rows: Sequence[Mapping[str, Any]]) -> str:
     limits = first["decoding"].get("limits", {})
     spelled = ", ".join(f"{name} {value}" for name, value in limits.items())
     marks = ("*" if first["baseline"] else "") + ("†" if any(r["imported"] for r in rows) else "")
-    return first["model"] + marks + (f" ({spelled})" if spelled else "")
+    return f"{first['model']}{marks}" + (f" ({spelled})" if spelled else "")
 
 
 def _imports(rows: Sequence[Mapping[str, Any]]) -> list[str]:
