@@ -116,7 +116,8 @@ def hanging_provider(arena: Arena) -> Tried:
         return len(arena.operator.get(f"/v1/jobs?sweep={sweep}&state=running&limit=100")["jobs"])
 
     wait_until(lambda: running() >= MANY, 60, f"{MANY} sessions run")
-    wait_until(lambda: _held_requests(arena) >= MANY, 60, f"{MANY} requests hang")
+    # Idle connections are among them: a few more than are waited for below.
+    wait_until(lambda: _held_requests(arena) >= MANY + 2, 60, "requests hang")
     started = time.monotonic()
     job = arena.innocent.post(
         "/v1/jobs", {"task": "support-1", "model": "builtin/idle", "seed": 77}
@@ -125,10 +126,10 @@ def hanging_provider(arena: Arena) -> Tried:
     wait_until(lambda: arena.innocent.get(f"/v1/jobs/{id_}")["state"] == "done", 30, "a session")
     room = time.monotonic() - started
     found.require(room <= ROOM_S, f"another key's session took {room:.1f} s")
-    held, left = running(), arena.provider.left
+    left = arena.provider.left
     started = time.monotonic()
     thief.post(f"/v1/sweeps/{sweep}/cancel")
-    wait_until(lambda: arena.provider.left - left >= held, 60, "the provider's requests end")
+    wait_until(lambda: arena.provider.left - left >= MANY, 60, "the provider's requests end")
     took = time.monotonic() - started
     found.require(took <= END_S, f"open requests ended after {took:.1f} s")
     arena.provider.fault = lambda _: None
