@@ -4,12 +4,14 @@ from typing import Final
 
 import numpy as np
 
+from buildarena_simulation.bearing import BearingMeter
 from buildarena_simulation.constants import GRAVITY
-from buildarena_simulation.engines.base import Engine
+from buildarena_simulation.engines.base import Engine, World
+from buildarena_simulation.resting import FaceFinder
 from buildarena_simulation.structure.clusters import Clusters, find_clusters
 from buildarena_simulation.structure.contacts import EvenSharing, PointForces
 from buildarena_simulation.structure.loads import LoadModel
-from buildarena_simulation.structure.model import JOINT_KINDS, FloatArray, Structure
+from buildarena_simulation.structure.model import JOINT_KINDS, FloatArray
 from buildarena_simulation.structure.motion import Motion, rope_ends
 from buildarena_simulation.structure.vectors import turned
 from buildarena_simulation.trajectory import Break, JointPeak
@@ -26,16 +28,18 @@ class BreakingModel:
     unless its load rises almost threefold at once.
 
     Args:
-        structure: The machine.
+        world: The machine and what is around it.
         clusters: Its clusters at the start.
         motion: Their motion at the start.
         interval_s: Time between two evaluations, seconds.
     """
 
     def __init__(
-        self, structure: Structure, clusters: Clusters, motion: Motion, *, interval_s: float
+        self, world: World, clusters: Clusters, motion: Motion, *, interval_s: float
     ) -> None:
-        self._structure = structure
+        structure = self._structure = world.structure
+        self._faces, self._has_cargo = FaceFinder(world), world.cargo is not None
+        self.bearing = BearingMeter(structure, len(world.terrain))
         self._loads = LoadModel(structure, clusters, motion)
         self._sharing = EvenSharing(clusters.cluster_of)
         self._interval_s, self._unseen_s, self._calm = interval_s, 0.0, False
@@ -70,7 +74,7 @@ class BreakingModel:
             self._calm = False
             return
         tensions = engine.rope_tensions()
-        contacts = self._sharing.shared(engine.contacts())
+        contacts = self._contacts(engine)
         forces = self._all_forces(contacts, thrusts, tensions)
         # An impact is reported for one interval only, whatever was left out before.
         seen_s = self._interval_s if engine.struck else self._unseen_s
@@ -119,6 +123,16 @@ class BreakingModel:
             for name, tension, limit in zip(ropes.names, self._rope_peaks, ropes.limit, strict=True)
         ]
         return (*joints, *winches)
+
+    def _contacts(self, engine: Engine) -> PointForces:
+        """The contacts, spread over all that touches."""
+        clusters = self.clusters
+        cargo = engine.cargo() if self._has_cargo else None
+        faces = self._faces.find(clusters, self.motion, cargo)
+        contacts = faces.joined_to(engine.contacts(), clusters.cluster_of)
+        shared = self._sharing.shared(contacts)
+        self.bearing.read(contacts.other, contacts.surface, shared)
+        return shared
 
     def _all_forces(
         self, contacts: PointForces, thrusts: FloatArray, tensions: FloatArray

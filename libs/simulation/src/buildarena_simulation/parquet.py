@@ -13,13 +13,18 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from buildarena_simulation.bearing import Bearing
 from buildarena_simulation.errors import TrajectoryFormatError
 from buildarena_simulation.trajectory import Break, JointPeak, Trajectory
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
-SCHEMA_VERSION: Final = 1
+SCHEMA_VERSION: Final = 2
+_READABLE: Final = (1, 2)
+"""Schema 1 has no pieces and no bearing forces."""
+
+_BEARING: Final = ("ground", "terrain", "cargo", "wheels")
 _KEY: Final = b"buildarena.trajectory"
 _COMPRESSION_LEVEL: Final = 6
 
@@ -41,11 +46,18 @@ def write_trajectory(trajectory: Trajectory) -> bytes:
         columns["cargo_quaternion"] = _rows(trajectory.cargo_quaternion)
     if trajectory.cargo_mass is not None:
         columns["cargo_mass"] = pa.array(trajectory.cargo_mass)
+    if trajectory.pieces is not None:
+        columns["pieces"] = _rows(trajectory.pieces)
+    bearing = trajectory.bearing
+    if bearing is not None:
+        for name in _BEARING:
+            columns[f"bearing_{name}"] = _rows(getattr(bearing, name).reshape(count, -1))
     facts = {
         "schema_version": SCHEMA_VERSION,
         "block_ids": trajectory.block_ids,
         "cannon_ids": trajectory.cannon_ids,
         "cargo_size": trajectory.cargo_size,
+        "wheel_ids": bearing.wheel_ids if bearing else None,
         "joint_peaks": [asdict(peak) for peak in trajectory.joint_peaks],
         "breaks": [asdict(event) for event in trajectory.breaks],
         "engine": trajectory.engine,
@@ -63,6 +75,7 @@ def write_trajectory(trajectory: Trajectory) -> bytes:
             ("quaternions", "quaternions.list.element"),
             ("cargo_position", "cargo_position.list.element"),
             ("cargo_quaternion", "cargo_quaternion.list.element"),
+            *((f"bearing_{name}", f"bearing_{name}.list.element") for name in _BEARING),
         )
         if name in columns
     ]
@@ -93,8 +106,9 @@ def read_trajectory(data: bytes) -> Trajectory:
         facts = json.loads(table.schema.metadata[_KEY])
     except (pa.ArrowException, KeyError, TypeError, ValueError) as error:
         raise TrajectoryFormatError(f"these bytes are not a trajectory: {error}") from error
-    if facts.pop("schema_version") != SCHEMA_VERSION:
-        raise TrajectoryFormatError(f"only trajectories of schema {SCHEMA_VERSION} can be read")
+    if facts.pop("schema_version") not in _READABLE:
+        known = " and ".join(str(version) for version in _READABLE)
+        raise TrajectoryFormatError(f"only trajectories of schemas {known} can be read")
     columns = {name: table.column(name).combine_chunks() for name in table.column_names}
     time_s = columns["time_s"].to_numpy()
     count = len(time_s)
@@ -112,8 +126,25 @@ def read_trajectory(data: bytes) -> Trajectory:
         cargo_mass=columns["cargo_mass"].to_numpy() if "cargo_mass" in columns else None,
         joint_peaks=tuple(JointPeak(**peak) for peak in facts["joint_peaks"]),
         breaks=tuple(Break(**event) for event in facts["breaks"]),
+        pieces=_matrix(columns["pieces"], count) if "pieces" in columns else None,
+        bearing=_bearing(columns, count, facts.pop("wheel_ids", None)),
     )
     return Trajectory(**facts)
+
+
+def _bearing(
+    columns: "dict[str, pa.ListArray]", count: int, wheel_ids: list[str] | None
+) -> Bearing | None:
+    if wheel_ids is None:
+        return None
+    series = {name: _matrix(columns[f"bearing_{name}"], count) for name in _BEARING}
+    return Bearing(
+        ground=series["ground"].reshape(count),
+        terrain=series["terrain"],
+        cargo=series["cargo"].reshape(count),
+        wheels=series["wheels"],
+        wheel_ids=tuple(wheel_ids),
+    )
 
 
 def _rows(matrix: NDArray[Any]) -> "pa.Array":
@@ -126,4 +157,4 @@ def _rows(matrix: NDArray[Any]) -> "pa.Array":
 
 def _matrix(column: "pa.ListArray", count: int) -> NDArray[Any]:
     values = column.flatten().to_numpy(zero_copy_only=False)
-    return np.ascontiguousarray(values.reshape(count, -1))
+    return np.ascontiguousarray(values.reshape(count, len(values) // count))

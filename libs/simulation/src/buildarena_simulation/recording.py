@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from buildarena_simulation.control import heated_cannons
 from buildarena_simulation.engines.base import CargoPose, quaternion_of
@@ -48,6 +49,7 @@ class Recorder:
         count, cannons = scenario.sample_count, len(structure.cannons)
         self._time_s = np.zeros(count)
         self._seen: list[tuple[Clusters, Motion]] = []
+        self._bearing: list[FloatArray] = []
         self._heated = np.zeros((count, cannons), dtype=bool)
         self._cargo_size = scenario.cargo.size if scenario.cargo else None
         self._cargo_position = np.zeros((count, 3))
@@ -63,11 +65,14 @@ class Recorder:
         clusters: Clusters,
         cargo: CargoPose | None,
         cargo_mass: float | None,
+        *,
+        bearing: FloatArray,
     ) -> None:
         """Keeps one instant, and finds which cannons are heated from here on."""
         row = self._row
         self._time_s[row] = time_s
         self._seen.append((clusters, motion))
+        self._bearing.append(bearing)
         if len(self.heated_now):
             self.heated_now = self._heated_in(clusters, motion)
         self._heated[row] = self.heated_now
@@ -82,6 +87,19 @@ class Recorder:
         shown = motion.points(clusters, structure.shown)
         directions = turned(motion.rotation[clusters.cluster_of], structure.directions)
         return heated_cannons(structure, shown, directions)
+
+    def _pieces(self) -> NDArray[np.int16]:
+        """(T, N) the articulated piece each tracked block belongs to, by its first block."""
+        rows = []
+        for _, run in itertools.groupby(self._seen, key=lambda seen: id(seen[0])):
+            samples = list(run)
+            clusters = samples[0][0]
+            first = np.array([blocks[0] for blocks in clusters.blocks])
+            lowest = np.full(len(clusters), len(self._structure), dtype=np.int64)
+            np.minimum.at(lowest, clusters.root, first)
+            piece = lowest[clusters.root][clusters.cluster_of[self._tracked]]
+            rows.append(np.tile(piece.astype(np.int16), (len(samples), 1)))
+        return np.concatenate(rows)
 
     def _poses(self) -> tuple[FloatArray, FloatArray]:
         """Positions (T, N, 3) and quaternions (T, N, 4) of the tracked blocks, world frame."""
@@ -124,6 +142,10 @@ class Recorder:
             cargo_size=self._cargo_size,
             cannon_ids=tuple(structure.block_ids[i] for i in structure.cannons),
             heated=self._heated,
+            pieces=self._pieces(),
+            bearing=breaking.bearing.series(
+                np.array(self._bearing), tuple(structure.block_ids[i] for i in structure.wheels)
+            ),
             joint_peaks=breaking.peaks(),
             breaks=tuple(breaking.breaks),
             engine=engine,

@@ -30,7 +30,7 @@ from buildarena_simulation.trajectory import Trajectory
 if TYPE_CHECKING:
     from buildarena_geometry import Machine
 
-SIMULATION_VERSION: Final = "1"
+SIMULATION_VERSION: Final = "2"
 """Version of the shared model: rises with every change that can move a trajectory."""
 
 _PROGRESS_EVERY = 10
@@ -108,7 +108,7 @@ def simulate_structure(
     )
     adapter = create_engine(engine, world)
     try:
-        trial = _Trial(structure, scenario, adapter, at=(position, rotation))
+        trial = _Trial(world, scenario, adapter, at=(position, rotation))
         trial.run(bindings or [{}] * len(structure), controls, on_progress)
         return trial.recorder.finished(
             breaking=trial.breaking,
@@ -136,19 +136,20 @@ class _Trial:
 
     def __init__(
         self,
-        structure: Structure,
+        world: World,
         scenario: Scenario,
         engine: Engine,
         *,
         at: tuple[np.ndarray, np.ndarray],
     ) -> None:
+        structure = world.structure
         self._structure, self._scenario, self._engine = structure, scenario, engine
         holds = np.ones(len(structure.members), dtype=bool)
         clusters = find_clusters(structure, holds)
         motion = at_rest(clusters, *at)
         engine.enter(clusters, motion)
         self._interval_s = engine.time_step_s * engine.steps_per_evaluation
-        self.breaking = BreakingModel(structure, clusters, motion, interval_s=self._interval_s)
+        self.breaking = BreakingModel(world, clusters, motion, interval_s=self._interval_s)
         self.recorder = Recorder(structure, scenario)
         self._blown_up = False
 
@@ -208,4 +209,5 @@ class _Trial:
             self.breaking.clusters,
             self._engine.cargo() if cargo else None,
             cargo.mass_at(time_s) if cargo else None,
+            bearing=self.breaking.bearing.now,
         )

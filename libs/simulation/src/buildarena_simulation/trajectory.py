@@ -7,6 +7,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from buildarena_simulation.bearing import Bearing
+
 Setting = float | int | str
 
 POSE_GRAIN: Final = 2.0**-14
@@ -73,6 +75,10 @@ class Trajectory:
         cargo_size: (3,) full extents, units; None without cargo.
         cannon_ids: (C,) ids of all cannons.
         heated: (T, C) bool, which cannons a flame touches.
+        pieces: (T, N) int16, which piece each tracked block belongs to: the index of the first of
+            the machine's blocks in it. Blocks that joints or axles still hold together are one
+            piece. None where no simulator of ours ran.
+        bearing: What bears the machine and what it bears; None where no simulator of ours ran.
         joint_peaks: One per joint.
         breaks: In order of time.
         engine: Name of the engine.
@@ -97,6 +103,8 @@ class Trajectory:
     engine_version: str
     simulation_version: str
     settings: Mapping[str, Setting]
+    pieces: NDArray[np.int16] | None = None
+    bearing: Bearing | None = None
 
     def __post_init__(self) -> None:
         """Checks that the arrays fit together, and closes them."""
@@ -108,6 +116,7 @@ class Trajectory:
             "cargo_quaternion": (count, 4),
             "cargo_mass": (count,),
             "heated": (count, len(self.cannon_ids)),
+            "pieces": (count, blocks),
         }
         for name, shape in wanted.items():
             array = getattr(self, name)

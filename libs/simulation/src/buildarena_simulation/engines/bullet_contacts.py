@@ -9,12 +9,9 @@ from typing import Any, Final
 import numpy as np
 
 from buildarena_simulation.engines.closest_points import ShapeTable
-from buildarena_simulation.structure.contacts import ContactForces
+from buildarena_simulation.structure.contacts import WORLD, ContactForces
 from buildarena_simulation.structure.model import FloatArray
 from buildarena_simulation.structure.motion import Motion
-
-WORLD: Final = -1
-"""Ground and terrain count as one body."""
 
 _TOUCHING: Final = 0.005
 """Points nearer than this touch, though the solver may have given them no force, units."""
@@ -27,6 +24,7 @@ def read_contacts(
     motion: Motion,
     *,
     outsiders: Mapping[int, int],
+    surfaces: Mapping[int, int],
 ) -> ContactForces:
     """The contact forces on all blocks.
 
@@ -35,7 +33,8 @@ def read_contacts(
         cluster_of_link: Cluster of each body and link.
         shapes: (C,) shapes of each cluster.
         motion: Where the clusters are.
-        outsiders: A negative number of its own for each moving body that is not a cluster.
+        outsiders: What `ContactForces.other` calls each moving body that is not a cluster.
+        surfaces: What `ContactForces.surface` calls each fixed body.
     """
     rows: dict[int, list[tuple[float, ...]]] = {}
     for contact in contacts:
@@ -51,10 +50,14 @@ def read_contacts(
         second = cluster_of_link.get((contact[2], contact[4]))
         if first is not None:
             other = outsiders.get(contact[2], WORLD) if second is None else second
-            rows.setdefault(first, []).append((*contact[5], x, y, z, nx, ny, nz, other))
+            fixed = surfaces.get(contact[2], -1)
+            rows.setdefault(first, []).append((*contact[5], x, y, z, nx, ny, nz, other, fixed))
         if second is not None:
             other = outsiders.get(contact[1], WORLD) if first is None else first
-            rows.setdefault(second, []).append((*contact[6], -x, -y, -z, -nx, -ny, -nz, other))
+            fixed = surfaces.get(contact[1], -1)
+            rows.setdefault(second, []).append(
+                (*contact[6], -x, -y, -z, -nx, -ny, -nz, other, fixed)
+            )
     return _gathered(
         [_to_blocks(np.array(table), c, shapes[c], motion) for c, table in sorted(rows.items())]
     )
@@ -66,7 +69,9 @@ def _to_blocks(table: FloatArray, c: int, shapes: ShapeTable, motion: Motion) ->
     return ContactForces(
         block=block,
         other=table[row, 9].astype(np.int64),
+        surface=table[row, 10].astype(np.int64),
         weight=weight,
+        area=np.zeros(len(block)),
         normal=table[row, 6:9],
         point=table[row, :3],
         force=table[row, 3:6] * weight[:, None],
@@ -78,7 +83,9 @@ def _gathered(found: Sequence[ContactForces]) -> ContactForces:
     return ContactForces(
         block=np.concatenate([none, *(f.block for f in found)]),
         other=np.concatenate([none, *(f.other for f in found)]),
+        surface=np.concatenate([none, *(f.surface for f in found)]),
         weight=np.concatenate([np.zeros(0), *(f.weight for f in found)]),
+        area=np.concatenate([np.zeros(0), *(f.area for f in found)]),
         normal=np.concatenate([np.zeros((0, 3)), *(f.normal for f in found)]),
         point=np.concatenate([np.zeros((0, 3)), *(f.point for f in found)]),
         force=np.concatenate([np.zeros((0, 3)), *(f.force for f in found)]),

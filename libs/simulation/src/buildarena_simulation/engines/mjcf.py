@@ -11,11 +11,12 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from buildarena_simulation.constants import COLLISION_MARGIN, FRICTION_TERRAIN
+from buildarena_simulation.constants import FRICTION_TERRAIN
 from buildarena_simulation.engines.base import World, quaternion_of
 from buildarena_simulation.structure.clusters import Clusters
-from buildarena_simulation.structure.model import FloatArray, Shape, ShapeKind, Structure
+from buildarena_simulation.structure.model import FloatArray, ShapeKind, Structure
 from buildarena_simulation.structure.motion import Motion
+from buildarena_simulation.structure.solids import Solid
 
 _TERRAIN_PRIORITY, _CARGO_PRIORITY, _BLOCK_PRIORITY, _WHEEL_PRIORITY = 0, 1, 2, 3
 """A contact takes its friction from the geom of higher priority."""
@@ -49,6 +50,7 @@ class MjcfState:
     Attributes:
         clusters: The clusters.
         motion: Where they are.
+        solids: Per cluster, its collision shapes.
         axes: (C, 3, 3) machine_from_principal.
         moments: (C, 3) principal moments of inertia.
         cargo_mass: Mass of the cargo now.
@@ -57,6 +59,7 @@ class MjcfState:
 
     clusters: Clusters
     motion: Motion
+    solids: Sequence[Sequence[Solid]]
     axes: FloatArray
     moments: FloatArray
     cargo_mass: float
@@ -70,7 +73,7 @@ class MjcfState:
 def mjcf_of(world: World, state: MjcfState, settings: MjcfSettings) -> str:
     """The MJCF text of a world with its clusters.
 
-    Bodies are named "cluster C", hinges "hinge C", free joints "free C", geoms "block N K", sites
+    Bodies are named "cluster C", hinges "hinge C", free joints "free C", geoms "solid C K", sites
     and actuators of cannons "cannon N", tendons "rope R", the cargo "cargo".
     """
     lines = [
@@ -180,40 +183,36 @@ def _body(structure: Structure, state: MjcfState, c: int) -> Iterator[str]:
             axis=state.axes[c].T @ structure.directions[wheel],
             armature=0.01,
         )
-    for i in clusters.blocks[c]:
-        yield from _block(structure, state, c, int(i))
+    yield from _solids(state, c)
+    yield from _cannon_sites(structure, state, c)
     yield from _rope_sites(structure, state, c)
     for child in np.flatnonzero(clusters.parent == c):
         yield from _body(structure, state, int(child))
     yield "</body>"
 
 
-def _block(structure: Structure, state: MjcfState, c: int, block: int) -> Iterator[str]:
-    part = structure.parts[block]
-    turns = [state.axes[c].T @ shape.rotation for shape in part.shapes]
-    quaternions = quaternion_of(np.array(turns))
-    for k, shape in enumerate(part.shapes):
-        kind, size = _form(shape)
+def _solids(state: MjcfState, c: int) -> Iterator[str]:
+    solids = state.solids[c]
+    quaternions = quaternion_of(np.array([state.axes[c].T @ solid.rotation for solid in solids]))
+    for k, solid in enumerate(solids):
+        half = solid.half_extents
+        cylinder = solid.kind is ShapeKind.CYLINDER
         yield _tag(
             "geom",
-            name=f"block {block} {k}",
-            type=kind,
-            size=size,
-            pos=state.in_body(c, shape.center),
+            name=f"solid {c} {k}",
+            type="cylinder" if cylinder else "box",
+            size=half[[0, 2]] if cylinder else half,
+            pos=state.in_body(c, solid.center),
             quat=quaternions[k],
-            friction=_friction(part.physics.friction),
-            priority=_WHEEL_PRIORITY if part.is_wheel else _BLOCK_PRIORITY,
+            friction=_friction(solid.friction),
+            priority=_WHEEL_PRIORITY if solid.is_wheel else _BLOCK_PRIORITY,
         )
-    for cannon in np.flatnonzero(structure.cannons == block):
+
+
+def _cannon_sites(structure: Structure, state: MjcfState, c: int) -> Iterator[str]:
+    for cannon in np.flatnonzero(state.clusters.cluster_of[structure.cannons] == c):
         place = state.in_body(c, structure.thrust_points[cannon])
-        yield _tag("site", name=f"cannon {block}", pos=place)
-
-
-def _form(shape: Shape) -> tuple[str, FloatArray]:
-    half = shape.half_extents
-    if shape.kind is ShapeKind.CYLINDER:
-        return "cylinder", half[[0, 2]]
-    return "box", half - COLLISION_MARGIN
+        yield _tag("site", name=f"cannon {structure.cannons[cannon]}", pos=place)
 
 
 def _rope_sites(structure: Structure, state: MjcfState, c: int) -> Iterator[str]:

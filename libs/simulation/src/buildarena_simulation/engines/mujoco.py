@@ -1,6 +1,6 @@
 """MuJoCo behind the engine seam: one body per cluster, one geom per block, hinges for axles."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -8,13 +8,15 @@ import numpy as np
 
 from buildarena_simulation.constants import MAX_SPIN
 from buildarena_simulation.engines.base import CargoPose, World, principal_frames
+from buildarena_simulation.engines.closest_points import ShapeTable, shape_table
 from buildarena_simulation.engines.hinges import hinge_rate
 from buildarena_simulation.engines.impacts import ImpactWatch
 from buildarena_simulation.engines.mjcf import MjcfSettings, MjcfState, mjcf_of
 from buildarena_simulation.structure.clusters import Clusters
-from buildarena_simulation.structure.contacts import ContactForces
-from buildarena_simulation.structure.model import BoolArray, FloatArray, IntArray, Structure
+from buildarena_simulation.structure.contacts import CARGO, WORLD, ContactForces
+from buildarena_simulation.structure.model import BoolArray, FloatArray, IntArray
 from buildarena_simulation.structure.motion import Motion
+from buildarena_simulation.structure.solids import Solid, Solids
 from buildarena_simulation.structure.vectors import cross, turned
 
 _TIME_STEP_S = 0.01
@@ -53,6 +55,7 @@ class MujocoEngine:
             iterations=_ITERATIONS,
             servo_slip=_SERVO_SLIP,
         )
+        self._solids = Solids(world.structure)
         self._rope_alive = np.ones(len(world.structure.ropes), dtype=bool)
         self._cargo_mass = world.cargo.mass if world.cargo else 0.0
         self._cargo_state: tuple[FloatArray, FloatArray] | None = None
@@ -85,9 +88,11 @@ class MujocoEngine:
         """See `Engine`."""
         self._clusters = clusters
         self._axes, moments = principal_frames(clusters)
+        solids = [self._solids.of(blocks) for blocks in clusters.blocks]
         state = MjcfState(
             clusters=clusters,
             motion=motion,
+            solids=solids,
             axes=self._axes,
             moments=moments,
             cargo_mass=self._cargo_mass,
@@ -95,7 +100,10 @@ class MujocoEngine:
         )
         self._model = mujoco.MjModel.from_xml_string(mjcf_of(self._world, state, self._mjcf))
         self._data = mujoco.MjData(self._model)
-        self._addresses = _addresses_in(self._model, self._structure, clusters, self._rope_alive)
+        self._addresses = _addresses_in(
+            self._model, self._world, clusters, solids, self._rope_alive
+        )
+        self._shapes: dict[int, ShapeTable] = {}
         if self._world.cargo is not None:
             self._cargo_body = self._model.body("cargo").id
             self._scale_cargo_by_mass()
@@ -222,28 +230,57 @@ class MujocoEngine:
             self._data.qvel[dofs] = spins * scale[:, None]
 
     def _read_contacts(self) -> ContactForces:
-        data = self._data
+        data, at = self._data, self._addresses
         contact, count = data.contact, data.ncon
         address = contact.efc_address[:count]
         active = np.flatnonzero(address >= 0)
         geoms = contact.geom[active]
-        blocks = self._addresses.block_of_geom[geoms]
         components = data.efc_force[address[active][:, None] + np.arange(3)]
         frames = contact.frame[active].reshape(-1, 3, 3)
         # MuJoCo's contact force acts on the second geom; its frame's rows are normal and tangents.
         force = (components[:, None] @ frames)[:, 0]
-        point, normal = contact.pos[active], frames[:, 0]
-        bodies = self._model.geom_bodyid[geoms]
-        first, second = np.flatnonzero(blocks[:, 0] >= 0), np.flatnonzero(blocks[:, 1] >= 0)
-        block = np.concatenate([blocks[first, 0], blocks[second, 1]])
+        clusters = at.body_of_geom[geoms]
+        sides = [
+            (np.flatnonzero(clusters[:, k] >= 0), k, sign) for k, sign in ((0, -1.0), (1, 1.0))
+        ]
+        row = np.concatenate([rows for rows, _, _ in sides])
+        own = np.concatenate([geoms[rows, k] for rows, k, _ in sides])
+        facing = np.concatenate([geoms[rows, 1 - k] for rows, k, _ in sides])
+        sign = np.concatenate([np.full((len(rows), 1), sign) for rows, _, sign in sides])
+        point = contact.pos[active][row]
+        index, block, weight = self._blocks_at(own, point)
         return ContactForces(
             block=block,
-            other=np.concatenate([bodies[first, 1], bodies[second, 0]]),
-            weight=np.ones(len(block)),
-            normal=np.concatenate([-normal[first], normal[second]]),
-            point=np.concatenate([point[first], point[second]]),
-            force=np.concatenate([-force[first], force[second]]),
+            other=at.body_of_geom[facing][index],
+            surface=at.surface_of_geom[facing][index],
+            weight=weight,
+            area=np.zeros(len(block)),
+            normal=(sign * frames[row, 0])[index],
+            point=point[index],
+            force=(sign * force[row])[index] * weight[:, None],
         )
+
+    def _blocks_at(
+        self, geoms: IntArray, points: FloatArray
+    ) -> tuple[IntArray, IntArray, FloatArray]:
+        """Rows of one contact and one block each: the contact's index, the block, its share."""
+        at = self._addresses
+        block = at.block_of_geom[geoms]
+        lone = np.flatnonzero(block >= 0)
+        rows, blocks, weights = [lone], [block[lone]], [np.ones(len(lone))]
+        if len(lone) < len(geoms):
+            motion = self.motion()
+            cluster = np.where(block >= 0, -1, at.body_of_geom[geoms])
+            for c in np.unique(cluster[cluster >= 0]).tolist():
+                if c not in self._shapes:
+                    self._shapes[c] = shape_table(self._structure, self._clusters.blocks[c])
+                among = np.flatnonzero(cluster == c)
+                local = (points[among] - motion.position[c]) @ motion.rotation[c]
+                row, found, weight = self._shapes[c].share(local)
+                rows.append(among[row])
+                blocks.append(found)
+                weights.append(weight)
+        return np.concatenate(rows), np.concatenate(blocks), np.concatenate(weights)
 
     def _read_tensions(self) -> FloatArray:
         tendons, tensions = self._addresses.tendons, np.zeros(len(self._rope_alive))
@@ -262,7 +299,9 @@ class _Addresses:
 
     Attributes:
         bodies: (C,) body of each cluster.
-        block_of_geom: Block of each geom, -1 for others.
+        body_of_geom: Cluster of each geom, `CARGO` or `WORLD`.
+        block_of_geom: Block of each geom that stands for one only, else -1.
+        surface_of_geom: Fixed body of each geom as in `ContactForces.surface`.
         hinge_wheels: (H,) which wheel of the structure each hinge is.
         hinge_signs: (H,) -1 where the body turned is not the wheel's but its mount's.
         hinge_actuators: (H,) motor of each hinge.
@@ -273,7 +312,9 @@ class _Addresses:
     """
 
     bodies: IntArray
+    body_of_geom: IntArray
     block_of_geom: IntArray
+    surface_of_geom: IntArray
     hinge_wheels: IntArray
     hinge_signs: FloatArray
     hinge_actuators: IntArray
@@ -284,12 +325,25 @@ class _Addresses:
 
 
 def _addresses_in(
-    model: "mujoco.MjModel", structure: Structure, clusters: Clusters, rope_alive: BoolArray
+    model: "mujoco.MjModel",
+    world: World,
+    clusters: Clusters,
+    solids: Sequence[Sequence[Solid]],
+    rope_alive: BoolArray,
 ) -> _Addresses:
-    block_of_geom = np.full(model.ngeom, -1, dtype=np.int64)
-    for i, part in enumerate(structure.parts):
-        for k in range(len(part.shapes)):
-            block_of_geom[model.geom(f"block {i} {k}").id] = i
+    structure = world.structure
+    body_of_geom = np.full(model.ngeom, CARGO, dtype=np.int64)
+    block_of_geom, surface_of_geom = (np.full(model.ngeom, -1, dtype=np.int64) for _ in range(2))
+    for c, of_cluster in enumerate(solids):
+        for k, solid in enumerate(of_cluster):
+            geom = model.geom(f"solid {c} {k}").id
+            body_of_geom[geom] = c
+            if len(solid.blocks) == 1:
+                block_of_geom[geom] = solid.blocks[0]
+    fixed = [(f"terrain {k}", k + 1) for k in range(len(world.terrain))]
+    for name, surface in [("ground", 0)] * world.ground + fixed:
+        geom = model.geom(name).id
+        body_of_geom[geom], surface_of_geom[geom] = WORLD, surface
     hinged = np.flatnonzero(clusters.parent >= 0)
     place = {int(wheel): w for w, wheel in enumerate(structure.wheels)}
     pieces = [model.joint(f"free {piece[0]}").dofadr[0] for piece in clusters.pieces]
@@ -297,7 +351,9 @@ def _addresses_in(
     free = pieces if pieces[0] == 0 else [0, *pieces]
     return _Addresses(
         bodies=_ids(model.body(f"cluster {c}").id for c in range(len(clusters))),
+        body_of_geom=body_of_geom,
         block_of_geom=block_of_geom,
+        surface_of_geom=surface_of_geom,
         hinge_wheels=_ids(place[int(clusters.wheel[c])] for c in hinged),
         hinge_signs=np.where(clusters.wheel_is_outer[hinged], 1.0, -1.0),
         hinge_actuators=_ids(model.actuator(f"hinge {c}").id for c in hinged),

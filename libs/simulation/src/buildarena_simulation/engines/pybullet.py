@@ -25,19 +25,19 @@ from buildarena_simulation.engines.base import (
     quaternion_of,
     rotation_of,
 )
-from buildarena_simulation.engines.bullet_contacts import WORLD, read_contacts
+from buildarena_simulation.engines.bullet_contacts import read_contacts
 from buildarena_simulation.engines.closest_points import shape_table
 from buildarena_simulation.engines.external_forces import Force, drag_forces, thrust_forces
 from buildarena_simulation.engines.hinges import HingedPiece, hinge_frames, hinge_rate
 from buildarena_simulation.engines.impacts import ImpactWatch
-from buildarena_simulation.engines.near_contacts import NearContacts
 from buildarena_simulation.engines.quiet_output import quiet_output
 from buildarena_simulation.engines.ropes import rope_forces
 from buildarena_simulation.engines.urdf import urdf_of
 from buildarena_simulation.structure.clusters import Clusters
-from buildarena_simulation.structure.contacts import ContactForces
+from buildarena_simulation.structure.contacts import CARGO, ContactForces
 from buildarena_simulation.structure.model import FloatArray
 from buildarena_simulation.structure.motion import Motion
+from buildarena_simulation.structure.solids import Solids
 
 # It greets when it is imported, on streams where our own output may be JSON.
 with quiet_output():
@@ -48,7 +48,6 @@ _STEPS_PER_EVALUATION = 10
 _ITERATIONS = 50
 _RESIDUAL = 1e-9
 _SPEED_CAP = 1e5
-_CARGO = -2
 _ORIGIN = (0.0, 0.0, 0.0)
 _GROUND_REACH = 2000.0
 
@@ -74,7 +73,8 @@ class PyBulletEngine:
         self._folder = Path(tempfile.mkdtemp(prefix="buildarena-"))
         self._serial = itertools.count()
         self._pieces: list[HingedPiece] = []
-        self._near = NearContacts(world)
+        self._solids = Solids(world.structure)
+        self._surfaces: dict[int, int] = {}
         self._cargo: int | None = None
         self._start_world()
 
@@ -196,10 +196,12 @@ class PyBulletEngine:
             **self._client,
         )
         if world.ground:
-            self._add_box((_GROUND_REACH, _GROUND_REACH, 1.0), (0.0, 0.0, -1.0), mass=0.0)
-        for box in world.terrain:
+            ground = self._add_box((_GROUND_REACH, _GROUND_REACH, 1.0), (0.0, 0.0, -1.0), mass=0.0)
+            self._surfaces[ground] = 0
+        for k, box in enumerate(world.terrain, 1):
             turn = pybullet.getQuaternionFromEuler((math.radians(box.slope_deg), 0.0, 0.0))
-            self._add_box([v / 2 for v in box.size], box.center, mass=0.0, turn=turn)
+            half = [v / 2 for v in box.size]
+            self._surfaces[self._add_box(half, box.center, mass=0.0, turn=turn)] = k
         if world.cargo is not None:
             cargo = world.cargo
             self._cargo = self._add_box(cargo.size / 2, cargo.position, mass=cargo.mass)
@@ -255,7 +257,8 @@ class PyBulletEngine:
     def _load(self, inside: tuple[int, ...], motion: Motion) -> int:
         """The body of a piece, put where its root is."""
         clusters, root = self._clusters, inside[0]
-        text = urdf_of(self._structure, clusters, inside, axes=self._axes, moments=self._moments)
+        solids = {c: self._solids.of(clusters.blocks[c]) for c in inside}
+        text = urdf_of(self._structure, clusters, solids, axes=self._axes, moments=self._moments)
         file = self._folder / f"{next(self._serial)}.urdf"
         file.write_text(text, encoding="ascii")
         turn = quaternion_of(motion.rotation[root] @ self._axes[root])
@@ -375,15 +378,11 @@ class PyBulletEngine:
 
     def _read_contacts(self) -> ContactForces:
         contacts = pybullet.getContactPoints(**self._client)
-        outsiders = {} if self._cargo is None else {self._cargo: _CARGO}
-        found = read_contacts(
-            contacts, self._cluster_of_link, self._shapes, self._motion, outsiders=outsiders
-        )
-        return self._near.beside(
-            found,
-            self._clusters,
+        return read_contacts(
+            contacts,
+            self._cluster_of_link,
+            self._shapes,
             self._motion,
-            None if self._cargo is None else self.cargo(),
-            world=WORLD,
-            cargo_number=_CARGO,
+            outsiders={} if self._cargo is None else {self._cargo: CARGO},
+            surfaces=self._surfaces,
         )

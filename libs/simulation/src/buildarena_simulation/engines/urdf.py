@@ -4,19 +4,19 @@ Each link's inertial frame is the principal frame of its cluster. A newline foll
 URDF lines fail to parse.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from buildarena_simulation.constants import COLLISION_MARGIN
 from buildarena_simulation.structure.clusters import Clusters
-from buildarena_simulation.structure.model import FloatArray, Shape, ShapeKind, Structure
+from buildarena_simulation.structure.model import FloatArray, ShapeKind, Structure
+from buildarena_simulation.structure.solids import Solid
 
 
 def urdf_of(
     structure: Structure,
     clusters: Clusters,
-    inside: Sequence[int],
+    solids: Mapping[int, Sequence[Solid]],
     *,
     axes: FloatArray,
     moments: FloatArray,
@@ -26,10 +26,11 @@ def urdf_of(
     Args:
         structure: The machine.
         clusters: Its clusters.
-        inside: The piece's clusters, its root first.
+        solids: The collision shapes of the piece's clusters, its root first.
         axes: (C, 3, 3) machine_from_principal.
         moments: (C, 3) principal moments of inertia.
     """
+    inside = list(solids)
     root = inside[0]
     # A link's frame stands where its hinge is; the root's, at its centre of mass.
     origins = {root: clusters.center_of_mass[root]}
@@ -39,10 +40,9 @@ def urdf_of(
             origins[c] = structure.positions[clusters.wheel[c]]
         offset = axes[c].T @ (clusters.center_of_mass[c] - origins[c])
         lines += [f'<link name="link {link}">', *_inertial(clusters.mass[c], moments[c], offset)]
-        for i in clusters.blocks[c]:
-            for shape in structure.parts[i].shapes:
-                place = axes[c].T @ (shape.center - origins[c])
-                lines += _collision(shape, place, axes[c].T @ shape.rotation)
+        for solid in solids[c]:
+            place = axes[c].T @ (solid.center - origins[c])
+            lines += _collision(solid, place, axes[c].T @ solid.rotation)
         lines.append("</link>")
     for link, c in enumerate(inside[1:], 1):
         parent = int(clusters.parent[c])
@@ -71,12 +71,12 @@ def _inertial(mass: float, moments: FloatArray, offset: FloatArray) -> list[str]
     ]
 
 
-def _collision(shape: Shape, place: FloatArray, rotation: FloatArray) -> list[str]:
-    half = shape.half_extents
-    if shape.kind is ShapeKind.CYLINDER:
+def _collision(solid: Solid, place: FloatArray, rotation: FloatArray) -> list[str]:
+    half = solid.half_extents
+    if solid.kind is ShapeKind.CYLINDER:
         form = f'<cylinder radius="{float(half[0])!r}" length="{float(2 * half[2])!r}"/>'
     else:
-        form = f'<box size="{_numbers(2 * (half - COLLISION_MARGIN))}"/>'
+        form = f'<box size="{_numbers(2 * half)}"/>'
     return [
         "<collision>",
         _origin(place, rotation),

@@ -15,6 +15,12 @@ import numpy as np
 from buildarena_simulation.structure.model import FloatArray, IntArray
 from buildarena_simulation.structure.vectors import cross, summed_by
 
+WORLD: Final = -1
+"""Ground and terrain on the other side of a contact: one body."""
+
+CARGO: Final = -2
+"""The cargo on the other side of a contact."""
+
 _NORMAL_GRID: Final = 4.0
 """Normals count as equal if their components round to the same quarters."""
 
@@ -48,8 +54,11 @@ class ContactForces:
 
     Attributes:
         block: (K,) block each acts on.
-        other: (K,) a number that identifies the body on the other side; ground and terrain are one.
+        other: (K,) the body on the other side: a cluster's number, `WORLD` or `CARGO`.
+        surface: (K,) which fixed body it is: 0 for the ground, from 1 on the terrain's boxes; -1
+            for a body that moves.
         weight: (K,) share of the point that belongs to the block, above 0, at most 1.
+        area: (K,) over which it presses, units²; 0 for a single point.
         normal: (K, 3) unit vector from the other body to the block, world frame.
         point: (K, 3) world frame, units.
         force: (K, 3) on the block, normal and friction, world frame, mass·unit/s².
@@ -57,7 +66,9 @@ class ContactForces:
 
     block: IntArray
     other: IntArray
+    surface: IntArray
     weight: FloatArray
+    area: FloatArray
     normal: FloatArray
     point: FloatArray
     force: FloatArray
@@ -74,7 +85,9 @@ def mean_contacts(readings: Sequence[tuple[float, ContactForces]]) -> ContactFor
     return ContactForces(
         block=np.concatenate([reading.block for _, reading in readings]),
         other=np.concatenate([reading.other for _, reading in readings]),
+        surface=np.concatenate([reading.surface for _, reading in readings]),
         weight=np.concatenate([share * reading.weight for share, reading in readings]),
+        area=np.concatenate([reading.area for _, reading in readings]),
         normal=np.concatenate([reading.normal for _, reading in readings]),
         point=np.concatenate([reading.point for _, reading in readings]),
         force=np.concatenate([share * reading.force for share, reading in readings]),
@@ -160,8 +173,10 @@ def _spread(contacts: ContactForces, patches: _Patches) -> FloatArray:
     anchor = np.empty((count, 3))
     anchor[of] = contacts.point
     x = contacts.point - anchor[of]
-    # A patch is shared by its blocks alike: how many points a block has is the solver's choice.
-    weight = contacts.weight / np.bincount(patches.beside, contacts.weight)[patches.beside]
+    # Points share a patch by blocks: how many points a block has is the solver's choice.
+    of_block = np.bincount(patches.beside, contacts.weight)[patches.beside]
+    weight = contacts.weight / np.maximum(of_block, 1e-12)
+    weight = np.where(contacts.area > 0.0, contacts.area, weight)
     for _ in range(_ROUNDS):
         spread, normal = _even(contacts, x, weight, patches)
         pulling = (spread * normal[of]).sum(axis=1) < 0.0
