@@ -29,6 +29,7 @@ class MjcfSettings:
     Attributes:
         time_step_s: Length of a step, seconds.
         solref: Time constant, seconds, and damping ratio of contacts and ropes.
+        friction_s: Time constant with which friction on ground and terrain stops a slip, seconds.
         solimp: Impedance of contacts.
         impratio: Stiffness of friction over that of normal forces.
         iterations: Most iterations of the solver.
@@ -37,6 +38,7 @@ class MjcfSettings:
 
     time_step_s: float
     solref: Sequence[float]
+    friction_s: float
     solimp: Sequence[float]
     impratio: float
     iterations: int
@@ -102,6 +104,7 @@ def mjcf_of(world: World, state: MjcfState, settings: MjcfSettings) -> str:
         "</worldbody>",
         "<contact>",
         *_exclusions(state.clusters),
+        *_surface_pairs(world, state, settings),
         "</contact>",
         "<tendon>",
         *_ropes(world.structure, state),
@@ -230,6 +233,33 @@ def _exclusions(clusters: Clusters) -> Iterator[str]:
         for i, first in enumerate(piece):
             for second in piece[i + 1 :]:
                 yield _tag("exclude", body1=f"cluster {first}", body2=f"cluster {second}")
+
+
+def _surface_pairs(world: World, state: MjcfState, settings: MjcfSettings) -> Iterator[str]:
+    """Contacts with ground and terrain, with a slower friction than contacts have by default.
+
+    MuJoCo's contacts are convex: a fast slip lifts the sliding body, the more the harder friction
+    pulls to stop it, and a wheel that spins would hop. Only pairs can say how fast that is.
+    """
+    surfaces = ["ground"] * world.ground + [f"terrain {i}" for i in range(len(world.terrain))]
+    sliding = [
+        (f"solid {c} {k}", solid.friction)
+        for c, solids in enumerate(state.solids)
+        for k, solid in enumerate(solids)
+    ]
+    for name, coefficient in sliding:
+        roll, spin = _friction(coefficient)[1:]
+        for surface in surfaces:
+            yield _tag(
+                "pair",
+                geom1=surface,
+                geom2=name,
+                condim=3,
+                friction=(coefficient, coefficient, roll, spin, spin),
+                solref=settings.solref,
+                solreffriction=(settings.friction_s, 1.0),
+                solimp=settings.solimp,
+            )
 
 
 def _ropes(structure: Structure, state: MjcfState) -> Iterator[str]:

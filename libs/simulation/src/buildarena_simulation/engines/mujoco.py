@@ -19,9 +19,10 @@ from buildarena_simulation.structure.motion import Motion
 from buildarena_simulation.structure.solids import Solid, Solids
 from buildarena_simulation.structure.vectors import cross, turned
 
-_TIME_STEP_S = 0.01
-_STEPS_PER_EVALUATION = 4
+_TIME_STEP_S = 0.0025
+_STEPS_PER_EVALUATION = 16
 _SOLREF = (0.02, 1.0)
+_FRICTION_S = 0.05
 _SOLIMP = (0.95, 0.995, 0.005, 0.5, 2.0)
 _IMPRATIO = 10.0
 _ITERATIONS = 50
@@ -50,6 +51,7 @@ class MujocoEngine:
         self._mjcf = MjcfSettings(
             time_step_s=_TIME_STEP_S,
             solref=_SOLREF,
+            friction_s=_FRICTION_S,
             solimp=_SOLIMP,
             impratio=_IMPRATIO,
             iterations=_ITERATIONS,
@@ -81,6 +83,7 @@ class MujocoEngine:
             "impratio": _IMPRATIO,
             "iterations": _ITERATIONS,
             "solref": str(_SOLREF),
+            "friction_s": _FRICTION_S,
             "solimp": str(_SOLIMP),
         }
 
