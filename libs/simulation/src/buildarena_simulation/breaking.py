@@ -9,10 +9,11 @@ from buildarena_simulation.constants import GRAVITY
 from buildarena_simulation.engines.base import Engine, World
 from buildarena_simulation.resting import FaceFinder
 from buildarena_simulation.structure.clusters import Clusters, find_clusters
-from buildarena_simulation.structure.contacts import EvenSharing, PointForces
+from buildarena_simulation.structure.contacts import EvenSharing, PointForces, together
 from buildarena_simulation.structure.loads import LoadModel
 from buildarena_simulation.structure.model import JOINT_KINDS, FloatArray
 from buildarena_simulation.structure.motion import Motion, rope_ends
+from buildarena_simulation.structure.supports import EdgeSupports
 from buildarena_simulation.structure.vectors import turned
 from buildarena_simulation.trajectory import Break, JointPeak
 
@@ -41,12 +42,11 @@ class BreakingModel:
         self._faces, self._has_cargo = FaceFinder(world), world.cargo is not None
         self.bearing = BearingMeter(structure, len(world.terrain))
         self._loads = LoadModel(structure, clusters, motion)
-        self._sharing = EvenSharing(clusters.cluster_of)
+        self._enter(clusters)
         self._interval_s, self._unseen_s, self._calm = interval_s, 0.0, False
         self._peaks = np.zeros((3, len(structure.members)))
         self._rope_holds = np.ones(len(structure.ropes), dtype=bool)
         self._rope_peaks = np.zeros(len(structure.ropes))
-        self.clusters = clusters
         self.motion = motion
         self.breaks: list[Break] = []
 
@@ -74,8 +74,7 @@ class BreakingModel:
             self._calm = False
             return
         tensions = engine.rope_tensions()
-        contacts = self._contacts(engine)
-        forces = self._all_forces(contacts, thrusts, tensions)
+        forces = self._forces(engine, thrusts, tensions)
         # An impact is reported for one interval only, whatever was left out before.
         seen_s = self._interval_s if engine.struck else self._unseen_s
         loads = self._loads.evaluate(forces, self.motion, elapsed_s=self._unseen_s, seen_s=seen_s)
@@ -124,43 +123,39 @@ class BreakingModel:
         ]
         return (*joints, *winches)
 
-    def _contacts(self, engine: Engine) -> PointForces:
-        """The contacts, spread over all that touches."""
-        clusters = self.clusters
+    def _forces(self, engine: Engine, thrusts: FloatArray, tensions: FloatArray) -> PointForces:
+        """Contacts, thrust and ropes together, each where the structure takes it."""
+        clusters, motion = self.clusters, self.motion
         cargo = engine.cargo() if self._has_cargo else None
-        faces = self._faces.find(clusters, self.motion, cargo)
+        faces = self._faces.find(clusters, motion, cargo)
         contacts = faces.joined_to(engine.contacts(), clusters.cluster_of)
-        shared = self._sharing.shared(contacts)
+        others = [self._pushes(thrusts), self._pulls(tensions)]
+        contacts, shared = self._supports.settled(
+            contacts, self._sharing.shared(contacts), faces.corners, self._loads, motion, others
+        )
         self.bearing.read(contacts.other, contacts.surface, shared)
-        return shared
+        return together([shared, *others])
 
-    def _all_forces(
-        self, contacts: PointForces, thrusts: FloatArray, tensions: FloatArray
-    ) -> PointForces:
-        """Contacts, thrust and ropes together."""
-        structure, clusters, motion = self._structure, self.clusters, self.motion
-        if not len(structure.cannons) and not len(structure.ropes):
-            return contacts
-        blocks, points, forces = [contacts.block], [contacts.point], [contacts.force]
-        if len(structure.cannons):
-            cannons = structure.cannons
-            c = clusters.cluster_of[cannons]
-            turn = motion.rotation[c]
-            blocks.append(cannons)
-            points.append(motion.position[c] + turned(turn, structure.thrust_points))
-            sprays = turned(turn, structure.directions[cannons])
-            forces.append(-thrusts[:, None] * sprays)
-        if len(structure.ropes):
-            start, end = rope_ends(structure, clusters, motion)
-            pull = end - start
-            pull *= (tensions / np.maximum(np.linalg.norm(pull, axis=1), 1e-9))[:, None]
-            blocks += [structure.ropes.first, structure.ropes.second]
-            points += [start, end]
-            forces += [pull, -pull]
+    def _pushes(self, thrusts: FloatArray) -> PointForces:
+        structure, motion = self._structure, self.motion
+        cannons = structure.cannons
+        c = self.clusters.cluster_of[cannons]
+        turn = motion.rotation[c]
         return PointForces(
-            block=np.concatenate(blocks),
-            point=np.concatenate(points),
-            force=np.concatenate(forces),
+            block=cannons,
+            point=motion.position[c] + turned(turn, structure.thrust_points),
+            force=-thrusts[:, None] * turned(turn, structure.directions[cannons]),
+        )
+
+    def _pulls(self, tensions: FloatArray) -> PointForces:
+        ropes = self._structure.ropes
+        start, end = rope_ends(self._structure, self.clusters, self.motion)
+        pull = end - start
+        pull *= (tensions / np.maximum(np.linalg.norm(pull, axis=1), 1e-9))[:, None]
+        return PointForces(
+            block=np.concatenate([ropes.first, ropes.second]),
+            point=np.concatenate([start, end]),
+            force=np.concatenate([pull, -pull]),
         )
 
     def _break_ropes(
@@ -186,13 +181,19 @@ class BreakingModel:
             )
         )
 
+    def _enter(self, clusters: Clusters) -> None:
+        self.clusters = clusters
+        self._sharing = EvenSharing(clusters.cluster_of)
+        self._supports = EdgeSupports(
+            self._structure.centers_of_mass, clusters.cluster_of, gravity=GRAVITY
+        )
+
     def _fall_apart(self, engine: Engine) -> None:
         before = self.clusters
         after = find_clusters(self._structure, self._loads.holds)
         if not _same(before, after):
             self.motion = self.motion.after_break(before, after)
-            self.clusters = after
-            self._sharing = EvenSharing(after.cluster_of)
+            self._enter(after)
             engine.enter(after, self.motion)
         self._loads.rebuild(after, self.motion)
 

@@ -43,9 +43,9 @@ from buildarena_simulation.structure.solids import Solids
 with quiet_output():
     import pybullet
 
-_TIME_STEP_S = 1 / 250
-_STEPS_PER_EVALUATION = 10
-_ITERATIONS = 50
+_TIME_STEP_S = 1 / 500
+_STEPS_PER_EVALUATION = 20
+_ITERATIONS = 100
 _RESIDUAL = 1e-9
 _SPEED_CAP = 1e5
 _ORIGIN = (0.0, 0.0, 0.0)

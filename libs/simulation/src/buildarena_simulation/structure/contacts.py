@@ -7,7 +7,7 @@ between the bodies would give.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from typing import Final
 
 import numpy as np
@@ -74,6 +74,23 @@ class ContactForces:
     force: FloatArray
 
 
+def together(parts: Sequence[PointForces]) -> PointForces:
+    """Several sets of forces in one, in order."""
+    return PointForces(
+        block=np.concatenate([part.block for part in parts]),
+        point=np.concatenate([part.point for part in parts]),
+        force=np.concatenate([part.force for part in parts]),
+    )
+
+
+def joined(parts: Sequence[ContactForces]) -> ContactForces:
+    """Several contacts in one table, in order."""
+    if len(parts) == 1:
+        return parts[0]
+    columns = (np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(ContactForces))
+    return ContactForces(**dict(zip((f.name for f in fields(ContactForces)), columns, strict=True)))
+
+
 def mean_contacts(readings: Sequence[tuple[float, ContactForces]]) -> ContactForces:
     """The mean of several readings.
 
@@ -82,15 +99,11 @@ def mean_contacts(readings: Sequence[tuple[float, ContactForces]]) -> ContactFor
     """
     if len(readings) == 1:
         return readings[0][1]
-    return ContactForces(
-        block=np.concatenate([reading.block for _, reading in readings]),
-        other=np.concatenate([reading.other for _, reading in readings]),
-        surface=np.concatenate([reading.surface for _, reading in readings]),
-        weight=np.concatenate([share * reading.weight for share, reading in readings]),
-        area=np.concatenate([reading.area for _, reading in readings]),
-        normal=np.concatenate([reading.normal for _, reading in readings]),
-        point=np.concatenate([reading.point for _, reading in readings]),
-        force=np.concatenate([share * reading.force for share, reading in readings]),
+    return joined(
+        [
+            replace(reading, weight=share * reading.weight, force=share * reading.force)
+            for share, reading in readings
+        ]
     )
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from buildarena_simulation.constants import GRAVITY, LOAD_FILTER_S
 from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.contacts import PointForces
-from buildarena_simulation.structure.model import BoolArray, FloatArray, Structure
+from buildarena_simulation.structure.model import BoolArray, FloatArray, IntArray, Structure
 from buildarena_simulation.structure.motion import Motion
 from buildarena_simulation.structure.stiffness import StiffnessModel
 from buildarena_simulation.structure.vectors import cross, summed_by, turned, turned_wrenches
@@ -95,6 +95,29 @@ class LoadModel:
         ratio = np.maximum(force / limits[:, 0], moment / limits[:, 1])
         return JointLoads(force=force, moment=moment, ratio=ratio)
 
+    def displacements(self, forces: PointForces, motion: Motion) -> FloatArray:
+        """How the blocks would move under some forces and gravity, each cluster's ground held.
+
+        Args:
+            forces: Forces on the blocks, without gravity.
+            motion: The clusters' motion now.
+
+        Returns:
+            (N, 6) displacement and turn of every block, in its cluster's axes; only differences
+            within a cluster and ratios mean anything.
+        """
+        wrenches = self._unfiltered(forces, motion)
+        relative = motion.rotation.transpose(0, 2, 1) @ self._root_rotation
+        wrenches = turned_wrenches(relative[self._clusters.cluster_of], wrenches)
+        if self._children:
+            count = len(self.holds)
+            self._add_axle_reactions(wrenches, relative, np.zeros(count), np.zeros(count))
+        return self._solver.displacements(self._relieved(wrenches))
+
+    def flexibility(self, blocks: IntArray) -> FloatArray:
+        """Displacements of blocks under unit wrenches on them; see `MemberForces.flexibility`."""
+        return self._solver.flexibility(blocks)
+
     def _enter(self, clusters: Clusters, motion: Motion) -> None:
         structure = self._structure
         self._clusters = clusters
@@ -112,18 +135,10 @@ class LoadModel:
         self, forces: PointForces, motion: Motion, *, elapsed_s: float, seen_s: float
     ) -> None:
         """Filters the wrenches on the blocks and the clusters' rates of momentum."""
-        structure, clusters = self._structure, self._clusters
+        clusters = self._clusters
         blend = 1.0 - math.exp(-seen_s / LOAD_FILTER_S)
-        self._root_rotation = motion.rotation[clusters.root]
-        centers = motion.points(clusters, structure.centers_of_mass)
-        moments = cross(forces.point - centers[forces.block], forces.force)
-        world = summed_by(
-            forces.block, np.concatenate([forces.force, moments], axis=1), len(structure)
-        )
-        world /= GRAVITY
-        world[:, 2] -= structure.masses
+        local = self._unfiltered(forces, motion)
         to_root = self._root_rotation.transpose(0, 2, 1)
-        local = turned_wrenches(to_root[clusters.cluster_of], world)
         self._wrenches += blend * (local - self._wrenches)
         rate = np.concatenate(
             [
@@ -137,6 +152,20 @@ class LoadModel:
         ) / (elapsed_s * GRAVITY)
         self._velocity, self._spin = motion.velocity, motion.spin
         self._inertial += blend * (turned_wrenches(to_root, rate) - self._inertial)
+
+    def _unfiltered(self, forces: PointForces, motion: Motion) -> FloatArray:
+        """Wrenches on the blocks now, weight included, (N, 6), in the axes of their roots."""
+        structure, clusters = self._structure, self._clusters
+        self._root_rotation = motion.rotation[clusters.root]
+        centers = motion.points(clusters, structure.centers_of_mass)
+        moments = cross(forces.point - centers[forces.block], forces.force)
+        world = summed_by(
+            forces.block, np.concatenate([forces.force, moments], axis=1), len(structure)
+        )
+        world /= GRAVITY
+        world[:, 2] -= structure.masses
+        to_root = self._root_rotation.transpose(0, 2, 1)
+        return turned_wrenches(to_root[clusters.cluster_of], world)
 
     def _add_axle_reactions(
         self, wrenches: FloatArray, relative: FloatArray, force: FloatArray, moment: FloatArray

@@ -5,6 +5,7 @@ clusters are solved at once: the first block of each is its ground, whose reacti
 the loads are self-equilibrated.
 """
 
+from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
@@ -111,6 +112,42 @@ class MemberForces:
         self._stress = stress
         self._solver = solver
         self._first, self._second = first, second
+        self._columns: dict[int, FloatArray] = {}
+
+    def displacements(self, wrenches: FloatArray) -> FloatArray:
+        """Displacements and turns of the blocks, (N, 6), machine frame; see `solve`."""
+        displacement = np.zeros_like(wrenches)
+        if self._solver is not None:
+            loads = wrenches[self._free].reshape(-1)
+            displacement[self._free] = self._solver.solve(loads).reshape(-1, 6)
+        return displacement
+
+    def flexibility(self, blocks: IntArray) -> FloatArray:
+        """Displacements of blocks under unit wrenches on each, relative to their clusters' grounds.
+
+        Args:
+            blocks: (B,) indices of the blocks.
+
+        Returns:
+            (B, 6, B, 6) of displaced block, its degree of freedom, loaded block, its wrench.
+        """
+        wanted = [int(block) for block in blocks if int(block) not in self._columns]
+        if wanted:
+            self._solve_columns(wanted)
+        columns = np.stack([self._columns[int(block)][blocks] for block in blocks], axis=2)
+        return np.asarray(columns)
+
+    def _solve_columns(self, blocks: Sequence[int]) -> None:
+        count = len(self._free)
+        loads = np.zeros((count, 6, len(blocks), 6))
+        for k, block in enumerate(blocks):
+            loads[block, :, k] = np.eye(6)
+        found = np.zeros_like(loads)
+        if self._solver is not None:
+            rhs = np.asfortranarray(loads[self._free].reshape(-1, 6 * len(blocks)))
+            found[self._free] = self._solver.solve(rhs).reshape(-1, 6, len(blocks), 6)
+        for k, block in enumerate(blocks):
+            self._columns[block] = np.ascontiguousarray(found[:, :, k])
 
     def solve(self, wrenches: FloatArray) -> FloatArray:
         """Forces and moments in the members.
@@ -124,10 +161,7 @@ class MemberForces:
         """
         if self._solver is None:
             return np.zeros((len(self.inside), 6))
-        displacement = np.zeros_like(wrenches)
-        displacement[self._free] = self._solver.solve(wrenches[self._free].reshape(-1)).reshape(
-            -1, 6
-        )
+        displacement = self.displacements(wrenches)
         ends = np.concatenate([displacement[self._first], displacement[self._second]], axis=1)
         return np.asarray((self._stress @ ends[:, :, None])[:, :, 0])
 
