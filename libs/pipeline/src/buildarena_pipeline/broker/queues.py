@@ -45,8 +45,8 @@ class Queues:
 
     def __init__(self, broker_url: str) -> None:
         self.app = celery_app(broker_url)
-        self._sender = celery_app(broker_url, timeout_s=TIMEOUT_S)
         self._broker_url = broker_url
+        self._sender = self._new_sender()
         self._lock = threading.Lock()
         # Celery's queues are lists of the same name.
         self._redis = Redis.from_url(
@@ -129,7 +129,10 @@ class Queues:
         """Takes a fresh sender: a pool's connections to a server that is gone stay in its way."""
         with self._lock:
             if self._sender is failed:
-                self._sender = celery_app(self._broker_url)
+                self._sender = self._new_sender()
+
+    def _new_sender(self) -> Celery:
+        return celery_app(self._broker_url, timeout_s=TIMEOUT_S)
 
     def close(self) -> None:
         """Ends announcements and closes the connections to the broker."""
