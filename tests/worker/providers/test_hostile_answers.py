@@ -17,7 +17,7 @@ from buildarena_pipeline.errors import PermanentError, TransientError
 from buildarena_store import clean
 from buildarena_worker.providers import bounds
 from buildarena_worker.providers.failures import ProviderError
-from buildarena_worker.providers.openai_answer import AnswerReader
+from buildarena_worker.providers.openai.answer import AnswerReader
 from buildarena_worker.providers.provider import ProviderClient
 from buildarena_worker.providers.retries import RetryPolicy
 from buildarena_worker.session.messages import Message, Reply, Request, ToolCall
