@@ -23,7 +23,7 @@ import floods
 import httpx
 import psutil
 from api_process import Service
-from arena import HOSTILE, Arena, Tenant
+from arena import HOSTILE, Arena
 from running import wait_until
 from tenants import everything
 
@@ -64,10 +64,10 @@ class Tried:
 def other_tenants(arena: Arena) -> Tried:
     """Another key's sweeps, jobs, sessions, names, keys and budgets."""
     owner, thief = arena.innocent, arena.attacker
-    sweep = owner.post("/v1/sweeps", {**SWEEP, "models": [HOSTILE]}).json()["id"]
+    sweep = owner.post("/v1/sweeps", {**SWEEP, "models": [HOSTILE]})["id"]
     owner.post(f"/v1/sweeps/{sweep}/pause")
-    session = owner.post("/v1/sessions", SESSION).json()["id"]
-    owner.client.post("/v1/tasks", content=EXAMPLE, headers=YAML)
+    session = owner.post("/v1/sessions", SESSION)["id"]
+    owner.ask("POST", "/v1/tasks", content=EXAMPLE, headers=YAML)
     job = arena.operator.get(f"/v1/jobs?sweep={sweep}")["jobs"][0]["id"]
     tries: list[tuple[str, str, dict[str, Any]]] = [
         *(
@@ -88,12 +88,12 @@ def other_tenants(arena: Arena) -> Tried:
     found = Tried(f"{len(tries)} commands over another key's things")
     time.sleep(1.5)  # until nothing of the service's own is under way
     before = everything(arena.database)
-    answers = Counter(thief.client.request(m, path, **more).status_code for m, path, more in tries)
+    answers = Counter(thief.ask(m, path, **more).status_code for m, path, more in tries)
     found.refused = f"answers {dict(sorted(answers.items()))}"
     found.require(set(answers) <= {403, 409}, "a command over another key's things was accepted")
     found.require(everything(arena.database) == before, "a refused command changed something")
     # Shared jobs: the thief's commands over a sweep of its own, of the same jobs.
-    shared = thief.post("/v1/sweeps", {**SWEEP, "models": [HOSTILE]}).json()["id"]
+    shared = thief.post("/v1/sweeps", {**SWEEP, "models": [HOSTILE]})["id"]
     owner.post(f"/v1/sweeps/{sweep}/resume")
     for verb in ("pause", "resume", "retry", "cancel"):
         thief.post(f"/v1/sweeps/{shared}/{verb}")
@@ -110,7 +110,7 @@ def hanging_provider(arena: Arena) -> Tried:
     arena.provider.fault = lambda number: ("hang", "drip")[number % 2]
     thief = arena.attacker
     wish = {"tasks": ["support-1"], "models": [HOSTILE], "samples": 60}
-    sweep = thief.post("/v1/sweeps", wish).json()["id"]
+    sweep = thief.post("/v1/sweeps", wish)["id"]
 
     def running() -> int:
         return len(arena.operator.get(f"/v1/jobs?sweep={sweep}&state=running&limit=100")["jobs"])
@@ -119,10 +119,8 @@ def hanging_provider(arena: Arena) -> Tried:
     # Idle connections are among them: a few more than are waited for below.
     wait_until(lambda: _held_requests(arena) >= MANY + 2, 60, "requests hang")
     started = time.monotonic()
-    job = arena.innocent.post(
-        "/v1/jobs", {"task": "support-1", "model": "builtin/idle", "seed": 77}
-    )
-    id_ = job.json()["id"]
+    body = {"task": "support-1", "model": "builtin/idle", "seed": 77}
+    id_ = arena.innocent.post("/v1/jobs", body)["id"]
     wait_until(lambda: arena.innocent.get(f"/v1/jobs/{id_}")["state"] == "done", 30, "a session")
     room = time.monotonic() - started
     found.require(room <= ROOM_S, f"another key's session took {room:.1f} s")
@@ -168,7 +166,7 @@ def lying_provider(arena: Arena) -> Tried:
             "seed": 1000 + number,
             "limits": {"max_requests": 3},
         }
-        id_ = arena.attacker.post("/v1/jobs", body).json()["id"]
+        id_ = arena.attacker.post("/v1/jobs", body)["id"]
         wait_until(lambda: arena.attacker.get(f"/v1/jobs/{id_}")["state"] == "done", 90, name)  # noqa: B023
         job = arena.attacker.get(f"/v1/jobs/{id_}")
         used = job["usage"]
@@ -180,9 +178,8 @@ def lying_provider(arena: Arena) -> Tried:
             found.require(used["input_tokens"] == 7 * used["requests"], f"{name}: {used}")
     arena.provider.elsewhere = f"http://127.0.0.1:{free_port()}/"
     arena.provider.fault = lambda _: "307"
-    id_ = arena.attacker.post(
-        "/v1/jobs", {"task": "support-1", "model": HOSTILE, "seed": 2000}
-    ).json()["id"]
+    body = {"task": "support-1", "model": HOSTILE, "seed": 2000}
+    id_ = arena.attacker.post("/v1/jobs", body)["id"]
     wait_until(lambda: arena.attacker.get(f"/v1/jobs/{id_}")["state"] == "done", 60, "redirect")
     job = arena.attacker.get(f"/v1/jobs/{id_}")
     found.require(job["reason"] == "request_refused", f"redirect: {job['reason']} {job['detail']}")
@@ -222,14 +219,14 @@ def flood(kind: str) -> Callable[[Arena], Tried]:
 
 def _done_sweep(arena: Arena, jobs: int) -> str:
     wish = {"tasks": ["support-1"], "models": ["builtin/idle"], "samples": jobs}
-    sweep = arena.attacker.client.post("/v1/sweeps?resume=true", json=wish).json()["id"]
+    sweep = arena.attacker.post("/v1/sweeps?resume=true", wish)["id"]
     wait_until(lambda: arena.operator.get(f"/v1/sweeps/{sweep}")["state"] == "done", 300, "a sweep")
     return str(sweep)
 
 
 def truncated_bodies(arena: Arena) -> Tried:
     """Bodies cut off by a disconnect, for everything that changes something."""
-    sweep = arena.attacker.post("/v1/sweeps", SWEEP).json()["id"]
+    sweep = arena.attacker.post("/v1/sweeps", SWEEP)["id"]
     wait_until(lambda: arena.operator.get(f"/v1/sweeps/{sweep}")["state"] == "done", 60, "a sweep")
     time.sleep(1.5)  # until nothing of the service's own is under way
     before = everything(arena.database)
@@ -272,9 +269,9 @@ def truncated_bodies(arena: Arena) -> Tried:
 
 def forged_archives(arena: Arena) -> Tried:
     """Archives that are no archives, bombs, and changed rows."""
-    sweep = arena.operator.post("/v1/sweeps", SWEEP | {"seeds": [40]}).json()["id"]
+    sweep = arena.operator.post("/v1/sweeps", SWEEP | {"seeds": [40]})["id"]
     wait_until(lambda: arena.operator.get(f"/v1/sweeps/{sweep}")["state"] == "done", 60, "a sweep")
-    good = arena.operator.client.get(f"/v1/sweeps/{sweep}/archive").content
+    good = arena.operator.ask("GET", f"/v1/sweeps/{sweep}/archive").content
 
     def changed(name: str, change: Callable[[bytes], bytes]) -> bytes:
         out = io.BytesIO()
@@ -303,8 +300,8 @@ def forged_archives(arena: Arena) -> Tried:
     }
     before = everything(arena.database)["jobs"]
     answers = {
-        name: arena.operator.client.post(
-            "/v1/archives", content=data, headers={"Content-Type": "application/zip"}
+        name: arena.operator.ask(
+            "POST", "/v1/archives", content=data, headers={"Content-Type": "application/zip"}
         ).status_code
         for name, data in tries.items()
     }
@@ -328,7 +325,7 @@ def full_disk(arena: Arena) -> Tried:
         while file.write(b"x" * 65536):
             pass
     body = {"task": "lift-1", "model": "builtin/expert", "simulator": "mujoco", "seed": 3}
-    id_ = arena.innocent.post("/v1/jobs", body).json()["id"]
+    id_ = arena.innocent.post("/v1/jobs", body)["id"]
 
     def waits() -> bool:
         job = arena.innocent.get(f"/v1/jobs/{id_}")
@@ -363,7 +360,7 @@ def stopped_broker(arena: Arena) -> Tried:
         while time.monotonic() < ends:
             started = time.monotonic()
             body = {"task": "support-1", "model": "builtin/idle", "seed": 5000 + number}
-            answer = arena.innocent.post("/v1/jobs", body)
+            answer = arena.innocent.ask("POST", "/v1/jobs", json=body)
             slowest = max(slowest, time.monotonic() - started)
             found.require(answer.status_code == 202, f"a submission got {answer.status_code}")
             ids.append(answer.json()["id"])
@@ -430,6 +427,3 @@ SCENARIOS: dict[str, Callable[[Arena], Tried]] = {
     "stopped broker": stopped_broker,
     "killed supervisor": killed_supervisor,
 }
-
-
-__all__ = ["SCENARIOS", "Tenant", "Tried"]
