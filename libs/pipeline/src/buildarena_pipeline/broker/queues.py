@@ -17,9 +17,9 @@ from redis.backoff import NoBackoff
 from redis.exceptions import RedisError
 from redis.retry import Retry
 
+from buildarena_pipeline.breakers import CircuitBreaker
 from buildarena_pipeline.broker.announcer import Announcer
 from buildarena_pipeline.broker.app import celery_app
-from buildarena_pipeline.broker.breaker import CircuitBreaker
 
 PROCESS_NEXT = "buildarena.process_next"
 """Name of the one message kind; its arguments are the queue's name and a job id."""
