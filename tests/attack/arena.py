@@ -63,6 +63,26 @@ class Arena:
         return found
 
 
+@dataclass
+class Tried:
+    """What came of a scenario.
+
+    Attributes:
+        tried: What was tried, in words.
+        refused: What came of it, in words.
+        wrong: What should not be.
+    """
+
+    tried: str
+    refused: str = ""
+    wrong: list[str] = field(default_factory=list)
+
+    def require(self, condition: object, what: str) -> None:
+        """Notes something that is wrong."""
+        if not condition:
+            self.wrong.append(what)
+
+
 class Bystander(threading.Thread):
     """An innocent caller: lists jobs all the time, and notes how long it took."""
 
