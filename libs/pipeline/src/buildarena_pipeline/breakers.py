@@ -55,7 +55,7 @@ class CircuitBreaker:
                 if self._probe():
                     break
             except Exception:
-                # A breaker without its thread would stay open for ever.
+                # A breaker without its thread would stay open forever.
                 log.exception("probe_failed")
         self._thread = None
 
