@@ -20,8 +20,8 @@ from buildarena_simulation.structure.model import (
 
 if TYPE_CHECKING:
     from buildarena_geometry import Block, Connector, Joint, Machine
+    from buildarena_geometry.blocks import FaceRef
     from buildarena_geometry.modules.module import Solid
-    from buildarena_geometry.state import FaceRef
 
 
 def structure_of(machine: "Machine") -> Structure:
@@ -96,7 +96,7 @@ def _shares(connectors: "Sequence[Connector]") -> list[float]:
         np.fill_diagonal(alike, 1.0)
         for (k, _), total in zip(leaving, alike.sum(axis=1), strict=True):
             company[k] = max(company[k], total)
-    return (1.0 / company).tolist()
+    return [float(share) for share in 1.0 / company]
 
 
 def bindings_of(machine: "Machine") -> Bindings:

@@ -83,6 +83,7 @@ class EdgeSupports:
         self,
         contacts: ContactForces,
         spread: PointForces,
+        *,
         corners: FloatArray,
         structure: ElasticStructure,
         motion: Motion,
@@ -128,13 +129,13 @@ class EdgeSupports:
 
     def _patch(self, contacts: ContactForces, of: IntArray, first_face: int, c: int) -> IntArray:
         """Rows of a cluster's contacts with the world along the normal of its resting faces."""
-        mine = np.flatnonzero((of == c) & (contacts.other == WORLD))
+        mine: IntArray = np.flatnonzero((of == c) & (contacts.other == WORLD))
         normal = contacts.normal[mine[mine >= first_face][0]]
-        return mine[(contacts.normal[mine] == normal).all(axis=1)]
+        return np.asarray(mine[(contacts.normal[mine] == normal).all(axis=1)])
 
     def _matters(self, candidates: _Candidates) -> bool:
         reach = float(np.ptp(candidates.point, axis=0).max())
-        return abs(candidates.base.sum()) / self._gravity * reach > _NEGLIGIBLE
+        return abs(float(candidates.base.sum())) / self._gravity * reach > _NEGLIGIBLE
 
     def _pushes(
         self,
