@@ -14,12 +14,13 @@ from buildarena_simulation.control import (
     effective_presses,
     plan_schedule,
     recoil,
+    varied_presses,
 )
 from buildarena_simulation.engines import ENGINES, create_engine, engine_version
 from buildarena_simulation.engines.base import Engine, World
 from buildarena_simulation.errors import BuildarenaSimulationError, SimulationError
 from buildarena_simulation.machine import bindings_of, structure_of
-from buildarena_simulation.placement import cargo_at_start, jittered, place
+from buildarena_simulation.placement import start_of
 from buildarena_simulation.recording import Recorder
 from buildarena_simulation.scenario import Scenario
 from buildarena_simulation.structure.clusters import find_clusters
@@ -52,7 +53,7 @@ def simulate(
         scenario: What it is put through.
         engine: Name of the engine; see `ENGINES`.
         controls: A control sequence to use in place of the machine's own.
-        seed: Shifts the machine's start by up to a hundredth of a unit; None for the exact place.
+        seed: Varies the start as a fair repetition would, see `start_of`; None for the exact one.
         on_progress: Called now and then with the share of the trial that is done, 0 to 1.
 
     Returns:
@@ -96,19 +97,20 @@ def simulate_structure(
         seed: See `simulate`.
         on_progress: Called now and then with the share of the trial that is done.
     """
-    position, rotation = place(structure, scenario.placement)
-    if seed is not None:
-        position = jittered(position, seed)
+    given, start = scenario, start_of(structure, scenario, seed)
     world = World(
         structure=structure,
         ground=True,
         terrain=scenario.terrain,
-        cargo=cargo_at_start(structure, scenario.cargo, position, rotation),
+        cargo=start.cargo,
         gravity=GRAVITY,
     )
+    if seed is not None:
+        controls, control = varied_presses(controls, scenario.control, seed)
+        scenario = scenario.model_copy(update={"control": control})
     adapter = create_engine(engine, world)
     try:
-        trial = _Trial(world, scenario, adapter, at=(position, rotation))
+        trial = _Trial(world, scenario, adapter, at=(start.position, start.rotation))
         trial.run(bindings or [{}] * len(structure), controls, on_progress)
         return trial.recorder.finished(
             breaking=trial.breaking,
@@ -120,7 +122,7 @@ def simulate_structure(
                 "gravity": GRAVITY,
                 "effective_key_presses": effective_presses(bindings, controls),
                 **({} if seed is None else {"seed": seed}),
-                "scenario": hashlib.sha256(scenario.model_dump_json().encode()).hexdigest()[:16],
+                "scenario": hashlib.sha256(given.model_dump_json().encode()).hexdigest()[:16],
             },
         )
     except BuildarenaSimulationError:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from buildarena_cli.commands.machine_files import check, export
+from buildarena_cli.commands.machine_robustness import show_robustness
 from buildarena_cli.errors import CommandError
 from buildarena_cli.lazy import new_group
 from buildarena_cli.machines import (
@@ -40,8 +41,14 @@ def simulate_command(  # noqa: PLR0917 - the command line passes options by name
     engine: Annotated[str | None, typer.Option(help="pybullet or mujoco.")] = None,
     seed: Annotated[
         int | None,
+        typer.Option(help="Vary the start a little, by this seed, as a fair repetition would."),
+    ] = None,
+    seeds: Annotated[
+        int | None,
         typer.Option(
-            help="Shift the start a little, by this seed, to see whether a result is luck."
+            help="Repeat the trial with so many varied starts, to see whether a result is luck.",
+            min=2,
+            max=1000,
         ),
     ] = None,
     video: Annotated[
@@ -62,8 +69,16 @@ def simulate_command(  # noqa: PLR0917 - the command line passes options by name
                 f"no engine {engine!r}; there are {', '.join(ENGINES)}"
                 f"{did_you_mean(engine, ENGINES)}"
             )
+        given = {"--seed": seed, "--video": video, "--trajectory": trajectory}
+        single = [option for option, value in given.items() if value is not None]
+        if seeds is not None and single:
+            raise CommandError(f"--seeds makes many trials, {single[0]} is for one; give either")
         chosen, machine = chosen_task(task), read_machine(file)
-        rollout = _simulated(machine, chosen, engine or ENGINES[0], seed)
+        engine = engine or ENGINES[0]
+        if seeds is not None:
+            show_robustness(chosen, machine, engine, seeds, as_json=as_json)
+            return
+        rollout = _simulated(machine, chosen, engine, seed)
         if rollout is None:
             result = failed_score(chosen, machine)
         else:
