@@ -109,7 +109,8 @@ def test_a_seed_varies_the_start(run, tmp_path: Path) -> None:
 
 
 def test_seeds_tell_how_often_a_machine_succeeds(run) -> None:
-    done = run("simulate", str(DATA / "beam.json"), "--engine", "mujoco", "--seeds", "3", "--json")
+    given = ("simulate", str(DATA / "beam.json"), "--engine", "mujoco")
+    done = run(*given, "--seeds", "3", "--json", task_name="support-1")
     found = json.loads(done.stdout)
     assert (found["trials"], found["successes"], found["robustness"]) == (3, 3, 1.0)
     loads = [result["indicator"] for result in found["results"]]

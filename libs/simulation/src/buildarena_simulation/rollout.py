@@ -26,6 +26,7 @@ from buildarena_simulation.scenario import Scenario
 from buildarena_simulation.structure.clusters import find_clusters
 from buildarena_simulation.structure.model import Structure
 from buildarena_simulation.structure.motion import at_rest
+from buildarena_simulation.threads import single_threaded
 from buildarena_simulation.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -110,8 +111,9 @@ def simulate_structure(
         scenario = scenario.model_copy(update={"control": control})
     adapter = create_engine(engine, world)
     try:
-        trial = _Trial(world, scenario, adapter, at=(start.position, start.rotation))
-        trial.run(bindings or [{}] * len(structure), controls, on_progress)
+        with single_threaded():
+            trial = _Trial(world, scenario, adapter, at=(start.position, start.rotation))
+            trial.run(bindings or [{}] * len(structure), controls, on_progress)
         return trial.recorder.finished(
             breaking=trial.breaking,
             engine=engine,
