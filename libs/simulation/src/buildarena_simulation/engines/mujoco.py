@@ -19,10 +19,10 @@ from buildarena_simulation.structure.motion import Motion
 from buildarena_simulation.structure.solids import Solid, Solids
 from buildarena_simulation.structure.vectors import cross, turned
 
-_TIME_STEP_S = 0.0025
-_STEPS_PER_EVALUATION = 16
+_TIME_STEP_S = 1 / 500
+_STEPS_PER_EVALUATION = 20
 _SOLREF = (0.02, 1.0)
-_FRICTION_S = 0.05
+_FRICTION_S = 0.03
 _SOLIMP = (0.95, 0.995, 0.005, 0.5, 2.0)
 _IMPRATIO = 10.0
 _ITERATIONS = 50

@@ -161,24 +161,20 @@ class EdgeSupports:
         local = (point - motion.position[c]) @ turn
         moments = cross(local - self._centers[block], inward[None])
         unit = np.concatenate([np.tile(inward, (len(block), 1)), moments], axis=1)
-        middle = local.mean(axis=0)
-        reach = max(float(np.abs(local - middle).max()), 1.0)
-        across = _across(inward) @ (local - middle).T / reach
-        balance = np.concatenate([np.ones((1, len(local))), across])
-        known = self._system(block, unit, balance, structure)
+        known = self._system(block, unit, local, structure)
         gap = (unit * displaced[block]).sum(axis=1) + base / _FOUNDATION
-        force = known.solver.solve(known.compliance @ base - gap, balance @ base)
+        force = known.solver.solve(known.compliance @ base - gap, base)
         return None if force is None else force * self._gravity
 
     def _system(
-        self, block: IntArray, unit: FloatArray, balance: FloatArray, structure: ElasticStructure
+        self, block: IntArray, unit: FloatArray, local: FloatArray, structure: ElasticStructure
     ) -> "_System":
         """How points yield to forces at each other; remembered while they hardly move.
 
         Args:
             block: (P,) block of each point.
             unit: (P, 6) wrench of a unit force there on its block.
-            balance: (3, P) from forces to resultant.
+            local: (P, 3) the points, machine frame, units.
             structure: The structure.
         """
         blocks, place = np.unique(block, return_inverse=True)
@@ -194,6 +190,10 @@ class EdgeSupports:
             return known
         compliance = _condensed(flexible, place, unit)
         compliance[np.diag_indices(len(compliance))] += 1.0 / _FOUNDATION
+        middle = local.mean(axis=0)
+        reach = max(float(np.abs(local - middle).max()), 1.0)
+        across = _across(unit[0, :3]) @ (local - middle).T / reach
+        balance = np.concatenate([np.ones((1, len(local))), across])
         self._systems[cluster] = _System(
             flexible=flexible,
             unit=unit,
@@ -244,7 +244,7 @@ def _condensed(flexible: FloatArray, place: IntArray, unit: FloatArray) -> Float
 
 
 class _LeastEnergy:
-    """Finds the f >= 0 that minimises f·h·f / 2 - target·f where balance·f = wanted.
+    """Finds the f >= 0 that minimises f·h·f / 2 - target·f with the resultant of a given f.
 
     Args:
         h: (P, P) positive definite.
@@ -256,14 +256,14 @@ class _LeastEnergy:
         self._bearing: BoolArray = np.ones(len(h), dtype=bool)
         self._factors: tuple[bytes, object] = (b"", None)
 
-    def solve(self, target: FloatArray, wanted: FloatArray) -> FloatArray | None:
+    def solve(self, target: FloatArray, given: FloatArray) -> FloatArray | None:
         """The forces; None if none have the resultant.
 
         Args:
             target: (P,).
-            wanted: (3,) the resultant.
+            given: (P,) forces with the resultant that is wanted.
         """
-        bearing = self._bearing
+        bearing, wanted = self._bearing, self._balance @ given
         scale = float(np.abs(wanted).max()) + 1e-12
         for turn in range(_ROUNDS):
             if not bearing.any():
