@@ -45,6 +45,7 @@ def simulate(
     *,
     controls: Sequence[KeyHold] | None = None,
     seed: int | None = None,
+    finer: int = 1,
     on_progress: Callable[[float], None] | None = None,
 ) -> Trajectory:
     """Puts a machine through a scenario. The same input gives the same bytes.
@@ -55,6 +56,8 @@ def simulate(
         engine: Name of the engine; see `ENGINES`.
         controls: A control sequence to use in place of the machine's own.
         seed: Varies the start as a fair repetition would, see `start_of`; None for the exact one.
+        finer: By how much the engine's steps are shorter than usual, to tell a result of the model
+            from one of the steps.
         on_progress: Called now and then with the share of the trial that is done, 0 to 1.
 
     Returns:
@@ -73,6 +76,7 @@ def simulate(
         bindings=bindings_of(machine),
         controls=machine.control_sequence if controls is None else controls,
         seed=seed,
+        finer=finer,
         on_progress=on_progress,
     )
 
@@ -85,6 +89,7 @@ def simulate_structure(
     bindings: Bindings = (),
     controls: Sequence[KeyHold] = (),
     seed: int | None = None,
+    finer: int = 1,
     on_progress: Callable[[float], None] | None = None,
 ) -> Trajectory:
     """Puts a structure through a scenario; see `simulate`.
@@ -96,6 +101,7 @@ def simulate_structure(
         bindings: (N,) the keys of each block's actions; may be empty if nothing is pressed.
         controls: The control sequence.
         seed: See `simulate`.
+        finer: See `simulate`.
         on_progress: Called now and then with the share of the trial that is done.
     """
     given, start = scenario, start_of(structure, scenario, seed)
@@ -105,6 +111,7 @@ def simulate_structure(
         terrain=scenario.terrain,
         cargo=start.cargo,
         gravity=GRAVITY,
+        finer=finer,
     )
     if seed is not None:
         controls, control = varied_presses(controls, scenario.control, seed)

@@ -49,7 +49,7 @@ class MujocoEngine:
         self._world = world
         self._structure = world.structure
         self._mjcf = MjcfSettings(
-            time_step_s=_TIME_STEP_S,
+            time_step_s=self.time_step_s,
             solref=_SOLREF,
             friction_s=_FRICTION_S,
             solimp=_SOLIMP,
@@ -65,19 +65,19 @@ class MujocoEngine:
     @property
     def time_step_s(self) -> float:
         """See `Engine`."""
-        return _TIME_STEP_S
+        return _TIME_STEP_S / self._world.finer
 
     @property
     def steps_per_evaluation(self) -> int:
         """See `Engine`."""
-        return _STEPS_PER_EVALUATION
+        return _STEPS_PER_EVALUATION * self._world.finer
 
     @property
     def settings(self) -> Mapping[str, float | int | str]:
         """See `Engine`."""
         return {
-            "time_step_s": _TIME_STEP_S,
-            "steps_per_evaluation": _STEPS_PER_EVALUATION,
+            "time_step_s": self.time_step_s,
+            "steps_per_evaluation": self.steps_per_evaluation,
             "integrator": "implicitfast",
             "cone": "elliptic",
             "impratio": _IMPRATIO,
@@ -135,7 +135,7 @@ class MujocoEngine:
         model, data, at = self._model, self._data, self._addresses
         data.ctrl[at.thrust_actuators] = thrusts
         impacts = ImpactWatch(
-            len(wheel_speeds), gravity=self._world.gravity, time_step_s=_TIME_STEP_S
+            len(wheel_speeds), gravity=self._world.gravity, time_step_s=self.time_step_s
         )
         velocity = data.qvel[at.free_dofs]
         for row in wheel_speeds:
