@@ -47,6 +47,7 @@ def board(models: list[str], tasks: list[str]) -> dict[str, Any]:
         ],
         "published": [],
         "reading": "ours",
+        "flags": [],
     }
 
 

@@ -292,7 +292,7 @@ def _legend(board: Mapping[str, Any]) -> list[str]:
         *(f"  {', '.join(tasks)}: {name}" for name, tasks in indicators.items()),
         "* baseline; # is the overall rank, shared by statistically tied models",
         *_remarks(rows),
-        *_reading(board),
+        *_reading(board, rows),
         *_imports(rows),
     ]
 
@@ -317,18 +317,28 @@ def _remarks(rows: Sequence[Mapping[str, Any]]) -> list[str]:
         found.append("≥ cargos that never fell may weigh more")
     if any(row.get("too_few_data") for row in rows):
         found.append("too few: no interval holds with fewer than 5 successes")
-    counts: Counter[str] = Counter()
-    for row in rows:
-        counts.update(row.get("flags", {}))
+    counts = _flags(rows)
     if counts:
         found.append("flags: " + ", ".join(f"{n} {flag}" for flag, n in sorted(counts.items())))
     return found
 
 
-def _reading(board: Mapping[str, Any]) -> list[str]:
-    if board["reading"] == "ours":
-        return []
-    return ["what the published evaluation calls hacked is left out, as it does itself"]
+def _flags(rows: Sequence[Mapping[str, Any]]) -> Counter[str]:
+    counts: Counter[str] = Counter()
+    for row in rows:
+        counts.update(row.get("flags", {}))
+    return counts
+
+
+def _reading(board: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """What the board's flags say, and what was done about them."""
+    counts = _flags(rows)
+    found = [
+        f"  {flag['name']}: {flag['meaning']}" for flag in board["flags"] if counts[flag["name"]]
+    ]
+    if board["reading"] != "ours":
+        found.append("what the published evaluation calls hacked is left out, as it does itself")
+    return found
 
 
 def _imports(rows: Sequence[Mapping[str, Any]]) -> list[str]:
