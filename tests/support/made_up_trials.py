@@ -49,9 +49,9 @@ def _censored(rng: np.random.Generator, n: int) -> Floats:
     return np.minimum(900 * np.exp(rng.normal(0, 0.8, n)), LIMIT)
 
 
-def _split(share: float) -> Draw:
+def _split(share: float, most: float) -> Draw:
     def draw(rng: np.random.Generator, n: int) -> Floats:
-        return np.where(rng.random(n) < share, LIMIT, rng.uniform(50, 500, n))
+        return np.where(rng.random(n) < share, LIMIT, rng.uniform(50, most, n))
 
     return draw
 
@@ -64,10 +64,10 @@ LOADS: Mapping[str, Loads] = {
     "near constant": Loads(lambda rng, n: 300 + rng.normal(0, 0.01, n), 300.0),
     "uniform": Loads(lambda rng, n: rng.uniform(10, 200, n), 105.0),
     "exponential": Loads(lambda rng, n: rng.exponential(300, n), 300.0),
-    "half at 1500": Loads(_split(0.5), 0.5 * LIMIT + 0.5 * 275),
+    "half at 1500": Loads(_split(0.5, 500), 0.5 * LIMIT + 0.5 * 275),
 }
 """Loads for which intervals promise to hold."""
-RARE = Loads(_split(0.15), 0.15 * LIMIT + 0.85 * 275)
+RARE = Loads(_split(0.1, 200), 0.1 * LIMIT + 0.9 * 125)
 """Successes of which few are far better: what was not seen is in no interval."""
 
 SIZES = (8, 16, 32, 64, 256)

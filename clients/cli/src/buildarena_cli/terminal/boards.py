@@ -109,6 +109,7 @@ def task_table(task: Mapping[str, Any]) -> None:
         notes=[
             "* baseline; # is shared by statistically tied models",
             "95 % is the exact interval of the success rate, and the one of the mean indicator",
+            "too few: no interval of the mean indicator holds with fewer than 5 successes",
             *_remarks(task["rows"]),
             *_imports(task["rows"]),
         ],
@@ -311,12 +312,10 @@ def _marked(rows: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _remarks(rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """What is shown of flags and of few data, where there are some."""
+    """What is shown of flags, where there are some."""
     found = []
     if any(map(_is_censored, rows)):
         found.append("≥ cargos that never fell may weigh more")
-    if any(row.get("too_few_data") for row in rows):
-        found.append("too few: no interval holds with fewer than 5 successes")
     counts = _flags(rows)
     if counts:
         found.append("flags: " + ", ".join(f"{n} {flag}" for flag, n in sorted(counts.items())))

@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
+MAX_TABLE: Final = 500_000
+"""Trials of pairs that are worked on at once: enough to be fast, and a few megabytes."""
 MAX_STEPS: Final = 60
 """Newton's steps at most; ten are usual."""
 PRECISE: Final = 1e-9
@@ -57,11 +59,22 @@ def pair_tests(pairs: Sequence[tuple[Floats, Floats]]) -> PairTests:
         J. Robinson, J. R. Stat. Soc. B 44 (1982) 91; I. M. Skovgaard, J. Appl. Probab. 24 (1987)
         875; B. L. Welch, Biometrika 34 (1947) 28.
     """
-    from scipy.special import ndtr, ndtri
-
     if not pairs:
         nothing = np.zeros(0)
         return PairTests(z=nothing, p_value=nothing, informative=nothing.astype(bool))
+    longest = max(len(first) + len(second) for first, second in pairs)
+    step = max(1, MAX_TABLE // longest)
+    found = [_tested(pairs[start : start + step]) for start in range(0, len(pairs), step)]
+    return PairTests(
+        z=np.concatenate([tests.z for tests in found]),
+        p_value=np.concatenate([tests.p_value for tests in found]),
+        informative=np.concatenate([tests.informative for tests in found]),
+    )
+
+
+def _tested(pairs: Sequence[tuple[Floats, Floats]]) -> PairTests:
+    from scipy.special import ndtr, ndtri
+
     table = _Weights.of(pairs)
     total = (table.weight * table.first).sum(axis=1)
     moved = np.maximum(0.0, np.abs(total) - table.gap / 2)
