@@ -20,7 +20,14 @@ from buildarena_cli.machines import (
     shown_errors,
 )
 from buildarena_cli.near import did_you_mean
-from buildarena_cli.terminal.output import columns, emphasised, print_json, print_table, warn
+from buildarena_cli.terminal.output import (
+    columns,
+    emphasised,
+    number,
+    print_json,
+    print_table,
+    warn,
+)
 
 if TYPE_CHECKING:
     from buildarena_benchmark import Score, Task
@@ -131,6 +138,8 @@ def _simulated(machine: Machine, task: Task, engine: str, seed: int | None) -> T
 
 
 def _report(task: Task, result: Score, rollout: Trajectory | None) -> dict[str, Any]:
+    from buildarena_benchmark.flags import is_censored
+
     return {
         "task": task.name,
         "task_version": task.version,
@@ -141,6 +150,7 @@ def _report(task: Task, result: Score, rollout: Trajectory | None) -> dict[str, 
         "indicator": result.indicator,
         "indicator_name": task.indicator.name,
         "indicator_unit": task.indicator.unit,
+        "censored": is_censored(result.flags),
         "flags": list(result.flags),
         "metrics": dict(result.metrics),
         "breaks": [
@@ -152,11 +162,16 @@ def _report(task: Task, result: Score, rollout: Trajectory | None) -> dict[str, 
 
 def _print_score(task: Task, result: Score, rollout: Trajectory | None) -> None:
     engine = f" on {rollout.engine} {rollout.engine_version}" if rollout else ""
+    from buildarena_benchmark.flags import is_censored, meaning
+
     unit = "" if task.indicator.unit == "1" else f" {task.indicator.unit}"
     rows = [
         ("verdict", "success" if result.success else "failure"),
-        (task.indicator.name, f"{result.indicator:,.2f}{unit}"),
-        *([("flags", ", ".join(result.flags))] if result.flags else []),
+        (
+            task.indicator.name,
+            number(result.indicator, 2, at_least=is_censored(result.flags)) + unit,
+        ),
+        *(("flag", f"{flag}: {meaning(flag)}") for flag in result.flags),
         *((name, "" if value is None else str(value)) for name, value in result.metrics.items()),
     ]
     print_table(columns("figure", "value"), rows, title=emphasised(f"{task.title}{engine}"))
