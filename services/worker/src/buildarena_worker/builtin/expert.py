@@ -30,7 +30,7 @@ def reply(request: Request) -> Reply:
         "drafter": lambda: Reply(text=_drawing(design, situation)),
         "reviewer": lambda: Reply(text=DONE),
         "guidance": lambda: _guide(design, situation),
-        "builder": lambda: _act(_script(design, situation), situation.own_actions),
+        "builder": lambda: _build(design, situation, request),
         "engineer": lambda: _act(_whole_script(design), situation.own_actions),
         "controller": lambda: Reply(text=json.dumps(design.control)),
     }
@@ -77,9 +77,17 @@ def _drawing(design: Design, situation: Situation) -> str:
     return f"Drawing of {situation.part}, in building order:\n{steps}"
 
 
+def _build(design: Design, situation: Situation, request: Request) -> Reply:
+    if not situation.own_turns and not situation.refining:
+        names = ", ".join(tool.name for tool in request.tools)
+        return Reply(text=f"My tools: {names}. Tell me blocks by number and faces by letter.")
+    return _act(_script(design, situation), situation.own_actions)
+
+
 def _guide(design: Design, situation: Situation) -> Reply:
     script = _script(design, situation)
-    done = situation.builder_turns
+    # The builder's first reply only tells its tools.
+    done = situation.builder_turns - 1
     if done >= len(script):
         return Reply(text=DONE)
     return Reply(text=f"Step {done + 1} of {len(script)}: {_rendered(script[done])}")

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 from buildarena_pipeline.transcript import ActionResult
 from buildarena_worker.session.messages import Message, Reply, Tool, ToolCall
-from buildarena_worker.session.results import ConstructionFailedError
+from buildarena_worker.session.results import ObjectionError
 from buildarena_worker.session.session import Session
 
-TERMINATE = re.compile(r"\bTERMINATE\b")
+_LAST_LINE = re.compile(r"(?:^|\n)[\s*_`'\"#]*TERMINATE[\s*_`'\".!]*\Z")
 NO_REPLY = "(no answer)"
 OBJECTION = Tool(
     name="raise_objection",
@@ -31,6 +31,14 @@ OBJECTION = Tool(
 Act = Callable[[ToolCall], ActionResult]
 
 
+def terminates(reply: Reply) -> bool:
+    """Whether a reply ends its stage: TERMINATE stands alone on its last line, without a call.
+
+    A role that speaks of the word, or says when it will say it, does not end anything.
+    """
+    return not reply.calls and _LAST_LINE.search(reply.text) is not None
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Role:
     """Somebody who speaks in a dialogue.
@@ -40,12 +48,14 @@ class Role:
         system: Its system message.
         tools: Tools it may use.
         act: Carries out its tool calls.
+        brief: What it reads first, in place of the dialogue's opening.
     """
 
     name: str
     system: str
     tools: Sequence[Tool] = ()
     act: Act | None = None
+    brief: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,8 +65,19 @@ class _Utterance:
     actions: Sequence[ActionResult]
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Remark:
+    """Something the session says to one role."""
+
+    to: str
+    text: str
+
+
 class Dialogue:
     """A thread that roles add to.
+
+    What was said is never taken back: a role's view only grows, so that providers can cache it, and
+    its replies always alternate with what it reads, as strict chat templates demand.
 
     Args:
         session: The session it is part of.
@@ -72,20 +93,20 @@ class Dialogue:
         self._phase = phase
         self._opening = opening
         self._sub_structure = sub_structure
-        self._thread: list[_Utterance] = []
+        self._thread: list[_Utterance | _Remark] = []
 
-    def turn(self, role: Role, *, extra: str = "") -> Reply:
+    def remark(self, role: Role, text: str) -> None:
+        """Says something to one role; it stays in what that role reads."""
+        self._thread.append(_Remark(to=role.name, text=text))
+
+    def turn(self, role: Role) -> Reply:
         """Lets a role speak and carries out the tool it calls.
 
-        Args:
-            role: Who speaks.
-            extra: Something that only this role reads, and only now.
-
         Raises:
-            ConstructionFailedError: The role raised an objection.
+            ObjectionError: The role raised an objection.
         """
         reply, entry = self._session.ask(
-            self._view(role, extra), role.tools, phase=self._phase, role=role.name
+            self._view(role), role.tools, phase=self._phase, role=role.name
         )
         actions = _carry_out(role, reply)
         self._thread.append(_Utterance(role=role.name, reply=reply, actions=actions))
@@ -99,21 +120,25 @@ class Dialogue:
         )
         for action in actions:
             if action.name == OBJECTION.name and action.ok:
-                raise ConstructionFailedError("objection", f"{role.name}: {action.feedback}")
+                raise ObjectionError("objection", f"{role.name}: {action.feedback}")
         return reply
 
-    def _view(self, role: Role, extra: str) -> list[Message]:
+    def _view(self, role: Role) -> list[Message]:
         messages = [Message(role="system", text=role.system)]
-        received = [self._opening]
-        for utterance in self._thread:
-            if utterance.role == role.name:
+        received = [role.brief or self._opening]
+        for said in self._thread:
+            if isinstance(said, _Remark):
+                received += [said.text] if said.to == role.name else []
+            elif said.role == role.name:
+                if not received and messages[-1].role == "assistant":
+                    received = [self._session.pack.say("go_on")]
                 messages += _joined(received)
-                messages += _own(utterance)
+                messages += _own(said)
                 received = []
             else:
-                received.append(_rendered(utterance))
-        if extra:
-            received.append(extra)
+                received.append(_rendered(said))
+        if not received and messages[-1].role == "assistant":
+            received = [self._session.pack.say("go_on")]
         return messages + _joined(received)
 
 
@@ -134,11 +159,15 @@ def _own(utterance: _Utterance) -> list[Message]:
 
 def _rendered(utterance: _Utterance) -> str:
     parts = [utterance.reply.text] if utterance.reply.text else []
-    parts += [
-        f"{action.name}({_rendered_arguments(action.arguments)}): {action.feedback}"
-        for action in utterance.actions
-    ]
+    parts += [_rendered_action(action) for action in utterance.actions]
     return f"[{utterance.role}] " + ("\n".join(parts) or NO_REPLY)
+
+
+def _rendered_action(action: ActionResult) -> str:
+    """An answer tells what was done; what was refused is told with the call."""
+    if action.ok:
+        return action.feedback
+    return f"{action.name}({_rendered_arguments(action.arguments)}): {action.feedback}"
 
 
 def _rendered_arguments(arguments: object) -> str:

@@ -116,7 +116,15 @@ class ConstructionFailedError(SessionEnded):
     Args:
         reason: Class of the failure, for example ``turn_limit``.
         detail: A sentence for people.
+
+    Attributes:
+        reason: As given.
     """
 
     def __init__(self, reason: str, detail: str) -> None:
         super().__init__(Failed(reason=reason, detail=detail))
+        self.reason = reason
+
+
+class ObjectionError(ConstructionFailedError):
+    """What a dialogue raises when a role objects: the work cannot be done."""

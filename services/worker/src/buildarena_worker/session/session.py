@@ -32,6 +32,7 @@ class Session:
     Attributes:
         additions: What follows the task's statement: an example, results of rounds.
         machine: What is being built.
+        plan: What the plan says of the whole machine, "" without one.
     """
 
     def __init__(
@@ -50,6 +51,7 @@ class Session:
         self.transcript = Transcript()
         self.additions: list[str] = []
         self.machine: Machine | None = None
+        self.plan = ""
         self._model_config = model_config
 
     @property
@@ -110,6 +112,10 @@ class Session:
                 tries=entry.tries,
             )
         )
+
+    def breaks_rules(self, machine: Machine) -> bool:
+        """Whether a machine breaks one of the task's constraints."""
+        return broken_constraint(self.task, machine) is not None
 
     def check_machine(self, machine: Machine) -> None:
         """Compares a finished machine with the task's constraints.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -16,6 +17,10 @@ from buildarena_worker.session.session import Session
 
 ATTEMPTS = 3
 """Attempts of a transport session; the best counts. Source: the paper's task details."""
+PROGRAM_TURNS = 5
+"""Answers the controller may need for one attempt; an unreadable one costs a turn, not a trial."""
+STILL = 0.02
+"""Closer than this to where it ends, it has stopped, units."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,41 +53,83 @@ def drive(session: Session, machine: Machine, *, final: bool) -> RolloutRecord:
         "control",
         task=task.name,
         statement=session.statement,
-        summary=machine.act("get_machine_summary", {}).text,
-        powered=machine.act("review_powered_blocks", {}).text,
+        plan=session.plan or pack.say("no_plan"),
+        machine=_unpowered(machine),
+        powered=_powered(machine),
     )
     dialogue = Dialogue(session, phase="control", opening=opening)
     controller = Role(name="controller", system=pack.roles["controller"])
     records: list[RolloutRecord] = []
-    extra, problem = "", ""
     for attempt in range(1, ATTEMPTS + 1):
-        text = dialogue.turn(controller, extra=extra).text
         try:
-            program = _read_program(machine, text)
+            program = _program(dialogue, controller, machine, session)
         except _ProgramError as error:
-            problem = result = str(error)
-            trajectory = "(not simulated)"
-        else:
-            session.machine = program.machine
-            record = session.host.simulate(
-                program.machine, program.presses, final=final and attempt == ATTEMPTS
+            if not records:
+                raise ConstructionFailedError("control_invalid", str(error)) from error
+            break
+        session.machine = program.machine
+        last = attempt == ATTEMPTS
+        record = session.host.simulate(program.machine, program.presses, final=final and last)
+        records.append(record)
+        if not last:
+            again = pack.say(
+                "control_again",
+                trial=str(attempt),
+                trials=str(ATTEMPTS),
+                trajectory=rendered_trace(record.trace or ()),
+                result=_result(session, record),
             )
-            records.append(record)
-            trajectory = _rendered(record.trace or ())
-            result = (
-                f"{'success' if record.success else 'no success'}, "
-                f"{task.indicator.name} {record.indicator:.2f} {task.indicator.unit}"
-            )
-        extra = pack.say(
-            "control_again",
-            trial=str(attempt),
-            trials=str(ATTEMPTS),
-            trajectory=trajectory,
-            result=result,
-        )
-    if not records:
-        raise ConstructionFailedError("control_invalid", problem)
+            dialogue.remark(controller, again)
     return best_rollout(records)
+
+
+def _program(dialogue: Dialogue, controller: Role, machine: Machine, session: Session) -> _Program:
+    """The controller's next program that can be used.
+
+    Raises:
+        _ProgramError: None within the turns; what is wrong with the last one.
+    """
+    error = _ProgramError("nothing was said")
+    for _ in range(PROGRAM_TURNS):
+        text = dialogue.turn(controller).text
+        try:
+            return _read_program(machine, text)
+        except _ProgramError as found:
+            error = found
+            dialogue.remark(controller, session.pack.say("program_again", error=str(error)))
+    raise error
+
+
+def _result(session: Session, record: RolloutRecord) -> str:
+    indicator = session.task.indicator
+    verdict = "success" if record.success else "no success"
+    flags = f"; {', '.join(record.flags)}" if record.flags else ""
+    return f"{verdict}, {indicator.name} {record.indicator or 0.0:.2f} {indicator.unit}{flags}"
+
+
+def _unpowered(machine: Machine) -> str:
+    """The machine's summary without the lines of blocks that keys move."""
+    text = machine.act("get_machine_summary", {}).text
+    powered = {f"{block.id} " for block in machine.blocks.values() if block.module.actions}
+    return "\n".join(line for line in text.splitlines() if not line.startswith(tuple(powered)))
+
+
+def _powered(machine: Machine) -> str:
+    """Each block that keys can move, with its actions and their keys."""
+    lines = machine.act("review_powered_blocks", {}).text.splitlines()
+    blocks = {block.id: block for block in machine.blocks.values() if block.module.actions}
+    told = []
+    for line in lines:
+        block = blocks.get(line.split(" ", 1)[0])
+        if block is None:
+            told.append(line)
+            continue
+        actions = (
+            f"{action} ({', '.join(block.bindings.get(action, ())) or 'no key'})"
+            for action in block.module.actions
+        )
+        told.append(f"{line}; actions: {', '.join(actions)}")
+    return "\n".join(told)
 
 
 def _read_program(machine: Machine, text: str) -> _Program:
@@ -92,15 +139,11 @@ def _read_program(machine: Machine, text: str) -> _Program:
     if not isinstance(bindings, list) or not bindings:
         raise _ProgramError("control_config must be a list with at least one entry")
     for index, entry in enumerate(bindings):
-        keys = entry.get("keys") if isinstance(entry, dict) else None
-        if not isinstance(keys, list) or not keys:
+        block, action, keys = _binding(entry)
+        if not keys:
             raise _ProgramError(f"control_config[{index}] needs block, action and keys")
         for key in keys:
-            arguments = {
-                "block_id": entry.get("block"),
-                "action": entry.get("action"),
-                "new_key": key,
-            }
+            arguments = {"block_id": block, "action": action, "new_key": key}
             outcome = driven.act("add_control_key", arguments)
             if not outcome.ok:
                 raise _ProgramError(f"control_config[{index}]: {outcome.text}")
@@ -108,14 +151,42 @@ def _read_program(machine: Machine, text: str) -> _Program:
     if not isinstance(presses, list) or not presses:
         raise _ProgramError("control_sequence must be a list with at least one entry")
     for index, press in enumerate(presses):
-        outcome = driven.act("add_control_sequence", press)
+        outcome = driven.act("add_control_sequence", _press(press))
         if not outcome.ok:
             raise _ProgramError(f"control_sequence[{index}]: {outcome.text}")
     return _Program(machine=driven, presses=driven.control_sequence)
 
 
-def _rendered(trace: Sequence[Sequence[float]]) -> str:
-    return "\n".join(", ".join(f"{value:.2f}" for value in row) for row in trace) or "(none)"
+def _binding(entry: object) -> tuple[object, object, list[object]]:
+    """Block, action and keys of an entry; the published form has block_id and a single key."""
+    if not isinstance(entry, dict):
+        return None, None, []
+    block = entry.get("block", entry.get("block_id"))
+    keys = entry.get("keys", entry.get("key"))
+    keys = keys if isinstance(keys, list) else [] if keys is None else [keys]
+    return block if block is None else str(block), entry.get("action"), keys
+
+
+def _press(press: object) -> object:
+    """A key press without the words the published form puts beside it."""
+    if not isinstance(press, dict):
+        return press
+    return {name: value for name, value in press.items() if name != "motion_action"}
+
+
+def rendered_trace(trace: Sequence[Sequence[float]]) -> str:
+    """Rows of time and position; where nothing moves any more, one line says so.
+
+    Args:
+        trace: Rows of time, seconds, and x, y, z, units.
+    """
+    moving = len(trace)
+    while moving > 1 and math.dist(trace[moving - 2][1:], trace[-1][1:]) < STILL:
+        moving -= 1
+    rows = [", ".join(f"{value:.2f}" for value in row) for row in trace[:moving]]
+    if moving < len(trace):
+        rows.append(f"It stays there until {trace[-1][0]:g} s.")
+    return "\n".join(rows) or "(none)"
 
 
 def _json_object(text: str) -> dict[str, Any]:

@@ -30,8 +30,7 @@ class FiveRole:
             blueprint = draft_phase(session, plan, part)
             machine = build_phase(session, part, blueprint)
             require_started(machine)
-            refine_phase(session, machine, part, blueprint)
-            machines[part.name] = machine
+            machines[part.name] = refine_phase(session, machine, part, blueprint)
         if len(machines) == 1:
             return next(iter(machines.values()))
         return assemble_phase(session, plan, machines)

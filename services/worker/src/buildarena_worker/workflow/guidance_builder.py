@@ -17,10 +17,9 @@ class GuidanceBuilder:
 
     def build(self, session: Session) -> Machine:
         """Builds the machine of the session's task as one structure."""
-        task = session.task
-        brief = f"{session.statement}\n\nModules\n\n{modules_text(task.constraints.modules)}"
+        brief = session.pack.say("no_drawing", statement=session.statement)
         part = SubStructure(name="machine", text=brief)
-        machine = build_phase(session, part, brief)
+        modules = modules_text(session.task.constraints.modules)
+        machine = build_phase(session, part, brief, modules=modules)
         require_started(machine)
-        refine_phase(session, machine, part, brief)
-        return machine
+        return refine_phase(session, machine, part, brief)

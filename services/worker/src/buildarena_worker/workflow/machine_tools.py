@@ -81,3 +81,37 @@ def modules_text(names: Sequence[str] | None = None) -> str:
         facts = f"{size}, mass {module.mass:g}"
         lines.append(f"- {module.name} ({facts}): {module.description}")
     return "\n".join(lines)
+
+
+def parts_text(names: Sequence[str] | None = None) -> str:
+    """The module list in short: sizes, masses, and which way each acts; the start included.
+
+    Args:
+        names: Only these modules and the start; all that can be built by default.
+    """
+    lines = []
+    for module in load_catalogue().values():
+        chosen = names is None or module.name in names or module.kind == "start"
+        if module.kind == "cargo" or not chosen:
+            continue
+        size = "connector" if module.size is None else " x ".join(f"{e:g}" for e in module.size)
+        actions = f", does {', '.join(module.actions)}" if module.actions else ""
+        lines.append(f"- {module.name}: {size}, mass {module.mass:g}{actions}")
+    return "\n".join(lines)
+
+
+def connectors_of(names: Sequence[str] | None = None) -> list[str]:
+    """Names of the connectors among some modules, or of all."""
+    return [
+        module.name
+        for module in load_catalogue().values()
+        if module.size is None and (names is None or module.name in names)
+    ]
+
+
+def tools_text(names: Sequence[str]) -> str:
+    """Tools and their limits for somebody who does not hold them, one line each."""
+    return "\n".join(
+        f"- {tool.name}({', '.join(tool.parameters['properties'])}): {tool.description}"
+        for tool in tools_named(names)
+    )

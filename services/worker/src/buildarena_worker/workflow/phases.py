@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from buildarena_geometry import Machine
-from buildarena_worker.session.dialogue import OBJECTION, TERMINATE, Dialogue, Role
+from buildarena_worker.session.dialogue import OBJECTION, Dialogue, Role, terminates
 from buildarena_worker.session.results import ConstructionFailedError
 from buildarena_worker.session.session import Session
 from buildarena_worker.workflow.machine_tools import (
@@ -13,11 +13,16 @@ from buildarena_worker.workflow.machine_tools import (
     BUILD,
     REFINE,
     acting_on,
+    connectors_of,
     modules_text,
+    parts_text,
     tools_named,
+    tools_text,
 )
 from buildarena_worker.workflow.plan import Plan, PlanError, SubStructure, read_plan
 
+PLAN_TURNS = 5
+"""Answers the planner may need until its plan can be read; one costs a turn, not the trial."""
 DRAFT_TURNS = 50
 BUILD_TURNS = 300
 """Replies a phase may take. Source: the paper's workflow appendix."""
@@ -26,10 +31,10 @@ SHOWN = 200
 
 
 def plan_phase(session: Session) -> Plan:
-    """Lets the planner write a plan, with a second attempt when it can't be read.
+    """Lets the planner write a plan, again while it can't be read or the task does not allow it.
 
     Raises:
-        ConstructionFailedError: No readable plan, or one with too many sub-structures.
+        ConstructionFailedError: No usable plan within the turns.
     """
     pack, task = session.pack, session.task
     opening = pack.say(
@@ -40,20 +45,24 @@ def plan_phase(session: Session) -> Plan:
     )
     dialogue = Dialogue(session, phase="plan", opening=opening)
     planner = Role(name="planner", system=pack.roles["planner"])
-    extra = ""
-    for last in (False, True):
-        text = dialogue.turn(planner, extra=extra).text
+    error = PlanError("nothing was said")
+    for _ in range(PLAN_TURNS):
+        text = dialogue.turn(planner).text
         try:
             plan = read_plan(text)
-        except PlanError as error:
-            if last:
-                detail = f"{error}; the planner said {text[:SHOWN]!r}"
-                raise ConstructionFailedError("plan_unreadable", detail) from error
-            extra = pack.say("plan_again", error=str(error))
-        else:
             _check_plan(session, plan)
+        except PlanError as found:
+            error = found
+            dialogue.remark(planner, pack.say("plan_again", error=str(error)))
+        else:
+            session.plan = plan.text
             return plan
-    raise AssertionError("the second attempt returns or raises")
+    reason = "constraint_violated" if isinstance(error, _PlanNotAllowedError) else "plan_unreadable"
+    raise ConstructionFailedError(reason, f"{error}; the planner said {text[:SHOWN]!r}")
+
+
+class _PlanNotAllowedError(PlanError):
+    """A plan that can be read and that the task does not allow."""
 
 
 def _check_plan(session: Session, plan: Plan) -> None:
@@ -62,9 +71,8 @@ def _check_plan(session: Session, plan: Plan) -> None:
     fewest, most = limits.min_sub_structures, limits.max_sub_structures
     if not fewest <= count <= most:
         allowed = str(most) if fewest == most else f"{fewest} to {most}"
-        raise ConstructionFailedError(
-            "constraint_violated",
-            f"the plan has {count} sub-structures, the task allows {allowed}",
+        raise _PlanNotAllowedError(
+            f"the plan has {count} sub-structures, the task allows {allowed}"
         )
 
 
@@ -80,7 +88,7 @@ def draft_phase(session: Session, plan: Plan, part: SubStructure) -> str:
         task=task.name,
         statement=session.statement,
         modules=modules_text(task.constraints.modules),
-        overall=plan.overall,
+        plan=plan.text,
         name=part.name,
         sub_structure=part.text,
     )
@@ -90,57 +98,106 @@ def draft_phase(session: Session, plan: Plan, part: SubStructure) -> str:
     for turn in range(DRAFT_TURNS):
         if turn % 2 == 0:
             dialogue.turn(drafter)
-        elif TERMINATE.search(dialogue.turn(reviewer).text):
-            return dialogue.turn(drafter, extra=pack.say("blueprint", name=part.name)).text
+        elif terminates(dialogue.turn(reviewer)):
+            dialogue.remark(drafter, pack.say("blueprint", name=part.name))
+            return dialogue.turn(drafter).text
     raise ConstructionFailedError(
         "turn_limit", f"no agreed drawing of {part.name} within {DRAFT_TURNS} turns"
     )
 
 
-def build_phase(session: Session, part: SubStructure, blueprint: str) -> Machine:
+def build_phase(
+    session: Session, part: SubStructure, blueprint: str, *, modules: str | None = None
+) -> Machine:
     """Lets builder and guidance alternate, the builder first, until guidance ends it.
+
+    Args:
+        session: The session.
+        part: What is built.
+        blueprint: What guidance works from.
+        modules: The module list that guidance reads; in short if there is a drawing.
 
     Raises:
         ConstructionFailedError: An objection, or the turn limit.
     """
     machine = Machine()
     session.machine = machine
-    opening = session.pack.say("build", task=session.task.name, name=part.name, blueprint=blueprint)
+    pack, task = session.pack, session.task
+    opening = pack.say("build", task=task.name, name=part.name)
+    brief = pack.say(
+        "guide_build",
+        task=task.name,
+        name=part.name,
+        blueprint=blueprint,
+        modules=modules or parts_text(task.constraints.modules),
+        tools=tools_text(BUILD),
+    )
     dialogue = Dialogue(session, phase="build", opening=opening, sub_structure=part.name)
-    builder, guidance = _builder(session, machine, BUILD), _guidance(session)
+    builder, guidance = _builder(session, machine, BUILD), _guidance(session, brief)
     _alternate(dialogue, (builder, guidance), ends=guidance, what=f"building {part.name}")
     return machine
 
 
-def refine_phase(session: Session, machine: Machine, part: SubStructure, blueprint: str) -> None:
-    """Lets guidance and builder correct powered parts, when the machine has wheels."""
+def refine_phase(session: Session, machine: Machine, part: SubStructure, blueprint: str) -> Machine:
+    """Lets guidance and builder correct powered parts, when the machine has wheels.
+
+    They work on a copy: a machine that is finished is not lost to an objection, to the turn limit,
+    or to a correction that the task's rules do not allow.
+
+    Returns:
+        The machine as it is to be used.
+    """
     if not any(block.module.spins for block in machine.blocks.values()):
-        return
-    opening = session.pack.say(
-        "refine",
-        task=session.task.name,
+        return machine
+    pack, task = session.pack, session.task
+    refined = machine.copy()
+    summary = machine.act("get_machine_summary", {}).text
+    opening = pack.say("refine", task=task.name, name=part.name, summary=summary)
+    brief = pack.say(
+        "guide_refine",
+        task=task.name,
         name=part.name,
         blueprint=blueprint,
-        summary=machine.act("get_machine_summary", {}).text,
+        summary=summary,
+        modules=parts_text(task.constraints.modules),
+        tools=tools_text(REFINE),
     )
     dialogue = Dialogue(session, phase="refine", opening=opening, sub_structure=part.name)
-    builder, guidance = _builder(session, machine, REFINE), _guidance(session)
-    _alternate(dialogue, (guidance, builder), ends=guidance, what=f"refining {part.name}")
+    builder, guidance = _builder(session, refined, REFINE), _guidance(session, brief)
+    try:
+        _alternate(dialogue, (guidance, builder), ends=guidance, what=f"refining {part.name}")
+    except ConstructionFailedError as failure:
+        if failure.reason not in {"objection", "turn_limit"}:
+            raise
+        return machine
+    if session.breaks_rules(refined) and not session.breaks_rules(machine):
+        return machine
+    session.machine = refined
+    return refined
 
 
 def assemble_phase(session: Session, plan: Plan, machines: Mapping[str, Machine]) -> Machine:
     """Lets builder and guidance put the sub-structures together."""
     assembly = Machine(available=machines)
     session.machine = assembly
+    pack, task = session.pack, session.task
     parts = "\n\n".join(
         f"### {name}\n\n{machine.act('get_machine_summary', {}).text}"
         for name, machine in machines.items()
     )
-    opening = session.pack.say(
-        "assemble", task=session.task.name, overall=plan.overall, sub_structures=parts
+    connectors = ", ".join(connectors_of(task.constraints.modules))
+    opening = pack.say("assemble", task=task.name, parts=", ".join(machines), connectors=connectors)
+    brief = pack.say(
+        "guide_assemble",
+        task=task.name,
+        statement=session.statement,
+        plan=plan.text,
+        sub_structures=parts,
+        connectors=connectors,
+        tools=tools_text(ASSEMBLE),
     )
     dialogue = Dialogue(session, phase="assemble", opening=opening)
-    builder, guidance = _builder(session, assembly, ASSEMBLE), _guidance(session)
+    builder, guidance = _builder(session, assembly, ASSEMBLE), _guidance(session, brief)
     _alternate(dialogue, (builder, guidance), ends=guidance, what="assembling")
     return assembly
 
@@ -176,14 +233,15 @@ def _builder(session: Session, machine: Machine, names: Sequence[str]) -> Role:
     )
 
 
-def _guidance(session: Session) -> Role:
-    return Role(name="guidance", system=session.pack.roles["guidance"], tools=[OBJECTION])
+def _guidance(session: Session, brief: str) -> Role:
+    system = session.pack.roles["guidance"]
+    return Role(name="guidance", system=system, tools=[OBJECTION], brief=brief)
 
 
 def _alternate(dialogue: Dialogue, roles: Sequence[Role], *, ends: Role, what: str) -> None:
     for turn in range(BUILD_TURNS):
         role = roles[turn % len(roles)]
         reply = dialogue.turn(role)
-        if role is ends and not reply.calls and TERMINATE.search(reply.text):
+        if role is ends and terminates(reply):
             return
     raise ConstructionFailedError("turn_limit", f"{what} took more than {BUILD_TURNS} turns")

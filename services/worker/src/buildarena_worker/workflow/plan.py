@@ -35,10 +35,25 @@ class SubStructure:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Plan:
-    """What is to be built."""
+    """What is to be built.
+
+    Attributes:
+        overall: What the whole is and how it meets the task.
+        assembly: How its sub-structures come together; "" if the plan does not say.
+        motion_control: What moves it and how; "" if the plan does not say.
+        sub_structures: Its parts, in building order.
+    """
 
     overall: str
+    assembly: str
+    motion_control: str
     sub_structures: Sequence[SubStructure]
+
+    @property
+    def text(self) -> str:
+        """What the plan says of the whole, for whoever works from it."""
+        further = (("Assembly", self.assembly), ("Motion control", self.motion_control))
+        return "\n".join([self.overall, *(f"{name}: {text}" for name, text in further if text)])
 
 
 def read_plan(text: str) -> Plan:
@@ -50,12 +65,13 @@ def read_plan(text: str) -> Plan:
     body = _last(text, "building_plan")
     if body is None:
         raise PlanError("there is no <building_plan> … </building_plan>")
-    blocks = _all(body, "sub_structure")
+    blocks = _all(body, "sub_structure") or _numbered(body)
     if not blocks:
         raise PlanError("there is no <sub_structure> … </sub_structure> in it")
     overall = _last(body, "overall_structure")
     if overall is None:
         raise PlanError("there is no <overall_structure> … </overall_structure> in it")
+    whole = _outside(body, blocks)
     found = []
     for number, block in enumerate(blocks, start=1):
         name = _last(block, "name")
@@ -70,7 +86,34 @@ def read_plan(text: str) -> Plan:
     twice = sorted(name for name, times in names.items() if times > 1)
     if twice:
         raise PlanError(f"the name {twice[0]!r} stands for several sub-structures")
-    return Plan(overall=overall, sub_structures=tuple(found))
+    return Plan(
+        overall=_without_tags(overall),
+        assembly=_last(whole, "assembly") or "",
+        motion_control=_last(whole, "motion_control") or "",
+        sub_structures=tuple(found),
+    )
+
+
+def _numbered(body: str) -> list[str]:
+    """Parts whose tags carry numbers, as in the published form."""
+    found: list[str] = []
+    while blocks := _all(body, f"sub_structure_{len(found) + 1}"):
+        found.append(blocks[-1])
+    return found
+
+
+def _outside(body: str, blocks: Sequence[str]) -> str:
+    """The plan without what its parts say."""
+    for block in blocks:
+        body = body.replace(block, "")
+    return body
+
+
+def _without_tags(overall: str) -> str:
+    """The overall structure; in the published form it has parts of its own."""
+    inner = [_last(overall, part) for part in ("description", "functionality")]
+    told = "\n".join(text for text in inner if text)
+    return told or overall
 
 
 def _last(text: str, tag: str) -> str | None:
