@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import itertools
+
 import pytest
 from scripted import Scripted, call
 
@@ -8,6 +10,7 @@ from buildarena_worker.session.messages import Message, Reply, ToolCall
 from buildarena_worker.session.results import Diverged, Failed, LimitReached, Superseded
 
 START = call("start", init_shift=[0, 0, 0], init_rotation=[0, 0, 0], note="")
+BLOCK = call("attach_block_to", base_block="1", face="A", new_block="Small Wooden Block", note="")
 PLAN = Reply(
     text="""Here you are. <building_plan><overall_structure>a & b < c</overall_structure>
 <sub_structures><sub_structure><name>one</name><description>a block</description></sub_structure>
@@ -107,10 +110,15 @@ def test_an_unreadable_plan_gets_one_more_try(play) -> None:
 def test_too_many_sub_structures_fail_the_plan(play) -> None:
     part = "<sub_structure><name>{}</name><function>x</function></sub_structure>"
     text = PLAN.text.replace("</sub_structures>", part.format("two") + "</sub_structures>")
-    failure = play(client=Scripted(Reply(text=text))).failure
+    failure = play(client=Scripted(last=Reply(text=text))).failure
     assert isinstance(failure, Failed)
     assert failure.reason == "constraint_violated"
     assert "2 sub-structures, the task allows 1" in failure.detail
+    # One such plan, as one that can't be read, costs a turn.
+    model = Scripted(Reply(text=text), Reply(text="no"), Reply(text="no"), PLAN)
+    played = play(client=model)
+    assert [turn.stage for turn in played.session.transcript.turns][:5] == ["plan"] * 4 + ["draft"]
+    assert "2 sub-structures, the task allows 1" in model.requests[1].messages[-1].text
 
 
 @pytest.mark.parametrize("role", ["reviewer", "guidance"])
@@ -183,7 +191,46 @@ def test_roles_see_the_thread_from_their_own_side(play) -> None:
     assert [m.role for m in builder] == ["system", "user", "assistant", "tool", "user"]
     assert builder[-1] == Message(role="user", text="[guidance] Go on.")
     assert [m.role for m in guidance] == ["system", "user"]
-    assert "[builder] start(" in guidance[-1].text
+    assert "[builder] Started. 1 Starting Block" in guidance[-1].text
+    # Guidance works from the drawing; the builder does what guidance says.
+    assert "final" in guidance[-1].text
+    assert all("final" not in m.text for m in builder)
+
+
+@pytest.mark.parametrize(
+    ("text", "ends"),
+    [
+        ("TERMINATE", True),
+        ("All is as drawn.\n\n**TERMINATE**.\n", True),
+        ("When it is done I shall say TERMINATE.", False),
+        ("TERMINATE\nOr rather, one more block.", False),
+        ("Not yet: do not TERMINATE", False),
+    ],
+)
+def test_a_stage_ends_with_the_word_alone_on_the_last_line(play, text, ends) -> None:
+    model = Scripted(START, BLOCK, Reply(text=text), last=Reply(text="TERMINATE"))
+    played = play(workflow="builder", client=model)
+    assert (len(played.entries) == 3) == ends
+
+
+def test_two_replies_of_one_role_are_never_next_to_each_other(play) -> None:
+    model = Scripted(START, Reply(text="Hm."), Reply(text="Hm again."), BLOCK)
+    play(workflow="builder", client=model)
+    for request in model.requests:
+        roles = [m.role for m in request.messages]
+        assert roles[:2] == ["system", "user"]
+        assert all(pair != ("assistant", "assistant") for pair in itertools.pairwise(roles))
+        assert roles[-1] in {"user", "tool"}
+
+
+def test_views_only_grow(play) -> None:
+    model = Scripted(PLAN, Reply(text="drawing"), Reply(text="TERMINATE"), Reply(text="final"))
+    played = play(client=model)
+    seen: dict[tuple[str, str], list[Message]] = {}
+    for turn, request in zip(played.session.transcript.turns, model.requests, strict=False):
+        before = seen.get((turn.stage, turn.role), [])
+        assert list(request.messages[: len(before)]) == before
+        seen[turn.stage, turn.role] = list(request.messages)
 
 
 def test_a_machine_of_one_block_is_no_machine(play) -> None:

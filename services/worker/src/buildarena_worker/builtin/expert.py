@@ -61,7 +61,7 @@ def _script(design: Design, situation: Situation) -> Sequence[Action]:
     part = design.parts.get(situation.part or "")
     if part is None:
         return _whole_script(design)
-    return () if situation.refining else part.actions
+    return part.actions
 
 
 def _whole_script(design: Design) -> Sequence[Action]:
@@ -88,7 +88,7 @@ def _guide(design: Design, situation: Situation) -> Reply:
     script = _script(design, situation)
     # The builder's first reply only tells its tools.
     done = situation.builder_turns - 1
-    if done >= len(script):
+    if situation.refining or done >= len(script):
         return Reply(text=DONE)
     return Reply(text=f"Step {done + 1} of {len(script)}: {_rendered(script[done])}")
 
