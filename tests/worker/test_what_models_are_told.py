@@ -1,0 +1,210 @@
+"""Every request of every workflow: it alternates, and nothing is absent, missing or told twice."""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+
+import pytest
+
+from buildarena_benchmark import builtin_tasks
+from buildarena_geometry import load_catalogue, tool_definitions
+from buildarena_worker.builtin import BuiltinClient
+from buildarena_worker.session.messages import Answer, Request
+from buildarena_worker.workflow.rounds import Loop
+
+TASKS = ("support-1", "support-3", "transport-1", "transport-2", "lift-2", "lift-3")
+WORKFLOWS = ("five-role", "guidance-builder", "builder")
+TOOLS = {tool.name for tool in tool_definitions()} | {"raise_objection"}
+MODULES = [m for m in load_catalogue().values() if m.kind not in {"start", "cargo"}]
+FRAME = "x points east, y north, z up"
+START = "mass 0.25"
+
+FACTS: dict[tuple[str, str], tuple[str, ...]] = {
+    ("plan", "planner"): (FRAME, START, "middle of a free face", "<motion_control>"),
+    ("draft", "drafter"): (FRAME, START, "You may move blocks to make the plan fit", "side"),
+    ("draft", "reviewer"): (FRAME, START, "half the sum of their sizes", "block by block"),
+    ("build", "guidance"): (
+        FRAME,
+        START,
+        "twist_block",
+        "clockwise seen from outside",
+        "shift_block",
+        "0.5",
+        "flip_spin",
+        "remove_block",
+        "reset",
+        "get_machine_summary",
+        "get_block_details",
+    ),
+    ("build", "builder"): (FRAME, "state in a few lines what each of your tools does"),
+    ("build", "engineer"): (FRAME, START, "`start`"),
+    ("refine", "guidance"): (FRAME, "twist_block", "shift_block", "flip_spin"),
+    ("assemble", "guidance"): (FRAME, "Brace", "Winch", "add_machine", "several times"),
+    ("assemble", "builder"): (FRAME, "Brace", "several times"),
+    ("control", "controller"): ("UpArrow", "spinning_forward", "## Plan", "no key"),
+}
+"""What a role must be able to read, by phase and role."""
+
+
+class Recording:
+    """The expert, with every request kept."""
+
+    def __init__(self) -> None:
+        self._expert = BuiltinClient("expert")
+        self.requests: list[Request] = []
+
+    def complete(self, request: Request, patience: object = None) -> Answer:
+        del patience
+        self.requests.append(request)
+        return self._expert.complete(request)
+
+
+@pytest.fixture(scope="module")
+def played_requests() -> Callable[..., list[tuple[str, str, Request]]]:
+    known: dict[tuple[str, str], list[tuple[str, str, Request]]] = {}
+
+    def of(play, task: str, workflow: str) -> list[tuple[str, str, Request]]:
+        if (task, workflow) not in known:
+            model = Recording()
+            played = play(task=task, workflow=workflow, client=model, loop=Loop(one_shot=True))
+            turns = played.session.transcript.turns
+            known[task, workflow] = [
+                (turn.stage, _role(request), request)
+                for turn, request in zip(turns, model.requests, strict=True)
+            ]
+        return known[task, workflow]
+
+    return of
+
+
+def _role(request: Request) -> str:
+    return request.messages[0].text.splitlines()[0].removeprefix("# Role: ")
+
+
+def _told(request: Request) -> Iterator[str]:
+    """What the session itself says in a request: not what roles said, nor what tools answered."""
+    for message in request.messages:
+        if message.role in {"system", "user"}:
+            for paragraph in message.text.split("\n\n"):
+                # What a role said or drew stands in brackets or under its own heading.
+                if not paragraph.startswith(("[", "Drawing of ")):
+                    yield paragraph
+
+
+def all_requests(play, played_requests) -> Iterator[tuple[str, tuple[str, str], Request]]:
+    for task, workflow in itertools.product(TASKS, WORKFLOWS):
+        for stage, role, request in played_requests(play, task, workflow):
+            yield task, (stage, role), request
+
+
+def test_replies_alternate_with_what_is_read(play, played_requests) -> None:
+    for _, where, request in all_requests(play, played_requests):
+        roles = [message.role for message in request.messages]
+        assert roles[:2] == ["system", "user"], where
+        assert roles.count("system") == 1
+        assert roles[-1] in {"user", "tool"}
+        for before, after in itertools.pairwise(roles):
+            assert (before, after) not in {
+                ("assistant", "assistant"),
+                ("user", "user"),
+                ("user", "tool"),
+            }, where
+
+
+def test_nobody_is_told_of_tools_that_are_not_there(play, played_requests) -> None:
+    for _, where, request in all_requests(play, played_requests):
+        text = "\n".join(_told(request))
+        there = {tool.name for tool in request.tools}
+        if where[1] == "guidance":  # the builder's tools, told as such
+            listed = text.partition("## The builder's tools")[2]
+            there |= set(re.findall(r"^- (\w+)\(", listed, re.MULTILINE))
+        named = {name for name in TOOLS if f"`{name}`" in text or ("_" in name and name in text)}
+        example = "## Example" in text  # a construction as the actions that built it
+        assert example or named <= there, (where, named - there)
+
+
+def test_nobody_is_told_of_modules_that_the_task_does_not_allow(play) -> None:
+    task = builtin_tasks()["support-1"]
+    constraints = task.constraints.model_copy(update={"modules": ("Small Wooden Block", "Brace")})
+    object.__setattr__(task, "constraints", constraints)
+    try:
+        for workflow in WORKFLOWS:
+            model = Recording()
+            play(task=task, workflow=workflow, client=model)
+            for request in model.requests:
+                text = "\n".join(_told(request)).lower()
+                for name in ("powered wheel", "winch"):
+                    assert name not in text, (workflow, _role(request))
+    finally:
+        object.__setattr__(task, "constraints", constraints.model_copy(update={"modules": None}))
+
+
+def test_each_role_is_told_what_its_work_needs(play, played_requests) -> None:
+    seen = set()
+    for task, where, request in all_requests(play, played_requests):
+        text = "\n".join(_told(request))
+        seen.add(where)
+        for fact in FACTS.get(where, ()):
+            assert fact in text, (task, where, fact)
+    # The controller comes after a simulation; it has a test of its own.
+    assert set(FACTS) - seen <= {("control", "controller"), ("refine", "guidance")}
+
+
+def test_whoever_designs_or_guides_knows_every_module(play, played_requests) -> None:
+    for task, where, request in all_requests(play, played_requests):
+        if where[1] in {"planner", "drafter", "reviewer", "engineer"} or where == (
+            "build",
+            "guidance",
+        ):
+            text = "\n".join(_told(request))
+            for module in MODULES:
+                assert re.search(rf"{module.name}.*mass {module.mass:g}", text), (task, where)
+
+
+def test_no_sentence_is_told_twice(play, played_requests) -> None:
+    for task, where, request in all_requests(play, played_requests):
+        sentences = Counter(
+            sentence for paragraph in _told(request) for sentence in _sentences(paragraph)
+        )
+        twice = [sentence for sentence, count in sentences.items() if count > 1]
+        assert not twice, (task, where, twice)
+
+
+def _sentences(paragraph: str) -> Sequence[str]:
+    """Sentences of six words or more; lines of summaries and lists of actions aside."""
+    if re.match(r"^\d+ parts|^\d+[. ]", paragraph):
+        return ()
+    found = re.split(r"(?<=[.;:])\s+|\n", paragraph)
+    return [" ".join(s.split()) for s in found if len(s.split()) > 5 and not s.startswith("- ")]
+
+
+def test_the_controller_keeps_its_past(play, rollout) -> None:
+    model = Recording()
+    records = [rollout(0, success=False, indicator=3.25), rollout(1, success=False, indicator=4.5)]
+    for record in records:
+        object.__setattr__(record, "trace", [[t, min(t, 4.0), 0.0, 1.0] for t in range(31)])
+    played = play(task="transport-1", client=model, rollouts=records)
+    asked = [r for r in model.requests if _role(r) == "controller"]
+    assert played.suspended is not None
+    assert len(asked) == 3
+    first, _, last = (r.messages for r in asked)
+    assert [m.role for m in last] == ["system", "user", *["assistant", "user"] * 2]
+    text = "\n".join(m.text for m in last)
+    assert "3.25" in text
+    assert "4.50" in text
+    # The idle tail of the trajectory is one line.
+    assert "It stays there until 30 s." in text
+    assert "20.00, 4.00" not in text
+    # The plan, and every powered block once, with its actions and keys.
+    opening = first[1].text
+    machine = played.session.machine
+    for block in machine.blocks.values():
+        lines = [line for line in opening.splitlines() if line.startswith(f"{block.id} ")]
+        assert len(lines) == 1, block.id
+        if block.module.actions:
+            assert all(action in lines[0] for action in block.module.actions)
+    for fact in FACTS["control", "controller"]:
+        assert fact in first[0].text + opening
