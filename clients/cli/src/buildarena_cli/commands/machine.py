@@ -53,7 +53,7 @@ def simulate_command(  # noqa: PLR0917 - the command line passes options by name
     as_json: Annotated[bool, typer.Option("--json", help="Print the score as JSON.")] = False,
 ) -> None:
     """Simulate a machine in a task's trial and score it."""
-    from buildarena_benchmark import failed_score, score
+    from buildarena_benchmark import broken_constraint, failed_score, score
     from buildarena_simulation import ENGINES, write_trajectory
 
     with shown_errors():
@@ -63,7 +63,11 @@ def simulate_command(  # noqa: PLR0917 - the command line passes options by name
                 f"{did_you_mean(engine, ENGINES)}"
             )
         chosen, machine = chosen_task(task), read_machine(file)
-        rollout = _simulated(machine, chosen, engine or ENGINES[0], seed)
+        broken, rollout = broken_constraint(chosen, machine), None
+        if broken is None:
+            rollout = _simulated(machine, chosen, engine or ENGINES[0], seed)
+        else:
+            warn(f"not simulated: {broken[0]}: {broken[1]}")
         if rollout is None:
             result = failed_score(chosen, machine)
         else:
