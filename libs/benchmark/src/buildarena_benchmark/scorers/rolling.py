@@ -16,12 +16,15 @@ if TYPE_CHECKING:
 SLACK: Final = 0.5
 """Distance that counts without wheels, units: a machine rocks, and its parts give."""
 
+ERROR: Final = 0.05
+"""Share by which wheels that bounce and slip may have carried a machine farther than measured."""
+
 _COASTING: Final = 0.5 * GRAVITY
 """How fast the speed that a wheel gave fades once it turns slower, units/s²: somewhat less than
 the tyres' friction brakes, so that a skid at the end of a drive counts."""
 
-_TOUCH_SAMPLES: Final = 2
-"""A wheel that leaves the ground for so few samples bounces."""
+_TOUCH_SAMPLES: Final = 6
+"""A wheel that leaves the ground for so few samples, a quarter of a second, bounces."""
 
 Floats = NDArray[np.float64]
 
@@ -29,13 +32,15 @@ Floats = NDArray[np.float64]
 def driven_distances(
     machine: "Machine", trajectory: "Trajectory", joined: Mask, path: Floats
 ) -> Floats | None:
-    """How far wheels explain that a path leads away from its start, (T,), units.
+    """How far wheels explain that a path leads away from its start, with what is allowed, (T,).
 
-    A powered wheel that bears on ground or terrain, joined to the starting block, carries the
-    machine along by as much as it rolls: by the horizontal motion of its centre along its rolling
-    direction, at most by its turning times its radius, and aside by no more than ahead. Slower
-    turning takes the speed that it gave away gradually, so a skid after a drive counts. The
-    distance is the largest of the wheels' displacements so far in the direction of the path's.
+    A powered wheel that bears on ground or terrain, joined to the starting block, drives the
+    machine as far as it rolls: by the horizontal motion of its centre along its rolling direction,
+    at most by its turning times its radius, and aside by no more than ahead. Turning slower takes
+    the speed that it gave away gradually, so a skid after a drive counts. Between two samples the
+    machine is driven as much as its best wheel: that share of the motion of each wheel that bears
+    counts. The distance is the largest of the wheels' displacements made up so, in the direction
+    of the path's, with `ERROR` and `SLACK` added, units.
 
     Args:
         machine: Gives the wheels.
@@ -49,19 +54,29 @@ def driven_distances(
     bearing = trajectory.bearing
     if bearing is None:
         return None
+    index = {block: i for i, block in enumerate(trajectory.block_ids)}
+    columns = [
+        column
+        for column, wheel in enumerate(bearing.wheel_ids)
+        if wheel in index and machine.blocks[wheel].module.spins
+    ]
+    if not columns:
+        return np.full(len(path), SLACK)
+    moves, shares = [], []
+    for column in columns:
+        wheel = bearing.wheel_ids[column]
+        row = index[wheel]
+        touches = (_lasting(bearing.wheels[:, column] > 0.0) & joined[:, row])[1:]
+        moved, share = _rolling(trajectory, row, touches, radius_of(machine.blocks[wheel]))
+        moves.append(np.where(touches[:, None], moved, 0.0))
+        shares.append(np.where(touches, share, 0.0))
+    driven = np.max(shares, axis=0)[None, :, None] * np.array(moves)
     away = path[:, :2] - path[0, :2]
     direction = away / np.maximum(np.linalg.norm(away, axis=1), 1e-9)[:, None]
-    index = {block: i for i, block in enumerate(trajectory.block_ids)}
-    best = np.zeros(len(path))
-    for column, wheel in enumerate(bearing.wheel_ids):
-        block = machine.blocks[wheel]
-        if wheel not in index or not block.module.spins:
-            continue
-        row = index[wheel]
-        touches = _lasting(bearing.wheels[:, column] > 0.0) & joined[:, row]
-        carried = _carried(trajectory, row, touches[1:], joined[1:, row], radius_of(block))
-        best = np.maximum(best, (carried * direction).sum(axis=1))
-    return best
+    carried = np.zeros((len(columns), *away.shape))
+    carried[:, 1:] = np.cumsum(driven, axis=1)
+    explained = (carried * direction).sum(axis=2).max(axis=0).clip(0.0)
+    return np.asarray(explained * (1.0 + ERROR) + SLACK)
 
 
 def radius_of(wheel: "Block") -> float:
@@ -73,31 +88,29 @@ def radius_of(wheel: "Block") -> float:
     return float(max(radii or boxes, default=0.0))
 
 
-def _carried(
-    trajectory: "Trajectory", row: int, touches: Mask, joined: Mask, radius: float
-) -> Floats:
-    """Where a wheel has carried its machine, (T, 2) from its start, units."""
+def _rolling(
+    trajectory: "Trajectory", row: int, touches: Mask, radius: float
+) -> tuple[Floats, Floats]:
+    """A wheel's horizontal steps, (T - 1, 2) units, and which share of each it rolled, (T - 1,)."""
     steps_s = np.diff(trajectory.time_s)
-    position = trajectory.positions[:, row, :2].astype(np.float64)
-    moved = np.diff(position, axis=0)
+    moved = np.diff(trajectory.positions[:, row, :2].astype(np.float64), axis=0)
     axle, turn = _turning(trajectory.quaternions[:, row].astype(np.float64))
     ahead = np.column_stack([axle[:, 1], -axle[:, 0]])
     ahead /= np.maximum(np.linalg.norm(ahead, axis=1), 1e-9)[:, None]
     along = (moved * ahead).sum(axis=1)
-    aside = moved - along[:, None] * ahead
     rolled = np.where(touches, turn * radius, 0.0)
     credit = np.zeros(len(along))
     speed = 0.0
     for k, step_s in enumerate(steps_s):
-        fade = max(abs(speed) - _COASTING * step_s, 0.0) if joined[k] else 0.0
-        kept = np.copysign(fade * step_s, speed)
+        kept = np.copysign(max(abs(speed) - _COASTING * step_s, 0.0) * step_s, speed)
         low, high = min(rolled[k], kept, 0.0), max(rolled[k], kept, 0.0)
         credit[k] = min(max(along[k], low), high)
         speed = credit[k] / step_s
-    share = np.minimum(np.abs(credit) / np.maximum(np.linalg.norm(aside, axis=1), 1e-9), 1.0)
+    length = np.linalg.norm(moved, axis=1)
+    aside = np.sqrt(np.maximum(length**2 - along**2, 0.0))
     whole = np.abs(credit) / np.maximum(np.abs(along), 1e-9)
-    carried = credit[:, None] * ahead + aside * np.minimum(share, whole)[:, None]
-    return np.vstack([np.zeros((1, 2)), np.cumsum(carried, axis=0)])
+    covered = np.hypot(credit, np.minimum(aside * whole, np.abs(credit)))
+    return moved, np.minimum(covered / np.maximum(length, 1e-9), 1.0)
 
 
 def _lasting(touches: Mask) -> Mask:

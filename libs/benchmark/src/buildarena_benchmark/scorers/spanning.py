@@ -15,6 +15,9 @@ if TYPE_CHECKING:
 MOST_ON_FLOOR: Final = 0.1
 """Largest share of the vertical force that the gap's floor may bear."""
 
+MOST_GROWTH_ON_FLOOR: Final = 0.2
+"""Largest share of a growing load that the floor may take up, however heavy the machine is."""
+
 LEAST_ON_TERRAIN: Final = 0.01
 """Smallest share of the vertical force that each side's terrain must bear."""
 
@@ -52,7 +55,8 @@ class Span:
     def spans(self) -> bool:
         """Whether the load went to both terrains."""
         return (
-            max(self.floor, self.floor_growth) <= MOST_ON_FLOOR
+            self.floor <= MOST_ON_FLOOR
+            and self.floor_growth <= MOST_GROWTH_ON_FLOOR
             and self.least_terrain >= LEAST_ON_TERRAIN
             and self.least_growth >= LEAST_GROWTH
             and self.carried >= LEAST_CARRIED

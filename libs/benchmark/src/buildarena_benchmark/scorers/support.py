@@ -86,10 +86,14 @@ def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict
 
 def _span_metrics(span: Span | None) -> dict[str, Metric]:
     if span is None:
-        return {"floor_share": None, "least_terrain_share": None, "carried_share": None}
+        return dict.fromkeys(
+            ("floor_share", "floor_growth", "least_terrain_share", "least_growth", "carried_share")
+        )
     return {
-        "floor_share": rounded(max(span.floor, span.floor_growth)),
-        "least_terrain_share": rounded(min(span.least_terrain, span.least_growth)),
+        "floor_share": rounded(span.floor),
+        "floor_growth": rounded(span.floor_growth),
+        "least_terrain_share": rounded(span.least_terrain),
+        "least_growth": rounded(span.least_growth),
         "carried_share": rounded(span.carried),
     }
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from buildarena_benchmark.scorers.pieces import Mask, joined_to_start
-from buildarena_benchmark.scorers.rolling import SLACK, driven_distances
+from buildarena_benchmark.scorers.rolling import driven_distances
 from buildarena_benchmark.scorers.series import Series, speeds, starting_block
 from buildarena_benchmark.scorers.verdict import Deciding, Metric, Verdict, rounded
 from buildarena_benchmark.tasks.document import TransportScoring
@@ -113,7 +113,7 @@ def _counted(
     driven = driven_distances(machine, trajectory, joined, path)
     if driven is None:
         return moved
-    counted = np.minimum(moved, driven + SLACK)
+    counted = np.minimum(moved, driven)
     if scoring.subject == "cargo":
         counted = np.where(_is_borne(trajectory), counted, 0.0)
     return counted
