@@ -38,15 +38,16 @@ def test_a_braced_deck_carries_more_than_a_bare_one(engine: str, tasks: dict[str
     assert min(event.time_s for event in trajectory.breaks) > 5.0  # not while the cargo is light
 
 
-def test_the_one_shot_bridge_carries_what_the_paper_reports(
+def test_the_one_shot_bridge_carries_what_the_paper_reports_but_stands_in_the_gap(
     engine: str, tasks: dict[str, Task]
 ) -> None:
     result, trajectory = _trial(tasks["support-1"], one_shot_bridge(), engine)
-    assert result.success
-    assert result.indicator >= 900.0
-    first = trajectory.breaks[0]
-    assert first.cargo_mass is not None
-    assert first.cargo_mass > 900.0  # the landing does not break it
+    assert result.metrics["load_when_decided"] >= 900.0
+    # The landing does not break it.
+    assert all((event.cargo_mass or 0.0) > 900.0 for event in trajectory.breaks)
+    assert (result.success, result.indicator) == (False, 0.0)
+    assert result.flags == ("does_not_span",)
+    assert result.metrics["floor_share"] > 0.5  # its pillars reach the gap's floor
 
 
 def test_a_beam_that_is_too_short_for_the_gap_scores_nothing(

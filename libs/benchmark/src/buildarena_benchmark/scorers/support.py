@@ -67,6 +67,7 @@ def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict
         "lowest_cargo_height": rounded(height.min()),
         "start_height": rounded(height[0]),
         "fall_time_s": None if decided is None else rounded(trajectory.time_s[decided]),
+        "load_when_decided": rounded(load),
         "load_at_first_break": first.cargo_mass if first else None,
         "broken_joints": len(trajectory.breaks),
         **_span_metrics(span),
