@@ -109,10 +109,13 @@ def test_modules_are_those_that_the_task_names(tasks, constraints, says) -> None
             "has 4 sub-structures, the task asks for 1 to 3",
         ),
         ({"min_sub_structures": 2, "max_sub_structures": 2}, (3, 4), None),
+        # An engine and three copies of a frame, or two copies of one thing.
+        ({"min_sub_structures": 2, "max_sub_structures": 2}, (3, 4, 4, 4), None),
+        ({"min_sub_structures": 2, "max_sub_structures": 2}, (3, 3), None),
         (
             {"min_sub_structures": 2, "max_sub_structures": 2},
-            (3, 3),
-            "has 1 sub-structure, the task asks for 2",
+            (3, 4, 5),
+            "has 3 sub-structures, the task asks for 2",
         ),
         (
             {"min_sub_structures": 2, "max_sub_structures": 2},

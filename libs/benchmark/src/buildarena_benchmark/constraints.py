@@ -29,9 +29,9 @@ def broken_constraint(task: Task, machine: Machine) -> tuple[str, str] | None:
         return "empty_machine", "no machine was started"
     if len(machine.blocks) == 1 and not machine.connectors:
         return "empty_machine", "the machine is nothing but its starting block"
-    for problem in (_wrong_structures(task, machine), _crowded(task, machine)):
-        if problem is not None:
-            return "constraint_violated", problem
+    crowded = _crowded(task, machine)
+    if crowded is not None:
+        return "constraint_violated", crowded
     used = Counter(block.module.name for block in machine.blocks.values())
     used.update(connector.module.name for connector in machine.connectors.values())
     if constraints.modules is not None:
@@ -44,6 +44,9 @@ def broken_constraint(task: Task, machine: Machine) -> tuple[str, str] | None:
                 "constraint_violated",
                 f"the machine has {used[name]} of {name}, the task asks for {least} or more",
             )
+    structures = _wrong_structures(task, machine)
+    if structures is not None:
+        return "constraint_violated", structures
     loose = _unjoined(machine)
     return None if loose is None else ("unjoined_parts", loose)
 
@@ -51,18 +54,16 @@ def broken_constraint(task: Task, machine: Machine) -> tuple[str, str] | None:
 def _wrong_structures(task: Task, machine: Machine) -> str | None:
     """Whether the machine has too few or too many sub-structures, or an empty one.
 
-    Copies of one sub-structure count once, unless the task asks for a machine of one piece.
+    Copies of one sub-structure are enough for the fewest and count once against the most, unless
+    the task asks for one.
     """
-    limits = task.constraints
     used = {block.structure for block in machine.blocks.values()}
-    sources = {
-        found.source if limits.max_sub_structures > 1 else letter
-        for letter, found in machine.sub_structures.items()
-        if letter in used
-    }
-    count = len(sources) or 1
-    least, most = limits.min_sub_structures, limits.max_sub_structures
-    if not least <= count <= most:
+    placed = {key: found for key, found in machine.sub_structures.items() if key in used}
+    copies = len(placed) or 1
+    least, most = task.constraints.min_sub_structures, task.constraints.max_sub_structures
+    kinds = len({found.source for found in placed.values()}) or 1
+    count = copies if most == 1 or copies < least else kinds
+    if copies < least or count > most:
         allowed = str(most) if least == most else f"{least} to {most}"
         named = "sub-structure" if count == 1 else "sub-structures"
         return f"the machine has {count} {named}, the task asks for {allowed}"
