@@ -5,10 +5,11 @@ from collections.abc import Iterator
 import pytest
 from live_api import LOOPBACK
 from starlette.testclient import TestClient
+from tenants import WITH_KEYS
 
 from buildarena_api.app import create_app
 from buildarena_pipeline.catalog.models import load_registry
-from buildarena_pipeline.runtime.context import Context
+from buildarena_pipeline.runtime.context import Context, open_context
 
 
 @pytest.fixture
@@ -18,6 +19,17 @@ def api(context: Context) -> Iterator[TestClient]:
         create_app(context, load_registry()), base_url=LOOPBACK, raise_server_exceptions=False
     ) as client:
         yield client
+
+
+@pytest.fixture
+def guarded(context: Context) -> Iterator[TestClient]:
+    """The API with keys asked for; requests carry none by themselves."""
+    own = open_context(context.settings.model_copy(update=WITH_KEYS))
+    with TestClient(
+        create_app(own, load_registry()), base_url=LOOPBACK, raise_server_exceptions=False
+    ) as client:
+        yield client
+    own.close()
 
 
 @pytest.fixture

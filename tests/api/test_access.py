@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import pytest
 from live_api import LOOPBACK
 from pydantic import SecretStr
 from running import wait_until
 from starlette.testclient import TestClient
+from tenants import ADMIN, WITH_KEYS
 
 from buildarena_api.app import create_app
 from buildarena_api.http.access import check_binding
 from buildarena_pipeline.catalog.models import load_registry
-from buildarena_pipeline.runtime.context import Context, open_context
+from buildarena_pipeline.runtime.context import open_context
 from buildarena_pipeline.runtime.settings import Settings
 
-ADMIN = "operator-secret-that-is-long-enough"
 CHANGES = [
     ("POST", "/v1/sweeps/{sweep}/pause"),
     ("POST", "/v1/sweeps/{sweep}/resume"),
@@ -29,18 +27,6 @@ CHANGES = [
 
 def bearer(secret: str) -> dict[str, str]:
     return {"Authorization": f"Bearer {secret}"}
-
-
-@pytest.fixture
-def guarded(context: Context) -> Iterator[TestClient]:
-    """The API with keys asked for; requests carry none by themselves."""
-    changes = {"require_keys": True, "admin_key": SecretStr(ADMIN)}
-    own = open_context(context.settings.model_copy(update=changes))
-    with TestClient(
-        create_app(own, load_registry()), base_url=LOOPBACK, raise_server_exceptions=False
-    ) as client:
-        yield client
-    own.close()
 
 
 @pytest.fixture
@@ -170,7 +156,7 @@ def test_too_many_requests_are_reported_when_to_come_back(context) -> None:
 
 
 def test_guessing_keys_is_limited(context) -> None:
-    changes = {"rate_limit": "3/minute", "require_keys": True, "admin_key": SecretStr(ADMIN)}
+    changes = {**WITH_KEYS, "rate_limit": "3/minute"}
     own = open_context(context.settings.model_copy(update=changes))
     with TestClient(create_app(own, load_registry()), base_url=LOOPBACK) as client:
         tried = [client.get("/v1/tasks", headers=bearer(f"ba_{n}")).status_code for n in range(5)]

@@ -10,7 +10,6 @@ import pytest
 import schemathesis
 from hypothesis import HealthCheck, given, settings, strategies
 from live_api import live_api
-from pydantic import SecretStr
 from schemathesis import GenerationMode
 from schemathesis.checks import not_a_server_error
 from schemathesis.specs.openapi.checks import (
@@ -19,10 +18,10 @@ from schemathesis.specs.openapi.checks import (
     response_schema_conformance,
     status_code_conformance,
 )
+from tenants import ADMIN, WITH_KEYS
 
 from buildarena_pipeline.catalog.specs import SweepSpec
 
-ADMIN = "operator-secret-that-is-long-enough"
 CONTRACT = Path(__file__).parents[1] / "data" / "openapi.json"
 CHECKS = [
     not_a_server_error,
@@ -42,8 +41,7 @@ OPERATIONS = {found.ok().label: found.ok() for found in SCHEMA.get_all_operation
 def service(context, submissions) -> Iterator[str]:
     """A live service that holds a few jobs and counts no requests."""
     submissions.submit_sweep(SweepSpec(tasks=["lift-1"], models=["builtin/idle"], seeds=[0, 1]))
-    changes = {"rate_limit": "1000000/minute", "admin_key": SecretStr(ADMIN)}
-    settings = context.settings.model_copy(update=changes)
+    settings = context.settings.model_copy(update={**WITH_KEYS, "require_keys": False})
     with live_api(replace(context, settings=settings)) as url:
         yield url
 

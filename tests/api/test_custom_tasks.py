@@ -7,8 +7,8 @@ import io
 
 import pytest
 from live_api import LOOPBACK
-from pydantic import SecretStr
 from starlette.testclient import TestClient
+from tenants import new_tenant
 
 from buildarena_api.app import create_app
 from buildarena_api.routes.tasks import EXAMPLE
@@ -138,29 +138,16 @@ def test_exports_hold_own_tasks(api, end_all) -> None:
     assert api.get("/v1/leaderboard/export", params={"format": "parquet"}).status_code == 200
 
 
-def test_only_its_owner_changes_a_task(context) -> None:
-    secret = "operator-secret-that-is-long-enough"
-    changes = {"require_keys": True, "admin_key": SecretStr(secret)}
-    own = open_context(context.settings.model_copy(update=changes))
-    with TestClient(create_app(own, load_registry()), base_url=LOOPBACK) as api:
-
-        def key(*scopes: str) -> dict[str, str]:
-            body = {"name": "somebody", "scopes": list(scopes)}
-            made = api.post(
-                "/v1/keys", json=body, headers={"Authorization": f"Bearer {secret}"}
-            ).json()
-            return {"Authorization": f"Bearer {made['secret']}"}
-
-        ada, bob, reader = key("submit"), key("submit"), key("read")
-        for who, text, status in (
-            (reader, OWN, 403),
-            (ada, OWN, 201),
-            (bob, OTHER, 403),
-            (bob, OTHER.replace("narrow-gap", "narrower-gap"), 201),
-            (ada, OTHER, 201),
-            (ada, OWN, 200),
-        ):
-            answer = api.post("/v1/tasks", content=text.encode(), headers={**YAML, **who})
-            assert answer.status_code == status, answer.text
-        assert api.get("/v1/tasks/narrow-gap", headers=reader).status_code == 200
-    own.close()
+def test_only_its_owner_changes_a_task(guarded) -> None:
+    ada, bob, reader = (new_tenant(guarded, "x", scope) for scope in ("submit", "submit", "read"))
+    for who, text, status in (
+        (reader, OWN, 403),
+        (ada, OWN, 201),
+        (bob, OTHER, 403),
+        (bob, OTHER.replace("narrow-gap", "narrower-gap"), 201),
+        (ada, OTHER, 201),
+        (ada, OWN, 200),
+    ):
+        answer = who.ask("POST", "/v1/tasks", content=text.encode(), headers=YAML)
+        assert answer.status_code == status, answer.text
+    assert reader.ask("GET", "/v1/tasks/narrow-gap").status_code == 200

@@ -11,24 +11,22 @@ from contextlib import ExitStack
 import httpx
 import pytest
 from live_api import live_api
-from pydantic import SecretStr
 from running import wait_until
 from sqlalchemy import text
+from tenants import WITH_KEYS
 
 from buildarena_pipeline.agents import sessions as agent_sessions
 from buildarena_pipeline.catalog.specs import SweepSpec
 from buildarena_pipeline.runtime.context import open_context
 from buildarena_store.jobs import verifications
 
-ADMIN = "operator-secret-that-is-long-enough"
 START = {"tool": "start", "arguments": {"init_shift": [0, 0, 0], "init_rotation": [0, 0, 0]}}
 
 
 @pytest.fixture
 def url(context):
-    changes = {"require_keys": True, "admin_key": SecretStr(ADMIN), "rate_limit": "100000/minute"}
     # As many connections as the API process has.
-    guarded = open_context(context.settings.model_copy(update=changes), pool_size=10)
+    guarded = open_context(context.settings.model_copy(update=WITH_KEYS), pool_size=10)
     with live_api(guarded) as found:
         yield found
     guarded.close()

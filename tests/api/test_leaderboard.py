@@ -68,7 +68,7 @@ def test_models_are_ranked_on_tasks_and_overall_with_their_uncertainty(api, fini
     first, second = answer["tasks"][0]["rows"]
     assert (first["model"], first["rank"], first["successes"]) == ("builtin/expert", 1, 5)
     assert (second["rank"], second["rank_low"], second["rank_high"]) == (2, 2, 2)
-    assert (first["indicator_low"], first["indicator_high"]) == (100.0, 100.0)
+    assert (first["indicator_low"], first["indicator_high"]) == (0.0, 100.0)
     assert first["pass_at"]["4"] == 1.0
     best, _ = answer["overall"]
     assert (best["model"], best["rank"], best["mean_rank"], best["pareto"]) == (
@@ -113,13 +113,59 @@ def test_filters_that_name_nothing_are_refused(api, params, field) -> None:
     assert (answer.status_code, answer.json()["errors"][0]["field"]) == (422, field)
 
 
-def test_flagged_successes_count_only_when_asked_for(api, finish) -> None:
+def expert_of(answer) -> dict:
+    rows = answer["tasks"][0]["rows"]
+    return next(row for row in rows if row["model"] == "builtin/expert")
+
+
+def test_each_reading_of_flags_can_be_asked_for(api, finish) -> None:
     finish(10, flags=["no_wheels"])
-    rows = board(api, task="support-1")["tasks"][0]["rows"]
-    expert = next(row for row in rows if row["model"] == "builtin/expert")
-    assert (expert["flagged"], expert["trials"], expert["success_rate"]) == (5, 0, None)
-    rows = board(api, task="support-1", flagged=True)["tasks"][0]["rows"]
-    assert (rows[0]["flagged"], rows[0]["successes"]) == (0, 5)
+    ours = board(api, task="support-1")
+    row = expert_of(ours)
+    assert (ours["reading"], row["flagged"], row["flags"]) == ("ours", 5, {"no_wheels": 5})
+    assert (row["trials"], row["successes"], row["indicator_mean"]) == (5, 0, 0.0)
+    assert board(api, task="support-1", reading="ours") == ours
+    published = board(api, task="support-1", reading="published")
+    row = expert_of(published)
+    assert (published["reading"], row["flagged"]) == ("published", 5)
+    assert (row["trials"], row["success_rate"]) == (0, None)
+
+
+@pytest.mark.parametrize("path", ["", "/compare", "/export", "/changes", "/manifest"])
+def test_an_unknown_reading_is_refused_with_the_choices(api, path) -> None:
+    given = {"reading": "theirs", "first": "a", "second": "b"}
+    answer = api.get(f"/v1/leaderboard{path}", params=given)
+    (error,) = answer.json()["errors"]
+    assert (answer.status_code, error["field"]) == (422, "reading")
+    assert error["choices"] == ["ours", "published"]
+
+
+def test_a_bridge_that_carries_everything_is_shown_as_at_least_its_load(api, finish) -> None:
+    ids = finish(10, flags=["never_fell"], indicator=1500.0)
+    row = expert_of(board(api, task="support-1"))
+    assert (row["successes"], row["censored"], row["indicator_best"]) == (5, 5, 1500.0)
+    assert {api.get(f"/v1/jobs/{id_}").json()["censored"] for id_ in ids} == {True}
+    flags = {flag["name"]: flag for flag in board(api)["flags"]}
+    assert flags["never_fell"]["disqualifying"] is False
+    assert flags["never_fell"]["published"] is True
+    assert flags["unstable"]["disqualifying"] is True
+    assert all(flag["meaning"].endswith(".") for flag in flags.values())
+
+
+def test_too_few_successes_are_said_to_be_too_few(api, finish) -> None:
+    finish()
+    failing = board(api, task="support-1")["tasks"][0]["rows"][1]
+    assert failing["too_few_data"] is True
+    assert (failing["indicator_low"], failing["indicator_high"]) == (None, None)
+
+
+def test_a_comparison_reads_flags_as_asked(api, finish) -> None:
+    finish(flags=["start_too_high"])
+    pair = {"first": "builtin/expert", "second": "builtin/random"}
+    answer = api.get("/v1/leaderboard/compare", params=pair).json()
+    assert (answer["reading"], answer["tasks"][0]["successes"]) == ("ours", [0, 0])
+    answer = api.get("/v1/leaderboard/compare", params={**pair, "reading": "published"}).json()
+    assert (answer["reading"], answer["tasks"]) == ("published", [])
 
 
 def test_a_reader_who_has_the_answer_gets_none_until_something_changes(api, context, finish):

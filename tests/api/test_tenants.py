@@ -2,34 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import pytest
-from pydantic import SecretStr
 from starlette.testclient import TestClient
-from tenants import ADMIN, Tenant, everything, new_tenant, operator
+from tenants import Tenant, everything, new_tenant, operator
 from working import work
 
-from buildarena_api.app import create_app
 from buildarena_api.routes.tasks import EXAMPLE
-from buildarena_pipeline.catalog.models import load_registry
-from buildarena_pipeline.runtime.context import Context, open_context
+from buildarena_pipeline.runtime.context import Context
 
 JOB = {"task": "support-1", "model": "builtin/idle"}
 SWEEP = {"tasks": ["support-1"], "models": ["builtin/idle"], "seeds": [0]}
 SESSION = {"task": "support-1", "agent": "mason", "seed": 0}
-
-
-@pytest.fixture
-def guarded(context: Context) -> Iterator[TestClient]:
-    """The API with keys asked for."""
-    changes = {"require_keys": True, "admin_key": SecretStr(ADMIN), "rate_limit": "100000/minute"}
-    own = open_context(context.settings.model_copy(update=changes))
-    with TestClient(create_app(own, load_registry()), raise_server_exceptions=False) as client:
-        yield client
-    own.close()
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ import threading
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,36 +15,16 @@ import httpx
 import psutil
 import yaml
 from provider_standin import ProviderStandIn
-from pydantic import SecretStr
 from running import running_stack
+from tenants import WITH_KEYS, Tenant, new_tenant, operator
 
 from buildarena_cli.local.stack import Stack
 from buildarena_pipeline.runtime.processes import memory_bytes
 from buildarena_store import Database
 
-ADMIN = "operator-secret-that-is-long-enough"
 HOSTILE = "hostile/model"
 MEBI = 1 << 20
 ASK_EVERY_S = 0.02
-
-
-@dataclass
-class Tenant:
-    """A key's holder."""
-
-    url: str
-    secret: str
-    id: str | None = None
-
-    def __post_init__(self) -> None:
-        headers = {"Authorization": f"Bearer {self.secret}"}
-        self.client = httpx.Client(base_url=self.url, headers=headers, timeout=60)
-
-    def post(self, path: str, body: Any = None) -> httpx.Response:
-        return self.client.post(path, json=body)
-
-    def get(self, path: str) -> Any:
-        return self.client.get(path).raise_for_status().json()
 
 
 @dataclass
@@ -83,6 +63,26 @@ class Arena:
         return found
 
 
+@dataclass
+class Tried:
+    """What came of a scenario.
+
+    Attributes:
+        tried: What was tried, in words.
+        refused: What came of it, in words.
+        wrong: What should not be.
+    """
+
+    tried: str
+    refused: str = ""
+    wrong: list[str] = field(default_factory=list)
+
+    def require(self, condition: object, what: str) -> None:
+        """Notes something that is wrong."""
+        if not condition:
+            self.wrong.append(what)
+
+
 class Bystander(threading.Thread):
     """An innocent caller: lists jobs all the time, and notes how long it took."""
 
@@ -96,7 +96,7 @@ class Bystander(threading.Thread):
         while not self._stopped.wait(ASK_EVERY_S):
             started = time.monotonic()
             try:
-                good = self._tenant.client.get("/v1/jobs?limit=20").status_code == 200
+                good = self._tenant.ask("GET", "/v1/jobs?limit=20").status_code == 200
             except httpx.TransportError:
                 good = False
             with self._lock:
@@ -134,36 +134,29 @@ def arena(folder: Path, sizes: Mapping[str, float], **settings: Any) -> Iterator
         stack = running.enter_context(
             running_stack(
                 folder,
-                require_keys=True,
-                admin_key=SecretStr(ADMIN),
-                rate_limit="1000000/minute",
+                **WITH_KEYS,
                 models_file=models,
                 sessions_per_worker=40,
                 **settings,
             )
         )
-        operator = Tenant(stack.url, ADMIN)
-        running.callback(operator.client.close)
-        tenants = []
-        for name in ("attacker", "innocent"):
-            made = operator.post("/v1/keys", {"name": name, "scopes": ["submit"]}).json()
-            tenants.append(Tenant(stack.url, made["secret"], made["id"]))
-            running.callback(tenants[-1].client.close)
+
+        def client() -> httpx.Client:
+            return running.enter_context(httpx.Client(base_url=stack.url, timeout=60))
+
         database = Database(stack.environment["BUILDARENA_DATABASE_URL"])
         running.callback(database.close)
         found = Arena(
             stack=stack,
             database=database,
-            operator=operator,
-            attacker=tenants[0],
-            innocent=tenants[1],
+            operator=operator(client()),
+            attacker=new_tenant(client(), "attacker"),
+            innocent=new_tenant(client(), "innocent"),
             provider=provider,
             sizes=sizes,
             folder=folder,
         )
-        beside = Tenant(stack.url, tenants[1].secret)
-        running.callback(beside.client.close)
-        found.bystander = Bystander(beside)
+        found.bystander = Bystander(replace(found.innocent, client=client()))
         found.bystander.start()
         running.callback(found.bystander.stop)
         yield found

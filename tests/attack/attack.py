@@ -20,8 +20,8 @@ from pathlib import Path
 HERE = Path(__file__).parent
 sys.path += [str(HERE), str(HERE.parent / "support")]
 
-from arena import Arena, arena  # noqa: E402
-from scenarios import SCENARIOS, Tried  # noqa: E402
+from arena import Arena, Tried, arena  # noqa: E402
+from scenarios import SCENARIOS  # noqa: E402
 
 FULL: Mapping[str, float] = {
     "jobs": 1000,

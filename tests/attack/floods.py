@@ -24,10 +24,10 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 
 from api_process import Service, api_service
 from sqlalchemy import text
+from tenants import ADMIN
 
 from buildarena_store import Database
 
-ADMIN = "operator-secret-that-is-long-enough"
 JOBS = 1000
 FLOODS = {"streams": 800, "archives": 60, "verifications": 1500, "exports": 200, "boards": 400}
 """How many requests of each kind are open at once."""

@@ -4,26 +4,18 @@ from __future__ import annotations
 
 import io
 import json
-import os
-import signal
 import socket
-import subprocess
-import sys
-import tempfile
 import time
 import zipfile
 from collections import Counter
 from collections.abc import Callable
-from contextlib import suppress
-from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import floods
-import httpx
 import psutil
 from api_process import Service
-from arena import HOSTILE, Arena, Tenant
+from arena import HOSTILE, Arena, Tried
+from outages import full_disk, killed_supervisor, stopped_broker
 from running import wait_until
 from tenants import everything
 
@@ -41,33 +33,13 @@ END_S = 3.0
 """Within so long a cancelled session's request ends."""
 
 
-@dataclass
-class Tried:
-    """What came of a scenario.
-
-    Attributes:
-        tried: What was tried, in words.
-        refused: What came of it, in words.
-        wrong: What should not be.
-    """
-
-    tried: str
-    refused: str = ""
-    wrong: list[str] = field(default_factory=list)
-
-    def require(self, condition: object, what: str) -> None:
-        """Notes something that is wrong."""
-        if not condition:
-            self.wrong.append(what)
-
-
 def other_tenants(arena: Arena) -> Tried:
     """Another key's sweeps, jobs, sessions, names, keys and budgets."""
     owner, thief = arena.innocent, arena.attacker
-    sweep = owner.post("/v1/sweeps", {**SWEEP, "models": [HOSTILE]}).json()["id"]
+    sweep = owner.post("/v1/sweeps", {**SWEEP, "models": [HOSTILE]})["id"]
     owner.post(f"/v1/sweeps/{sweep}/pause")
-    session = owner.post("/v1/sessions", SESSION).json()["id"]
-    owner.client.post("/v1/tasks", content=EXAMPLE, headers=YAML)
+    session = owner.post("/v1/sessions", SESSION)["id"]
+    owner.ask("POST", "/v1/tasks", content=EXAMPLE, headers=YAML)
     job = arena.operator.get(f"/v1/jobs?sweep={sweep}")["jobs"][0]["id"]
     tries: list[tuple[str, str, dict[str, Any]]] = [
         *(
@@ -88,12 +60,12 @@ def other_tenants(arena: Arena) -> Tried:
     found = Tried(f"{len(tries)} commands over another key's things")
     time.sleep(1.5)  # until nothing of the service's own is under way
     before = everything(arena.database)
-    answers = Counter(thief.client.request(m, path, **more).status_code for m, path, more in tries)
+    answers = Counter(thief.ask(m, path, **more).status_code for m, path, more in tries)
     found.refused = f"answers {dict(sorted(answers.items()))}"
     found.require(set(answers) <= {403, 409}, "a command over another key's things was accepted")
     found.require(everything(arena.database) == before, "a refused command changed something")
     # Shared jobs: the thief's commands over a sweep of its own, of the same jobs.
-    shared = thief.post("/v1/sweeps", {**SWEEP, "models": [HOSTILE]}).json()["id"]
+    shared = thief.post("/v1/sweeps", {**SWEEP, "models": [HOSTILE]})["id"]
     owner.post(f"/v1/sweeps/{sweep}/resume")
     for verb in ("pause", "resume", "retry", "cancel"):
         thief.post(f"/v1/sweeps/{shared}/{verb}")
@@ -110,7 +82,7 @@ def hanging_provider(arena: Arena) -> Tried:
     arena.provider.fault = lambda number: ("hang", "drip")[number % 2]
     thief = arena.attacker
     wish = {"tasks": ["support-1"], "models": [HOSTILE], "samples": 60}
-    sweep = thief.post("/v1/sweeps", wish).json()["id"]
+    sweep = thief.post("/v1/sweeps", wish)["id"]
 
     def running() -> int:
         return len(arena.operator.get(f"/v1/jobs?sweep={sweep}&state=running&limit=100")["jobs"])
@@ -119,10 +91,8 @@ def hanging_provider(arena: Arena) -> Tried:
     # Idle connections are among them: a few more than are waited for below.
     wait_until(lambda: _held_requests(arena) >= MANY + 2, 60, "requests hang")
     started = time.monotonic()
-    job = arena.innocent.post(
-        "/v1/jobs", {"task": "support-1", "model": "builtin/idle", "seed": 77}
-    )
-    id_ = job.json()["id"]
+    body = {"task": "support-1", "model": "builtin/idle", "seed": 77}
+    id_ = arena.innocent.post("/v1/jobs", body)["id"]
     wait_until(lambda: arena.innocent.get(f"/v1/jobs/{id_}")["state"] == "done", 30, "a session")
     room = time.monotonic() - started
     found.require(room <= ROOM_S, f"another key's session took {room:.1f} s")
@@ -168,7 +138,7 @@ def lying_provider(arena: Arena) -> Tried:
             "seed": 1000 + number,
             "limits": {"max_requests": 3},
         }
-        id_ = arena.attacker.post("/v1/jobs", body).json()["id"]
+        id_ = arena.attacker.post("/v1/jobs", body)["id"]
         wait_until(lambda: arena.attacker.get(f"/v1/jobs/{id_}")["state"] == "done", 90, name)  # noqa: B023
         job = arena.attacker.get(f"/v1/jobs/{id_}")
         used = job["usage"]
@@ -180,9 +150,8 @@ def lying_provider(arena: Arena) -> Tried:
             found.require(used["input_tokens"] == 7 * used["requests"], f"{name}: {used}")
     arena.provider.elsewhere = f"http://127.0.0.1:{free_port()}/"
     arena.provider.fault = lambda _: "307"
-    id_ = arena.attacker.post(
-        "/v1/jobs", {"task": "support-1", "model": HOSTILE, "seed": 2000}
-    ).json()["id"]
+    body = {"task": "support-1", "model": HOSTILE, "seed": 2000}
+    id_ = arena.attacker.post("/v1/jobs", body)["id"]
     wait_until(lambda: arena.attacker.get(f"/v1/jobs/{id_}")["state"] == "done", 60, "redirect")
     job = arena.attacker.get(f"/v1/jobs/{id_}")
     found.require(job["reason"] == "request_refused", f"redirect: {job['reason']} {job['detail']}")
@@ -222,14 +191,14 @@ def flood(kind: str) -> Callable[[Arena], Tried]:
 
 def _done_sweep(arena: Arena, jobs: int) -> str:
     wish = {"tasks": ["support-1"], "models": ["builtin/idle"], "samples": jobs}
-    sweep = arena.attacker.client.post("/v1/sweeps?resume=true", json=wish).json()["id"]
+    sweep = arena.attacker.post("/v1/sweeps?resume=true", wish)["id"]
     wait_until(lambda: arena.operator.get(f"/v1/sweeps/{sweep}")["state"] == "done", 300, "a sweep")
     return str(sweep)
 
 
 def truncated_bodies(arena: Arena) -> Tried:
     """Bodies cut off by a disconnect, for everything that changes something."""
-    sweep = arena.attacker.post("/v1/sweeps", SWEEP).json()["id"]
+    sweep = arena.attacker.post("/v1/sweeps", SWEEP)["id"]
     wait_until(lambda: arena.operator.get(f"/v1/sweeps/{sweep}")["state"] == "done", 60, "a sweep")
     time.sleep(1.5)  # until nothing of the service's own is under way
     before = everything(arena.database)
@@ -272,9 +241,9 @@ def truncated_bodies(arena: Arena) -> Tried:
 
 def forged_archives(arena: Arena) -> Tried:
     """Archives that are no archives, bombs, and changed rows."""
-    sweep = arena.operator.post("/v1/sweeps", SWEEP | {"seeds": [40]}).json()["id"]
+    sweep = arena.operator.post("/v1/sweeps", SWEEP | {"seeds": [40]})["id"]
     wait_until(lambda: arena.operator.get(f"/v1/sweeps/{sweep}")["state"] == "done", 60, "a sweep")
-    good = arena.operator.client.get(f"/v1/sweeps/{sweep}/archive").content
+    good = arena.operator.ask("GET", f"/v1/sweeps/{sweep}/archive").content
 
     def changed(name: str, change: Callable[[bytes], bytes]) -> bytes:
         out = io.BytesIO()
@@ -303,8 +272,8 @@ def forged_archives(arena: Arena) -> Tried:
     }
     before = everything(arena.database)["jobs"]
     answers = {
-        name: arena.operator.client.post(
-            "/v1/archives", content=data, headers={"Content-Type": "application/zip"}
+        name: arena.operator.ask(
+            "POST", "/v1/archives", content=data, headers={"Content-Type": "application/zip"}
         ).status_code
         for name, data in tries.items()
     }
@@ -314,109 +283,6 @@ def forged_archives(arena: Arena) -> Tried:
     found.require(not wrong, f"answers {wrong}")
     found.require(everything(arena.database)["jobs"] == before, "a forged archive left something")
     return found
-
-
-def full_disk(arena: Arena) -> Tried:
-    """Artifacts lie on a small disk that is full for a while."""
-    found = Tried("a full disk under the artifacts")
-    place = Path(arena.stack.environment["BUILDARENA_ARTIFACTS_URL"])
-    if not os.path.ismount(place):
-        found.refused = "left out: mounting a small disk needs root"
-        return found
-    filler = place / "filler"
-    with filler.open("wb", buffering=0) as file, suppress(OSError):
-        while file.write(b"x" * 65536):
-            pass
-    body = {"task": "lift-1", "model": "builtin/expert", "simulator": "mujoco", "seed": 3}
-    id_ = arena.innocent.post("/v1/jobs", body).json()["id"]
-
-    def waits() -> bool:
-        job = arena.innocent.get(f"/v1/jobs/{id_}")
-        return job["faults"] >= 1 and "artifacts can't be written" in (job["detail"] or "")
-
-    wait_until(waits, 30, "the job waits for the disk")
-
-    def shows() -> bool:
-        checks = httpx.get(f"{arena.stack.url}/v1/health").json()["checks"]
-        return any(check["name"] == "artifacts" and not check["ok"] for check in checks)
-
-    wait_until(shows, 15, "health shows the full disk")
-    asked = arena.innocent.get(f"/v1/jobs/{id_}")["usage"]["requests"]
-    filler.unlink()
-    wait_until(lambda: arena.innocent.get(f"/v1/jobs/{id_}")["state"] == "done", 90, "it ends")
-    job = arena.innocent.get(f"/v1/jobs/{id_}")
-    found.require(job["outcome"] == "success", f"the job ended as {job['outcome']}")
-    found.require(job["usage"]["requests"] == asked, "its model was asked again")
-    found.refused = "the job waited, and succeeded when there was room"
-    return found
-
-
-def stopped_broker(arena: Arena) -> Tried:
-    """The broker is stopped, not dead: connections hang."""
-    seconds = arena.sizes["broker_s"]
-    found = Tried(f"the broker stopped for {seconds:.0f} s")
-    broker, slowest, number = arena.process("valkey"), 0.0, 0
-    broker.send_signal(signal.SIGSTOP)
-    try:
-        ends = time.monotonic() + seconds
-        ids = []
-        while time.monotonic() < ends:
-            started = time.monotonic()
-            body = {"task": "support-1", "model": "builtin/idle", "seed": 5000 + number}
-            answer = arena.innocent.post("/v1/jobs", body)
-            slowest = max(slowest, time.monotonic() - started)
-            found.require(answer.status_code == 202, f"a submission got {answer.status_code}")
-            ids.append(answer.json()["id"])
-            number += 1
-            time.sleep(0.1)
-    finally:
-        broker.send_signal(signal.SIGCONT)
-    started = time.monotonic()
-    wait_until(
-        lambda: all(arena.innocent.get(f"/v1/jobs/{id_}")["state"] == "done" for id_ in ids),
-        120,
-        "all jobs end",
-    )
-    found.require(slowest < 2.5, f"a submission took {slowest:.1f} s")
-    found.refused = (
-        f"{number} submissions, the slowest {slowest * 1000:.0f} ms; all done "
-        f"{time.monotonic() - started:.0f} s after it went on"
-    )
-    return found
-
-
-def killed_supervisor(arena: Arena) -> Tried:
-    """What `buildarena up` started ends when it is killed."""
-    found = Tried("kill -9 of `buildarena up`")
-    with tempfile.TemporaryDirectory(prefix="buildarena-attack-") as name:
-        port = free_port()
-        environment = {
-            **os.environ,
-            "BUILDARENA_DATA": f"{name}/data",
-            "BUILDARENA_PORT": str(port),
-        }
-        words = [sys.executable, "-m", "buildarena_cli", "up"]
-        with subprocess.Popen(words, env=environment, stdout=-3, stderr=-3, cwd=name) as process:
-            url = f"http://127.0.0.1:{port}/v1/health"
-            wait_until(lambda: _ok(url), 60, "the service is up")
-            family = psutil.Process(process.pid).children(recursive=True)
-            process.kill()
-        started = time.monotonic()
-        _, alive = psutil.wait_procs(family, timeout=15)
-        took = time.monotonic() - started
-        found.require(not alive, f"still alive: {[' '.join(p.cmdline())[:80] for p in alive]}")
-        for left in alive:
-            left.kill()
-        found.refused = f"{len(family)} processes ended within {took:.1f} s"
-    del arena
-    return found
-
-
-def _ok(url: str) -> bool:
-    try:
-        return httpx.get(url, timeout=5).json()["status"] == "ok"
-    except (httpx.TransportError, ValueError):
-        return False
 
 
 SCENARIOS: dict[str, Callable[[Arena], Tried]] = {
@@ -430,6 +296,3 @@ SCENARIOS: dict[str, Callable[[Arena], Tried]] = {
     "stopped broker": stopped_broker,
     "killed supervisor": killed_supervisor,
 }
-
-
-__all__ = ["SCENARIOS", "Tenant", "Tried"]

@@ -15,8 +15,8 @@ from dataclasses import replace
 import httpx
 import pytest
 from live_api import live_api
-from pydantic import SecretStr
 from sqlalchemy import text
+from tenants import WITH_KEYS
 
 from buildarena_pipeline.catalog.specs import Budget, SweepSpec
 from buildarena_pipeline.errors import TransientError
@@ -187,12 +187,7 @@ def test_commands_at_once_leave_legal_histories(context) -> None:
     ends = time.monotonic() + SECONDS
     sweeps: list[str] = []
     keys = [context.store.keys.create(name=f"K{n}", scopes=["submit"])[1] for n in range(KEYS)]
-    guarded = {
-        "rate_limit": "1000000/minute",
-        "require_keys": True,
-        "admin_key": SecretStr("operator-secret-that-is-long-enough"),
-    }
-    with live_api(replace(context, settings=context.settings.model_copy(update=guarded))) as url:
+    with live_api(replace(context, settings=context.settings.model_copy(update=WITH_KEYS))) as url:
         commanders = [
             Commander(url, keys[seed % KEYS], seed, sweeps, ends) for seed in range(THREADS)
         ]

@@ -25,6 +25,7 @@ def row(place: int, model: str, task: str) -> dict[str, Any]:
         "trials": 4,
         "success_low": 0.1,
         "success_high": 0.9,
+        "too_few_data": False,
         "indicator_mean": 1000.0 * place + TASKS.index(task),
     }
 
@@ -45,6 +46,8 @@ def board(models: list[str], tasks: list[str]) -> dict[str, Any]:
             {"model": model, "configuration": "c", "rank": n} for n, model in enumerate(models, 1)
         ],
         "published": [],
+        "reading": "ours",
+        "flags": [],
     }
 
 
@@ -74,7 +77,7 @@ def test_a_pipe_gets_one_line_for_each_model(shown) -> None:
 def test_a_terminal_gets_every_figure_within_its_width(shown, width) -> None:
     lines = shown(width)
     table = lines[
-        : lines.index("Successes of jobs, the rate's 95 % Wilson interval, and the mean indicator:")
+        : lines.index("Successes of jobs, the rate's exact 95 % interval, and the mean indicator:")
     ]
     assert max(map(len, table)) <= width
     text = "\n".join(table)
@@ -87,7 +90,7 @@ def test_a_terminal_gets_every_figure_within_its_width(shown, width) -> None:
 def test_intervals_give_way_where_not_one_column_fits(shown) -> None:
     text = "\n".join(lines := shown(30, models=MODELS[:2]))
     table = lines[
-        : lines.index("Successes of jobs, the rate's 95 % Wilson interval, and the mean indicator:")
+        : lines.index("Successes of jobs, the rate's exact 95 % interval, and the mean indicator:")
     ]
     assert max(map(len, table)) <= 30
     assert "10-90 %" not in text

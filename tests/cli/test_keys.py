@@ -8,22 +8,20 @@ from collections.abc import Callable, Iterator
 import pytest
 import yaml
 from live_api import live_api
-from pydantic import SecretStr
+from tenants import ADMIN, WITH_KEYS
 from typer.testing import CliRunner, Result
 
 from buildarena_cli.errors import CommandError
 from buildarena_cli.main import app
 from buildarena_pipeline.runtime.context import open_context
 
-ADMIN = "operator-secret-that-is-long-enough"
 Call = Callable[..., Result]
 
 
 @pytest.fixture
 def call(context, monkeypatch) -> Iterator[Call]:
     """Runs commands with a key against an API that asks for one."""
-    changes = {"require_keys": True, "admin_key": SecretStr(ADMIN)}
-    own = open_context(context.settings.model_copy(update=changes))
+    own = open_context(context.settings.model_copy(update=WITH_KEYS))
     with live_api(own) as url:
         monkeypatch.setenv("BUILDARENA_URL", url)
 

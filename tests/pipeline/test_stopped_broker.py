@@ -16,6 +16,7 @@ from running import wait_until
 
 from buildarena_cli.local import EmbeddedValkey
 from buildarena_pipeline.broker.announcer import Announcer
+from buildarena_pipeline.broker.queues import TIMEOUT_S, Queues
 from buildarena_pipeline.runtime.context import open_context
 from buildarena_worker.providers.throttle import Throttle
 
@@ -67,6 +68,21 @@ def test_requests_stay_quick_and_jobs_flow_again(context, valkey) -> None:
             assert (broker["ok"], "not reachable" in broker["detail"]) == (False, True)
         wait_until(lambda: (own.queues.waiting("construct") or 0) > 20, 20, "jobs flow again")
     own.close()
+
+
+def test_every_stop_costs_a_message_one_short_time_out(valkey) -> None:
+    url, pid = valkey
+    queues, times = Queues(url), []
+    try:
+        for _ in range(2):
+            wait_until(lambda: queues.notify("construct", ["job_1"]), 10, "messages are sent")
+            with stopped(pid):
+                started = time.monotonic()
+                assert not queues.notify("construct", ["job_2"])
+                times.append(time.monotonic() - started)
+    finally:
+        queues.close()
+    assert max(times) < 4 * TIMEOUT_S, times
 
 
 def test_provider_requests_go_on_without_waiting_each(context, valkey) -> None:

@@ -89,7 +89,7 @@ def test_a_film_shows_the_trial(run, tmp_path: Path, kind: str) -> None:
     assert len(colors) > 8
 
 
-def test_a_seed_nudges_the_start(run, tmp_path: Path) -> None:
+def test_a_seed_varies_the_start(run, tmp_path: Path) -> None:
     starts = []
     for more in ([], ["--seed", "1"], ["--seed", "2"]):
         data = tmp_path / "shifted.parquet"
@@ -104,7 +104,28 @@ def test_a_seed_nudges_the_start(run, tmp_path: Path) -> None:
         )
         starts.append(tuple(read_trajectory(data.read_bytes()).positions[0, 0]))
     assert len(set(starts)) == 3
-    assert all(abs(x) <= 0.01 and abs(y) <= 0.01 for x, y, _ in starts)
+    assert starts[0][:2] == (0.0, 0.0)
+    assert all(abs(x) <= 0.1 and abs(y) <= 0.1 for x, y, _ in starts)
+
+
+def test_seeds_tell_how_often_a_machine_succeeds(run) -> None:
+    given = ("simulate", str(DATA / "beam.json"), "--engine", "mujoco")
+    done = run(*given, "--seeds", "3", "--json", task_name="support-1")
+    found = json.loads(done.stdout)
+    assert (found["trials"], found["successes"], found["robustness"]) == (3, 3, 1.0)
+    loads = [result["indicator"] for result in found["results"]]
+    assert len(set(loads)) > 1
+    assert max(loads) < 1.3 * min(loads)
+    short = str(DATA / "beam-too-short.json")
+    done = run("simulate", short, "--engine", "mujoco", "--seeds", "2", task_name="support-1")
+    assert "0 of 2 succeed" in done.output
+    assert "failed seeds" in done.output
+
+
+def test_seeds_and_a_single_trials_options_exclude_each_other(run) -> None:
+    done = run("simulate", str(DATA / "beam.json"), "--seeds", "3", "--seed", "1")
+    assert done.exit_code == 1
+    assert "--seed" in done.output
 
 
 def test_an_empty_machine_is_a_failed_trial_not_a_crash(run, tmp_path: Path) -> None:

@@ -169,7 +169,9 @@ def test_sharing_a_patch_evenly_keeps_its_resultant(
     given_ = ContactForces(
         block=np.arange(count),
         other=np.full(count, -1),
+        surface=np.zeros(count, dtype=np.int64),
         weight=np.ones(count),
+        area=np.zeros(count),
         normal=np.tile([0.0, 0.0, 1.0], (count, 1)),
         point=point,
         force=force,

@@ -4,11 +4,12 @@ import dataclasses
 
 import numpy as np
 import pytest
-from tests.simulation.designs import car, one_shot_bridge, replayed, rocket
+from tests.simulation.designs import beam, car, deck, one_shot_bridge, replayed, rocket
 
 from buildarena_benchmark import Task
 from buildarena_simulation import (
     SIMULATION_VERSION,
+    Bearing,
     Trajectory,
     TrajectoryFormatError,
     engine_version,
@@ -19,13 +20,13 @@ from buildarena_simulation import (
 from buildarena_simulation.engines.base import rotation_of
 
 
-def _equal(first: Trajectory, second: Trajectory) -> bool:
-    for field in dataclasses.fields(Trajectory):
-        a, b = getattr(first, field.name), getattr(second, field.name)
-        same = np.array_equal(a, b) if isinstance(a, np.ndarray) else a == b
-        if not same:
-            return False
-    return True
+def _equal(first: object, second: object) -> bool:
+    if isinstance(first, np.ndarray):
+        return np.array_equal(first, second)
+    if isinstance(first, Trajectory | Bearing):
+        names = [field.name for field in dataclasses.fields(first)]
+        return all(_equal(getattr(first, name), getattr(second, name)) for name in names)
+    return first == second
 
 
 def test_a_file_gives_back_the_trajectory(tasks: dict[str, Task]) -> None:
@@ -37,6 +38,35 @@ def test_a_file_gives_back_the_trajectory(tasks: dict[str, Task]) -> None:
         assert _equal(read_trajectory(data), trajectory)
         assert write_trajectory(read_trajectory(data)) == data
     assert len(write_trajectory(bridge)) < 250_000  # 51 blocks, 17 s, most of it falling debris
+
+
+def test_a_trajectory_tells_what_bears_the_machine_and_what_it_bears(
+    engine: str, tasks: dict[str, Task]
+) -> None:
+    machine = replayed(deck(5, 7))
+    cargo = tasks["support-1"].scenario.cargo.model_copy(update={"final_mass": 100.0})
+    scenario = tasks["support-1"].scenario.model_copy(update={"cargo": cargo})
+    bearing = simulate(machine, scenario, engine).bearing
+    assert bearing is not None
+    settled = slice(-25, None)
+    assert bearing.cargo[settled] == pytest.approx(100.0, rel=0.02)
+    assert bearing.ground[settled] == pytest.approx(0.0, abs=0.1)
+    half = (100.0 + machine.mass) / 2
+    assert bearing.terrain[settled] == pytest.approx(half, rel=0.03)
+    wheels = simulate(replayed(car(drive=())), tasks["transport-1"].scenario, engine).bearing
+    assert wheels is not None
+    assert wheels.wheels[settled].sum(axis=1) == pytest.approx(replayed(car()).mass, rel=0.02)
+    assert len(wheels.wheel_ids) == 4
+
+
+def test_a_break_makes_pieces(tasks: dict[str, Task]) -> None:
+    trajectory = simulate(replayed(beam(7)), tasks["support-1"].scenario, "mujoco")
+    assert trajectory.pieces is not None
+    assert len(set(trajectory.pieces[0])) == 1
+    assert len(set(trajectory.pieces[-1])) > 1
+    broken = round(trajectory.breaks[0].time_s * 25)
+    assert len(set(trajectory.pieces[broken + 1])) > 1
+    assert len(set(trajectory.pieces[broken - 1])) == 1
 
 
 def test_a_trajectory_tells_where_it_is_from(engine: str, tasks: dict[str, Task]) -> None:

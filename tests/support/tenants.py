@@ -5,14 +5,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from httpx import Response
+from httpx import Client, Response
+from pydantic import SecretStr
 from sqlalchemy import text
-from starlette.testclient import TestClient
 
 from buildarena_store import Database
 from buildarena_store.tables import metadata
 
 ADMIN = "operator-secret-that-is-long-enough"
+WITH_KEYS = {
+    "require_keys": True,
+    "admin_key": SecretStr(ADMIN),
+    "rate_limit": "1000000/minute",
+}
+"""Settings of a service that asks for keys, as often as tests like to ask."""
 
 
 @dataclass(frozen=True)
@@ -25,7 +31,7 @@ class Tenant:
         id: Its id.
     """
 
-    client: TestClient
+    client: Client
     secret: str
     id: str | None
 
@@ -47,12 +53,12 @@ class Tenant:
         return answer.json()
 
 
-def operator(client: TestClient) -> Tenant:
+def operator(client: Client) -> Tenant:
     """The one with the admin key of the settings."""
     return Tenant(client, ADMIN, None)
 
 
-def new_tenant(client: TestClient, name: str, *scopes: str) -> Tenant:
+def new_tenant(client: Client, name: str, *scopes: str) -> Tenant:
     """Somebody with a new key."""
     body = {"name": name, "scopes": list(scopes) or ["submit"]}
     made = operator(client).post("/v1/keys", body)

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from buildarena_benchmark.flags import DISQUALIFYING, INFORMATIVE, PUBLISHED, Reading
 from buildarena_benchmark.leaderboard import (
     BoardQuery,
     EndedJob,
@@ -15,6 +16,7 @@ from buildarena_benchmark.leaderboard import (
     compare_models,
     summarise,
 )
+from buildarena_benchmark.statistics import holm
 
 START = datetime(2026, 1, 1, tzinfo=UTC)
 ALL = BoardQuery()
@@ -64,7 +66,8 @@ def test_a_cell_of_a_hand_worked_case() -> None:
     assert (cell.success_rate, cell.success_rate_of_ended) == (0.75, 0.5)
     assert (cell.simulated, cell.successes) == (3, 3)
     assert cell.indicator_mean == pytest.approx((10 + 11 + 12) / 4)
-    assert cell.indicator_low < cell.indicator_mean < cell.indicator_high
+    assert (cell.indicator_low, cell.indicator_high, cell.too_few_data) == (None, None, True)
+    assert (cell.indicator_best, cell.censored, cell.flags) == (12.0, 0, {})
     assert cell.cost_per_success_usd == pytest.approx(2.0 / 3)
     assert cell.invalid_action_rate == pytest.approx(0.1)
     assert (cell.pass_at["2"], cell.pass_all["2"]) == (1.0, pytest.approx(0.5))
@@ -72,13 +75,65 @@ def test_a_cell_of_a_hand_worked_case() -> None:
     assert cell.outcomes["construction_failed"] == 1
 
 
-def test_a_flagged_success_counts_only_when_it_is_asked_for() -> None:
+@pytest.mark.parametrize("flag", DISQUALIFYING)
+def test_a_disqualified_success_is_a_failure_with_nothing_in_our_reading(flag) -> None:
     found = trials("lift-1", "a", 3, 4)
-    found[0] = replace(found[0], flags=("thrust_below_weight",))
-    found[3] = replace(found[3], flags=("unstable",))
-    strict, lax = summarise(found), summarise(found, include_flagged=True)
-    assert (strict.flagged, strict.successes, strict.trials) == (1, 2, 3)
-    assert (lax.flagged, lax.successes, lax.trials) == (0, 3, 4)
+    found[0] = replace(found[0], flags=("never_fell", flag), indicator=900.0)
+    ours = summarise(found)
+    assert (ours.flagged, ours.successes, ours.trials) == (1, 2, 4)
+    assert (ours.indicator_best, ours.censored) == (12.0, 0)
+    assert ours.indicator_mean == pytest.approx((11 + 12) / 4)
+    assert ours.flags == {"never_fell": 1, flag: 1}
+
+
+@pytest.mark.parametrize("flag", [*INFORMATIVE, "a flag of tomorrow"])
+def test_an_informative_flag_changes_no_figure_of_a_rank(flag) -> None:
+    plain = trials("lift-1", "a", 3, 4)
+    cell, without = summarise([replace(t, flags=(flag,)) for t in plain]), summarise(plain)
+    for name in ("trials", "successes", "success_low", "indicator_mean", "indicator_best"):
+        assert getattr(cell, name) == getattr(without, name)
+    assert (cell.flagged, cell.flags) == (0, {flag: 4})
+    assert cell.censored == (3 if flag == "never_fell" else 0)
+
+
+@pytest.mark.parametrize("flag", sorted(PUBLISHED))
+@pytest.mark.parametrize("success", [True, False])
+def test_the_published_reading_leaves_out_what_it_calls_hacked(flag, success) -> None:
+    found = trials("lift-1", "a", 3, 4)
+    found[0] = replace(found[0], flags=(flag,), success=success)
+    cell = summarise(found, reading=Reading.PUBLISHED)
+    assert (cell.flagged, cell.successes, cell.trials, cell.ended) == (1, 2, 3, 4)
+
+
+@pytest.mark.parametrize("flag", sorted({*DISQUALIFYING, *INFORMATIVE} - PUBLISHED))
+def test_the_published_reading_knows_no_flags_but_its_own(flag) -> None:
+    found = [replace(t, flags=(flag,)) for t in trials("lift-1", "a", 3, 4)]
+    cell = summarise(found, reading=Reading.PUBLISHED)
+    assert (cell.flagged, cell.successes, cell.trials) == (0, 3, 4)
+
+
+def bridges(model: str, successes: int, load: float, *flags: str) -> list[EndedJob]:
+    found = trials("support-1", model, successes, 64)
+    return [replace(t, indicator=load, flags=flags) if t.success else t for t in found]
+
+
+def test_a_bridge_that_carries_everything_is_the_best_result() -> None:
+    board = board_of(bridges("all", 40, 1500.0, "never_fell"), bridges("some", 6, 200.0))
+    first, second = board.board(ALL).tasks[0].rows
+    assert (first.cell.model, first.rank, first.cell.censored) == ("all", 1, 40)
+    assert (second.cell.model, second.rank) == ("some", 2)
+    published = board.board(BoardQuery(reading=Reading.PUBLISHED)).tasks[0].rows
+    assert [(row.cell.model, row.cell.trials) for row in published] == [("some", 64), ("all", 24)]
+    assert board.board(ALL).tasks[0].rows[0].cell.successes == 40
+
+
+def test_who_cheats_does_not_gain_by_it() -> None:
+    """Not in our reading: neither by far-off figures nor by having few trials that count."""
+    cheat = [
+        replace(t, flags=("not_driven",), indicator=1e6) for t in trials("lift-1", "a", 60, 64)
+    ]
+    board = board_of(cheat, trials("lift-1", "b", 5, 64), trials("lift-1", "c", 30, 64))
+    assert [row.cell.model for row in board.board(ALL).tasks[0].rows] == ["c", "b", "a"]
 
 
 def test_errored_jobs_alone_give_no_numbers() -> None:
@@ -96,8 +151,8 @@ def test_errored_jobs_alone_give_no_numbers() -> None:
 def test_zero_successes_have_an_interval_and_no_cost_per_success() -> None:
     cell = summarise(trials("lift-1", "a", 0, 64))
     assert (cell.success_low, cell.cost_per_success_usd) == (0.0, None)
-    assert 0.05 < cell.success_high < 0.06
-    assert (cell.indicator_low, cell.indicator_high) == (0.0, 0.0)
+    assert 0.05 < cell.success_high < 0.06  # 1 - 0.025^(1/64)
+    assert (cell.indicator_low, cell.indicator_high, cell.too_few_data) == (None, None, True)
 
 
 def test_an_empty_board_is_empty() -> None:
@@ -224,10 +279,16 @@ def test_a_duel_pairs_shared_seeds_and_adjusts_for_the_tasks() -> None:
     second = trials("lift-1", "b", 20, 64) + trials("support-1", "b", 28, 64)
     lift, support = compare_models(first, second).tasks
     assert (lift.successes, lift.trials, lift.success.pairs) == ((60, 20), (64, 64), 64)
-    assert lift.success_p == pytest.approx(2 * lift.success.p_value)
+    # Two figures on two tasks: all four tests are one family.
+    tests = [lift.success, lift.indicator, support.success, support.indicator]
+    assert [
+        lift.success_p,
+        lift.indicator_p,
+        support.success_p,
+        support.indicator_p,
+    ] == pytest.approx(holm([test.p_value for test in tests]))
     assert lift.success_p < 0.001
     assert lift.low > 0
-    assert support.success_p == support.success.p_value
     assert support.low < 0 < support.high
 
 

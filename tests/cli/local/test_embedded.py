@@ -4,7 +4,9 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import psutil
@@ -12,6 +14,7 @@ import pytest
 from redis import Redis
 
 from buildarena_cli.local import EmbeddedValkey, ManagedProcess, Supervisor
+from buildarena_cli.local.supervisor import LOOK_EVERY_S
 from buildarena_pipeline.errors import StartupError
 
 
@@ -48,6 +51,58 @@ def test_a_process_that_keeps_dying_is_given_up() -> None:
         wait_until(lambda: supervisor.failed is not None)
     assert "mayfly died 6 times" in supervisor.failed
     assert "exit code 3" in supervisor.failed
+
+
+def sleeper() -> subprocess.Popen[bytes]:
+    return subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
+
+
+@pytest.fixture
+def started() -> Iterator[list[subprocess.Popen[bytes]]]:
+    """What a test starts; whatever happens, nothing of it is left."""
+    processes: list[subprocess.Popen[bytes]] = []
+    yield processes
+    for process in processes:
+        process.kill()
+        process.wait()
+
+
+def test_what_is_started_again_while_all_is_stopped_is_stopped_too(started) -> None:
+    restarting, stopping = threading.Event(), threading.Event()
+
+    def start() -> subprocess.Popen[bytes]:
+        if started:
+            restarting.set()
+            assert stopping.wait(timeout=10)
+            time.sleep(0.3)  # long enough for a stop that does not wait to be over
+        started.append(sleeper())
+        return started[-1]
+
+    with Supervisor() as supervisor:
+        supervisor.launch(ManagedProcess(name="slow", start=start))
+        supervisor.watch()
+        started[0].kill()
+        assert restarting.wait(timeout=10)
+        stopping.set()
+    assert len(started) == 2
+    assert [process.returncode for process in started] == [-signal.SIGKILL, -signal.SIGTERM]
+
+
+def test_what_dies_while_all_is_stopped_is_not_started_again(started) -> None:
+    def start() -> subprocess.Popen[bytes]:
+        started.append(sleeper())
+        return started[-1]
+
+    def stop(process: subprocess.Popen[bytes]) -> None:
+        process.kill()
+        process.wait()
+        time.sleep(3 * LOOK_EVERY_S)
+
+    with Supervisor() as supervisor:
+        for name in ("one", "two"):
+            supervisor.launch(ManagedProcess(name=name, start=start, stop=stop))
+        supervisor.watch()
+    assert [process.returncode for process in started] == [-signal.SIGKILL] * 2
 
 
 def test_a_server_that_ends_at_once_is_reported(tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from buildarena_pipeline.errors import PermanentError, TransientError
 from buildarena_store import clean
 from buildarena_worker.providers import bounds
 from buildarena_worker.providers.failures import ProviderError
-from buildarena_worker.providers.openai_answer import AnswerReader
+from buildarena_worker.providers.openai.answer import AnswerReader
 from buildarena_worker.providers.provider import ProviderClient
 from buildarena_worker.providers.retries import RetryPolicy
 from buildarena_worker.session.messages import Message, Reply, Request, ToolCall
@@ -260,3 +260,13 @@ def test_bounded_arguments_are_plain() -> None:
         assert isinstance(bounds.bounded_arguments(given), str)
     call = ToolCall(id="c", name="n", arguments={"a": [1, "x", None, True, 1.5]})
     assert bounds.bounded(Reply(text="", calls=(call,))).calls == (call,)
+
+
+@pytest.mark.parametrize("inner", [1, [], {}, {"k": "v"}])
+def test_arguments_have_a_last_level(inner: Any) -> None:
+    deep = inner
+    for _ in range(bounds.MAX_DEPTH - bool(inner == {"k": "v"})):
+        deep = [deep]
+    assert bounds.bounded_arguments(deep) == deep
+    assert isinstance(bounds.bounded_arguments({"k": deep}), str)
+    assert isinstance(bounds.bounded_arguments([0, deep]), str)

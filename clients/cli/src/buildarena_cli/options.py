@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -53,6 +54,23 @@ TasksOption = Annotated[
 ModelsOption = Annotated[
     list[str] | None,
     typer.Option("--model", help="Only these models.", autocompletion=complete_model),
+]
+
+
+class ReadingName(StrEnum):
+    """How flags are read; see `buildarena_benchmark.flags.Reading`, which is slow to load."""
+
+    OURS = "ours"
+    PUBLISHED = "published"
+
+
+ReadingOption = Annotated[
+    ReadingName,
+    typer.Option(
+        "--reading",
+        help="How flags are read: disqualified trials fail, or what the published evaluation "
+        "calls hacked is left out.",
+    ),
 ]
 TrackOption = Annotated[str | None, typer.Option("--track", help="Track; default: the first.")]
 AfterOption = Annotated[str | None, typer.Option("--after", help="Cursor of the previous page.")]

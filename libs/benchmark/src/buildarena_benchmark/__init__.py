@@ -2,6 +2,7 @@
 
 from buildarena_benchmark.constraints import broken_constraint
 from buildarena_benchmark.errors import BenchmarkError, SourceError, TaskError, ValidationIssue
+from buildarena_benchmark.robustness import Robustness, robustness
 from buildarena_benchmark.scores import Score, failed_score, score
 from buildarena_benchmark.tasks.loading import (
     builtin_tasks,
@@ -13,6 +14,7 @@ from buildarena_benchmark.tasks.task import Task
 
 __all__ = [
     "BenchmarkError",
+    "Robustness",
     "Score",
     "SourceError",
     "Task",
@@ -24,5 +26,6 @@ __all__ = [
     "load_task",
     "parse_custom_task",
     "parse_task",
+    "robustness",
     "score",
 ]

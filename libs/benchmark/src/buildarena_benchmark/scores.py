@@ -33,7 +33,7 @@ class Score:
         success: Whether the task's criterion is met.
         indicator: The task's figure; see `Task.indicator`.
         metrics: Parts, mass, cost and the category's secondary metrics; None where there is none.
-        flags: Signs that a success is not what it seems; see the scorers.
+        flags: Remarks on it; see `buildarena_benchmark.flags`.
     """
 
     success: bool

@@ -1,10 +1,10 @@
-"""Copies of arbitrary values that can be written as JSON wherever a machine is stored."""
+"""Values as JSON: copies that can be written wherever a machine is stored, and their levels."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 LARGEST_INTEGER = 2**63 - 1  # databases and other languages read no larger one back
 _LONGEST_TEXT = 2_000  # characters; texts an action accepts are far shorter
@@ -16,6 +16,26 @@ _WIDEST = 200  # entries of a list or object
 def is_storable(text: str) -> bool:
     """Whether every database takes the text: without NUL characters and lone surrogates."""
     return _UNSTORABLE.search(text) is None
+
+
+def levels(value: object) -> Iterator[list[object]]:
+    """A JSON value level by level: itself, then what it holds, then what that holds, and so on.
+
+    A level is collected when it is asked for, so that whoever stops reads no deeper.
+
+    Args:
+        value: JSON as Python has it: objects are dicts, arrays lists or tuples.
+    """
+    level = [value]
+    while level:
+        yield level
+        inner: list[object] = []
+        for entry in level:
+            if isinstance(entry, dict):
+                inner += entry.values()
+            elif isinstance(entry, list | tuple):
+                inner += entry
+        level = inner
 
 
 def json_value(value: object, *, depth: int = 0) -> object:

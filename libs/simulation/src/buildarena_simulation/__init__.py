@@ -3,6 +3,7 @@
 Importing this package loads no engine, no pyarrow and no scipy; `simulate` does, when called.
 """
 
+from buildarena_simulation.bearing import Bearing
 from buildarena_simulation.engines import ENGINES, engine_version
 from buildarena_simulation.errors import (
     BuildarenaSimulationError,
@@ -19,6 +20,7 @@ from buildarena_simulation.trajectory import Break, JointPeak, Trajectory
 __all__ = [
     "ENGINES",
     "SIMULATION_VERSION",
+    "Bearing",
     "Break",
     "BuildarenaSimulationError",
     "JointPeak",

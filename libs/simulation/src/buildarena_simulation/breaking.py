@@ -131,7 +131,12 @@ class BreakingModel:
         contacts = faces.joined_to(engine.contacts(), clusters.cluster_of)
         others = [self._pushes(thrusts), self._pulls(tensions)]
         contacts, shared = self._supports.settled(
-            contacts, self._sharing.shared(contacts), faces.corners, self._loads, motion, others
+            contacts,
+            self._sharing.shared(contacts),
+            corners=faces.corners,
+            structure=self._loads,
+            motion=motion,
+            others=others,
         )
         self.bearing.read(contacts.other, contacts.surface, shared)
         return together([shared, *others])

@@ -90,3 +90,18 @@ JOINT_STRENGTH: Final = MappingProxyType(
 )
 ROPE_STRENGTH: Final = 1000.0
 """Tension at which a winch's rope gives way, mass·g. Fitted: not public."""
+
+START_SHIFT: Final = 0.1
+"""A seed moves the machine's start by up to this along east and along north, units. Ours."""
+
+START_DROP: Final = 0.05
+"""A seed lifts the machine's start by up to this, units. Ours."""
+
+START_YAW_DEG: Final = 2.0
+"""A seed turns the machine's start by up to this about the vertical, degrees. Ours."""
+
+CARGO_SHIFT: Final = 0.1
+"""A seed moves the cargo's start by up to this along east and along north, units. Ours."""
+
+KEY_DELAY_S: Final = 0.04
+"""A seed delays every pressing and letting go of a key by up to this, seconds. Ours."""

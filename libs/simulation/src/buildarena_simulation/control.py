@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from buildarena_simulation.constants import GRAVITY
+from buildarena_simulation.constants import GRAVITY, KEY_DELAY_S
 from buildarena_simulation.scenario import Control
 from buildarena_simulation.structure.model import BoolArray, FloatArray, Structure
 
@@ -26,6 +26,37 @@ class KeyHold(Protocol):
     @property
     def hold_for_s(self) -> float:
         """For how long, seconds."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TimedHold:
+    """A key hold at its own times; fields as in `KeyHold`."""
+
+    time_s: float
+    key: str
+    hold_for_s: float
+
+
+def varied_presses(
+    keys: Sequence[KeyHold], control: Control, seed: int
+) -> tuple[Sequence[KeyHold], Control]:
+    """The same presses, each pressed and let go a little late, as by a hand or a runner.
+
+    Args:
+        keys: The control sequence.
+        control: Who presses the keys; held cannons start late too.
+        seed: Draws the delays, each up to `KEY_DELAY_S`.
+    """
+    delays = KEY_DELAY_S * np.random.default_rng([seed, 1]).random(1 + 2 * len(keys))
+    holds = [
+        TimedHold(
+            time_s=press.time_s + early,
+            key=press.key,
+            hold_for_s=max(0.0, press.hold_for_s + late - early),
+        )
+        for press, early, late in zip(keys, delays[1::2], delays[2::2], strict=True)
+    ]
+    return holds, control.model_copy(update={"from_s": control.from_s + float(delays[0])})
 
 
 Bindings = Sequence[Mapping[str, Sequence[str]]]

@@ -1,5 +1,6 @@
 """From a machine of the geometry library to the arrays the simulation works on."""
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,7 +19,8 @@ from buildarena_simulation.structure.model import (
 )
 
 if TYPE_CHECKING:
-    from buildarena_geometry import Block, Joint, Machine
+    from buildarena_geometry import Block, Connector, Joint, Machine
+    from buildarena_geometry.blocks import FaceRef
     from buildarena_geometry.modules.module import Solid
 
 
@@ -43,34 +45,58 @@ def structure_of(machine: "Machine") -> Structure:
     index = {part.id: i for i, part in enumerate(parts)}
     links = [_link(joint, index, parts) for joint in machine.joints if joint.holds]
     ropes = []
-    for connector in machine.connectors.values():
-        first, second = index[connector.start[0]], index[connector.end[0]]
-        start, end = np.array(connector.start_point), np.array(connector.end_point)
-        name = f"{connector.module.name} {connector.id}"
-        if connector.module.link == "rope":
-            ropes.append(
-                Rope(
-                    name=name,
-                    first=first,
-                    second=second,
-                    start=start,
-                    end=end,
-                    mass=connector.module.mass,
-                )
+    connectors = list(machine.connectors.values())
+    braces = [c for c in connectors if c.module.link != "rope"]
+    winches = [c for c in connectors if c.module.link == "rope"]
+    for connector, share in zip(braces, _shares(braces), strict=True):
+        links.append(
+            Link(
+                name=f"{connector.module.name} {connector.id}",
+                first=index[connector.start[0]],
+                second=index[connector.end[0]],
+                kind=JointKind.BRACE,
+                start=np.array(connector.start_point),
+                end=np.array(connector.end_point),
+                mass=connector.module.mass,
+                share=share,
+                faces=(connector.start, connector.end),
             )
-        else:
-            links.append(
-                Link(
-                    name=name,
-                    first=first,
-                    second=second,
-                    kind=JointKind.BRACE,
-                    start=start,
-                    end=end,
-                    mass=connector.module.mass,
-                )
+        )
+    for connector, share in zip(winches, _shares(winches), strict=True):
+        ropes.append(
+            Rope(
+                name=f"{connector.module.name} {connector.id}",
+                first=index[connector.start[0]],
+                second=index[connector.end[0]],
+                start=np.array(connector.start_point),
+                end=np.array(connector.end_point),
+                mass=connector.module.mass,
+                share=share,
             )
+        )
     return build_structure(parts, links, ropes)
+
+
+def _shares(connectors: "Sequence[Connector]") -> list[float]:
+    """Each connector's share of one's stiffness or strength, by the company on its faces.
+
+    Connectors that leave a face in one direction are together worth one; those that leave it at
+    right angles or in opposite directions do not help each other.
+    """
+    ways: dict[FaceRef, list[tuple[int, FloatArray]]] = {}
+    for k, connector in enumerate(connectors):
+        span = np.array(connector.end_point) - np.array(connector.start_point)
+        way = span / max(float(np.linalg.norm(span)), 1e-9)
+        ways.setdefault(connector.start, []).append((k, way))
+        ways.setdefault(connector.end, []).append((k, -way))
+    company = np.ones(len(connectors))
+    for leaving in ways.values():
+        directions = np.array([way for _, way in leaving])
+        alike = np.maximum(directions @ directions.T, 0.0) ** 2
+        np.fill_diagonal(alike, 1.0)
+        for (k, _), total in zip(leaving, alike.sum(axis=1), strict=True):
+            company[k] = max(company[k], total)
+    return [float(share) for share in 1.0 / company]
 
 
 def bindings_of(machine: "Machine") -> Bindings:

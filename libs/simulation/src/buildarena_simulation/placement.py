@@ -1,17 +1,60 @@
-"""Where machine and cargo are at the start of a trial."""
+"""Where machine and cargo are at the start of a trial, and what a seed varies about it."""
+
+import math
+from dataclasses import dataclass
 
 import numpy as np
 
+from buildarena_simulation.constants import CARGO_SHIFT, START_DROP, START_SHIFT, START_YAW_DEG
 from buildarena_simulation.engines.base import CargoBox
-from buildarena_simulation.scenario import Cargo, GroundPlacement, SpanPlacement
+from buildarena_simulation.scenario import Cargo, GroundPlacement, Scenario, SpanPlacement
 from buildarena_simulation.structure.model import FloatArray, Structure
 
 _CLEARANCE = 0.005
 """Height of the lowest point above the ground at the start, units: touching, not overlapping."""
 
-_NUDGE = 0.01
-
 _QUARTER_TURN = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Start:
+    """The start of a trial.
+
+    Attributes:
+        position: (3,) of the machine frame, world frame, units.
+        rotation: (3, 3) world_from_machine.
+        cargo: The cargo, if there is one.
+    """
+
+    position: FloatArray
+    rotation: FloatArray
+    cargo: CargoBox | None
+
+
+def start_of(structure: Structure, scenario: Scenario, seed: int | None = None) -> Start:
+    """Where a trial starts: the exact place, or one that a fair repetition might have as well.
+
+    Args:
+        structure: The machine.
+        scenario: What it is put through.
+        seed: Draws the machine's place and yaw and the cargo's place within the tolerances of
+            `constants`; None for the exact places.
+    """
+    position, rotation = place(structure, scenario.placement)
+    shift, yaw, cargo_shift = np.zeros(3), 0.0, np.zeros(3)
+    if seed is not None:
+        draw = np.random.default_rng(seed).uniform(-1.0, 1.0, size=6)
+        shift = np.array([*(START_SHIFT * draw[:2]), START_DROP * (1.0 + draw[2]) / 2])
+        yaw = math.radians(START_YAW_DEG * draw[3])
+        cargo_shift[:2] = CARGO_SHIFT * draw[4:]
+    cosine, sine = math.cos(yaw), math.sin(yaw)
+    turn = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+    position, rotation = turn @ position + shift, turn @ rotation
+    return Start(
+        position=position,
+        rotation=rotation,
+        cargo=_cargo_at_start(structure, scenario.cargo, position, rotation, cargo_shift),
+    )
 
 
 def place(
@@ -41,21 +84,12 @@ def place(
     return np.array([-middle[0], -middle[1], placement.lowest_center - lowest]), rotation
 
 
-def jittered(position: FloatArray, seed: int) -> FloatArray:
-    """The position moved sideways by up to a hundredth of a unit, at random.
-
-    A result that such a jitter changes depends on luck.
-
-    Args:
-        position: (3,) units.
-        seed: Of the random generator.
-    """
-    shift = np.random.default_rng(seed).uniform(-_NUDGE, _NUDGE, size=2)
-    return np.asarray(position + np.array([*shift, 0.0]))
-
-
-def cargo_at_start(
-    structure: Structure, cargo: Cargo | None, position: FloatArray, rotation: FloatArray
+def _cargo_at_start(
+    structure: Structure,
+    cargo: Cargo | None,
+    position: FloatArray,
+    rotation: FloatArray,
+    shift: FloatArray,
 ) -> CargoBox | None:
     """The cargo above the machine's top, over (0, 0); None without cargo.
 
@@ -64,6 +98,7 @@ def cargo_at_start(
         cargo: The scenario's cargo.
         position: (3,) world_from_machine at the start, units.
         rotation: (3, 3) world_from_machine at the start; turns about the vertical only.
+        shift: (3,) from there, units.
     """
     if cargo is None:
         return None
@@ -71,6 +106,6 @@ def cargo_at_start(
     height = top + cargo.drop_height + cargo.size[2] / 2
     return CargoBox(
         size=np.array(cargo.size),
-        position=np.array([0.0, 0.0, height]),
+        position=np.array([0.0, 0.0, height]) + shift,
         mass=cargo.mass_at(0.0),
     )

@@ -14,17 +14,19 @@ from buildarena_simulation.control import (
     effective_presses,
     plan_schedule,
     recoil,
+    varied_presses,
 )
 from buildarena_simulation.engines import ENGINES, create_engine, engine_version
 from buildarena_simulation.engines.base import Engine, World
 from buildarena_simulation.errors import BuildarenaSimulationError, SimulationError
 from buildarena_simulation.machine import bindings_of, structure_of
-from buildarena_simulation.placement import cargo_at_start, jittered, place
+from buildarena_simulation.placement import start_of
 from buildarena_simulation.recording import Recorder
 from buildarena_simulation.scenario import Scenario
 from buildarena_simulation.structure.clusters import find_clusters
 from buildarena_simulation.structure.model import Structure
 from buildarena_simulation.structure.motion import at_rest
+from buildarena_simulation.threads import single_threaded
 from buildarena_simulation.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -43,6 +45,7 @@ def simulate(
     *,
     controls: Sequence[KeyHold] | None = None,
     seed: int | None = None,
+    finer: int = 1,
     on_progress: Callable[[float], None] | None = None,
 ) -> Trajectory:
     """Puts a machine through a scenario. The same input gives the same bytes.
@@ -52,7 +55,9 @@ def simulate(
         scenario: What it is put through.
         engine: Name of the engine; see `ENGINES`.
         controls: A control sequence to use in place of the machine's own.
-        seed: Shifts the machine's start by up to a hundredth of a unit; None for the exact place.
+        seed: Varies the start as a fair repetition would, see `start_of`; None for the exact one.
+        finer: By how much the engine's steps are shorter than usual, to tell a result of the model
+            from one of the steps.
         on_progress: Called now and then with the share of the trial that is done, 0 to 1.
 
     Returns:
@@ -71,6 +76,7 @@ def simulate(
         bindings=bindings_of(machine),
         controls=machine.control_sequence if controls is None else controls,
         seed=seed,
+        finer=finer,
         on_progress=on_progress,
     )
 
@@ -83,6 +89,7 @@ def simulate_structure(
     bindings: Bindings = (),
     controls: Sequence[KeyHold] = (),
     seed: int | None = None,
+    finer: int = 1,
     on_progress: Callable[[float], None] | None = None,
 ) -> Trajectory:
     """Puts a structure through a scenario; see `simulate`.
@@ -94,22 +101,26 @@ def simulate_structure(
         bindings: (N,) the keys of each block's actions; may be empty if nothing is pressed.
         controls: The control sequence.
         seed: See `simulate`.
+        finer: See `simulate`.
         on_progress: Called now and then with the share of the trial that is done.
     """
-    position, rotation = place(structure, scenario.placement)
-    if seed is not None:
-        position = jittered(position, seed)
+    given, start = scenario, start_of(structure, scenario, seed)
     world = World(
         structure=structure,
         ground=True,
         terrain=scenario.terrain,
-        cargo=cargo_at_start(structure, scenario.cargo, position, rotation),
+        cargo=start.cargo,
         gravity=GRAVITY,
+        finer=finer,
     )
+    if seed is not None:
+        controls, control = varied_presses(controls, scenario.control, seed)
+        scenario = scenario.model_copy(update={"control": control})
     adapter = create_engine(engine, world)
     try:
-        trial = _Trial(world, scenario, adapter, at=(position, rotation))
-        trial.run(bindings or [{}] * len(structure), controls, on_progress)
+        with single_threaded():
+            trial = _Trial(world, scenario, adapter, at=(start.position, start.rotation))
+            trial.run(bindings or [{}] * len(structure), controls, on_progress)
         return trial.recorder.finished(
             breaking=trial.breaking,
             engine=engine,
@@ -120,7 +131,7 @@ def simulate_structure(
                 "gravity": GRAVITY,
                 "effective_key_presses": effective_presses(bindings, controls),
                 **({} if seed is None else {"seed": seed}),
-                "scenario": hashlib.sha256(scenario.model_dump_json().encode()).hexdigest()[:16],
+                "scenario": hashlib.sha256(given.model_dump_json().encode()).hexdigest()[:16],
             },
         )
     except BuildarenaSimulationError:

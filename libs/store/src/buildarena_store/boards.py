@@ -10,6 +10,7 @@ from typing import Any
 
 from sqlalchemy import Connection, Integer, Row, and_, cast, func, select, text
 
+from buildarena_benchmark.flags import is_disqualified
 from buildarena_benchmark.leaderboard import EndedJob
 from buildarena_store.database import Database
 from buildarena_store.rows import columns_of, value_of
@@ -67,12 +68,14 @@ class Round:
 
     Attributes:
         machine: Hash of its document: the same machine in another simulator has the same.
+        flags: Remarks on its score.
     """
 
     machine: str
     success: bool
     indicator: float
     parts: int | None
+    flags: tuple[str, ...]
 
 
 class Boards:
@@ -249,8 +252,13 @@ def _add_rollout(rounds: list[Round], row: Row[Any]) -> None:
         success=bool(row.success),
         indicator=row.indicator or 0.0,
         parts=(row.metrics or {}).get("parts"),
+        flags=tuple(row.flags or ()),
     )
     if rounds and rounds[-1].machine == new.machine:
-        rounds[-1] = max(rounds[-1], new, key=lambda r: (r.success, r.indicator))
+        rounds[-1] = max(
+            rounds[-1],
+            new,
+            key=lambda r: (r.success and not is_disqualified(r.flags), r.indicator),
+        )
     else:
         rounds.append(new)

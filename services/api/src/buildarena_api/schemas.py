@@ -7,6 +7,7 @@ from typing import Any, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from buildarena_benchmark.flags import is_censored
 from buildarena_store import Budget, Job, JobState, Outcome, Stage, SweepProgress, SweepState
 from buildarena_store.states import AttemptResult
 
@@ -76,8 +77,9 @@ class JobView(_Answer):
     detail: str | None
     success: bool | None
     indicator: float | None = Field(description="The task's performance indicator")
+    censored: bool = Field(description="Whether the indicator is at least what it says")
     metrics: dict[str, Any] | None
-    flags: list[str] | None
+    flags: list[str] | None = Field(description="Remarks on the score; the board says what of")
     usage: UsageView
     actions: int
     refused_actions: int
@@ -98,6 +100,7 @@ class JobView(_Answer):
         return JobView.model_validate(
             {
                 **{name: getattr(job, name, None) for name in JobView.model_fields},
+                "censored": is_censored(job.flags or ()),
                 "usage": UsageView.model_validate(job),
             }
         )

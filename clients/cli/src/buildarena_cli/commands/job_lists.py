@@ -94,6 +94,6 @@ def _row(job: dict[str, Any]) -> list[str]:
         job["outcome"] or f"{job['stage']} {job['state']}",
         job["reason"] or "",
         ", ".join(job["flags"] or ()),
-        number(job["indicator"], 2),
+        number(job["indicator"], 2, at_least=job["censored"]),
         minute_of(job["created_at"]),
     ]

@@ -110,15 +110,17 @@ def _show(job: dict[str, Any], *, as_json: bool) -> None:
     if as_json:
         print_json(job)
         return
+    from buildarena_benchmark.flags import meaning
+
     say(f"{job['id']}  {job['task']} x {job['model']} x seed {job['seed']}")
     say(f"track     {job['track']}")
     ended = job["outcome"] or f"{job['stage']} {job['state']}"
     say(f"outcome   {ended}" + (f" ({job['reason']})" if job["reason"] else ""))
     if job["detail"]:
         say(f"detail    {job['detail']}")
-    if job["flags"]:
-        say(f"flags     {', '.join(job['flags'])}")
-    say(f"indicator {number(job['indicator'], 3)}")
+    for flag in job["flags"] or ():
+        say(f"flag      {flag}: {meaning(flag)}" if meaning(flag) else f"flag      {flag}")
+    say(f"indicator {number(job['indicator'], 3, at_least=job['censored'])}")
     if job["imported_from"]:
         verified = job["verified_at"]
         state = f"verified here at {minute_of(verified)}" if verified else "not verified here"

@@ -16,6 +16,8 @@ from buildarena_cli.options import (
     JsonOption,
     ModelName,
     ModelsOption,
+    ReadingName,
+    ReadingOption,
     TasksOption,
     TrackOption,
     UrlOption,
@@ -33,7 +35,6 @@ LevelOption = Annotated[list[int] | None, typer.Option("--level", help="Only the
 SinceOption = Annotated[
     datetime | None, typer.Option(help="Only jobs that ended then or later (UTC).")
 ]
-FlaggedOption = Annotated[bool, typer.Option("--flagged", help="Count flagged successes too.")]
 
 
 def leaderboard(
@@ -42,7 +43,7 @@ def leaderboard(
     level: LevelOption = None,
     model: ModelsOption = None,
     since: SinceOption = None,
-    flagged: FlaggedOption = False,
+    reading: ReadingOption = ReadingName.OURS,
     track: Annotated[
         str | None, typer.Option("--track", help="Only this track; as JSON the first without.")
     ] = None,
@@ -59,7 +60,7 @@ def leaderboard(
         "level": level,
         "model": model,
         "since": None if since is None else f"{since.isoformat()}Z",
-        "flagged": flagged or None,
+        "reading": reading.value,
     }
     client = Client(url)
     board = client.get("/v1/leaderboard", track=track, **asked)
@@ -99,6 +100,7 @@ def compare(
     second: ModelName,
     *,
     task: TasksOption = None,
+    reading: ReadingOption = ReadingName.OURS,
     track: TrackOption = None,
     url: UrlOption = DEFAULT_URL,
     as_json: JsonOption = False,
@@ -109,7 +111,12 @@ def compare(
     """
     client = Client(url)
     answer = client.get(
-        "/v1/leaderboard/compare", first=first, second=second, task=task, track=track
+        "/v1/leaderboard/compare",
+        first=first,
+        second=second,
+        task=task,
+        reading=reading.value,
+        track=track,
     )
     if as_json:
         print_json(answer)
@@ -135,7 +142,7 @@ def compare(
         title=f"{first} against {second}",
         notes=[
             "diff %: difference of success rates with its 95 % interval",
-            "p: McNemar's and Wilcoxon's tests on shared seeds, adjusted over the tasks (Holm)",
+            "p: McNemar's and Wilcoxon's tests on shared seeds, adjusted over all of them (Holm)",
         ],
     )
 
@@ -146,7 +153,7 @@ def export(
     task: TasksOption = None,
     level: LevelOption = None,
     model: ModelsOption = None,
-    flagged: FlaggedOption = False,
+    reading: ReadingOption = ReadingName.OURS,
     track: TrackOption = None,
     url: UrlOption = DEFAULT_URL,
 ) -> None:
@@ -164,7 +171,7 @@ def export(
         task=task,
         level=level,
         model=model,
-        flagged=flagged or None,
+        reading=reading.value,
         track=track,
     )
     try:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from buildarena_cli.commands.machine_files import check, export
+from buildarena_cli.commands.machine_robustness import show_robustness
 from buildarena_cli.errors import CommandError
 from buildarena_cli.lazy import new_group
 from buildarena_cli.machines import (
@@ -19,7 +20,14 @@ from buildarena_cli.machines import (
     shown_errors,
 )
 from buildarena_cli.near import did_you_mean
-from buildarena_cli.terminal.output import columns, emphasised, print_json, print_table, warn
+from buildarena_cli.terminal.output import (
+    columns,
+    emphasised,
+    number,
+    print_json,
+    print_table,
+    warn,
+)
 
 if TYPE_CHECKING:
     from buildarena_benchmark import Score, Task
@@ -40,8 +48,14 @@ def simulate_command(  # noqa: PLR0917 - the command line passes options by name
     engine: Annotated[str | None, typer.Option(help="pybullet or mujoco.")] = None,
     seed: Annotated[
         int | None,
+        typer.Option(help="Vary the start a little, by this seed, as a fair repetition would."),
+    ] = None,
+    seeds: Annotated[
+        int | None,
         typer.Option(
-            help="Shift the start a little, by this seed, to see whether a result is luck."
+            help="Repeat the trial with so many varied starts, to see whether a result is luck.",
+            min=2,
+            max=1000,
         ),
     ] = None,
     video: Annotated[
@@ -62,12 +76,24 @@ def simulate_command(  # noqa: PLR0917 - the command line passes options by name
                 f"no engine {engine!r}; there are {', '.join(ENGINES)}"
                 f"{did_you_mean(engine, ENGINES)}"
             )
+        given = {"--seed": seed, "--video": video, "--trajectory": trajectory}
+        single = [option for option, value in given.items() if value is not None]
+        if seeds is not None and single:
+            raise CommandError(f"--seeds makes many trials, {single[0]} is for one; give either")
         chosen, machine = chosen_task(task), read_machine(file)
+<<<<<<< HEAD
         broken, rollout = broken_constraint(chosen, machine), None
         if broken is None:
             rollout = _simulated(machine, chosen, engine or ENGINES[0], seed)
         else:
             warn(f"not simulated: {broken[0]}: {broken[1]}")
+=======
+        engine = engine or ENGINES[0]
+        if seeds is not None:
+            show_robustness(chosen, machine, engine, seeds, as_json=as_json)
+            return
+        rollout = _simulated(machine, chosen, engine, seed)
+>>>>>>> main
         if rollout is None:
             result = failed_score(chosen, machine)
         else:
@@ -120,6 +146,8 @@ def _simulated(machine: Machine, task: Task, engine: str, seed: int | None) -> T
 
 
 def _report(task: Task, result: Score, rollout: Trajectory | None) -> dict[str, Any]:
+    from buildarena_benchmark.flags import is_censored
+
     return {
         "task": task.name,
         "task_version": task.version,
@@ -130,6 +158,7 @@ def _report(task: Task, result: Score, rollout: Trajectory | None) -> dict[str, 
         "indicator": result.indicator,
         "indicator_name": task.indicator.name,
         "indicator_unit": task.indicator.unit,
+        "censored": is_censored(result.flags),
         "flags": list(result.flags),
         "metrics": dict(result.metrics),
         "breaks": [
@@ -141,11 +170,16 @@ def _report(task: Task, result: Score, rollout: Trajectory | None) -> dict[str, 
 
 def _print_score(task: Task, result: Score, rollout: Trajectory | None) -> None:
     engine = f" on {rollout.engine} {rollout.engine_version}" if rollout else ""
+    from buildarena_benchmark.flags import is_censored, meaning
+
     unit = "" if task.indicator.unit == "1" else f" {task.indicator.unit}"
     rows = [
         ("verdict", "success" if result.success else "failure"),
-        (task.indicator.name, f"{result.indicator:,.2f}{unit}"),
-        *([("flags", ", ".join(result.flags))] if result.flags else []),
+        (
+            task.indicator.name,
+            number(result.indicator, 2, at_least=is_censored(result.flags)) + unit,
+        ),
+        *(("flag", f"{flag}: {meaning(flag)}") for flag in result.flags),
         *((name, "" if value is None else str(value)) for name, value in result.metrics.items()),
     ]
     print_table(columns("figure", "value"), rows, title=emphasised(f"{task.title}{engine}"))

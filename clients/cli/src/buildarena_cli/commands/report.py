@@ -11,11 +11,12 @@ import typer
 from buildarena_cli.client import Client, at
 from buildarena_cli.errors import CommandError
 from buildarena_cli.ids import whole_id
-from buildarena_cli.options import DEFAULT_URL, UrlOption
+from buildarena_cli.options import DEFAULT_URL, ReadingName, ReadingOption, UrlOption
 from buildarena_cli.terminal.completion import complete_sweep
 from buildarena_cli.terminal.output import say
 
 if TYPE_CHECKING:
+    from buildarena_benchmark.flags import Reading
     from buildarena_benchmark.leaderboard import EndedJob
 
 ENDINGS = (".html", ".md", ".pdf")
@@ -38,6 +39,7 @@ def report(
         ),
     ],
     out: Annotated[Path, typer.Option("--out", help="File: .html, .md or .pdf.")],
+    reading: ReadingOption = ReadingName.OURS,
     url: UrlOption = DEFAULT_URL,
 ) -> None:
     """Write a report of sweeps: tables and plots.
@@ -50,7 +52,7 @@ def report(
     from buildarena_cli.report.writing import write_report
 
     client = Client(url)
-    material = collect(client, [whole_id(client, "sweep", id_) for id_ in sweeps])
+    material = collect(client, [whole_id(client, "sweep", id_) for id_ in sweeps], reading)
     try:
         write_report(sections(material), out)
     except OSError as error:
@@ -58,12 +60,13 @@ def report(
     say(f"{out}: {len(material.trials):,} jobs")
 
 
-def collect(client: Client, ids: Sequence[str]) -> Any:
-    """Reads what a report of these sweeps is made of.
+def collect(client: Client, ids: Sequence[str], reading: str = "ours") -> Any:
+    """Reads what a report of these sweeps is made of, with flags read as asked.
 
     Sweeps of different workflows, prompts or decodings are set side by side: each becomes a row
     of its own, named by what differs from the paper's main experiment.
     """
+    from buildarena_benchmark.flags import Reading
     from buildarena_cli.report.custom_tasks import read_tasks
     from buildarena_cli.report.material import Material
 
@@ -82,13 +85,14 @@ def collect(client: Client, ids: Sequence[str]) -> Any:
             # The paper's main table is of the main experiment alone.
             if not variants[sweep["id"]]:
                 snapshots[row] = registry.get(result["model"], "")
-            rounds[result["job_id"]] = [(r["success"], r["indicator"]) for r in result["rounds"]]
+            rounds[result["job_id"]] = [_verdict(r, Reading(reading)) for r in result["rounds"]]
             for made in result["rounds"]:
                 tried = verdicts.setdefault((result["task"], made["machine"]), {})
-                tried[sweep["spec"]["simulator"]] = (made["success"], made["indicator"])
+                tried[sweep["spec"]["simulator"]] = _verdict(made, Reading(reading))
             trials[result["job_id"]] = _trial(result, row)
     progress = [sweep["progress"] for sweep in found]
     return Material(
+        reading=Reading(reading),
         title=", ".join(dict.fromkeys(sweep["name"] for sweep in found)),
         tasks=read_tasks(client, list(trials.values())),
         trials=list(trials.values()),
@@ -124,6 +128,15 @@ def variant(spec: Mapping[str, Any]) -> str:
         if decoding.get(key) != PLAIN_DECODING.get(key)
     ]
     return ", ".join(parts)
+
+
+def _verdict(made: Mapping[str, Any], reading: Reading) -> tuple[bool, float]:
+    """Success and indicator of a simulated machine, as a reading of flags has them."""
+    from buildarena_benchmark.flags import Reading, is_disqualified
+
+    if reading == Reading.OURS and is_disqualified(made["flags"]):
+        return False, 0.0
+    return made["success"], made["indicator"]
 
 
 def _trial(result: Mapping[str, Any], row: str) -> EndedJob:

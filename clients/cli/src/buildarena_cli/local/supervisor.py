@@ -54,6 +54,8 @@ class Supervisor:
         self.managed: list[ManagedProcess] = []
         self.failed: str | None = None
         self._stop = threading.Event()
+        # Held while a process is started again, so that what is stopped is all there is.
+        self._starting = threading.Lock()
         self._stopped = threading.Event()
         self._thread: threading.Thread | None = None
 
@@ -80,11 +82,12 @@ class Supervisor:
     def stop(self) -> None:
         """Stops watching, then stops the processes, the last started first."""
         self._stop.set()
-        running = [
-            (managed, managed.process)
-            for managed in reversed(self.managed)
-            if managed.process is not None
-        ]
+        with self._starting:
+            running = [
+                (managed, managed.process)
+                for managed in reversed(self.managed)
+                if managed.process is not None
+            ]
         programs = [pair for pair in running if pair[0].stop is _terminate]
         threads = [threading.Thread(target=m.stop, args=(p,)) for m, p in programs]
         for thread in threads:
@@ -124,7 +127,10 @@ class Supervisor:
         # The first restart is immediate; a process that goes on dying is given more and more time.
         if self._stop.wait(LOOK_EVERY_S * (2 ** (len(managed.deaths) - 1) - 1)):
             return
-        try:
-            managed.process = managed.start()
-        except (StartupError, OSError) as error:
-            log.warning("restart_failed", name=managed.name, error=str(error))
+        with self._starting:
+            if self._stop.is_set():
+                return
+            try:
+                managed.process = managed.start()
+            except (StartupError, OSError) as error:
+                log.warning("restart_failed", name=managed.name, error=str(error))

@@ -7,7 +7,7 @@ from itertools import combinations
 
 import numpy as np
 
-from buildarena_benchmark.leaderboard import Cell
+from buildarena_benchmark.leaderboard import Cell, counted_trials
 from buildarena_benchmark.statistics import agreement, detectable_difference, token_bins
 from buildarena_cli.report.document import Block, Grid, Heading, Paragraph, Plot
 from buildarena_cli.report.material import Material, paper_rows, percent
@@ -67,10 +67,9 @@ def cost(material: Material, cells: Mapping[str, Sequence[Cell]]) -> list[Block]
 def rounds(material: Material) -> list[Block]:
     """Closed loops: curves of every model and task that had a second round."""
     runs: dict[str, dict[str, list[Sequence[tuple[bool, float]]]]] = {}
-    for trial in material.trials:
-        if trial.scored:
-            models = runs.setdefault(trial.task, {})
-            models.setdefault(trial.model, []).append(material.rounds[trial.job_id])
+    for trial in counted_trials(material.trials, reading=material.reading):
+        models = runs.setdefault(trial.task, {})
+        models.setdefault(trial.model, []).append(material.rounds[trial.job_id])
     blocks: list[Block] = []
     for task, models in runs.items():
         looped = {model: found for model, found in models.items() if max(map(len, found)) > 1}
@@ -161,11 +160,12 @@ def _normalised(material: Material) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Output tokens and performance, relative to the best job of the task, by category."""
     tasks = material.tasks
     best: dict[str, float] = {}
-    for trial in material.trials:
+    trials = counted_trials(material.trials, reading=material.reading)
+    for trial in trials:
         best[trial.task] = max(best.get(trial.task, 0.0), trial.indicator)
     found: dict[str, list[tuple[float, float]]] = {}
-    for trial in material.trials:
-        if trial.scored and trial.output_tokens:
+    for trial in trials:
+        if trial.output_tokens:
             category = tasks[trial.task].category if trial.task in tasks else trial.task
             top = best[trial.task]
             relative = trial.indicator / top if top > 0 else 0.0

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from buildarena_benchmark.flags import Reading
 from buildarena_benchmark.leaderboard import Cell, EndedJob, PublishedRow, published_rows
 
 
@@ -38,6 +39,7 @@ class Material:
 
     Attributes:
         title: What was run.
+        reading: How flags are read.
         tasks: The tasks by name, the built-in ones first; also such as were not run.
         trials: Ended jobs; their models are named as rows of the report.
         rounds: Of each job by id, for each round: success and indicator.
@@ -47,6 +49,7 @@ class Material:
     """
 
     title: str
+    reading: Reading
     tasks: Mapping[str, ReportTask]
     trials: Sequence[EndedJob]
     rounds: Mapping[str, Sequence[tuple[bool, float]]]
@@ -65,6 +68,11 @@ def between(low: float | None, high: float | None, factor: float = 1.0) -> str:
     if low is None or high is None:
         return "-"
     return f"{factor * low:.1f}-{factor * high:.1f}"
+
+
+def indicator_between(cell: Cell) -> str:
+    """The interval of a cell's mean indicator for people."""
+    return "too few data" if cell.too_few_data else between(cell.indicator_low, cell.indicator_high)
 
 
 def paper_rows(

@@ -27,7 +27,7 @@ CellsByTask = Mapping[str, Sequence[Cell]]
 
 
 def success_plot(cells: CellsByTask, published: Mapping[str, Mapping[str, PublishedRow]]) -> Figure:
-    """Success rates with Wilson intervals, a panel for each task; the paper's as diamonds.
+    """Success rates with exact intervals, a panel for each task; the paper's as diamonds.
 
     Args:
         cells: Cells by task.
@@ -48,7 +48,7 @@ def indicator_plot(
     published: Mapping[str, Mapping[str, PublishedRow]],
     labels: Mapping[str, str],
 ) -> Figure:
-    """Mean indicators with bootstrap intervals, a panel for each task.
+    """Mean indicators with their intervals, a panel for each task.
 
     Args:
         cells: Cells by task.

@@ -4,14 +4,30 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from typing import Final
 
+from buildarena_benchmark.flags import Reading, is_disqualified, is_left_out, meaning
 from buildarena_benchmark.leaderboard import Board, BoardQuery, Cell, TrackBoard
+from buildarena_benchmark.statistics import MIN_SUCCESSES
 from buildarena_cli.report.custom_tasks import custom_tasks
 from buildarena_cli.report.document import Block, Grid, Heading, Paragraph, Plot
 from buildarena_cli.report.effort import cost, power, rounds, simulators
-from buildarena_cli.report.material import Material, between, paper_rows, percent
+from buildarena_cli.report.material import (
+    Material,
+    between,
+    indicator_between,
+    paper_rows,
+    percent,
+)
 from buildarena_cli.report.plots import indicator_plot, radar_plot, shares_plot, success_plot
 from buildarena_cli.terminal.output import in_words, number
+
+READ: Final[Mapping[Reading, str]] = {
+    Reading.OURS: "Disqualified jobs count as failures with an indicator of 0.",
+    Reading.PUBLISHED: "Jobs that the published evaluation calls hacked are left out of them, as "
+    "it leaves them out itself.",
+}
+"""What each reading does with flags."""
 
 
 def sections(material: Material) -> list[Block]:
@@ -26,13 +42,14 @@ def sections(material: Material) -> list[Block]:
     )
     for trial in material.trials:
         kept.put(trial)
-    board = kept.board(BoardQuery())
+    board = kept.board(BoardQuery(reading=material.reading))
     cells = {task.task: [row.cell for row in task.rows] for task in board.tasks}
     return [
         *blocks,
         *custom_tasks(material, board),
         *_overall(board),
         *_performance(board, cells, material),
+        *_flags(cells, material.reading),
         *_dimensions(board),
         *_failures(material, cells),
         *cost(material, cells),
@@ -50,8 +67,8 @@ def _opening(material: Material) -> Paragraph:
     if material.unfinished:
         text += f". {material.unfinished:,} have not ended yet, and are not in this report"
     return Paragraph(
-        text=f"{text}. Averages are over scored jobs; errored and cancelled jobs and flagged "
-        "successes are left out and counted beside. The paper's figures were measured in the "
+        text=f"{text}. Averages are over scored jobs; errored and cancelled jobs are left out and "
+        f"counted beside. {READ[material.reading]} The paper's figures were measured in the "
         "game itself: they are a reference and are never ranked with ours."
     )
 
@@ -101,8 +118,9 @@ def _performance(
                     percent(cell.success_rate),
                     between(cell.success_low, cell.success_high, 100),
                     percent(reference.success_rate) if reference else "-",
-                    number(cell.indicator_mean),
-                    between(cell.indicator_low, cell.indicator_high),
+                    number(cell.indicator_mean, at_least=cell.censored > 0),
+                    indicator_between(cell),
+                    number(cell.indicator_best, at_least=cell.censored > 0),
                     number(reference.indicator_mean) if reference else "-",
                     number(cell.parts_mean),
                     number(reference.parts_mean) if reference else "-",
@@ -111,7 +129,7 @@ def _performance(
             )
     columns = (
         *("task", "model", "rank", "of scored", "of ended", "success", "95 %", "paper"),
-        *("indicator", "95 %", "paper", "parts", "paper", "flagged"),
+        *("indicator", "95 %", "best", "paper", "parts", "paper", "flagged"),
     )
     labels = {
         name: in_words(material.tasks[name].indicator, material.tasks[name].unit)
@@ -121,7 +139,8 @@ def _performance(
     return [
         Heading(text="Performance"),
         Grid(
-            caption="Success rate with Wilson interval, indicator with bootstrap interval",
+            caption="Success rate and mean indicator with 95 % intervals. Too few data: fewer "
+            f"than {MIN_SUCCESSES} successes. ≥: a cargo that never fell may weigh more",
             columns=columns,
             rows=rows,
             text_columns=2,
@@ -137,6 +156,32 @@ def _performance(
             figure=indicator_plot(cells, paper, labels),
         ),
     ]
+
+
+def _flags(cells: Mapping[str, Sequence[Cell]], reading: Reading) -> list[Block]:
+    """Which flags trials have, what they say, and what they do to a rank."""
+    rows = [
+        (task, cell.model, flag, str(count), _effect(flag, reading), meaning(flag))
+        for task, row in cells.items()
+        for cell in row
+        for flag, count in cell.flags.items()
+    ]
+    if not rows:
+        return []
+    columns = "task", "model", "flag", "jobs", "these jobs", "meaning"
+    caption = "Scored jobs by flag; a job may have several"
+    return [
+        Heading(text="Flags"),
+        Grid(caption=caption, columns=columns, rows=rows, text_columns=3),
+    ]
+
+
+def _effect(flag: str, reading: Reading) -> str:
+    if is_left_out([flag], reading):
+        return "are left out"
+    if reading == Reading.OURS and is_disqualified([flag]):
+        return "are failures"
+    return "count as scored"
 
 
 def _dimensions(board: Board) -> list[Block]:

@@ -8,6 +8,7 @@ not even one column fits beside the names, the intervals give way.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -28,16 +29,19 @@ from buildarena_cli.terminal.output import (
 )
 
 GAP = "   "
-FIGURES = ("success", "95 %", "indicator", "parts", "requests", "tokens", "USD")
+RESULTS = ("success", "95 %", "indicator")
+SPREAD = ("of it 95 %", "best")
+EFFORT = ("parts", "requests", "tokens")
+LEAVING = ("requests", "parts", "tokens", "USD", *reversed(SPREAD), "95 %", "indicator")
 DETAILS = columns(
-    *("#", "model", *FIGURES),
-    figures=("#", *FIGURES),
-    leaving=("requests", "parts", "tokens", "USD", "95 %", "indicator"),
+    *("#", "model", *RESULTS, *SPREAD, *EFFORT, "USD"),
+    figures=("#", *RESULTS, *SPREAD, *EFFORT, "USD"),
+    leaving=LEAVING,
 )
 PUBLISHED = columns(
-    *("model", *FIGURES[:-1]),
-    figures=FIGURES,
-    leaving=("requests", "parts", "tokens", "95 %", "indicator"),
+    *("model", *RESULTS, *EFFORT),
+    figures=(*RESULTS, *EFFORT),
+    leaving=[name for name in LEAVING if name in {*RESULTS, *EFFORT}],
 )
 OVERALL = columns(
     *("#", "model", "place", "mean rank", "success", "USD", "front"),
@@ -93,7 +97,10 @@ def task_table(task: Mapping[str, Any]) -> None:
             (
                 _rank(row["rank"]),
                 _marked([row]),
-                *_figures(row),
+                *_results(row),
+                _spread(row),
+                number(row["indicator_best"], at_least=_is_censored(row)),
+                *_effort(row),
                 number(row["cost_usd_mean"], 2),
             )
             for row in task["rows"]
@@ -101,7 +108,9 @@ def task_table(task: Mapping[str, Any]) -> None:
         title=emphasised(f"{task['task']}: {in_words(task['indicator'], task['unit'])}"),
         notes=[
             "* baseline; # is shared by statistically tied models",
-            "95 % is the Wilson interval of the success rate",
+            "95 % is the exact interval of the success rate, and the one of the mean indicator",
+            "too few: no interval of the mean indicator holds with fewer than 5 successes",
+            *_remarks(task["rows"]),
             *_imports(task["rows"]),
         ],
     )
@@ -111,7 +120,7 @@ def published_table(task: Mapping[str, Any]) -> None:
     """Prints the paper's figures of one task."""
     print_table(
         PUBLISHED,
-        [(row["model"], *_figures(row)) for row in task["published"]],
+        [(row["model"], *_results(row), *_effort(row)) for row in task["published"]],
         title=f"{task['task']}, as published: measured in the game, never ranked with ours",
     )
 
@@ -144,15 +153,32 @@ def overall_table(board: Mapping[str, Any]) -> None:
     )
 
 
-def _figures(row: Mapping[str, Any]) -> tuple[str, ...]:
+def _results(row: Mapping[str, Any]) -> tuple[str, ...]:
     return (
         f"{row['successes']}/{row['trials']}",
         _interval(row),
-        number(row["indicator_mean"]),
+        number(row["indicator_mean"], at_least=_is_censored(row)),
+    )
+
+
+def _effort(row: Mapping[str, Any]) -> tuple[str, ...]:
+    return (
         number(row.get("parts_mean")),
         number(row["requests_mean"], 0),
         number(row["output_tokens_mean"], 0),
     )
+
+
+def _spread(row: Mapping[str, Any]) -> str:
+    if row["too_few_data"]:
+        return "too few"
+    low, high = row["indicator_low"], row["indicator_high"]
+    return NOTHING if low is None else f"{number(low)}-{number(high)}"
+
+
+def _is_censored(row: Mapping[str, Any]) -> bool:
+    """Whether figures are at least what they say; never those of the paper."""
+    return bool(row.get("censored"))
 
 
 def _rank(rank: int | None) -> str:
@@ -240,7 +266,7 @@ def _cells(rows: Sequence[Mapping[str, Any] | None], intervals: bool) -> list[st
             continue
         middle = (_interval(row),) if intervals else ()
         rate = f"{row['successes']}/{row['trials']}"
-        cells.append((rate, *middle, number(row["indicator_mean"])))
+        cells.append((rate, *middle, number(row["indicator_mean"], at_least=_is_censored(row))))
     return _aligned(cells, right=range(2 + intervals))
 
 
@@ -261,11 +287,14 @@ def _legend(board: Mapping[str, Any]) -> list[str]:
     for task in board["tasks"]:
         name = in_words(task["indicator"], task["unit"])
         indicators.setdefault(name, []).append(task["task"])
+    rows = [row for task in board["tasks"] for row in task["rows"]]
     return [
-        "Successes of jobs, the rate's 95 % Wilson interval, and the mean indicator:",
+        "Successes of jobs, the rate's exact 95 % interval, and the mean indicator:",
         *(f"  {', '.join(tasks)}: {name}" for name, tasks in indicators.items()),
         "* baseline; # is the overall rank, shared by statistically tied models",
-        *_imports([row for task in board["tasks"] for row in task["rows"]]),
+        *_remarks(rows),
+        *_reading(board, rows),
+        *_imports(rows),
     ]
 
 
@@ -280,6 +309,35 @@ def _marked(rows: Sequence[Mapping[str, Any]]) -> str:
     spelled = ", ".join(f"{name} {value}" for name, value in limits.items())
     marks = ("*" if first["baseline"] else "") + ("†" if any(r["imported"] for r in rows) else "")
     return f"{first['model']}{marks}" + (f" ({spelled})" if spelled else "")
+
+
+def _remarks(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """What is shown of flags, where there are some."""
+    found = []
+    if any(map(_is_censored, rows)):
+        found.append("≥ cargos that never fell may weigh more")
+    counts = _flags(rows)
+    if counts:
+        found.append("flags: " + ", ".join(f"{n} {flag}" for flag, n in sorted(counts.items())))
+    return found
+
+
+def _flags(rows: Sequence[Mapping[str, Any]]) -> Counter[str]:
+    counts: Counter[str] = Counter()
+    for row in rows:
+        counts.update(row.get("flags", {}))
+    return counts
+
+
+def _reading(board: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """What the board's flags say, and what was done about them."""
+    counts = _flags(rows)
+    found = [
+        f"  {flag['name']}: {flag['meaning']}" for flag in board["flags"] if counts[flag["name"]]
+    ]
+    if board["reading"] != "ours":
+        found.append("what the published evaluation calls hacked is left out, as it does itself")
+    return found
 
 
 def _imports(rows: Sequence[Mapping[str, Any]]) -> list[str]:

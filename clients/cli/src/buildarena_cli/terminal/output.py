@@ -105,9 +105,11 @@ def print_lines(lines: Sequence[str]) -> None:
     _write(sys.stdout, "".join(f"{line}\n" for line in lines))
 
 
-def number(value: float | None, digits: int = 1) -> str:
-    """A number for people; a dash for nothing."""
-    return NOTHING if value is None else f"{value:,.{digits}f}"
+def number(value: float | None, digits: int = 1, *, at_least: bool = False) -> str:
+    """A number for people; a dash for nothing, a mark for what may be greater."""
+    if value is None:
+        return NOTHING
+    return ("≥ " if at_least else "") + f"{value:,.{digits}f}"
 
 
 def minute_of(timestamp: str) -> str:

@@ -1,7 +1,7 @@
 """Leaderboard mathematics: from ended jobs to ranks, with what is not known about them."""
 
 from buildarena_benchmark.leaderboard.board import Board, BoardQuery, TaskBoard, TrackBoard
-from buildarena_benchmark.leaderboard.cells import Cell, summarise
+from buildarena_benchmark.leaderboard.cells import Cell, counted_trials, summarise
 from buildarena_benchmark.leaderboard.comparisons import Comparison, TaskComparison, compare_models
 from buildarena_benchmark.leaderboard.ended_jobs import EndedJob
 from buildarena_benchmark.leaderboard.latex import cost_table, performance_table, plain_table
@@ -27,6 +27,7 @@ __all__ = [
     "TrackBoard",
     "compare_models",
     "cost_table",
+    "counted_trials",
     "performance_table",
     "plain_table",
     "published_overall",

@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Final
 
+from buildarena_benchmark.flags import Reading
 from buildarena_benchmark.leaderboard.cells import Cell, summarise
 from buildarena_benchmark.leaderboard.ended_jobs import EndedJob
-from buildarena_benchmark.leaderboard.overall import OverallRow, Weights, overall_rows, rank_cells
-
-KEPT_RANKINGS: Final = 256
-"""Rankings of tasks that are kept: the present ones, and those of recent filters."""
+from buildarena_benchmark.leaderboard.overall import OverallRow, Weights, overall_rows
+from buildarena_benchmark.leaderboard.standings import KeptTests, Standing, standings
 
 CellKey = tuple[str, str, str]
 """Task, task version, configuration."""
@@ -27,7 +25,7 @@ class BoardQuery:
         models: Model names.
         since: Only jobs that ended then or later.
         until: Only jobs that ended before.
-        include_flagged: Whether flagged successes count.
+        reading: How flags are read.
         overall: Tasks that the overall ranking is over, as far as they are on the board.
     """
 
@@ -35,7 +33,7 @@ class BoardQuery:
     models: frozenset[str] | None = None
     since: datetime | None = None
     until: datetime | None = None
-    include_flagged: bool = False
+    reading: Reading = Reading.OURS
     overall: frozenset[str] | None = None
 
     def holds(self, trial: EndedJob) -> bool:
@@ -97,8 +95,8 @@ class TrackBoard:
         self._weights = weights
         self._cells: dict[CellKey, dict[str, EndedJob]] = {}
         self._places: dict[str, CellKey] = {}
-        self._summaries: dict[tuple[CellKey, bool], Cell] = {}
-        self._rankings: dict[tuple[int, ...], tuple[list[Cell], list[RankedCell]]] = {}
+        self._summaries: dict[tuple[CellKey, Reading], Cell] = {}
+        self._tests = KeptTests()
 
     def use(self, versions: Mapping[str, str], weights: Weights) -> None:
         """Takes other tasks for known from now on; arguments as for the constructor."""
@@ -142,24 +140,25 @@ class TrackBoard:
         chosen, outdated = self._chosen(query)
         cells: dict[str, dict[str, Cell]] = {}
         for (task, _), keys in chosen.items():
-            found = {key[2]: self._summary(key, query) for key in keys}
-            cells[task] = {name: cell for name, cell in found.items() if cell is not None}
+            row = {key[2]: self._summary(key, query) for key in keys}
+            cells[task] = {name: cell for name, cell in row.items() if cell is not None}
+
+        def ranked(task: str) -> bool:
+            return query.overall is None or task in query.overall
+
+        found = standings(cells, ranked, self._tests)
         boards = [
             TaskBoard(
                 task=task,
                 version=version,
                 outdated=outdated.get(task, 0),
-                rows=self._ranked(list(cells[task].values())),
+                rows=_ranked(cells[task], found.tasks.get(task)),
             )
             for task, version in chosen
             if cells[task]
         ]
-        filled = {
-            task: row
-            for task, row in cells.items()
-            if row and (query.overall is None or task in query.overall)
-        }
-        return Board(tasks=boards, overall=overall_rows(filled, self._weights))
+        filled = {task: row for task, row in cells.items() if row and ranked(task)}
+        return Board(tasks=boards, overall=overall_rows(filled, found.overall, self._weights))
 
     def _chosen(
         self, query: BoardQuery
@@ -200,37 +199,26 @@ class TrackBoard:
         if not inside:
             return None
         if len(inside) < len(trials):
-            return summarise(inside, include_flagged=query.include_flagged)
-        place = (key, query.include_flagged)
+            return summarise(inside, reading=query.reading)
+        place = (key, query.reading)
         if place not in self._summaries:
-            self._summaries[place] = summarise(trials, include_flagged=query.include_flagged)
+            self._summaries[place] = summarise(trials, reading=query.reading)
         return self._summaries[place]
 
-    def _ranked(self, cells: list[Cell]) -> list[RankedCell]:
-        """The cells with their places; kept as long as none of them changes."""
-        # The kept cells stay alive, so no other cell can have their identity.
-        key = tuple(id(cell) for cell in cells)
-        if key not in self._rankings:
-            if len(self._rankings) >= KEPT_RANKINGS:
-                self._rankings.clear()
-            self._rankings[key] = (cells, _ranked(cells))
-        return self._rankings[key][1]
-
     def _forget(self, key: CellKey) -> None:
-        for flagged in (False, True):
-            self._summaries.pop((key, flagged), None)
+        for reading in Reading:
+            self._summaries.pop((key, reading), None)
 
 
-def _ranked(cells: Sequence[Cell]) -> list[RankedCell]:
-    counted = [cell for cell in cells if cell.trials]
+def _ranked(cells: Mapping[str, Cell], standing: Standing | None) -> list[RankedCell]:
     rows = [
         RankedCell(cell=cell, rank=None, rank_low=None, rank_high=None)
-        for cell in sorted(cells, key=lambda c: (c.model, c.configuration))
+        for cell in sorted(cells.values(), key=lambda c: (c.model, c.configuration))
         if not cell.trials
     ]
-    if not counted:
+    if standing is None:
         return rows
-    ranking = rank_cells([counted])
+    ranking, counted = standing.ranking, [cells[name] for name in standing.names]
     order = sorted(
         range(len(counted)),
         key=lambda i: (

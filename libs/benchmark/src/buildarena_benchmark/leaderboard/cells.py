@@ -5,23 +5,22 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 from typing import Any, Final
-from zlib import crc32
 
 import numpy as np
 from numpy.typing import NDArray
 
+from buildarena_benchmark.flags import Reading, is_censored, is_disqualified, is_left_out
 from buildarena_benchmark.leaderboard.ended_jobs import EndedJob
 from buildarena_benchmark.outcomes import SIMULATED, Outcome
 from buildarena_benchmark.statistics import (
     cost_per_success,
+    exact_interval,
     mean_interval,
     pass_at_k,
     pass_hat_k,
-    resampled_means,
-    wilson_interval,
 )
 
 TRIES: Final = (1, 2, 4, 8)
@@ -32,8 +31,7 @@ TRIES: Final = (1, 2, 4, 8)
 class Cell:
     """One model configuration on one task. What does not exist is None.
 
-    Averages are over counted trials: scored ones, but for flagged successes unless these were
-    asked for.
+    Averages are over counted trials: scored ones, as far as the reading of flags leaves them in.
 
     Attributes:
         trials: Counted trials: the denominator of the averages.
@@ -41,13 +39,18 @@ class Cell:
             denominator.
         errored: Jobs that infrastructure faults ended.
         cancelled: Jobs that somebody cancelled.
-        flagged: Successes that a flag keeps out of the averages.
+        flagged: Scored trials that a flag makes failures or, in the published reading, leaves out.
+        flags: Scored trials by flag; one may have several.
         imported: Jobs that came from another service's archive, unverified ones included.
         unverified: Those of them that were not found again here: they count in nothing else.
         simulated: Counted trials whose machine was finished and tried.
-        success_rate: Successes of counted trials, with its Wilson interval.
+        success_rate: Successes of counted trials, with its exact interval.
         success_rate_of_ended: Successes of all ended jobs.
-        indicator_mean: Mean indicator, with its bootstrap interval.
+        indicator_mean: Mean indicator, with its interval.
+        too_few_data: Whether too few counted trials succeeded for an interval of the indicator.
+        indicator_best: The greatest indicator.
+        censored: Counted trials whose indicator is only known to be at least as great; if there
+            are any, the mean and the best are at least what they say.
         invalid_action_rate: Refused actions of all actions.
         cost_per_success_usd: US dollars of all counted trials for each success.
         pass_at: Chance that at least one of k tries succeeds, by k.
@@ -56,8 +59,7 @@ class Cell:
         reasons: Counted trials that failed, by reason.
         refusals: Refused actions by refusal class.
         newest: When the last of its jobs ended.
-        replicates: (B, 2) float64, success rate and mean indicator of resampled trials; None
-            without counted trials.
+        figures: (N, 2) float64, success and indicator of each counted trial.
     """
 
     task: str
@@ -69,6 +71,7 @@ class Cell:
     errored: int
     cancelled: int
     flagged: int
+    flags: Mapping[str, int]
     imported: int
     unverified: int
     simulated: int
@@ -80,6 +83,9 @@ class Cell:
     indicator_mean: float | None
     indicator_low: float | None
     indicator_high: float | None
+    too_few_data: bool
+    indicator_best: float | None
+    censored: int
     parts_mean: float | None
     requests_mean: float | None
     input_tokens_mean: float | None
@@ -93,41 +99,43 @@ class Cell:
     reasons: Mapping[str, int]
     refusals: Mapping[str, int]
     newest: datetime | None
-    replicates: NDArray[np.float64] | None = field(repr=False, compare=False)
+    figures: NDArray[np.float64] = field(repr=False, compare=False)
 
 
-def counted_trials(trials: Iterable[EndedJob], *, include_flagged: bool = False) -> list[EndedJob]:
-    """The trials that averages are made of.
+def counted_trials(
+    trials: Iterable[EndedJob], *, reading: Reading = Reading.OURS
+) -> list[EndedJob]:
+    """The trials that averages are made of, as a reading of flags has them.
 
-    A flag casts doubt on a success, so a flagged success leaves numerator and denominator. A
-    flagged failure stays a failure: else a machine that blows up would raise its model's rate.
+    In ours a disqualified trial stays, as a failure with an indicator of 0: were it left out, a
+    model would lose nothing by trying to cheat, and one whose machines blow up would gain.
     """
-    return [
-        trial
-        for trial in trials
-        if trial.scored and (include_flagged or not (trial.success and trial.flags))
-    ]
+    counted = []
+    for trial in trials:
+        if not trial.scored or is_left_out(trial.flags, reading):
+            continue
+        if reading == Reading.OURS and is_disqualified(trial.flags):
+            counted.append(replace(trial, success=False, indicator=0.0))
+        else:
+            counted.append(trial)
+    return counted
 
 
-def summarise(trials: Sequence[EndedJob], *, include_flagged: bool = False) -> Cell:
+def summarise(trials: Sequence[EndedJob], *, reading: Reading = Reading.OURS) -> Cell:
     """Summarises the trials of one model configuration on one task; at least one.
 
     The order of the trials does not matter.
     """
     first, imported = trials[0], sum(trial.imported for trial in trials)
     given, trials = len(trials), [trial for trial in trials if not trial.unverified]
-    counted = counted_trials(trials, include_flagged=include_flagged)
+    counted = counted_trials(trials, reading=reading)
     number = len(counted)
     successes = sum(trial.success for trial in counted)
     outcomes = Counter(trial.outcome for trial in trials)
-    low_high = wilson_interval(successes, number) if counted else (None, None)
-    replicates, indicator_ends = None, None
-    if counted:
-        figures = np.array([(trial.success, trial.indicator) for trial in counted], float)
-        # Each cell has draws of its own: resamples of different cells are independent.
-        seed = crc32(f"{first.task} {first.model} {first.configuration}".encode())
-        replicates = resampled_means(figures, seed=seed)
-        indicator_ends = mean_interval(figures[:, 1], replicates[:, 1])
+    low_high = exact_interval(successes, number) if counted else (None, None)
+    figures = np.array([(t.success, t.indicator) for t in counted], float).reshape(-1, 2)
+    indicator_ends = mean_interval(figures[:, 1], figures[:, 0] > 0) if counted else None
+    scored = [trial for trial in trials if trial.scored]
     actions = sum(trial.actions for trial in counted)
     refused = sum(trial.refused_actions for trial in counted)
     mean = _Means(counted)
@@ -140,7 +148,8 @@ def summarise(trials: Sequence[EndedJob], *, include_flagged: bool = False) -> C
         ended=len(trials),
         errored=outcomes[Outcome.ERRORED],
         cancelled=outcomes[Outcome.CANCELLED],
-        flagged=sum(trial.scored for trial in trials) - number,
+        flagged=sum(_is_flagged(trial, reading) for trial in scored),
+        flags=dict(sorted(Counter(flag for t in scored for flag in set(t.flags)).items())),
         imported=imported,
         unverified=given - len(trials),
         simulated=sum(trial.outcome in SIMULATED for trial in counted),
@@ -152,6 +161,9 @@ def summarise(trials: Sequence[EndedJob], *, include_flagged: bool = False) -> C
         indicator_mean=mean.of(lambda t: t.indicator),
         indicator_low=indicator_ends[0] if indicator_ends else None,
         indicator_high=indicator_ends[1] if indicator_ends else None,
+        too_few_data=bool(counted) and indicator_ends is None,
+        indicator_best=max((t.indicator for t in counted), default=None),
+        censored=sum(t.success and is_censored(t.flags) for t in counted),
         parts_mean=mean.of(lambda t: t.parts),
         requests_mean=mean.of(lambda t: t.requests),
         input_tokens_mean=mean.of(lambda t: t.input_tokens),
@@ -165,8 +177,14 @@ def summarise(trials: Sequence[EndedJob], *, include_flagged: bool = False) -> C
         reasons=dict(sorted(Counter(t.reason for t in counted if t.reason).items())),
         refusals=_refusals(counted),
         newest=max((t.finished_at for t in trials if t.finished_at), default=None),
-        replicates=replicates,
+        figures=figures[np.lexsort(figures.T)],
     )
+
+
+def _is_flagged(trial: EndedJob, reading: Reading) -> bool:
+    if reading == Reading.OURS:
+        return is_disqualified(trial.flags)
+    return is_left_out(trial.flags, reading)
 
 
 class _Means:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
+from buildarena_benchmark.flags import Reading
 from buildarena_benchmark.leaderboard.cells import counted_trials
 from buildarena_benchmark.leaderboard.ended_jobs import EndedJob
 from buildarena_benchmark.statistics import (
@@ -28,7 +29,7 @@ class TaskComparison:
         high: Upper end.
         success: Test of success on shared seeds; None when none are shared.
         indicator: Test of the indicators on shared seeds; None when none are shared.
-        success_p: P-value of the success test, adjusted for the number of tasks.
+        success_p: P-value of the success test, adjusted over all tests of the comparison.
         indicator_p: The same of the indicator test.
     """
 
@@ -53,26 +54,29 @@ class Comparison:
     tasks: Sequence[TaskComparison]
 
 
-def compare_models(first: Sequence[EndedJob], second: Sequence[EndedJob]) -> Comparison | None:
+def compare_models(
+    first: Sequence[EndedJob], second: Sequence[EndedJob], *, reading: Reading = Reading.OURS
+) -> Comparison | None:
     """Compares two models; None when one of them has no trial.
 
-    Each side has one model configuration; p-values are adjusted by Holm over the tasks.
+    Each side has one model configuration; p-values are adjusted by Holm over the tests of both
+    figures on all tasks.
     """
     if not first or not second:
         return None
-    sides = [_by_task(counted_trials(side)) for side in (first, second)]
+    sides = [_by_task(counted_trials(side, reading=reading)) for side in (first, second)]
     shared = [task for task in sides[0] if task in sides[1]]
     tasks = [_compare_task(task, sides[0][task], sides[1][task]) for task in sorted(shared)]
-    success_p = iter(holm([t.success.p_value for t in tasks if t.success]))
-    indicator_p = iter(holm([t.indicator.p_value for t in tasks if t.indicator]))
+    tests = [test for t in tasks for test in (t.success, t.indicator) if test]
+    p_values = iter(holm([test.p_value for test in tests]))
     return Comparison(
         first=first[0].model,
         second=second[0].model,
         tasks=[
             replace(
                 task,
-                success_p=next(success_p) if task.success else None,
-                indicator_p=next(indicator_p) if task.indicator else None,
+                success_p=next(p_values) if task.success else None,
+                indicator_p=next(p_values) if task.indicator else None,
             )
             for task in tasks
         ],

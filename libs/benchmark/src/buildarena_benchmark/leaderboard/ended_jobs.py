@@ -31,7 +31,7 @@ class EndedJob:
         success: Whether it met the task's criterion.
         indicator: The task's performance indicator.
         parts: Parts of its machine, if there was one.
-        flags: Remarks that keep a success out of rankings.
+        flags: Remarks on its score; see `buildarena_benchmark.flags`.
         refusals: Refused actions by refusal class.
         requests: Model requests.
         input_tokens: Tokens sent.

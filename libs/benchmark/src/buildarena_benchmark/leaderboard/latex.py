@@ -58,7 +58,11 @@ def plain_table(cells: Cells) -> str:
     for task, rows in cells.items():
         lines += [r"\midrule", rf"\multirow{{{len(rows)}}}{{*}}{{{_escaped(task)}}}"]
         texts = [
-            _marked([_scaled(getattr(row, name), power) for row in rows], more=more)
+            _marked(
+                [_scaled(getattr(row, name), power) for row in rows],
+                [_is_bound(row, name) for row in rows],
+                more=more,
+            )
             for _, name, power, more in columns
         ]
         lines += [
@@ -89,9 +93,10 @@ def _category(cells: Cells, category: str, columns: Sequence[Column]) -> list[st
     texts: list[list[str]] = []
     for _, name, power, more in columns:
         for task in tasks:
-            values = {row.model: getattr(row, name) for row in cells.get(task, ())}
-            shown = [_scaled(values.get(model), power) for model in models]
-            texts.append(_marked(shown, more=more))
+            rows = {row.model: row for row in cells.get(task, ())}
+            shown = [_scaled(getattr(rows.get(model), name, None), power) for model in models]
+            bounds = [_is_bound(rows.get(model), name) for model in models]
+            texts.append(_marked(shown, bounds, more=more))
     lines = [rf"\multirow{{{len(models)}}}{{*}}{{{_escaped(category.capitalize())}}}"]
     for number, model in enumerate(models):
         figures = " & ".join(column[number] for column in texts)
@@ -104,13 +109,18 @@ def _scaled(value: float | None, power: int) -> float | None:
     return None if value is None else round(value / 10.0**power, 1)
 
 
-def _marked(values: Sequence[float | None], *, more: bool) -> list[str]:
+def _is_bound(row: Figures | None, name: str) -> bool:
+    """Whether a figure is at least what it says: a mean over bridges that carried everything."""
+    return name == "indicator_mean" and bool(getattr(row, "censored", 0))
+
+
+def _marked(values: Sequence[float | None], bounds: Sequence[bool], *, more: bool) -> list[str]:
     known = sorted((value for value in values if value is not None), reverse=more)
     # Where nobody has anything there is no best.
     places = [value for value in known if value != 0.0 or not more][:2]
     found = []
-    for value in values:
-        text = "--" if value is None else f"{value:.1f}"
+    for value, bound in zip(values, bounds, strict=True):
+        text = "--" if value is None else (r"$\geq$" if bound else "") + f"{value:.1f}"
         if places and value == places[0]:
             text = rf"\textbf{{{text}}}"
         elif len(places) > 1 and value == places[1]:

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from buildarena_benchmark.leaderboard.cells import Cell
-from buildarena_benchmark.statistics import Ranking, rank_models
-from buildarena_benchmark.statistics.ranking import mean_ranks
+from buildarena_benchmark.leaderboard.standings import Standing
+from buildarena_benchmark.statistics import mean_ranks
 
 Weights = Mapping[str, Mapping[str, int]]
 """Weight of each difficulty dimension, by task."""
@@ -26,7 +26,7 @@ class OverallRow:
 
     Attributes:
         rank: Shared rank, or None.
-        rank_low: Lower end of the 95 % bootstrap interval of the place, or None.
+        rank_low: Lower end of the 95 % interval of the place, or None.
         rank_high: Upper end, or None.
         mean_rank: Mean rank over tasks and both figures, or None.
         missing: Tasks of the board without counted trials.
@@ -53,49 +53,27 @@ class OverallRow:
     dimensions: Mapping[str, float]
 
 
-def rank_cells(cells: Sequence[Sequence[Cell]]) -> Ranking:
-    """Ranks configurations by their cells.
-
-    Args:
-        cells: One sequence of M cells for each of T tasks; all have counted trials.
-    """
-    figures = [
-        np.array([[float(getattr(cell, name) or 0.0) for cell in row] for row in cells])
-        for name in ("success_rate", "indicator_mean")
-    ]
-    replicates = np.stack(
-        [
-            np.stack([cell.replicates for cell in row if cell.replicates is not None], axis=1)
-            for row in cells
-        ],
-        axis=1,
-    )
-    trials = np.array([[cell.trials for cell in row] for row in cells], np.int64)
-    return rank_models((figures[0], figures[1]), (replicates[..., 0], replicates[..., 1]), trials)
-
-
-def overall_rows(cells: Mapping[str, Mapping[str, Cell]], weights: Weights) -> list[OverallRow]:
-    """Ranks configurations over tasks, the best first, unranked ones last.
+def overall_rows(
+    cells: Mapping[str, Mapping[str, Cell]], standing: Standing | None, weights: Weights
+) -> list[OverallRow]:
+    """Configurations over tasks, the best first, unranked ones last.
 
     Args:
         cells: Cells by task and configuration.
+        standing: Who stands where of those that are complete; None when nobody is.
         weights: Difficulty weights of the tasks that have some.
     """
     tasks = [task for task, row in cells.items() if any(cell.trials for cell in row.values())]
     names = sorted({name for row in cells.values() for name in row})
-    complete = [
-        name for name in names if tasks and all(_counts(cells[task].get(name)) for task in tasks)
-    ]
-    ranking = dimensions = None
-    if complete:
+    complete, dimensions = list(standing.names) if standing else [], None
+    if standing:
         table = [[cells[task][name] for name in complete] for task in tasks]
-        ranking = rank_cells(table)
         dimensions = dimension_scores(table, [weights.get(task, {}) for task in tasks])
     rows = []
     for name in names:
         own = [cells[task][name] for task in cells if name in cells[task]]
         place = complete.index(name) if name in complete else None
-        ranked = ranking if place is not None else None
+        ranked = standing.ranking if standing and place is not None else None
         rows.append(
             OverallRow(
                 model=own[0].model,

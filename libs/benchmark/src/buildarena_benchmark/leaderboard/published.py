@@ -10,13 +10,20 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
+from itertools import combinations
 from types import MappingProxyType
-from zlib import crc32
 
 import numpy as np
+from numpy.typing import NDArray
 
-from buildarena_benchmark.statistics import Ranking, rank_models, wilson_interval
-from buildarena_benchmark.statistics.resampling import REPLICATES
+from buildarena_benchmark.statistics import (
+    Ranking,
+    adjusted,
+    combined,
+    exact_interval,
+    pair_tests,
+    rank_models,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -26,7 +33,7 @@ class PublishedRow:
     Attributes:
         model: The paper's name of the model.
         snapshot: The provider's name of the snapshot.
-        success_low: Lower end of the 95 % Wilson interval; the paper states none.
+        success_low: Lower end of the 95 % exact interval; the paper states none.
         success_high: Upper end of it.
         input_tokens_mean: None where the paper gives no cost.
     """
@@ -66,8 +73,7 @@ def published_overall() -> tuple[Sequence[str], Ranking]:
     """The paper's models in its order, and their ranking over its nine tasks.
 
     Mean ranks are of success rates and indicators. The paper gives no spread of its indicators,
-    so ranks and their intervals rest on the success rates alone, drawn from what the counts
-    tell of them (Jeffreys' prior).
+    so who is better beyond chance rests on the success rates alone.
     """
     tasks = published_rows()
     models = [row.model for row in next(iter(tasks.values()))]
@@ -75,19 +81,22 @@ def published_overall() -> tuple[Sequence[str], Ranking]:
     table = [[rows[model] for model in models] for rows in by_name]
     success = np.array([[row.success_rate for row in rows] for rows in table])
     indicator = np.array([[row.indicator_mean for row in rows] for rows in table])
-    trials = np.array([[row.trials for row in rows] for rows in table])
-    won = success * trials
-    drawn = np.random.default_rng(crc32(b"published")).beta(
-        won + 0.5, trials - won + 0.5, size=(REPLICATES, *success.shape)
+    tests = combined(
+        [pair_tests(list(combinations([_trials(row) for row in rows], 2))) for rows in table]
     )
-    return models, rank_models((success, indicator), (drawn, drawn), trials)
+    return models, rank_models((success, indicator), tests, adjusted([tests])[0])
+
+
+def _trials(row: PublishedRow) -> NDArray[np.float64]:
+    """What the counts tell of the trials: (N, 1) float64, 1 for a success."""
+    return (np.arange(row.trials) < row.successes).astype(float)[:, None]
 
 
 def _row(line: Mapping[str, str]) -> PublishedRow:
     trials = int(line["samples"])
     # Percentages are rounded to a tenth, which names the count without doubt.
     successes = round(float(line["success_rate_pct"]) / 100 * trials)
-    low, high = wilson_interval(successes, trials)
+    low, high = exact_interval(successes, trials)
     return PublishedRow(
         task=f"{line['task']}-{line['level']}",
         model=line["model"],

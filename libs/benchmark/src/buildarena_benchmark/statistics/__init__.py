@@ -12,34 +12,47 @@ from buildarena_benchmark.statistics.comparisons import (
     paired_successes,
 )
 from buildarena_benchmark.statistics.economy import TokenBin, cost_per_success, token_bins
+from buildarena_benchmark.statistics.means import MIN_SUCCESSES, mean_interval
+from buildarena_benchmark.statistics.permutation import PairTests, pair_tests
 from buildarena_benchmark.statistics.power import detectable_difference, trials_needed
 from buildarena_benchmark.statistics.proportions import (
     difference_interval,
+    exact_interval,
     pass_at_k,
     pass_hat_k,
     wilson_interval,
 )
-from buildarena_benchmark.statistics.ranking import Ranking, mean_ranks, rank_models
-from buildarena_benchmark.statistics.resampling import mean_interval, resampled_means
+from buildarena_benchmark.statistics.ranking import (
+    Ranking,
+    adjusted,
+    combined,
+    mean_ranks,
+    rank_models,
+)
 
 __all__ = [
+    "MIN_SUCCESSES",
     "Agreement",
+    "PairTests",
     "PairedTest",
     "Ranking",
     "TokenBin",
+    "adjusted",
     "agreement",
+    "combined",
     "cost_per_success",
     "detectable_difference",
     "difference_interval",
+    "exact_interval",
     "holm",
     "mean_interval",
     "mean_ranks",
+    "pair_tests",
     "paired_indicators",
     "paired_successes",
     "pass_at_k",
     "pass_hat_k",
     "rank_models",
-    "resampled_means",
     "token_bins",
     "trials_needed",
     "wilson_interval",

@@ -1,7 +1,4 @@
-"""Success rates: their intervals, their differences, and what k tries would bring.
-
-Closed forms only, so that a process which serves rates need not load SciPy.
-"""
+"""Success rates: their intervals, their differences, and what k tries would bring."""
 
 from __future__ import annotations
 
@@ -16,6 +13,55 @@ LEVEL: Final = 0.95
 def quantile(level: float = LEVEL) -> float:
     """How many standard deviations a two-sided interval of this level spans to each side."""
     return NormalDist().inv_cdf(0.5 + level / 2)
+
+
+def exact_interval(
+    successes: int, trials: int, level: float = LEVEL, *, at_least: int = 0
+) -> tuple[float, float]:
+    """The Clopper-Pearson interval of a success rate: it covers at least as often as it says.
+
+    Args:
+        successes: How many trials succeeded.
+        trials: How many there were.
+        level: Confidence level.
+        at_least: Successes without which no interval would have been asked for. That so many
+            were seen then says little, and the lower end takes it for given.
+
+    Raises:
+        ValueError: There were no trials, more successes than trials, or fewer than were asked for.
+
+    Source:
+        C. J. Clopper & E. S. Pearson, Biometrika 26 (1934) 404.
+    """
+    from scipy.special import betaincinv
+
+    if not at_least <= successes <= trials or trials == 0:
+        raise ValueError(f"{successes} successes of {trials} trials have no interval")
+    tail = (1 - level) / 2
+    low, high = 0.0, 1.0
+    if successes > at_least:
+        low = float(betaincinv(successes, trials - successes + 1, tail))
+    if 0 < at_least < successes:
+        low = _conditional_low(successes, trials, at_least, tail, most=low)
+    if successes < trials:
+        high = float(betaincinv(successes + 1, trials - successes, 1 - tail))
+    return low, high
+
+
+def _conditional_low(
+    successes: int, trials: int, at_least: int, tail: float, *, most: float
+) -> float:
+    """The rate at which so many successes, given that there are some, have the tail's chance."""
+    from scipy.optimize import brentq
+    from scipy.special import betainc
+
+    def excess(rate: float) -> float:
+        given = float(betainc(at_least, trials - at_least + 1, rate))
+        if given == 0.0:
+            return -tail
+        return float(betainc(successes, trials - successes + 1, rate)) / given - tail
+
+    return float(brentq(excess, 0.0, most)) if excess(most) > 0 else most
 
 
 def wilson_interval(successes: int, trials: int, level: float = LEVEL) -> tuple[float, float]:

@@ -9,14 +9,23 @@ tasks".
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations, pairwise
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from buildarena_benchmark.statistics.comparisons import holm
+from buildarena_benchmark.statistics.permutation import PairTests
 from buildarena_benchmark.statistics.proportions import LEVEL
 
 Floats = NDArray[np.float64]
+
+MAX_EVIDENCE: Final = 4.0
+"""Evidence of one task counts in the ranking over tasks up to so many standard deviations: as in
+ranks, being far ahead on one task does not outweigh being behind on many."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,8 +36,9 @@ class Ranking:
         mean_rank: (M,) float64, 1 is the best possible.
         rank: (M,) int64: 1 + the number of models that are better beyond chance. Models that
             is statistically tied with the same betters share a rank.
-        low: (M,) int64, lower end of the bootstrap interval of the place.
-        high: (M,) int64, upper end of it.
+        low: (M,) int64, lower end of the interval of the place.
+        high: (M,) int64, upper end of it. The intervals of all places hold together at the
+            level of the claims they rest on.
         better: (M, M) bool: row is better than column beyond chance.
     """
 
@@ -70,68 +80,75 @@ def mean_ranks(success_rate: Floats, indicator: Floats) -> Floats:
     return mean
 
 
-def rank_models(
-    figures: tuple[Floats, Floats],
-    replicates: tuple[Floats, Floats],
-    trials: NDArray[np.int64],
-    *,
-    level: float = LEVEL,
-) -> Ranking:
-    """Ranks models, with the uncertainty that their resampled figures show.
+def combined(tests: Sequence[PairTests]) -> PairTests:
+    """Evidence of the same pairs on several tasks, put together with equal weights.
 
-    A model is better than another beyond chance when its mean rank is smaller in nearly all
-    replicates: in more than the share that a one-sided test at half the level's error asks for.
-    A resample of very few trials shows no spread, so there must also be enough trials for an
-    exact permutation test to find a difference at all (four of each on a single task).
+    Args:
+        tests: Of each task, with the pairs in the same order; at least one.
+
+    Source:
+        S. A. Stouffer et al., The American Soldier 1 (1949), footnote 14.
+    """
+    from scipy.special import ndtr
+
+    if len(tests) == 1:
+        return tests[0]
+    z = np.clip([test.z for test in tests], -MAX_EVIDENCE, MAX_EVIDENCE)
+    number = np.sum([test.informative for test in tests], axis=0)
+    total = z.sum(axis=0) / np.sqrt(np.maximum(number, 1))
+    return PairTests(
+        z=total, p_value=np.minimum(1.0, 2 * ndtr(-np.abs(total))), informative=number > 0
+    )
+
+
+def adjusted(family: Sequence[PairTests]) -> list[Floats]:
+    """P-values of all tests of a family, adjusted such that any false finding is unlikely."""
+    sizes = [len(tests.p_value) for tests in family]
+    p_values = holm([float(p) for tests in family for p in tests.p_value])
+    return [np.array(found) for found in _split(p_values, sizes)]
+
+
+def rank_models(
+    figures: tuple[Floats, Floats], tests: PairTests, p_values: Floats, *, level: float = LEVEL
+) -> Ranking:
+    """Ranks models by their figures, with what the tests of all pairs can tell apart.
+
+    A model is better than another beyond chance when its mean rank is smaller, the evidence
+    points the same way, and the adjusted p-value is at most the level's error.
 
     Args:
         figures: Success rates and indicators, each (T, M) float64.
-        replicates: The same of resampled trials, each (B, T, M) float64.
-        trials: (T, M) int64, how many trials each figure rests on.
+        tests: Of all pairs of models, in the order of `itertools.combinations`.
+        p_values: The adjusted p-value of each test.
         level: Confidence level.
 
     Returns:
         The ranking; models in the order given.
+
+    Source:
+        Intervals of places from claims on pairs: M. Mogstad et al., Rev. Econ. Stud. 91 (2024)
+        476, section 3.
     """
-    means = mean_ranks(*replicates)
-    wins = np.stack([(row[None, :] < means.T).mean(axis=1) for row in means.T])
-    better = (wins >= (1 + level) / 2) & (smallest_p_value(trials) <= 1 - level)
-    places = 1 + (means[:, None, :] < means[:, :, None]).sum(axis=-1)
-    tail = (1 - level) / 2
-    low = np.quantile(places, tail, axis=0, method="lower")
-    high = np.quantile(places, 1 - tail, axis=0, method="higher")
-    # A statistically tied model rules out no place.
+    mean_rank = mean_ranks(*figures)
+    models = len(mean_rank)
+    better = np.zeros((models, models), bool)
+    for (first, second), z, p_value in zip(
+        combinations(range(models), 2), tests.z, p_values, strict=True
+    ):
+        ahead = mean_rank[second] - mean_rank[first]
+        # Rounding must not say who is ahead.
+        if p_value <= 1 - level and ahead * z > 0 and not math.isclose(ahead, 0, abs_tol=1e-9):
+            better[(first, second) if z > 0 else (second, first)] = True
+    low = 1 + better.sum(axis=0)
     return Ranking(
-        mean_rank=mean_ranks(*figures),
-        rank=(1 + better.sum(axis=0)).astype(np.int64),
-        low=np.minimum(low, 1 + better.sum(axis=0)).astype(np.int64),
-        high=np.maximum(high, len(better) - better.sum(axis=1)).astype(np.int64),
+        mean_rank=mean_rank,
+        rank=low.astype(np.int64),
+        low=low.astype(np.int64),
+        high=(models - better.sum(axis=1)).astype(np.int64),
         better=better,
     )
 
 
-def smallest_p_value(trials: NDArray[np.int64]) -> Floats:
-    """The least two-sided p-value that a permutation test of two models can reach.
-
-    The labels of n and m trials can be dealt in C(n + m, n) ways on each task, and the most
-    extreme deal is one of them.
-
-    Args:
-        trials: (T, M) int64.
-
-    Returns:
-        (M, M) float64, at most 1.
-    """
-    models = range(trials.shape[1])
-    ways = np.array(
-        [
-            [sum(_log_binomial(int(n), int(m)) for n, m in trials[:, [i, j]]) for j in models]
-            for i in models
-        ]
-    )
-    least: Floats = np.minimum(1.0, 2.0 * np.exp(-ways))
-    return least
-
-
-def _log_binomial(first: int, second: int) -> float:
-    return math.lgamma(first + second + 1) - math.lgamma(first + 1) - math.lgamma(second + 1)
+def _split(values: Sequence[float], sizes: Sequence[int]) -> list[list[float]]:
+    ends = np.cumsum([0, *sizes])
+    return [list(values[start:end]) for start, end in pairwise(ends)]

@@ -8,6 +8,7 @@ from typing import Any
 
 from buildarena_benchmark import ValidationIssue
 from buildarena_geometry import Machine, Refused, ToolDefinition, tool_definitions
+from buildarena_geometry.json_values import levels
 from buildarena_pipeline.errors import SubmissionError
 from buildarena_store import ExternalCall, clean
 
@@ -69,18 +70,9 @@ def check_arguments(arguments: Any) -> None:
     Raises:
         SubmissionError: They are too deep or too large.
     """
-    level, depth = [arguments], 0
-    while level:
-        depth += 1
-        if depth > MAX_DEPTH:
+    for depth, level in enumerate(levels(arguments)):
+        if depth >= MAX_DEPTH and any(isinstance(value, dict | list) for value in level):
             raise _refused(f"more than {MAX_DEPTH} lists or objects inside each other")
-        inner: list[Any] = []
-        for value in level:
-            if isinstance(value, dict):
-                inner += value.values()
-            elif isinstance(value, list):
-                inner += value
-        level = [value for value in inner if isinstance(value, dict | list)]
     size = _size(arguments)
     if size > MAX_BYTES:
         raise _refused(f"{size:,} bytes; a call's arguments have at most {MAX_BYTES:,}")

@@ -17,9 +17,9 @@ from redis.backoff import NoBackoff
 from redis.exceptions import RedisError
 from redis.retry import Retry
 
+from buildarena_pipeline.breakers import CircuitBreaker
 from buildarena_pipeline.broker.announcer import Announcer
 from buildarena_pipeline.broker.app import celery_app
-from buildarena_pipeline.broker.breaker import CircuitBreaker
 
 PROCESS_NEXT = "buildarena.process_next"
 """Name of the one message kind; its arguments are the queue's name and a job id."""
@@ -45,8 +45,8 @@ class Queues:
 
     def __init__(self, broker_url: str) -> None:
         self.app = celery_app(broker_url)
-        self._sender = celery_app(broker_url, timeout_s=TIMEOUT_S)
         self._broker_url = broker_url
+        self._sender = self._new_sender()
         self._lock = threading.Lock()
         # Celery's queues are lists of the same name.
         self._redis = Redis.from_url(
@@ -129,7 +129,10 @@ class Queues:
         """Takes a fresh sender: a pool's connections to a server that is gone stay in its way."""
         with self._lock:
             if self._sender is failed:
-                self._sender = celery_app(self._broker_url)
+                self._sender = self._new_sender()
+
+    def _new_sender(self) -> Celery:
+        return celery_app(self._broker_url, timeout_s=TIMEOUT_S)
 
     def close(self) -> None:
         """Ends announcements and closes the connections to the broker."""

@@ -22,7 +22,7 @@ from buildarena_store import (
     StaleLeaseError,
     clean,
 )
-from buildarena_store.jobs.leases import OPERATOR
+from buildarena_store.jobs.claiming import OPERATOR
 
 log = structlog.get_logger(__name__)
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from buildarena_benchmark import Task, failed_score
+from buildarena_benchmark.flags import is_disqualified
 from buildarena_geometry import DOCUMENT_VERSION, Machine
 from buildarena_geometry import __version__ as geometry_version
 from buildarena_pipeline import __version__
@@ -30,9 +31,21 @@ def task_of(job: Job, catalogue: TaskCatalog) -> Task:
 
 
 def best_rollout(records: Sequence[RolloutRecord]) -> RolloutRecord:
-    """The rollout that counts: a success before none, then the larger indicator, then the first."""
+    """The rollout that counts.
+
+    A success before none, one that no flag disqualifies before others, then the larger indicator,
+    then the first.
+    """
     done = [record for record in records if record.finished_at is not None]
-    return max(done, key=lambda r: (bool(r.success), r.indicator or 0.0, -r.number))
+    return max(
+        done,
+        key=lambda r: (
+            bool(r.success) and not is_disqualified(r.flags or ()),
+            bool(r.success),
+            r.indicator or 0.0,
+            -r.number,
+        ),
+    )
 
 
 def rollout_score(job: Job, record: RolloutRecord) -> JobScore:

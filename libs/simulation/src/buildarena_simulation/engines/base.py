@@ -42,6 +42,7 @@ class World:
         terrain: Fixed boxes.
         cargo: The cargo, if there is one.
         gravity: Downward acceleration, units/s².
+        finer: By how much an engine's steps are shorter than usual.
     """
 
     structure: Structure
@@ -49,6 +50,7 @@ class World:
     terrain: tuple[TerrainBox, ...]
     cargo: CargoBox | None
     gravity: float
+    finer: int = 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

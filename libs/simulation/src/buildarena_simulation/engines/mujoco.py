@@ -19,10 +19,10 @@ from buildarena_simulation.structure.motion import Motion
 from buildarena_simulation.structure.solids import Solid, Solids
 from buildarena_simulation.structure.vectors import cross, turned
 
-_TIME_STEP_S = 0.0025
-_STEPS_PER_EVALUATION = 16
+_TIME_STEP_S = 1 / 500
+_STEPS_PER_EVALUATION = 20
 _SOLREF = (0.02, 1.0)
-_FRICTION_S = 0.05
+_FRICTION_S = 0.03
 _SOLIMP = (0.95, 0.995, 0.005, 0.5, 2.0)
 _IMPRATIO = 10.0
 _ITERATIONS = 50
@@ -49,7 +49,7 @@ class MujocoEngine:
         self._world = world
         self._structure = world.structure
         self._mjcf = MjcfSettings(
-            time_step_s=_TIME_STEP_S,
+            time_step_s=self.time_step_s,
             solref=_SOLREF,
             friction_s=_FRICTION_S,
             solimp=_SOLIMP,
@@ -65,19 +65,19 @@ class MujocoEngine:
     @property
     def time_step_s(self) -> float:
         """See `Engine`."""
-        return _TIME_STEP_S
+        return _TIME_STEP_S / self._world.finer
 
     @property
     def steps_per_evaluation(self) -> int:
         """See `Engine`."""
-        return _STEPS_PER_EVALUATION
+        return _STEPS_PER_EVALUATION * self._world.finer
 
     @property
     def settings(self) -> Mapping[str, float | int | str]:
         """See `Engine`."""
         return {
-            "time_step_s": _TIME_STEP_S,
-            "steps_per_evaluation": _STEPS_PER_EVALUATION,
+            "time_step_s": self.time_step_s,
+            "steps_per_evaluation": self.steps_per_evaluation,
             "integrator": "implicitfast",
             "cone": "elliptic",
             "impratio": _IMPRATIO,
@@ -135,7 +135,7 @@ class MujocoEngine:
         model, data, at = self._model, self._data, self._addresses
         data.ctrl[at.thrust_actuators] = thrusts
         impacts = ImpactWatch(
-            len(wheel_speeds), gravity=self._world.gravity, time_step_s=_TIME_STEP_S
+            len(wheel_speeds), gravity=self._world.gravity, time_step_s=self.time_step_s
         )
         velocity = data.qvel[at.free_dofs]
         for row in wheel_speeds:

@@ -81,19 +81,19 @@ class PyBulletEngine:
     @property
     def time_step_s(self) -> float:
         """See `Engine`."""
-        return _TIME_STEP_S
+        return _TIME_STEP_S / self._world.finer
 
     @property
     def steps_per_evaluation(self) -> int:
         """See `Engine`."""
-        return _STEPS_PER_EVALUATION
+        return _STEPS_PER_EVALUATION * self._world.finer
 
     @property
     def settings(self) -> Mapping[str, float | int | str]:
         """See `Engine`."""
         return {
-            "time_step_s": _TIME_STEP_S,
-            "steps_per_evaluation": _STEPS_PER_EVALUATION,
+            "time_step_s": self.time_step_s,
+            "steps_per_evaluation": self.steps_per_evaluation,
             "iterations": _ITERATIONS,
             "residual": _RESIDUAL,
             "cone_friction": 1,
@@ -132,7 +132,7 @@ class PyBulletEngine:
         external_forces = thrust_forces(self._structure, self._clusters, self._axes, thrusts)
         drags = drag_forces(self._clusters, self._motion, self._axes, self._moments)
         impacts = ImpactWatch(
-            len(wheel_speeds), gravity=self._world.gravity, time_step_s=_TIME_STEP_S
+            len(wheel_speeds), gravity=self._world.gravity, time_step_s=self.time_step_s
         )
         velocity = self._free_velocities()
         driven: FloatArray | None = None
@@ -186,7 +186,7 @@ class PyBulletEngine:
         world = self._world
         pybullet.setGravity(0, 0, -world.gravity, **self._client)
         pybullet.setPhysicsEngineParameter(
-            fixedTimeStep=_TIME_STEP_S,
+            fixedTimeStep=self.time_step_s,
             numSubSteps=0,
             numSolverIterations=_ITERATIONS,
             solverResidualThreshold=_RESIDUAL,
@@ -326,7 +326,7 @@ class PyBulletEngine:
         structure, clusters = self._structure, self._clusters
         motion = self._read_motion()
         pulls = rope_forces(
-            structure, clusters, motion, alive=self._rope_alive, time_step_s=_TIME_STEP_S
+            structure, clusters, motion, alive=self._rope_alive, time_step_s=self.time_step_s
         )
         self._tensions = pulls.tension
         ends = pulls.forces

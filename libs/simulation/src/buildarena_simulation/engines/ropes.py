@@ -15,7 +15,7 @@ from buildarena_simulation.structure.motion import Motion, rope_ends
 from buildarena_simulation.structure.vectors import cross, turned
 
 _STIFFNESS_SHARE = 0.2
-_DAMPING_SHARE = 0.4
+_DAMPING_SHARE = 0.8
 """Shares of m/dt² and m/dt; an explicit step is stable below 1 each."""
 
 

@@ -1,6 +1,7 @@
 """From parts and joints to the arrays of a `Structure`: masses, members, far joints."""
 
-from collections.abc import Iterable, Sequence
+from collections import Counter
+from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -44,6 +45,9 @@ class Link:
         start: (3,) where it leaves the first block, machine frame, units.
         end: (3,) where it reaches the second block; equals `start` unless it is a brace.
         mass: Its own mass, half of which the block at each end carries, mass units.
+        share: Its share of one connector's stiffness: connectors that leave a face the same way
+            are together no stiffer than one.
+        faces: What identifies the faces at its start and end; None for joints of attachments.
     """
 
     name: str
@@ -53,11 +57,13 @@ class Link:
     start: FloatArray
     end: FloatArray
     mass: float = 0.0
+    share: float = 1.0
+    faces: tuple[Hashable, Hashable] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rope:
-    """A winch between two blocks; fields as in `Link`."""
+    """A winch between two blocks; fields as in `Link`, its share that of a rope's strength."""
 
     name: str
     first: int
@@ -65,6 +71,7 @@ class Rope:
     start: FloatArray
     end: FloatArray
     mass: float
+    share: float = 1.0
 
 
 def build_structure(
@@ -230,8 +237,10 @@ def _members(parts: Sequence[Part], links: Sequence[Link]) -> Members:
         if link.kind is JointKind.BRACE:
             span = link.end - link.start
             length = float(np.linalg.norm(span))
+            if length < _FLUSH_TOLERANCE:  # between faces that lie on each other
+                span = parts[link.first].center - link.start
             frames.append(axis_frame(span))
-            stiffness.append(_brace_springs(length))
+            stiffness.append(link.share * _brace_springs(length))
         else:
             apart = parts[link.second].center - parts[link.first].center
             if np.linalg.norm(apart) < 1e-9:  # noqa: PLR2004 - centres coincide: any axis will do
@@ -248,7 +257,24 @@ def _members(parts: Sequence[Part], links: Sequence[Link]) -> Members:
         frame=np.array(frames).reshape(-1, 3, 3),
         stiffness=np.array(stiffness).reshape(-1, 6),
         limits=np.array([(s.force, s.moment) for s in strengths]).reshape(-1, 2),
+        ends=_shared_faces(links),
     )
+
+
+def _shared_faces(links: Sequence[Link]) -> IntArray:
+    """Ends of connectors at faces that several use, as in `Members.ends`."""
+    ends = [
+        (face, k, sign)
+        for k, link in enumerate(links)
+        if link.faces is not None
+        for face, sign in zip(link.faces, (-1, 1), strict=True)
+    ]
+    used = Counter(face for face, _, _ in ends)
+    place: dict[Hashable, int] = {}
+    rows = [
+        (k, sign, place.setdefault(face, len(place))) for face, k, sign in ends if used[face] > 1
+    ]
+    return np.array(rows, dtype=np.int64).reshape(-1, 3)
 
 
 def _brace_springs(length: float) -> FloatArray:
@@ -277,5 +303,5 @@ def _ropes(ropes: Sequence[Rope]) -> Ropes:
         first_point=first_point,
         second_point=second_point,
         length=np.linalg.norm(second_point - first_point, axis=1),
-        limit=np.full(len(ropes), ROPE_STRENGTH),
+        limit=np.array([rope.share * ROPE_STRENGTH for rope in ropes]),
     )

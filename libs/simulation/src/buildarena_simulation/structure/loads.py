@@ -26,7 +26,8 @@ class JointLoads:
     Attributes:
         force: (M,) norm of the force, mass·g; 0 for members that bear none.
         moment: (M,) norm of the moment, mass·g·unit.
-        ratio: (M,) the larger of force and moment over its limit.
+        ratio: (M,) the larger of force and moment over its limit; for connectors that share a
+            face, of what they exert on it together, if that is more.
     """
 
     force: FloatArray
@@ -93,6 +94,7 @@ class LoadModel:
         moment[inside] = np.sqrt((members[:, 3:] ** 2).sum(axis=1))
         limits = self._structure.members.limits
         ratio = np.maximum(force / limits[:, 0], moment / limits[:, 1])
+        self._add_shared_faces(members, ratio)
         return JointLoads(force=force, moment=moment, ratio=ratio)
 
     def displacements(self, forces: PointForces, motion: Motion) -> FloatArray:
@@ -210,6 +212,26 @@ class LoadModel:
             bending -= (bending * axis).sum(axis=1)[:, None] * axis
             force[axle] = np.sqrt((transmitted**2).sum(axis=1))
             moment[axle] = np.sqrt((bending**2).sum(axis=1))
+
+    def _add_shared_faces(self, loads: FloatArray, ratio: FloatArray) -> None:
+        """Raises the ratios of connectors to that of all connectors on one of their faces.
+
+        Args:
+            loads: (K, 6) of the members within clusters, member frame.
+            ratio: (M,) changed in place.
+        """
+        members = self._structure.members
+        if not len(members.ends):
+            return
+        of_member = np.zeros((len(members), 6))
+        of_member[self._solver.inside] = turned_wrenches(members.frame[self._solver.inside], loads)
+        member, sign, face = members.ends.T
+        count = int(face.max()) + 1
+        total = summed_by(face, sign[:, None] * of_member[member], count)
+        norms = np.sqrt((total.reshape(-1, 2, 3) ** 2).sum(axis=2))[face]
+        together = (norms / members.limits[member]).max(axis=1)
+        bears = (of_member[member] != 0.0).any(axis=1)
+        np.maximum.at(ratio, member[bears], together[bears])
 
     def _cluster_totals(self, wrenches: FloatArray) -> FloatArray:
         """Resultant on each cluster about its centre of mass, (C, 6)."""

@@ -113,6 +113,7 @@ class MemberForces:
         self._solver = solver
         self._first, self._second = first, second
         self._columns: dict[int, FloatArray] = {}
+        self._flexible: tuple[tuple[int, ...], FloatArray] = ((), np.zeros((0, 6, 0, 6)))
 
     def displacements(self, wrenches: FloatArray) -> FloatArray:
         """Displacements and turns of the blocks, (N, 6), machine frame; see `solve`."""
@@ -131,11 +132,16 @@ class MemberForces:
         Returns:
             (B, 6, B, 6) of displaced block, its degree of freedom, loaded block, its wrench.
         """
-        wanted = [int(block) for block in blocks if int(block) not in self._columns]
-        if wanted:
-            self._solve_columns(wanted)
-        columns = np.stack([self._columns[int(block)][blocks] for block in blocks], axis=2)
-        return np.asarray(columns)
+        key = tuple(blocks.tolist())
+        if key != self._flexible[0]:
+            wanted = [block for block in key if block not in self._columns]
+            if wanted:
+                self._solve_columns(wanted)
+            found = np.empty((len(key), 6, len(key), 6))
+            for k, block in enumerate(key):
+                found[:, :, k] = self._columns[block][blocks]
+            self._flexible = (key, found)
+        return self._flexible[1]
 
     def _solve_columns(self, blocks: Sequence[int]) -> None:
         count = len(self._free)

@@ -32,8 +32,16 @@ _SOFTNESS: Final = 1e-9
 
 _ROUNDS: Final = 12
 _TOLERANCE: Final = 1e-9
+"""A pull below this share of the resultant is none."""
+
+_CLOSED: Final = 1e-10
+"""The same for a gap, per mass·g of the resultant: a thousandth of what the ground yields."""
+
 _MISMATCH: Final = 1e-3
 """Share of the resultant that may be missed before the even spread is kept."""
+
+_STILL: Final = 2e-3
+"""Points that moved less than this in the machine frame are where they were, units."""
 
 _NEGLIGIBLE: Final = 20.0
 """A resultant times its reach below this breaks no joint, mass·g·unit."""
@@ -77,12 +85,13 @@ class EdgeSupports:
 
     def __init__(self, centers: FloatArray, cluster_of: IntArray, *, gravity: float) -> None:
         self._centers, self._cluster_of, self._gravity = centers, cluster_of, gravity
-        self._bearing: dict[tuple[int, ...], BoolArray] = {}
+        self._systems: dict[int, _System] = {}
 
     def settled(
         self,
         contacts: ContactForces,
         spread: PointForces,
+        *,
         corners: FloatArray,
         structure: ElasticStructure,
         motion: Motion,
@@ -128,13 +137,13 @@ class EdgeSupports:
 
     def _patch(self, contacts: ContactForces, of: IntArray, first_face: int, c: int) -> IntArray:
         """Rows of a cluster's contacts with the world along the normal of its resting faces."""
-        mine = np.flatnonzero((of == c) & (contacts.other == WORLD))
+        mine: IntArray = np.flatnonzero((of == c) & (contacts.other == WORLD))
         normal = contacts.normal[mine[mine >= first_face][0]]
-        return mine[(contacts.normal[mine] == normal).all(axis=1)]
+        return np.asarray(mine[(contacts.normal[mine] == normal).all(axis=1)])
 
     def _matters(self, candidates: _Candidates) -> bool:
         reach = float(np.ptp(candidates.point, axis=0).max())
-        return abs(candidates.base.sum()) / self._gravity * reach > _NEGLIGIBLE
+        return abs(float(candidates.base.sum())) / self._gravity * reach > _NEGLIGIBLE
 
     def _pushes(
         self,
@@ -152,74 +161,151 @@ class EdgeSupports:
         local = (point - motion.position[c]) @ turn
         moments = cross(local - self._centers[block], inward[None])
         unit = np.concatenate([np.tile(inward, (len(block), 1)), moments], axis=1)
-        blocks, place = np.unique(block, return_inverse=True)
-        flexible = structure.flexibility(blocks)[place][:, :, place]
-        h = np.einsum("pi,piqj,qj->pq", unit, flexible, unit, optimize=True)
-        h[np.diag_indices(len(h))] += 1.0 / _FOUNDATION
+        known = self._system(block, unit, local, structure)
         gap = (unit * displaced[block]).sum(axis=1) + base / _FOUNDATION
+        force = known.solver.solve(known.compliance @ base - gap, base)
+        return None if force is None else force * self._gravity
+
+    def _system(
+        self, block: IntArray, unit: FloatArray, local: FloatArray, structure: ElasticStructure
+    ) -> "_System":
+        """How points yield to forces at each other; remembered while they hardly move.
+
+        Args:
+            block: (P,) block of each point.
+            unit: (P, 6) wrench of a unit force there on its block.
+            local: (P, 3) the points, machine frame, units.
+            structure: The structure.
+        """
+        blocks, place = np.unique(block, return_inverse=True)
+        flexible = structure.flexibility(blocks)
+        cluster = int(self._cluster_of[block[0]])
+        known = self._systems.get(cluster)
+        if (
+            known is not None
+            and known.flexible is flexible
+            and known.unit.shape == unit.shape
+            and np.abs(known.unit - unit).max() < _STILL
+        ):
+            return known
+        compliance = _condensed(flexible, place, unit)
+        compliance[np.diag_indices(len(compliance))] += 1.0 / _FOUNDATION
         middle = local.mean(axis=0)
-        span = _across(inward)
         reach = max(float(np.abs(local - middle).max()), 1.0)
-        balance = np.concatenate([np.ones((1, len(local))), span @ (local - middle).T / reach])
-        wanted = balance @ base
-        key = (*block.tolist(), len(block))
-        start = self._bearing.get(key)
-        solved = _least_energy(h, h @ base - gap, balance, wanted, start)
-        if solved is None:
-            return None
-        force, self._bearing[key] = solved
-        return force * self._gravity
+        across = _across(unit[0, :3]) @ (local - middle).T / reach
+        balance = np.concatenate([np.ones((1, len(local))), across])
+        self._systems[cluster] = _System(
+            flexible=flexible,
+            unit=unit,
+            compliance=compliance,
+            solver=_LeastEnergy(compliance, balance),
+        )
+        return self._systems[cluster]
 
 
-def _least_energy(
-    h: FloatArray,
-    target: FloatArray,
-    balance: FloatArray,
-    wanted: FloatArray,
-    start: BoolArray | None,
-) -> tuple[FloatArray, BoolArray] | None:
-    """The f >= 0 that minimises f·h·f / 2 - target·f where balance·f = wanted.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _System:
+    """The points of one cluster that may bear, and how they yield.
+
+    Attributes:
+        flexible: What `compliance` was made from.
+        unit: (P, 6) what it was made with.
+        compliance: (P, P) how far each point yields under a unit force at each.
+        solver: Shares a resultant among the points.
+    """
+
+    flexible: FloatArray
+    unit: FloatArray
+    compliance: FloatArray
+    solver: "_LeastEnergy"
+
+
+def _condensed(flexible: FloatArray, place: IntArray, unit: FloatArray) -> FloatArray:
+    """The product unit · flexible · unit over the blocks' degrees of freedom, (P, P).
+
+    Args:
+        flexible: (B, 6, B, 6).
+        place: (P,) the points' blocks, indices below B.
+        unit: (P, 6).
+    """
+    count, points = len(flexible), len(place)
+    order = np.argsort(place, kind="stable")
+    start = np.searchsorted(place[order], np.arange(count))
+    slot = np.empty(points, dtype=np.int64)
+    slot[order] = np.arange(points) - start[place[order]]
+    slots = int(slot.max()) + 1
+    units = np.zeros((count, 6, slots))
+    units[place, :, slot] = unit
+    loaded = flexible.reshape(6 * count, count, 6).transpose(1, 0, 2) @ units
+    yields = loaded.transpose(1, 0, 2).reshape(count, 6, count * slots)
+    table = (units.transpose(0, 2, 1) @ yields).reshape(count * slots, count * slots)
+    where = place * slots + slot
+    return np.asarray(table[np.ix_(where, where)])
+
+
+class _LeastEnergy:
+    """Finds the f >= 0 that minimises f·h·f / 2 - target·f with the resultant of a given f.
 
     Args:
         h: (P, P) positive definite.
-        target: (P,).
         balance: (3, P) from forces to resultant.
-        wanted: (3,) the resultant.
-        start: (P,) the points that are likely to bear.
-
-    Returns:
-        f and the points that bear; None if no f has the resultant.
     """
-    count = len(target)
-    bearing = np.ones(count, dtype=bool) if start is None else start.copy()
-    scale = float(np.abs(wanted).max()) + 1e-12
-    force = np.zeros(count)
-    for turn in range(_ROUNDS):
-        held = np.flatnonzero(bearing)
-        if not len(held):
+
+    def __init__(self, h: FloatArray, balance: FloatArray) -> None:
+        self._h, self._balance = h, balance
+        self._bearing: BoolArray = np.ones(len(h), dtype=bool)
+        self._factors: tuple[bytes, object] = (b"", None)
+
+    def solve(self, target: FloatArray, given: FloatArray) -> FloatArray | None:
+        """The forces; None if none have the resultant.
+
+        Args:
+            target: (P,).
+            given: (P,) forces with the resultant that is wanted.
+        """
+        bearing, wanted = self._bearing, self._balance @ given
+        scale = float(np.abs(wanted).max()) + 1e-12
+        for turn in range(_ROUNDS):
+            if not bearing.any():
+                break
+            force, opening = self._with(bearing, target, wanted)
+            pulling = force < -_TOLERANCE * scale
+            # A point without load opens; where it would close again, it bears.
+            closing = ~bearing & (opening < -_CLOSED * scale)
+            if turn >= _ROUNDS // 2:
+                closing[:] = False
+            if not pulling.any() and not closing.any():
+                break
+            bearing = (bearing & ~pulling) | closing
+        else:
+            force = np.maximum(force, 0.0)
+        if not bearing.any() or np.abs(self._balance @ force - wanted).max() > _MISMATCH * scale:
+            self._bearing = np.ones(len(bearing), dtype=bool)
             return None
+        self._bearing = bearing
+        return force
+
+    def _with(
+        self, bearing: BoolArray, target: FloatArray, wanted: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Forces of points that bear, and how far the others open, each (P,)."""
+        from scipy.linalg import lu_factor, lu_solve
+
+        held = np.flatnonzero(bearing)
         size = len(held)
-        matrix = np.zeros((size + 3, size + 3))
-        matrix[:size, :size] = h[np.ix_(held, held)]
-        matrix[:size, size:] = balance[:, held].T
-        matrix[size:, :size] = balance[:, held]
-        matrix[size:, size:] = -_SOFTNESS * np.eye(3)
-        solution = np.linalg.solve(matrix, np.concatenate([target[held], wanted]))
-        force = np.zeros(count)
+        if self._factors[0] != bearing.tobytes():
+            matrix = np.zeros((size + 3, size + 3))
+            matrix[:size, :size] = self._h[np.ix_(held, held)]
+            matrix[:size, size:] = self._balance[:, held].T
+            matrix[size:, :size] = self._balance[:, held]
+            matrix[size:, size:] = -_SOFTNESS * np.eye(3)
+            self._factors = (bearing.tobytes(), lu_factor(matrix, check_finite=False))
+        right = np.concatenate([target[held], wanted])
+        solution = lu_solve(self._factors[1], right, check_finite=False)
+        force = np.zeros(len(target))
         force[held] = solution[:size]
-        pulling = force < -_TOLERANCE * scale
-        # A point without load opens; where it would close again, it bears.
-        opening = h @ force - target + solution[size:] @ balance
-        closing = (
-            ~bearing & (opening < -_TOLERANCE * scale) if turn < _ROUNDS // 2 else pulling & False
-        )
-        if not pulling.any() and not closing.any():
-            break
-        bearing = (bearing & ~pulling) | closing
-    force = np.maximum(force, 0.0)
-    if np.abs(balance @ force - wanted).max() > _MISMATCH * scale:
-        return None
-    return force, bearing
+        opening = self._h @ force - target + solution[size:] @ self._balance
+        return force, opening
 
 
 def _candidates(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import defaultdict, deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass, field
@@ -167,14 +167,12 @@ class _Archive:
             if row.id in self._jobs:
                 raise ArchiveError(f"job {row.id} is in it twice")
             self._jobs[row.id] = row
-        for task in self._members.rows("tasks", TaskRow):
-            del task
+        _read_through(self._members.rows("tasks", TaskRow))
         self._check_rows_of_jobs()
 
     def _check_rows_of_jobs(self) -> None:
         sums: dict[str, _Sums] = defaultdict(_Sums)
-        for _ in self._of_jobs("attempts", AttemptRow):
-            pass
+        _read_through(self._of_jobs("attempts", AttemptRow))
         for entry in self._of_jobs("journal", JournalRow):
             mine = sums[entry.job_id]
             _require_next("journal", entry.job_id, entry.sequence, mine.entries)
@@ -332,6 +330,11 @@ class _Archive:
         for digest in digests:
             if digest is not None and digest not in self._hashes:
                 raise ArchiveError(f"artifact {digest} is not in the archive")
+
+
+def _read_through(rows: Iterator[object]) -> None:
+    """Reads rows that have nothing to be compared with: each is checked as it is read."""
+    deque(rows, maxlen=0)
 
 
 def _require_next(table: str, job_id: str, given: int, wanted: int) -> None:

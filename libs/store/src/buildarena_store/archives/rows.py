@@ -7,7 +7,6 @@ leases, marks) are taken out here.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from datetime import UTC, datetime, timedelta
 from decimal import Decimal
 from typing import Annotated, Any, Final, Self
@@ -17,6 +16,7 @@ from pydantic import AfterValidator, AwareDatetime, BaseModel, ConfigDict, Field
 from buildarena_benchmark import TaskError, parse_task
 from buildarena_benchmark.outcomes import SCORED
 from buildarena_benchmark.tasks.sources import MAX_BYTES
+from buildarena_geometry.json_values import levels
 from buildarena_store.jobs.job import JobKey, configuration_hash
 from buildarena_store.states import JobState, Outcome, Stage, SweepState
 
@@ -28,24 +28,26 @@ AHEAD: Final = timedelta(minutes=5)
 """How far another service's clock may be ahead of ours."""
 
 
-def _plain(value: Any, depth: int = 0) -> Any:
+def _plain(value: Any) -> Any:
     """A JSON value of bounded depth, whose numbers are finite and whose texts can be stored."""
-    if depth > DEEPEST:
-        raise ValueError(f"nested deeper than {DEEPEST}")
+    for depth, level in enumerate(levels(value)):
+        if depth > DEEPEST:
+            raise ValueError(f"nested deeper than {DEEPEST}")
+        for item in level:
+            _require_storable(item)
+            if isinstance(item, dict):
+                for key in item:
+                    _require_storable(key)
+    return value
+
+
+def _require_storable(value: object) -> None:
     if isinstance(value, float) and not math.isfinite(value):
         raise ValueError(f"{value} is not a finite number")
     if isinstance(value, int) and abs(value) > LARGEST_COUNT:
         raise ValueError("a whole number beyond 2**53")
     if isinstance(value, str) and "\0" in value:
         raise ValueError("a text with a NUL character")
-    if isinstance(value, Mapping):
-        for key, item in value.items():
-            _plain(key)
-            _plain(item, depth + 1)
-    elif isinstance(value, list):
-        for item in value:
-            _plain(item, depth + 1)
-    return value
 
 
 def _past(value: datetime) -> datetime:

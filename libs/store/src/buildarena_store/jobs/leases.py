@@ -13,15 +13,12 @@ from datetime import timedelta
 from typing import Any
 
 from sqlalchemy import (
-    Boolean,
     ColumnElement,
     Connection,
     and_,
     case,
-    column,
     literal,
     select,
-    text,
     tuple_,
     update,
 )
@@ -30,7 +27,8 @@ from buildarena_store import events
 from buildarena_store.database import Database
 from buildarena_store.errors import StaleLeaseError
 from buildarena_store.jobs.attempts import Ending, end_attempts
-from buildarena_store.jobs.job import JOB_COLUMNS, Job
+from buildarena_store.jobs.claiming import CLAIM
+from buildarena_store.jobs.job import Job
 from buildarena_store.rows import value_of
 from buildarena_store.states import AttemptResult, JobState, Outcome, Stage
 from buildarena_store.tables import budgets, jobs
@@ -61,65 +59,6 @@ class Lease:
     def first(self) -> bool:
         """Whether this is the job's first lease, so that it has neither journal nor rollouts."""
         return self.token == 1
-
-
-OPERATOR = ""
-"""Who owns the jobs that no API key submitted."""
-
-# One statement each, because every stage of every job waits for them. The distinct owners of a
-# queue are found in steps along the index, one probe each, however many jobs an owner has.
-_OWNER = "COALESCE(owner, '')"
-_QUEUED = f"state = '{JobState.QUEUED}' AND queue = :queue"
-_WAITS = f"{_QUEUED} AND available_at <= clock_timestamp()"
-_ROOM = f"{_OWNER} <> ALL(CAST(:full AS text[]))"
-_CLAIM = text(
-    f"""
-    WITH RECURSIVE owners (name) AS (
-        (SELECT {_OWNER} FROM jobs WHERE {_QUEUED} ORDER BY {_OWNER} LIMIT 1)
-        UNION ALL
-        SELECT (
-            SELECT {_OWNER} FROM jobs WHERE {_QUEUED} AND {_OWNER} > owners.name
-            ORDER BY {_OWNER} LIMIT 1
-        ) FROM owners WHERE owners.name IS NOT NULL
-    ), turns AS MATERIALIZED (
-        SELECT name FROM owners
-        WHERE name IS NOT NULL AND name <> ALL(CAST(:full AS text[]))
-        ORDER BY
-            name IS NOT DISTINCT FROM CAST(:last AS text),
-            name < COALESCE(CAST(:last AS text), ''),
-            name
-    ), taken AS (
-        UPDATE jobs SET
-            state = '{JobState.RUNNING}',
-            lease_owner = :owner,
-            lease_token = lease_token + 1,
-            lease_expires_at = clock_timestamp() + :duration,
-            started_at = COALESCE(started_at, clock_timestamp())
-        WHERE id = COALESCE(
-            (SELECT id FROM jobs WHERE {_WAITS} AND faults > 0 AND {_ROOM}
-             ORDER BY created_at, id LIMIT 1 FOR UPDATE SKIP LOCKED),
-            (SELECT id FROM jobs WHERE {_WAITS} AND id = CAST(:hint AS text) AND {_ROOM}
-             AND ({_OWNER} IS DISTINCT FROM CAST(:last AS text)
-                  OR NOT EXISTS (SELECT FROM turns WHERE name IS DISTINCT FROM :last))
-             FOR UPDATE SKIP LOCKED),
-            (SELECT oldest.id FROM turns CROSS JOIN LATERAL (
-                SELECT id FROM jobs WHERE {_WAITS} AND {_OWNER} = turns.name
-                ORDER BY created_at, id LIMIT 1 FOR UPDATE SKIP LOCKED
-             ) AS oldest LIMIT 1)
-        )
-        RETURNING *
-    ), attempted AS (
-        INSERT INTO attempts (job_id, token, stage, worker)
-        SELECT id, lease_token, stage, lease_owner FROM taken
-    ), recorded AS (
-        INSERT INTO events (job_id, kind, data)
-        SELECT id, state, jsonb_build_object('stage', stage, 'worker', lease_owner) FROM taken
-    )
-    SELECT {", ".join(column.name for column in JOB_COLUMNS)},
-        EXISTS (SELECT 1 FROM budgets WHERE budgets.id IN (payer, owner)) AS budgeted
-    FROM taken
-    """  # noqa: S608 - made of our own column names
-).columns(*JOB_COLUMNS, column("budgeted", Boolean))
 
 
 class Leases:
@@ -171,7 +110,7 @@ class Leases:
             "last": last,
         }
         with self._database.statement() as connection:
-            row = connection.execute(_CLAIM, given).first()
+            row = connection.execute(CLAIM, given).first()
         if row is None:
             return None
         job = value_of(Job, row)

@@ -25,7 +25,7 @@ class JobScore:
         success: Whether the task's criterion was met.
         indicator: The task's performance indicator.
         metrics: Secondary metrics by name.
-        flags: Remarks that keep a result out of rankings.
+        flags: Remarks on the score; see `buildarena_benchmark.flags`.
         reason: Class of the failure, if it failed before it was simulated.
         detail: A sentence for people.
         manifest: Versions of everything that can change the score.

@@ -74,7 +74,7 @@ class SweepLifecycle:
             self._move(sweep_id, SweepState.ACTIVE, connection)
             if limits is not None:
                 self._budgets.set(sweep_id, limits, connection=connection)
-            self._release(sweep_id, connection)
+            self._release(sweep_id, self._sweep(sweep_id, connection).owner, connection)
 
     def ensure_active(
         self, sweep_id: str, limits: BudgetLimits | None, *, connection: Connection
@@ -85,11 +85,12 @@ class SweepLifecycle:
             UnknownIdError: There is no such sweep.
             TransitionError: It is cancelled.
         """
-        if self._state(sweep_id, connection) != SweepState.ACTIVE:
+        sweep = self._sweep(sweep_id, connection)
+        if sweep.state != SweepState.ACTIVE:
             self._move(sweep_id, SweepState.ACTIVE, connection)
         if limits is not None:
             self._budgets.set(sweep_id, limits, connection=connection)
-        self._release(sweep_id, connection)
+        self._release(sweep_id, sweep.owner, connection)
 
     def cancel(self, sweep_id: str) -> None:
         """Ends the sweep's jobs that have not ended and that nobody else wants.
@@ -116,19 +117,19 @@ class SweepLifecycle:
             TransitionError: It is cancelled.
         """
         with self.command() as connection:
-            state = self._state(sweep_id, connection)
-            if state == SweepState.CANCELLED:
-                raise TransitionError("sweep", sweep_id, state, "retried")
-            owner = self._owner(sweep_id, connection)
-            own = jobs.c.owner.is_not_distinct_from(owner) | ~wants.wanted_by_others(owner)
+            sweep = self._sweep(sweep_id, connection)
+            if sweep.state == SweepState.CANCELLED:
+                raise TransitionError("sweep", sweep_id, sweep.state, "retried")
+            own = jobs.c.owner.is_not_distinct_from(sweep.owner)
+            own |= ~wants.wanted_by_others(sweep.owner)
             self._jobs.retry(
                 jobs.c.id.in_(wants.members(sweep_id)),
                 own,
                 connection=connection,
                 payer=sweep_id,
-                owner=owner,
+                owner=sweep.owner,
             )
-            if state != SweepState.ACTIVE:
+            if sweep.state != SweepState.ACTIVE:
                 self._hold(sweep_id, connection)
 
     def cancel_job(self, job_id: str, *, owner: str | None, force: bool = False) -> bool:
@@ -244,7 +245,7 @@ class SweepLifecycle:
         wants.hand_over(own, connection=connection)
         transition(own, to=JobState.ON_HOLD, allowed_from={JobState.QUEUED}, connection=connection)
 
-    def _release(self, sweep_id: str, connection: Connection) -> None:
+    def _release(self, sweep_id: str, owner: str | None, connection: Connection) -> None:
         """Whoever resumes pays, also for jobs that another paused sweep would have paid for."""
         transition(
             jobs.c.id.in_(wants.members(sweep_id)),
@@ -252,7 +253,7 @@ class SweepLifecycle:
             allowed_from={JobState.ON_HOLD},
             connection=connection,
             payer=sweep_id,
-            owner=self._owner(sweep_id, connection),
+            owner=owner,
         )
 
     def _drop(
@@ -273,7 +274,7 @@ class SweepLifecycle:
 
     def _move(self, sweep_id: str, to: SweepState, connection: Connection) -> None:
         if not self._transition(sweeps.c.id == sweep_id, to, connection, {}):
-            raise TransitionError("sweep", sweep_id, self._state(sweep_id, connection), to)
+            raise TransitionError("sweep", sweep_id, self._sweep(sweep_id, connection).state, to)
 
     def _transition(
         self,
@@ -293,18 +294,12 @@ class SweepLifecycle:
             events.record_sweep(connection, sweep_id, to, data)
         return moved
 
-    def _state(self, sweep_id: str, connection: Connection) -> str:
-        query = select(sweeps.c.state).where(sweeps.c.id == sweep_id)
-        state: str | None = connection.execute(query).scalar()
-        if state is None:
+    def _sweep(self, sweep_id: str, connection: Connection) -> Row[Any, Any]:
+        query = select(sweeps.c.state, sweeps.c.owner).where(sweeps.c.id == sweep_id)
+        row = connection.execute(query).first()
+        if row is None:
             raise UnknownIdError("sweep", sweep_id)
-        return state
-
-    def _owner(self, sweep_id: str, connection: Connection) -> str | None:
-        owner: str | None = connection.execute(
-            select(sweeps.c.owner).where(sweeps.c.id == sweep_id)
-        ).scalar()
-        return owner
+        return row
 
     def _job(self, job_id: str, connection: Connection) -> Row[Any, Any, Any]:
         query = select(jobs.c.owner, jobs.c.payer, jobs.c.state).where(jobs.c.id == job_id)

@@ -28,7 +28,7 @@ from sqlalchemy import (
 )
 from sqlalchemy.dialects.postgresql import distinct_on, insert
 
-from buildarena_store.jobs.leases import OPERATOR
+from buildarena_store.jobs.claiming import OPERATOR
 from buildarena_store.states import JobState, Outcome, SweepState
 from buildarena_store.tables import job_wants, jobs, sweep_jobs, sweeps
 

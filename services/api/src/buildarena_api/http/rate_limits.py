@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import asyncio
 import math
 import time
-from contextlib import suppress
 from typing import Any
 
 import structlog
@@ -19,9 +17,10 @@ from redis.asyncio.retry import Retry
 from redis.backoff import NoBackoff
 from redis.exceptions import RedisError
 
+from buildarena_pipeline.breakers import AsyncCircuitBreaker
+
 TIMEOUT_S = 0.3
 """How long a request waits for its count; the store is not asked again until it answers."""
-PROBE_S = 1.0
 GROUP = "buildarena"
 
 log = structlog.get_logger(__name__)
@@ -48,7 +47,7 @@ class RateLimits:
         self._storage = RedisStorage(f"async+{broker_url}", implementation="redispy", **handed_on)
         self._shared = SharedLimiter(self._storage)
         self._own = OwnLimiter(MemoryStorage())
-        self._probe: asyncio.Task[None] | None = None
+        self._breaker = AsyncCircuitBreaker(self._storage.check)
         self.spelled = rate.replace("/", " per ")
 
     async def hit(self, who: str) -> int | None:
@@ -60,13 +59,15 @@ class RateLimits:
         Returns:
             None when it may pass, otherwise after how many seconds the next one may.
         """
-        if self._probe is None:
+        if not self._breaker.is_open:
             try:
                 if await self._shared.hit(self._item, GROUP, who):
                     return None
                 stats = await self._shared.get_window_stats(self._item, GROUP, who)
             except (RedisError, OSError) as error:
-                self._leave_alone(error)
+                if not self._breaker.is_open:
+                    log.warning("rate_limits_unreachable", error=str(error))
+                self._breaker.failed()
             else:
                 return _seconds_until(stats.reset_time)
         if self._own.hit(self._item, GROUP, who):
@@ -75,24 +76,8 @@ class RateLimits:
 
     async def close(self) -> None:
         """Closes the connections."""
-        if self._probe is not None:
-            self._probe.cancel()
-            with suppress(asyncio.CancelledError):
-                await self._probe
+        await self._breaker.close()
         await self._pool.aclose()
-
-    def _leave_alone(self, error: Exception) -> None:
-        """Asks the store no more, but for one probe a second."""
-        if self._probe is None:
-            log.warning("rate_limits_unreachable", error=str(error))
-            self._probe = asyncio.create_task(self._return_when_it_answers())
-
-    async def _return_when_it_answers(self) -> None:
-        while True:
-            await asyncio.sleep(PROBE_S)
-            if await self._storage.check():
-                self._probe = None
-                return
 
 
 def _seconds_until(moment: float) -> int:

@@ -11,6 +11,7 @@ from fastapi import Depends, Query, Request
 from buildarena_api.http.problems import ProblemError
 from buildarena_api.leaderboard.cache import BoardCache
 from buildarena_benchmark import ValidationIssue, builtin_tasks
+from buildarena_benchmark.flags import Reading
 from buildarena_benchmark.leaderboard import BoardQuery
 
 
@@ -40,7 +41,13 @@ def select_board(
     model: Annotated[list[str] | None, Query(description="Only these models")] = None,
     since: Annotated[datetime | None, Query(description="Only jobs ended then or later")] = None,
     until: Annotated[datetime | None, Query(description="Only jobs ended before")] = None,
-    flagged: Annotated[bool, Query(description="Count flagged successes too")] = False,
+    reading: Annotated[
+        Reading,
+        Query(
+            description="How flags are read: ours counts disqualified trials as failures, "
+            "published leaves out what the published evaluation calls hacked"
+        ),
+    ] = Reading.OURS,
 ) -> Selection:
     """What the parameters ask for.
 
@@ -79,7 +86,7 @@ def select_board(
             models=frozenset(model) if model else None,
             since=since,
             until=until,
-            include_flagged=flagged,
+            reading=reading,
             # A task of somebody's own does not take from the others that are ranked over all
             # tasks, unless it is asked for.
             overall=None if task else frozenset(builtin_tasks()),

@@ -9,8 +9,10 @@ from urllib.parse import urlencode
 from pydantic import BaseModel, ConfigDict, Field
 
 from buildarena_benchmark import builtin_tasks
+from buildarena_benchmark.flags import DISQUALIFYING, INFORMATIVE, PUBLISHED, Reading, meaning
 from buildarena_benchmark.leaderboard import Board as RankedBoard
 from buildarena_benchmark.leaderboard import Cell, published_overall, published_rows
+from buildarena_benchmark.statistics import MIN_SUCCESSES
 from buildarena_pipeline.catalog.models import ModelRegistry
 from buildarena_pipeline.catalog.tasks import TaskCatalog
 
@@ -23,7 +25,9 @@ class Row(_View):
     """One model configuration on one task. What does not exist is null."""
 
     rank: int | None = Field(description="Statistically tied models share a rank")
-    rank_low: int | None = Field(description="Lower end of the place's 95 % bootstrap interval")
+    rank_low: int | None = Field(
+        description="Lower end of the place's interval; all of a board's hold together at 95 %"
+    )
     rank_high: int | None
     model: str
     configuration: str = Field(description="Hash of model, decoding and limits")
@@ -35,7 +39,11 @@ class Row(_View):
     ended: int = Field(description="All ended jobs, also errored and cancelled ones")
     errored: int = Field(description="Jobs that infrastructure faults ended: in no average")
     cancelled: int
-    flagged: int = Field(description="Successes that a flag keeps out of the averages")
+    flagged: int = Field(
+        description="Scored jobs that a flag makes failures or, in the published reading, leaves "
+        "out"
+    )
+    flags: dict[str, int] = Field(description="Scored jobs by flag")
     imported: int = Field(description="Jobs that came from another service's archive")
     unverified: int = Field(
         description="Imported jobs whose figures were not found again here: they count nowhere"
@@ -43,12 +51,23 @@ class Row(_View):
     simulated: int = Field(description="Counted jobs whose machine was finished and simulated")
     successes: int
     success_rate: float | None = Field(description="null when nothing was scored")
-    success_low: float | None = Field(description="Lower end of the 95 % Wilson interval")
-    success_high: float | None = Field(description="Upper end of the 95 % Wilson interval")
+    success_low: float | None = Field(description="Lower end of the 95 % exact interval")
+    success_high: float | None = Field(description="Upper end of the 95 % exact interval")
     success_rate_of_ended: float | None = Field(description="Successes of all ended jobs")
     indicator_mean: float | None
-    indicator_low: float | None = Field(description="Lower end of the 95 % bootstrap interval")
+    indicator_low: float | None = Field(
+        description="Lower end of the 95 % interval; null when there are too few data"
+    )
     indicator_high: float | None
+    too_few_data: bool = Field(
+        description=f"Fewer than {MIN_SUCCESSES} successes: no interval of the mean indicator "
+        "would hold"
+    )
+    indicator_best: float | None
+    censored: int = Field(
+        description="Counted jobs that carried everything; if there are any, the mean and the "
+        "best indicator are at least what they say"
+    )
     parts_mean: float | None
     requests_mean: float | None
     input_tokens_mean: float | None
@@ -116,6 +135,26 @@ class OverallView(_View):
     dimensions: dict[str, float] = Field(description="Score, 0 to 1, by difficulty dimension")
 
 
+class FlagView(_View):
+    """A flag that scores can have."""
+
+    name: str
+    disqualifying: bool = Field(description="Whether our reading counts its trials as failures")
+    published: bool = Field(description="Whether the published reading leaves its trials out")
+    meaning: str
+
+
+FLAGS = [
+    FlagView(
+        name=name,
+        disqualifying=name in DISQUALIFYING,
+        published=name in PUBLISHED,
+        meaning=meaning(name),
+    )
+    for name in (*DISQUALIFYING, *INFORMATIVE)
+]
+
+
 class PublishedOverall(_View):
     """The paper's models ranked over its nine tasks, among themselves."""
 
@@ -131,6 +170,8 @@ class Board(_View):
 
     track: str | None = Field(description="null when no job has ended")
     tracks: list[str] = Field(description="Every track with ended jobs")
+    reading: Reading = Field(description="How flags were read")
+    flags: list[FlagView] = Field(default_factory=lambda: FLAGS)
     tasks: list[TaskBoard]
     overall: list[OverallView] = []
     published: list[PublishedOverall] = []
@@ -163,6 +204,7 @@ def board_view(
     *,
     track: str,
     tracks: list[str],
+    reading: Reading,
     registry: ModelRegistry,
     catalogue: TaskCatalog,
 ) -> Board:
@@ -195,6 +237,7 @@ def board_view(
     return Board(
         track=track,
         tracks=tracks,
+        reading=reading,
         tasks=[
             TaskBoard(
                 task=found.task,

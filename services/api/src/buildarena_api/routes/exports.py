@@ -47,6 +47,7 @@ class RoundView(BaseModel):
     success: bool
     indicator: float
     parts: int | None
+    flags: list[str]
 
 
 class Result(BaseModel):
@@ -110,6 +111,7 @@ async def export(
                 ranked,
                 track=track or "",
                 tracks=tracks,
+                reading=selection.query.reading,
                 registry=registry,
                 catalogue=exporting.context.tasks,
             ),

@@ -15,6 +15,7 @@ from buildarena_api.http.problems import problem_responses
 from buildarena_api.leaderboard.filters import BoardsDep, SelectionDep, unknown
 from buildarena_api.leaderboard.views import Board, ChangePage, ChangeView, board_view
 from buildarena_api.routes.verifications import request_verifications
+from buildarena_benchmark.flags import Reading
 from buildarena_benchmark.leaderboard import SCORED, BoardQuery, TaskComparison, compare_models
 
 router = APIRouter(prefix="/v1", tags=["leaderboard"])
@@ -46,7 +47,9 @@ class TaskDuelView(BaseModel):
     high: float
     success: TestView | None
     indicator: TestView | None
-    success_p: float | None = Field(description="Adjusted over the tasks (Holm)")
+    success_p: float | None = Field(
+        description="Adjusted over the tests of both figures on all tasks (Holm)"
+    )
     indicator_p: float | None
 
 
@@ -54,6 +57,7 @@ class Comparison(BaseModel):
     """Two models on all tasks that both played."""
 
     track: str | None
+    reading: Reading
     first: str
     second: str
     tasks: list[TaskDuelView]
@@ -103,14 +107,19 @@ def leaderboard(
     """Ranks the models of one track, on each task and overall; tracks are never mixed."""
     track, tracks = selection.track, selection.tracks
     if track is None:
-        return Board(track=None, tracks=[], tasks=[])
+        return Board(track=None, tracks=[], tasks=[], reading=selection.query.reading)
     answer = boards.answer(
         track,
         selection.query,
         "json " + " ".join(tracks),
         lambda board: (
             board_view(
-                board, track=track, tracks=tracks, registry=registry, catalogue=context.tasks
+                board,
+                track=track,
+                tracks=tracks,
+                reading=selection.query.reading,
+                registry=registry,
+                catalogue=context.tasks,
             )
             .model_dump_json()
             .encode()
@@ -144,10 +153,11 @@ def compare(
             configurations = [trial.configuration for trial in side]
             usual = max(sorted(set(configurations)), key=configurations.count)
             sides.append([trial for trial in side if trial.configuration == usual])
-        found = compare_models(*sides)
+        found = compare_models(*sides, reading=selection.query.reading)
         tasks = list(found.tasks) if found else []
     return Comparison(
         track=selection.track,
+        reading=selection.query.reading,
         first=first,
         second=second,
         tasks=[TaskDuelView.model_validate(task) for task in tasks],
@@ -212,7 +222,7 @@ def verify(
     if body.track is not None and body.track not in tracks:
         raise unknown("track", body.track, tracks)
     track = body.track or (tracks[0] if tracks else None)
-    query = BoardQuery(tasks=frozenset(body.tasks) if body.tasks else None, include_flagged=True)
+    query = BoardQuery(tasks=frozenset(body.tasks) if body.tasks else None)
     every = [] if track is None else boards.trials(track, query)
     scored = sorted(t.job_id for t in every if t.model == body.model and t.outcome in SCORED)
     if not scored:

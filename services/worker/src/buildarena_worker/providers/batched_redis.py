@@ -6,7 +6,6 @@ A message costs more than what it asks for, and hundreds of requests want someth
 from __future__ import annotations
 
 import asyncio
-from contextlib import suppress
 from typing import Any
 
 import structlog
@@ -15,11 +14,11 @@ from redis.asyncio.retry import Retry
 from redis.backoff import NoBackoff
 from redis.exceptions import RedisError
 
+from buildarena_pipeline.breakers import AsyncCircuitBreaker
+
 log = structlog.get_logger(__name__)
 
 TIMEOUT_S = 1.0
-PROBE_S = 1.0
-"""How often a store that failed is asked whether it is back."""
 BATCH_S = 0.005
 """How long commands are collected: little beside a model's seconds."""
 
@@ -41,14 +40,14 @@ class BatchedRedis:
             socket_connect_timeout=TIMEOUT_S,
             retry=Retry(NoBackoff(), 0),
         )
-        self._probe: asyncio.Task[None] | None = None
+        self._breaker = AsyncCircuitBreaker(self._answers_again)
         self._waiting: list[tuple[tuple[Any, ...], asyncio.Future[Any]]] = []
         self._sender: asyncio.Task[None] | None = None
 
     def execute(self, *command: Any) -> asyncio.Future[Any]:
         """The store's answer to a command; failures are logged here and raised there."""
         answer: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
-        if self._probe is not None:
+        if self._breaker.is_open:
             answer.set_exception(ConnectionError("the store does not answer"))
             return answer
         self._waiting.append((command, answer))
@@ -64,10 +63,7 @@ class BatchedRedis:
         """Closes the connection, after what is still to be sent."""
         if self._sender is not None:
             await self._sender
-        if self._probe is not None:
-            self._probe.cancel()
-            with suppress(asyncio.CancelledError):
-                await self._probe
+        await self._breaker.close()
         await self._redis.aclose()
 
     async def _send(self) -> None:
@@ -88,20 +84,17 @@ class BatchedRedis:
             answers: list[Any] = await pipeline.execute(raise_on_error=False)
         except Exception as error:  # noqa: BLE001 - raised where the answers are waited for
             answers = [error] * len(commands)
-            if self._probe is None:
-                self._probe = asyncio.create_task(self._return_when_it_answers())
+            self._breaker.failed()
         errors = [answer for answer in answers if isinstance(answer, Exception)]
         if errors:
             log.warning("store_failed", commands=len(errors), error=str(errors[0]))
         return answers
 
-    async def _return_when_it_answers(self) -> None:
-        while True:
-            await asyncio.sleep(PROBE_S)
-            with suppress(RedisError, OSError):
-                await self._redis.ping()
-                self._probe = None
-                return
+    async def _answers_again(self) -> bool:
+        try:
+            return bool(await self._redis.ping())
+        except (RedisError, OSError):
+            return False
 
 
 def _deliver(waiting: list[asyncio.Future[Any]], answers: list[Any]) -> None:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
 from typing import Any
 
+from buildarena_geometry.json_values import levels
 from buildarena_worker.session.messages import Reply, ToolCall
 
 MAX_BODY = 8 * 1024 * 1024
@@ -74,28 +74,18 @@ def bounded_arguments(arguments: Any) -> Any:
 
 def _shallow(arguments: Any) -> bool:
     """Whether arguments are JSON of a few levels, without figures that JSON has no word for."""
-    level: Sequence[Any] = [arguments]
-    for _ in range(MAX_DEPTH + 1):
-        inner: list[Any] = []
-        for value in level:
-            if isinstance(value, dict):
-                if not all(isinstance(key, str) for key in value):
-                    return False
-                inner += value.values()
-            elif isinstance(value, list | tuple):
-                inner += value
-            elif not _plain(value):
-                return False
-        if not inner:
-            return True
-        level = inner
-    return False
+    return all(
+        depth <= MAX_DEPTH and all(map(_plain, level))
+        for depth, level in enumerate(levels(arguments))
+    )
 
 
 def _plain(value: Any) -> bool:
     if isinstance(value, float):
         return math.isfinite(value)
-    return value is None or isinstance(value, str | bool | int)
+    if isinstance(value, dict):
+        return all(isinstance(key, str) for key in value)
+    return value is None or isinstance(value, str | bool | int | list | tuple)
 
 
 def _text(value: Any, most: int) -> str:

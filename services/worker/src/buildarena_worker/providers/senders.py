@@ -26,7 +26,7 @@ class Sender(Protocol):
 def sender_for(entry: ModelEntry, provider: ProviderEntry, key: str) -> Sender:
     """The sender that speaks the provider's wire."""
     if provider.wire == "openai":
-        from buildarena_worker.providers.openai_chat import OpenAIChat
+        from buildarena_worker.providers.openai.chat import OpenAIChat
 
         return OpenAIChat(model=entry.model, base_url=provider.base_url, api_key=key)
     from buildarena_worker.providers.library import anthropic_sender, google_sender

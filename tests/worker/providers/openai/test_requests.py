@@ -8,14 +8,14 @@ from typing import Any
 
 import pytest
 
-from buildarena_worker.providers.openai_request import RequestWriter
-from buildarena_worker.providers.openai_schema import function_tool
+from buildarena_worker.providers.openai.request import RequestWriter
+from buildarena_worker.providers.openai.schema import function_tool
 from buildarena_worker.session.dialogue import OBJECTION
 from buildarena_worker.session.messages import Message, Request, Tool, ToolCall
 from buildarena_worker.workflow.analyst import BREAKS, TRAJECTORY, TRANSCRIPT
 from buildarena_worker.workflow.machine_tools import ASSEMBLE, BUILD, QUERIES, REFINE, tools_named
 
-KEPT = json.loads((Path(__file__).parents[2] / "data/openai/requests.json").read_text())
+KEPT = json.loads((Path(__file__).parents[3] / "data/openai/requests.json").read_text())
 CALL = ToolCall(id="c1", name="start", arguments={"block": "Wüfel", "n": 1.5})
 TALK = [
     Message(role="system", text="Build."),
@@ -113,7 +113,7 @@ def test_requests_carry_what_kept_ones_carried(case) -> None:
 
 
 def test_schemas_are_written_as_kept_ones_were() -> None:
-    for case in json.loads((Path(__file__).parents[2] / "data/openai/schemas.json").read_text()):
+    for case in json.loads((Path(__file__).parents[3] / "data/openai/schemas.json").read_text()):
         tool = Tool(name="t", description="d", parameters=case["given"])
         function = function_tool(tool)["function"]
         found = {"sent": function["parameters"], "strict": function.get("strict", False)}

@@ -1,4 +1,4 @@
-"""OpenAI's chat completions over aiohttp: the wire that most providers speak.
+"""Requests and answers of OpenAI's chat completions over aiohttp.
 
 A construct process sends hundreds of requests a second, for which a general library takes 2 to
 5 ms of processor time each, most of it for walking the whole conversation several times.
@@ -17,8 +17,8 @@ from buildarena_pipeline import __version__
 from buildarena_worker.providers.answered import Answered
 from buildarena_worker.providers.bounds import MAX_BODY
 from buildarena_worker.providers.failures import Failure, ProviderError
-from buildarena_worker.providers.openai_answer import AnswerReader
-from buildarena_worker.providers.openai_request import RequestWriter
+from buildarena_worker.providers.openai.answer import AnswerReader
+from buildarena_worker.providers.openai.request import RequestWriter
 from buildarena_worker.session.messages import Request
 
 OPENAI_URL = "https://api.openai.com/v1"

@@ -1,7 +1,7 @@
 """Requests in OpenAI's chat completions: our messages, tools and settings as its JSON.
 
 Written from OpenAI's API reference. Bodies are compared with kept ones in
-``tests/worker/providers/test_openai_requests.py``.
+``tests/worker/providers/openai/test_requests.py``.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from buildarena_worker.providers.answered import arguments_text
-from buildarena_worker.providers.openai_schema import function_tool
+from buildarena_worker.providers.openai.schema import function_tool
 from buildarena_worker.session.messages import Message, Request
 
 MAX_FRAMES = 256

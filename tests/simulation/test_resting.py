@@ -1,17 +1,15 @@
-"""Blocks with a small gap take part in the sharing of a patch."""
+"""Which blocks rest on terrain, ground or under the cargo."""
 
 import numpy as np
 from tests.simulation.designs import beam, replayed
 
 from buildarena_simulation.engines.base import CargoBox, CargoPose, World
-from buildarena_simulation.engines.near_contacts import NearContacts
 from buildarena_simulation.machine import structure_of
+from buildarena_simulation.resting import FaceFinder
 from buildarena_simulation.scenario import gap_terrain
 from buildarena_simulation.structure.clusters import find_clusters
-from buildarena_simulation.structure.contacts import ContactForces
+from buildarena_simulation.structure.contacts import CARGO, WORLD, ContactForces
 from buildarena_simulation.structure.motion import at_rest
-
-WORLD, CARGO = -1, -2
 
 
 def _beside(height: float, cargo_height: float, *, turn: np.ndarray | None = None) -> ContactForces:
@@ -26,7 +24,9 @@ def _beside(height: float, cargo_height: float, *, turn: np.ndarray | None = Non
     touching = ContactForces(
         block=ends[:1],
         other=np.array([WORLD]),
+        surface=np.array([1]),
         weight=np.ones(1),
+        area=np.zeros(1),
         normal=np.array([[0.0, 0.0, 1.0]]),
         point=np.array([[0.0, -3.0, 5.0]]),
         force=np.array([[0.0, 0.0, 9.0]]),
@@ -37,22 +37,26 @@ def _beside(height: float, cargo_height: float, *, turn: np.ndarray | None = Non
         velocity=np.zeros(3),
     )
     motion = at_rest(clusters, np.array([0.0, 0.0, height]), np.eye(3) if turn is None else turn)
-    found = NearContacts(world).beside(
-        touching, clusters, motion, pose, world=WORLD, cargo_number=CARGO
-    )
+    faces = FaceFinder(world).find(clusters, motion, pose)
+    found = faces.joined_to(touching, clusters.cluster_of)
     assert (found.force[1:] == 0.0).all()
     return found
 
 
-def test_the_other_end_and_all_blocks_below_the_cargo_count_as_touching() -> None:
+def test_both_ends_and_all_blocks_below_the_cargo_rest() -> None:
     found = _beside(5.5 + 0.01, 0.01)
     structure = structure_of(replayed(beam(7)))
     across = np.round(structure.positions[found.block, 1]).astype(int)
-    assert sorted(across[found.other == WORLD]) == [-3, 3]
+    assert sorted(across[found.other == WORLD]) == [-3, -3, 3]
     assert sorted(across[found.other == CARGO]) == [-1, 0, 1]
     assert np.allclose(found.normal[found.other == CARGO], [0, 0, -1])
     # The end blocks overhang the terrain's edge; their points lie on it.
     assert (np.abs(found.point[found.other == WORLD, 1]) >= 2.5).all()
+    # The cargo, 2.5 wide, covers the outer blocks in part.
+    assert np.allclose(sorted(found.area[found.other == CARGO]), [0.75, 0.75, 1.0])
+    # What the engine reports keeps its force and leaves its weight to the face.
+    assert (found.weight[0], found.force[0, 2]) == (0.0, 9.0)
+    assert sorted(found.surface[found.other == WORLD]) == [1, 1, 2]
 
 
 def test_what_is_farther_than_a_hair_does_not() -> None:

@@ -1,0 +1,86 @@
+"""`buildarena machine simulate --seeds N`: one machine's trial, many times."""
+
+from __future__ import annotations
+
+import statistics
+from typing import TYPE_CHECKING, Any
+
+from buildarena_cli.machines import progress_bar
+from buildarena_cli.terminal.output import columns, emphasised, print_json, print_table
+
+if TYPE_CHECKING:
+    from buildarena_benchmark import Robustness, Task
+    from buildarena_geometry import Machine
+
+
+def show_robustness(
+    task: Task, machine: Machine, engine: str, trials: int, *, as_json: bool
+) -> None:
+    """Repeats a trial with the starts of seeds 0, 1, … and prints how it goes.
+
+    Args:
+        task: The task.
+        machine: What is tried.
+        engine: Name of the engine.
+        trials: Number of trials.
+        as_json: Print JSON instead of a table.
+    """
+    from buildarena_benchmark import robustness
+
+    with progress_bar() as bar:
+        row = bar.add_task(f"{trials} trials on {engine}", total=1.0)
+        found = robustness(
+            task,
+            machine,
+            engine,
+            range(trials),
+            on_progress=lambda done: bar.update(row, completed=done),
+        )
+    if as_json:
+        print_json(_report(task, engine, found))
+    else:
+        _print(task, engine, found)
+
+
+def _report(task: Task, engine: str, found: Robustness) -> dict[str, Any]:
+    from buildarena_benchmark.statistics import wilson_interval
+
+    trials = len(found.scores)
+    return {
+        "task": task.name,
+        "task_version": task.version,
+        "engine": engine,
+        "trials": trials,
+        "successes": found.successes,
+        "robustness": found.share,
+        "robustness_interval": list(wilson_interval(found.successes, trials)),
+        "indicator_name": task.indicator.name,
+        "indicator_unit": task.indicator.unit,
+        "results": [
+            {
+                "seed": seed,
+                "success": result.success,
+                "indicator": result.indicator,
+                "flags": list(result.flags),
+            }
+            for seed, result in zip(found.seeds, found.scores, strict=True)
+        ],
+    }
+
+
+def _print(task: Task, engine: str, found: Robustness) -> None:
+    report = _report(task, engine, found)
+    low, high = report["robustness_interval"]
+    indicators = [result.indicator for result in found.scores]
+    flags = sorted({flag for result in found.scores for flag in result.flags})
+    failed = [str(r["seed"]) for r in report["results"] if not r["success"]]
+    unit = "" if task.indicator.unit == "1" else f" {task.indicator.unit}"
+    rows = [
+        ("robustness", f"{found.successes} of {report['trials']} succeed ({found.share:.0%})"),
+        ("95 % interval", f"{low:.0%} to {high:.0%}"),
+        (f"{task.indicator.name}, median", f"{statistics.median(indicators):,.2f}{unit}"),
+        ("least and greatest", f"{min(indicators):,.2f} to {max(indicators):,.2f}{unit}"),
+        *([("flags", ", ".join(flags))] if flags else []),
+        *([("failed seeds", ", ".join(failed))] if failed else []),
+    ]
+    print_table(columns("figure", "value"), rows, title=emphasised(f"{task.title} on {engine}"))

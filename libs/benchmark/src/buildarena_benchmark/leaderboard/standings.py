@@ -1,0 +1,158 @@
+"""Who is better than whom on a board: all its claims are one family of tests.
+
+A board of twelve models and nine tasks compares 594 pairs, and twelve models that are alike would
+show some pair apart on most boards if each were tested for itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import combinations
+from typing import Final
+
+import numpy as np
+
+from buildarena_benchmark.leaderboard.cells import Cell
+from buildarena_benchmark.statistics import (
+    PairTests,
+    Ranking,
+    adjusted,
+    combined,
+    pair_tests,
+    rank_models,
+)
+
+KEPT_TESTS: Final = 256
+"""Tasks whose tests are kept: the present ones, and those of recent filters."""
+
+Row = Mapping[str, Cell]
+"""Cells by configuration."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Standing:
+    """Configurations with counted trials, and how they rank."""
+
+    names: Sequence[str]
+    ranking: Ranking
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Standings:
+    """The standings of a board.
+
+    Attributes:
+        tasks: By task, of those where anybody has counted trials.
+        overall: Over the ranked tasks, of those who have counted trials on all; None when nobody
+            has.
+    """
+
+    tasks: Mapping[str, Standing]
+    overall: Standing | None
+
+
+def standings(
+    cells: Mapping[str, Row], ranked: Callable[[str], bool], tests: KeptTests
+) -> Standings:
+    """Ranks configurations on each task and over the ranked ones.
+
+    The tests of the ranked tasks and of the ranking over them are one family; each other task is
+    one by itself, so that whoever uploads a task takes no power from the others.
+
+    Args:
+        cells: Cells by task and configuration.
+        ranked: Whether a task belongs to the ranking over tasks.
+        tests: What was tested before.
+    """
+    counted = {
+        task: {name: cell for name, cell in row.items() if cell.trials}
+        for task, row in cells.items()
+    }
+    counted = {task: row for task, row in counted.items() if row}
+    found = {task: tests.of(list(row.values())) for task, row in counted.items()}
+    over = [task for task in counted if ranked(task)]
+    complete = [name for name in _names(counted, over) if all(name in counted[t] for t in over)]
+    together = _over_tasks(counted, found, over, complete) if complete else None
+    p_values = {task: adjusted([found[task]])[0] for task in counted if task not in over}
+    family = [found[task] for task in over]
+    overall = None
+    if together is None:
+        own = adjusted(family)
+    else:
+        if len(over) > 1:
+            *own, last = adjusted([*family, together])
+        else:
+            # One task alone is its own ranking: its tests are not counted twice.
+            own = adjusted(family)
+            last = own[0][_places(counted[over[0]], complete)]
+        table = [[counted[task][name] for name in complete] for task in over]
+        overall = Standing(names=complete, ranking=rank_models(_figures(table), together, last))
+    p_values |= dict(zip(over, own, strict=True))
+    return Standings(
+        tasks={
+            task: Standing(
+                names=list(row),
+                ranking=rank_models(_figures([list(row.values())]), found[task], p_values[task]),
+            )
+            for task, row in counted.items()
+        },
+        overall=overall,
+    )
+
+
+@dataclass(slots=True)
+class KeptTests:
+    """Tests of all pairs of cells, kept as long as none of the cells changes."""
+
+    _kept: dict[tuple[int, ...], tuple[Sequence[Cell], PairTests]] = field(default_factory=dict)
+
+    def of(self, cells: Sequence[Cell]) -> PairTests:
+        """The tests of all pairs of cells, in the order of `itertools.combinations`."""
+        # The kept cells stay alive, so no other cell can have their identity.
+        key = tuple(id(cell) for cell in cells)
+        if key not in self._kept:
+            if len(self._kept) >= KEPT_TESTS:
+                self._kept.clear()
+            pairs = [(a.figures, b.figures) for a, b in combinations(cells, 2)]
+            self._kept[key] = (cells, pair_tests(pairs))
+        return self._kept[key][1]
+
+
+def _names(counted: Mapping[str, Row], tasks: Sequence[str]) -> list[str]:
+    return sorted({name for task in tasks for name in counted[task]})
+
+
+def _places(row: Row, complete: Sequence[str]) -> list[int]:
+    """Where the pairs of complete configurations are among a task's pairs."""
+    number = {name: place for place, name in enumerate(row)}
+    pairs = {pair: place for place, pair in enumerate(combinations(range(len(row)), 2))}
+    return [pairs[number[a], number[b]] for a, b in combinations(complete, 2)]
+
+
+def _over_tasks(
+    counted: Mapping[str, Row],
+    found: Mapping[str, PairTests],
+    over: Sequence[str],
+    complete: Sequence[str],
+) -> PairTests:
+    chosen = []
+    for task in over:
+        places, tests = _places(counted[task], complete), found[task]
+        chosen.append(
+            PairTests(
+                z=tests.z[places],
+                p_value=tests.p_value[places],
+                informative=tests.informative[places],
+            )
+        )
+    return combined(chosen)
+
+
+def _figures(table: Sequence[Sequence[Cell]]) -> tuple[np.ndarray, np.ndarray]:
+    """Success rates and mean indicators, each (T, M) float64."""
+    success, indicator = (
+        np.array([[float(getattr(cell, name) or 0.0) for cell in row] for row in table])
+        for name in ("success_rate", "indicator_mean")
+    )
+    return success, indicator

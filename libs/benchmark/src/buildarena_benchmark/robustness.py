@@ -1,0 +1,66 @@
+"""How a machine does when its trial is repeated: a result that a nudge changes is luck."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from buildarena_benchmark.scores import failed_score, score
+from buildarena_simulation import MachineNotSimulable, simulate
+
+if TYPE_CHECKING:
+    from buildarena_benchmark.scores import Score
+    from buildarena_benchmark.tasks.task import Task
+    from buildarena_geometry import Machine
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Robustness:
+    """The scores of repeated trials.
+
+    Attributes:
+        seeds: What each trial's start was drawn with.
+        scores: One per seed.
+    """
+
+    seeds: tuple[int, ...]
+    scores: tuple["Score", ...]
+
+    @property
+    def successes(self) -> int:
+        """Number of trials that succeeded."""
+        return sum(result.success for result in self.scores)
+
+    @property
+    def share(self) -> float:
+        """Share of the trials that succeeded, 0 to 1."""
+        return self.successes / len(self.scores)
+
+
+def robustness(
+    task: "Task",
+    machine: "Machine",
+    engine: str,
+    seeds: Sequence[int],
+    *,
+    on_progress: Callable[[float], None] | None = None,
+) -> Robustness:
+    """Tries a machine once per seed, its start varied as a fair repetition would vary it.
+
+    Args:
+        task: The task.
+        machine: What is tried.
+        engine: Name of the engine.
+        seeds: One per trial.
+        on_progress: Called after each trial with the share that is done.
+    """
+    scores = []
+    for k, seed in enumerate(seeds, 1):
+        try:
+            trajectory = simulate(machine, task.scenario, engine, seed=seed)
+        except MachineNotSimulable:
+            scores.append(failed_score(task, machine))
+        else:
+            scores.append(score(task, machine, trajectory))
+        if on_progress:
+            on_progress(k / len(seeds))
+    return Robustness(seeds=tuple(seeds), scores=tuple(scores))

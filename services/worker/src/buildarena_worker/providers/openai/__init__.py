@@ -1,0 +1,1 @@
+"""OpenAI's chat completions: the wire that most providers speak."""

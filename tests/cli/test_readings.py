@@ -1,0 +1,141 @@
+"""Both readings of flags, and what is only known to be at least, wherever figures are shown."""
+
+from __future__ import annotations
+
+import csv
+import json
+
+import pytest
+from commands import printed, run_cli
+from live_api import live_api
+from sqlalchemy import insert, select, update
+
+from buildarena_pipeline.catalog.specs import SweepSpec
+from buildarena_store.tables import jobs, rollouts
+
+
+@pytest.fixture
+def url(context):
+    with live_api(context) as url:
+        yield url
+
+
+@pytest.fixture
+def sweep(context, submissions) -> str:
+    """Bridges of one model carry everything, of another a little; a third one's are not bridges."""
+    models = {
+        "openai/gpt-5": (1500.0, ["never_fell"]),
+        "xai/grok-4": (200.0, []),
+        "builtin/random": (900.0, ["does_not_span"]),
+    }
+    spec = SweepSpec(name="bridges", tasks=["support-1"], models=list(models), samples=6)
+    done = submissions.submit_sweep(spec)
+    with context.store.database.transaction() as connection:
+        for job in connection.execute(select(jobs)).all():
+            load, flags = models[job.model]
+            score = {"success": True, "indicator": load, "flags": flags, "metrics": {"parts": 9}}
+            connection.execute(
+                update(jobs)
+                .where(jobs.c.id == job.id)
+                .values(state="done", outcome="success", finished_at=job.created_at, **score)
+            )
+            connection.execute(
+                insert(rollouts).values(
+                    job_id=job.id,
+                    number=0,
+                    final=True,
+                    engine="pybullet",
+                    machine_hash="machine",
+                    finished_at=job.created_at,
+                    **score,
+                )
+            )
+    return str(done.sweep.id)
+
+
+def rows_of(url: str, *words: str) -> dict[str, dict]:
+    answer = json.loads(printed(url, "leaderboard", "--json", *words))
+    return {row["model"]: row for row in answer["tasks"][0]["rows"]}
+
+
+@pytest.mark.usefixtures("sweep")
+def test_a_board_is_read_as_asked(url) -> None:
+    ours = rows_of(url)
+    assert list(ours) == ["openai/gpt-5", "xai/grok-4", "builtin/random"]
+    assert ours["builtin/random"]["successes"] == 0
+    published = rows_of(url, "--reading", "published")
+    assert published["openai/gpt-5"]["trials"] == 0
+    assert published["builtin/random"]["successes"] == 6
+    text = printed(url, "leaderboard", "--task", "support-1")
+    assert text.count("≥ 1,500.0") == 2  # the mean and the best
+    assert "xai/grok-4" in text
+    assert "too few" in text
+    overview = printed(url, "leaderboard")
+    assert "≥ 1,500.0" in overview
+    assert "flags: 6 does_not_span, 6 never_fell" in overview
+    assert "  never_fell: The bridge carried everything" in overview
+    assert "not_driven" not in overview
+    assert "left out" not in overview
+    assert "left out" in printed(url, "leaderboard", "--reading", "published")
+
+
+@pytest.mark.parametrize(
+    "words",
+    ["leaderboard", "compare a b", "export --out x.csv", "report sweep_x --out x.md"],
+)
+def test_an_unknown_reading_is_a_usage_error_that_names_the_choices(url, words) -> None:
+    done = run_cli(url, *words.split(), "--reading", "theirs")
+    assert done.returncode == 2
+    assert "'theirs'" in done.stderr
+    assert "'ours'" in done.stderr
+    assert "'published'" in done.stderr
+
+
+@pytest.mark.usefixtures("sweep")
+def test_comparisons_and_exports_are_read_as_asked(url, tmp_path) -> None:
+    words = ["compare", "openai/gpt-5", "builtin/random", "--json"]
+    (task,) = json.loads(printed(url, *words))["tasks"]
+    assert task["successes"] == [6, 0]
+    assert json.loads(printed(url, *words, "--reading", "published"))["tasks"] == []
+    for reading, trials in (("ours", "6"), ("published", "0")):
+        out = tmp_path / f"{reading}.csv"
+        printed(url, "export", "--out", str(out), "--reading", reading)
+        with out.open() as file:
+            rows = {row["model"]: row for row in csv.DictReader(file)}
+        assert (rows["openai/gpt-5"]["trials"], rows["openai/gpt-5"]["flags"]) == (
+            trials,
+            '{"never_fell": 6}',
+        )
+    tex = tmp_path / "board.tex"
+    printed(url, "export", "--out", str(tex))
+    assert r"\textbf{$\geq$1500.0}" in tex.read_text()
+
+
+def test_reports_are_read_as_asked_and_tell_what_flags_say(url, sweep, tmp_path) -> None:
+    for ending in ("md", "html", "pdf"):
+        printed(url, "report", sweep, "--out", str(tmp_path / f"ours.{ending}"))
+    text = (tmp_path / "ours.md").read_text()
+    assert "## Flags" in text
+    assert "≥ 1,500.0" in text
+    assert "too few data" in text
+    assert "Disqualified jobs count as failures" in text
+    flagged = [line for line in text.splitlines() if "does" in line and "span" in line]
+    assert "are failures" in flagged[0]
+    assert "≥ 1,500.0" in (tmp_path / "ours.html").read_text()
+    assert (tmp_path / "ours.pdf").read_bytes()[:5] == b"%PDF-"
+    out = tmp_path / "published.md"
+    printed(url, "report", sweep, "--out", str(out), "--reading", "published")
+    text = out.read_text()
+    assert "are left out" in text
+    assert "≥ 1,500.0" not in text
+
+
+@pytest.mark.usefixtures("sweep")
+def test_a_job_tells_its_flags_in_words(url) -> None:
+    text = printed(url, "job", "list", "--flag", "never_fell")
+    assert text.count("≥ 1,500.00") == 6
+    job = json.loads(printed(url, "job", "list", "--flag", "never_fell", "--json"))["jobs"][0]
+    assert job["censored"] is True
+    shown = printed(url, "job", "show", job["id"])
+    assert "indicator ≥ 1,500.000" in shown
+    assert "never_fell: The bridge carried everything" in shown
