@@ -103,9 +103,7 @@ def test_what_wheels_did_not_drive_does_not_count(tasks, trajectory_of, car, mot
     assert result.flags == ("not_driven",)
 
 
-def test_wheels_that_burn_out_in_place_earn_nothing_for_a_throw(
-    tasks, trajectory_of, car
-) -> None:
+def test_wheels_that_burn_out_in_place_earn_nothing_for_a_throw(tasks, trajectory_of, car) -> None:
     def thrown(t: np.ndarray) -> np.ndarray:
         return np.column_stack([np.zeros_like(t), np.where(t > 20.0, 18.0, 0.0)])
 
@@ -130,9 +128,7 @@ def test_a_skid_after_a_drive_counts(tasks, trajectory_of, car) -> None:
         )
         return np.column_stack([np.zeros_like(t), length])
 
-    trial = _driven(
-        trajectory_of, car, moved=skids, turned=lambda t: 4.0 * np.minimum(t, 5.0)
-    )
+    trial = _driven(trajectory_of, car, moved=skids, turned=lambda t: 4.0 * np.minimum(t, 5.0))
     assert score(tasks["transport-1"], car, trial).indicator == pytest.approx(20.4, abs=0.01)
 
 
@@ -198,3 +194,15 @@ def test_a_cargo_that_is_thrown_off_a_car_counts_until_then(tasks, trajectory_of
         cargo_borne=hops,
     )
     assert score(tasks["transport-2"], car, carried).success
+
+
+def test_wheels_that_are_not_tracked_are_not_measured(tasks, trajectory_of, car) -> None:
+    trial = _driven(trajectory_of, car, moved=_north(1.0), turned=_turn(0.0))
+    first = replace(
+        trial,
+        block_ids=trial.block_ids[:1],
+        positions=trial.positions[:, :1],
+        quaternions=trial.quaternions[:, :1],
+    )
+    result = score(tasks["transport-1"], car, first)
+    assert (result.success, result.flags) == (True, ("drive_not_measured",))

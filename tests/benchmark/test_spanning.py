@@ -121,9 +121,7 @@ def test_a_bridge_that_sinks_onto_a_tower(tasks, trajectory_of, car, sinks_at, s
     assert score(task, car, sunk).success == spans
 
 
-def test_a_cargo_that_slides_onto_a_terrain_is_no_longer_carried(
-    tasks, trajectory_of, car
-) -> None:
+def test_a_cargo_that_slides_onto_a_terrain_is_no_longer_carried(tasks, trajectory_of, car) -> None:
     trial = _carried(trajectory_of, car, north=lambda t: np.maximum(t - 4.0, 0.0))
     result = score(tasks["support-1"], car, _shared(trial))
     assert result.success
@@ -150,7 +148,7 @@ def test_without_contact_forces_the_rule_is_not_measured(tasks, trajectory_of, c
 
 
 def test_islands_in_the_gap_and_boxes_behind_belong_to_the_scenario(
-    tasks: dict[str, Task], trajectory_of, car
+    tasks: dict[str, Task],
 ) -> None:
     from buildarena_benchmark.scorers.spanning import terrain_sides
     from buildarena_simulation import Scenario

@@ -24,31 +24,31 @@ def broken_constraint(task: Task, machine: Machine) -> tuple[str, str] | None:
     Returns:
         Class and sentence, or None when the machine may be simulated.
     """
-    constraints = task.constraints
     if not machine.started:
         return "empty_machine", "no machine was started"
     if len(machine.blocks) == 1 and not machine.connectors:
         return "empty_machine", "the machine is nothing but its starting block"
-    crowded = _crowded(task, machine)
-    if crowded is not None:
-        return "constraint_violated", crowded
+    for check in (_crowded, _wrong_modules, _wrong_structures):
+        problem = check(task, machine)
+        if problem is not None:
+            return "constraint_violated", problem
+    loose = _unjoined(machine)
+    return None if loose is None else ("unjoined_parts", loose)
+
+
+def _wrong_modules(task: Task, machine: Machine) -> str | None:
+    """Whether the machine has a module that is not allowed, or too few of one."""
+    constraints = task.constraints
     used = Counter(block.module.name for block in machine.blocks.values())
     used.update(connector.module.name for connector in machine.connectors.values())
     if constraints.modules is not None:
         foreign = set(used) - {*constraints.modules, machine.catalogue.start.name}
         if foreign:
-            return "constraint_violated", f"{min(foreign)} is not among the task's modules"
+            return f"{min(foreign)} is not among the task's modules"
     for name, least in constraints.min_modules.items():
         if used[name] < least:
-            return (
-                "constraint_violated",
-                f"the machine has {used[name]} of {name}, the task asks for {least} or more",
-            )
-    structures = _wrong_structures(task, machine)
-    if structures is not None:
-        return "constraint_violated", structures
-    loose = _unjoined(machine)
-    return None if loose is None else ("unjoined_parts", loose)
+            return f"the machine has {used[name]} of {name}, the task asks for {least} or more"
+    return None
 
 
 def _wrong_structures(task: Task, machine: Machine) -> str | None:

@@ -125,8 +125,10 @@ def terrain_sides(scenario: "Scenario") -> tuple[list[int], list[int]] | None:
     if not isinstance(scenario.placement, SpanPlacement):
         return None
     edge = scenario.placement.gap / 2 - _EDGE
-    reach = [(box.center[1] - box.size[1] / 2, box.center[1] + box.size[1] / 2)
-             for box in scenario.terrain]
+    reach = [
+        (box.center[1] - box.size[1] / 2, box.center[1] + box.size[1] / 2)
+        for box in scenario.terrain
+    ]
     south = [i for i, (_, high) in enumerate(reach) if high <= -edge]
     north = [i for i, (low, _) in enumerate(reach) if low >= edge]
     return (south, north) if south and north else None
