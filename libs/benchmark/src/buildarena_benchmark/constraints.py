@@ -11,7 +11,7 @@ from collections import Counter
 from buildarena_benchmark.tasks.task import Task
 from buildarena_geometry import Machine
 
-_MOST_NAMED = 10
+_MAX_NAMED = 10
 
 
 def broken_constraint(task: Task, machine: Machine) -> tuple[str, str] | None:
@@ -90,7 +90,7 @@ def _unjoined(machine: Machine) -> str | None:
     rest = [block for block in loose if machine.blocks[block].structure not in whole]
     named = [f"sub-structure {letter}" for letter in whole]
     named += [f"block {block} ({machine.blocks[block].module.name})" for block in rest]
-    shown = named[:_MOST_NAMED]
+    shown = named[:_MAX_NAMED]
     if len(named) > len(shown):
         shown.append(f"{len(named) - len(shown)} more")
     listed = shown[0] if len(shown) == 1 else f"{', '.join(shown[:-1])} and {shown[-1]}"
