@@ -87,6 +87,8 @@ def test_a_bridge_that_breaks_spans_until_then(tasks, trajectory_of, car) -> Non
         # Dead weight besides: of a tower's companion that lies on the terrains, or of one side's.
         {"floor": 1.0, "south": 0.0, "dead": (0.0, 4000.0, 4000.0)},
         {"floor": 0.0, "south": 1.0, "dead": (0.0, 0.0, 100.0)},
+        {"floor": 0.5, "south": 0.25, "dead": (0.0, 4000.0, 4000.0)},
+        {"floor": 0.0, "south": 0.06, "dead": (0.0, 0.0, 9000.0)},
         # Something else holds the cargo: a wall, or a terrain's edge.
         {"held": 0.5},
         {"held": 0.0},
