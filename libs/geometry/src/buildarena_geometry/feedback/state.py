@@ -74,6 +74,13 @@ def connector_line(link: Connector) -> str:
     )
 
 
+def idle(link: Connector) -> str:
+    """A further sentence on a connector that begins and ends on one block; "" for others."""
+    if link.start[0] != link.end[0]:
+        return ""
+    return f" Both faces are block {link.start[0]}'s, so it joins and strengthens nothing."
+
+
 def faces(state: MachineState, block: Block) -> str:
     """The faces of a block: where they are, which way they look, what sits on them."""
     if not block.module.faces:
