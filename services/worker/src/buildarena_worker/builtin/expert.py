@@ -90,7 +90,7 @@ def _guide(design: Design, situation: Situation) -> Reply:
     done = situation.builder_turns - 1
     if situation.refining or done >= len(script):
         return Reply(text=DONE)
-    return Reply(text=f"Step {done + 1} of {len(script)}: {_rendered(script[done])}")
+    return Reply(text=_rendered(script[done]))
 
 
 def _act(script: Sequence[Action], done: int) -> Reply:
@@ -102,5 +102,6 @@ def _act(script: Sequence[Action], done: int) -> Reply:
 
 
 def _rendered(action: Action) -> str:
+    """An action in few words: the tool and the values it takes, in the order it takes them."""
     name, arguments = action
-    return f"{name} " + ", ".join(f"{key} {value}" for key, value in arguments.items() if value)
+    return f"{name}: " + ", ".join(str(value) for value in arguments.values() if value)

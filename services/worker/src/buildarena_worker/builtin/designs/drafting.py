@@ -51,13 +51,14 @@ class Draft:
 
     def start(self, note: str = "") -> str:
         """Places the starting block; returns its id."""
-        self.do("start", init_shift=[0, 0, 0], init_rotation=[0, 0, 0], note=note)
+        self.do("start", **({"note": note} if note else {}))
         return "1"
 
     def attach(self, base: str, way: Direction, module: str = WOOD, note: str = "") -> str:
         """Attaches a block to a block's side; returns the new block's id."""
         face = self._face(base, way)
-        self.do("attach_block_to", base_block=base, face=face, new_block=module, note=note)
+        noted = {"note": note} if note else {}
+        self.do("attach_block_to", base_block=base, face=face, new_block=module, **noted)
         return list(self.machine.blocks)[-1]
 
     def row(self, base: str, way: Direction, count: int) -> list[str]:
@@ -85,7 +86,6 @@ class Draft:
             block_b=second,
             face_b=self._face(second, other_way or way),
             connector=connector,
-            note="",
         )
 
     def cannon(self, base: str, side: Direction, spray: Direction) -> str:
