@@ -1,14 +1,13 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import pytest
 from provider_standin import ProviderStandIn
 
-from buildarena_pipeline.catalog.models import ModelEntry, Price, ProviderEntry
+from buildarena_pipeline.catalog.models import ModelEntry, ProviderEntry
 from buildarena_pipeline.errors import PermanentError, TransientError
 from buildarena_store import Usage
 from buildarena_worker.providers.provider import ProviderClient
@@ -16,29 +15,7 @@ from buildarena_worker.providers.retries import RetryPolicy
 from buildarena_worker.session.messages import Message, Reply, Request, Tool, ToolCall
 from buildarena_worker.session.results import Failed
 
-QUICK = RetryPolicy(tries=5, first_wait_s=0.01, longest_wait_s=0.05, timeout_s=2.0)
-PRICE = Price(input=2.0, output=8.0, cached=0.5)
 WIRES = ["openai", "anthropic", "google"]
-
-
-@pytest.fixture
-def client(monkeypatch) -> Iterator[Callable[..., ProviderClient]]:
-    """Makes clients of a stand-in and closes them."""
-    monkeypatch.setenv("STANDIN_KEY", "secret")
-    made: list[ProviderClient] = []
-
-    def make(
-        standin: ProviderStandIn, wire: str = "openai", policy: RetryPolicy = QUICK
-    ) -> ProviderClient:
-        base = f"{standin.url}/v1" if wire == "openai" else standin.url
-        entry = ModelEntry(name=f"{wire}/standin", provider=wire, model="standin", price=PRICE)
-        provider = ProviderEntry(wire=wire, base_url=base, key="STANDIN_KEY")
-        made.append(ProviderClient(entry, provider, policy))
-        return made[-1]
-
-    yield make
-    for one in made:
-        one.close()
 
 
 def ask(text: str = "hello") -> Request:

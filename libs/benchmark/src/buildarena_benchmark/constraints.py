@@ -98,7 +98,7 @@ def _unjoined(machine: Machine) -> str | None:
     verb = "is" if len(named) == 1 else "are"
     return (
         f"{listed} {verb} not joined to the starting block {first}: join every part by an "
-        "attachment that holds, a brace or a winch"
+        "attachment that holds or a connector"
     )
 
 
