@@ -11,7 +11,7 @@ from genome import Genome, grown
 from suspicion import Evidence, suspicions
 from threadpoolctl import threadpool_limits
 
-from buildarena_benchmark import Score, Task, broken_constraint, builtin_tasks, robustness, score
+from buildarena_benchmark import Score, Task, builtin_tasks, robustness, score
 from buildarena_benchmark.flags import is_disqualified
 from buildarena_geometry import Machine
 from buildarena_simulation import ENGINES, Trajectory, simulate
@@ -68,14 +68,6 @@ class Order:
     task: str
     genome: Genome
     picture: Path | None
-
-
-def closed_verdicts(task: Task, machine: Machine) -> dict[str, dict[str, Any]]:
-    """Success, indicator and flags by engine of full trials; refused machines have their reason."""
-    broken = broken_constraint(task, machine)
-    if broken is not None:
-        return {"refused": {"success": False, "indicator": 0.0, "flags": [broken[0]]}}
-    return {engine: _told(_trial(task, machine, engine)[0]) for engine in ENGINES}
 
 
 def confirmed(order: Order) -> Confirmed:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from genome import Genome
+from genome import Genome, grown
 
 from buildarena_benchmark import builtin_tasks
+from buildarena_geometry import Machine
 
 DATA: Final = Path(__file__).parents[1] / "data"
 EXPLOITS: Final = DATA / "exploits"
@@ -26,6 +28,8 @@ class Exploit:
         task: The task it is for.
         once: What it was once worth.
         why: Why that is an exploit.
+        seconds: How long a trial must be to show that it is closed.
+        most: What it may be worth now, on every engine; 0 for what must fail.
         genome: What builds it.
     """
 
@@ -33,7 +37,21 @@ class Exploit:
     task: str
     once: str
     why: str
+    seconds: float
+    most: float
     genome: Genome
+
+    @property
+    def machine(self) -> Machine:
+        """The machine, with every action that its file has.
+
+        Raises:
+            ValueError: An action is refused.
+        """
+        machine, kept = grown(self.genome, most=sys.maxsize)
+        if kept.as_json() != self.genome.as_json():
+            raise ValueError(f"{self.name}: not all of its actions are accepted")
+        return machine
 
 
 def exploits(folder: Path = EXPLOITS) -> list[Exploit]:
@@ -65,10 +83,10 @@ def _content(path: Path) -> dict[str, Any]:
 
 
 def _exploit(path: Path, content: dict[str, Any]) -> Exploit:
-    missing = {"task", "once", "why", "actions"} - content.keys()
+    missing = {"task", "once", "why", "seconds", "most", "actions"} - content.keys()
     if missing or content.get("task") not in builtin_tasks():
         raise ValueError(
-            f"{path}: an exploit has a built-in task, once, why and actions; "
+            f"{path}: an exploit has a built-in task, once, why, seconds, most and actions; "
             f"missing or wrong: {', '.join(sorted(missing)) or 'task'}"
         )
     return Exploit(
@@ -76,5 +94,7 @@ def _exploit(path: Path, content: dict[str, Any]) -> Exploit:
         task=content["task"],
         once=content["once"],
         why=content["why"],
+        seconds=float(content["seconds"]),
+        most=float(content["most"]),
         genome=Genome.from_json(content),
     )
