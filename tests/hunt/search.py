@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from multiprocessing import get_context
 from typing import Final, Self, TypeVar
 
 import numpy as np
+from breeding import Child, made
 from genome import Genome
-from mutation import crossed, mutated
 from ribs.archives import GridArchive
-from threadpoolctl import threadpool_limits
-from trial import CELLS, RANGES, Finding, Scorer, tried
+from trial import CELLS, RANGES, Finding, Scorer
 
 from buildarena_benchmark import builtin_tasks, score
 
@@ -25,37 +23,6 @@ BATCH: Final = 16
 _CROSSED_SHARE: Final = 0.15
 _GREEDY_SHARE: Final = 0.4
 """How many parents are the better of four; the others are drawn evenly from all cells."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Child:
-    """A genome to make and try, as a worker process gets it.
-
-    Attributes:
-        task: Name of the task.
-        parents: One to mutate, or two to cross and mutate.
-        seed: Of everything that is drawn.
-        scorer: Judges it.
-        changed: Whether it is mutated at all; seeds are not.
-    """
-
-    task: str
-    parents: tuple[Genome, ...]
-    seed: tuple[int, ...]
-    scorer: Scorer
-    changed: bool = True
-
-
-def made(child: Child) -> Finding | None:
-    """Makes a child and tries it; equal children give equal findings in every process."""
-    draw = np.random.default_rng(child.seed)
-    genome = child.parents[0]
-    if len(child.parents) > 1:
-        genome = crossed(genome, child.parents[1], draw)
-    if child.changed:
-        genome = mutated(genome, builtin_tasks()[child.task].category, draw)
-    with threadpool_limits(limits=1):
-        return tried(child.task, genome, child.scorer)
 
 
 class Crew:

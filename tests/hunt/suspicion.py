@@ -155,7 +155,7 @@ def _rolls_on_without_keys(evidence: Evidence) -> bool:
     ends = [press.time_s + press.hold_for_s for press in evidence.machine.control_sequence]
     way = np.linalg.norm(_path(trajectory)[:, 0, :2] - _path(trajectory)[0, 0, :2], axis=1)
     last = int(np.searchsorted(trajectory.time_s, max(ends, default=0.0)))
-    return last < len(way) and bool(way[last] < 0.5 * way.max())
+    return bool(way[: last + 1].max() < 0.5 * way.max())
 
 
 def _cargo_on_the_ground(evidence: Evidence) -> bool:

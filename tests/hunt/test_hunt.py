@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
+from dataclasses import replace
 
 import hunt
 import numpy as np
@@ -32,7 +32,7 @@ def naive(task, machine, trajectory):
     lasted = result.metrics["time_above_s"] >= task.scoring.min_time_s
     load = float(result.metrics["load_when_decided"]) if lasted else 0.0
     flags = tuple(flag for flag in result.flags if flag != "does_not_span")
-    return dataclasses.replace(result, success=lasted, indicator=load, flags=flags)
+    return replace(result, success=lasted, indicator=load, flags=flags)
 
 
 def searched(scorer, generations: int = GENERATIONS) -> TaskSearch:
@@ -64,7 +64,7 @@ def test_a_search_with_the_same_seed_is_the_same_whoever_does_the_work() -> None
             search.advance(crew, batch=6)
         return [found.as_json() for found in search.elites]
 
-    assert elites(1) == elites(2) == elites(1)
+    assert elites(1) == elites(2)
 
 
 def test_genomes_survive_mutation_and_crossing() -> None:
@@ -115,7 +115,7 @@ def test_checks_name_past_exploits_without_any_rule(name: str, check: str) -> No
     task = next(exploit.task for exploit in exploits() if exploit.name == name)
 
     def lenient(*trial):
-        return dataclasses.replace(score(*trial), success=True, flags=())
+        return replace(score(*trial), success=True, flags=())
 
     found = tried(task, stored(name), lenient)
     assert found is not None
@@ -135,13 +135,13 @@ def test_a_gallery_is_resumed_and_its_machines_can_be_opened(tmp_path, capsys) -
 
 def test_a_confirmed_machine_has_scores_of_both_engines_and_a_picture(tmp_path) -> None:
     gallery = Gallery(tmp_path)
-    genome = seeds_of("lift-1")[1]
-    key = grown(genome)[1].key
+    genome = Genome.from_json(grown(seeds_of("lift-1")[1])[1].as_json())
+    key = genome.key
     found = confirmed(Order(task="lift-1", genome=genome, picture=gallery.picture("lift-1", key)))
     gallery.write_confirmed(found)
     assert set(found.scores) == {"mujoco", "pybullet"}
     assert gallery.picture("lift-1", key).stat().st_size > 1000
-    assert gallery.known("lift-1", key) == found
+    assert gallery.known("lift-1", key) == replace(found, genome=genome)
     page = gallery.write_index([found]).read_text()
     assert ("| [lift-1-" in page) == found.success
 
