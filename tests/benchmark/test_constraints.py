@@ -153,10 +153,13 @@ def test_a_sub_structure_that_was_removed_does_not_count(tasks) -> None:
 @pytest.mark.parametrize("connector", ["Brace", "Winch"])
 def test_sub_structures_must_be_joined(tasks, connector) -> None:
     assert broken_constraint(tasks["support-2"], assembly(3, 4, connector=connector)) is None
-    assert broken_constraint(tasks["support-2"], assembly(3, 4, joined=False)) == (
-        "unjoined_parts",
+    broken = broken_constraint(tasks["support-2"], assembly(3, 4, joined=False))
+    assert broken is not None
+    reason, sentence = broken
+    assert reason == "unjoined_parts"
+    assert sentence == (
         "sub-structure B is not joined to the starting block A_1: join every part by an "
-        "attachment that holds, a brace or a winch",
+        "attachment that holds, a brace or a winch"
     )
 
 

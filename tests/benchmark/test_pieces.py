@@ -26,7 +26,7 @@ def _engine(*sprays: int) -> Machine:
     return machine
 
 
-def _up(machine: Machine) -> list[int]:
+def _turns_down() -> list[int]:
     """How many quarter turns make each of four cannons spray down."""
     turns = []
     for place in range(4):
@@ -37,7 +37,7 @@ def _up(machine: Machine) -> list[int]:
     return turns
 
 
-DOWN = _up(Machine())
+DOWN = _turns_down()
 
 
 def test_cannons_that_push_against_each_other_cancel(tasks, trajectory_of) -> None:

@@ -103,9 +103,7 @@ def test_what_wheels_did_not_drive_does_not_count(tasks, trajectory_of, car, mot
     assert result.flags == ("not_driven",)
 
 
-def test_wheels_that_burn_out_in_place_earn_nothing_for_a_throw(
-    tasks, trajectory_of, car
-) -> None:
+def test_wheels_that_burn_out_in_place_earn_nothing_for_a_throw(tasks, trajectory_of, car) -> None:
     def thrown(t: np.ndarray) -> np.ndarray:
         return np.column_stack([np.zeros_like(t), np.where(t > 20.0, 18.0, 0.0)])
 
@@ -124,16 +122,21 @@ def test_a_wheel_that_bounces_drives(tasks, trajectory_of, car) -> None:
 
 def test_a_skid_after_a_drive_counts(tasks, trajectory_of, car) -> None:
     def skids(t: np.ndarray) -> np.ndarray:
-        braked = np.maximum(t - 5.0, 0.0)
-        length = 4.0 * np.minimum(t, 5.0) + np.where(
-            braked < 0.2, 4.0 * braked - 10.0 * braked**2, 0.4
-        )
+        braked = np.clip(t - 1.0, 0.0, 0.5)
+        length = 10.0 * np.minimum(t, 1.0) + 10.0 * braked - 10.0 * braked**2
         return np.column_stack([np.zeros_like(t), length])
 
-    trial = _driven(
-        trajectory_of, car, moved=skids, turned=lambda t: 4.0 * np.minimum(t, 5.0)
-    )
-    assert score(tasks["transport-1"], car, trial).indicator == pytest.approx(20.4, abs=0.01)
+    def slides(t: np.ndarray) -> np.ndarray:
+        return np.column_stack([np.zeros_like(t), 10.0 * np.minimum(t, 3.0)])
+
+    def turned(t: np.ndarray) -> np.ndarray:
+        return 10.0 * np.minimum(t, 1.0)
+
+    skid = _driven(trajectory_of, car, moved=skids, turned=turned)
+    assert score(tasks["transport-1"], car, skid).indicator == pytest.approx(12.5, abs=0.01)
+    # A slide that does not slow down is no skid: something else pushes.
+    slide = _driven(trajectory_of, car, moved=slides, turned=turned)
+    assert score(tasks["transport-1"], car, slide).indicator < 10.0 * 1.05 + 0.5 + 3.5
 
 
 def test_one_good_wheel_is_enough(tasks, trajectory_of, car) -> None:
@@ -198,3 +201,15 @@ def test_a_cargo_that_is_thrown_off_a_car_counts_until_then(tasks, trajectory_of
         cargo_borne=hops,
     )
     assert score(tasks["transport-2"], car, carried).success
+
+
+def test_wheels_that_are_not_tracked_are_not_measured(tasks, trajectory_of, car) -> None:
+    trial = _driven(trajectory_of, car, moved=_north(1.0), turned=_turn(0.0))
+    first = replace(
+        trial,
+        block_ids=trial.block_ids[:1],
+        positions=trial.positions[:, :1],
+        quaternions=trial.quaternions[:, :1],
+    )
+    result = score(tasks["transport-1"], car, first)
+    assert (result.success, result.flags) == (True, ("drive_not_measured",))

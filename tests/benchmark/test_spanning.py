@@ -87,6 +87,8 @@ def test_a_bridge_that_breaks_spans_until_then(tasks, trajectory_of, car) -> Non
         # Dead weight besides: of a tower's companion that lies on the terrains, or of one side's.
         {"floor": 1.0, "south": 0.0, "dead": (0.0, 4000.0, 4000.0)},
         {"floor": 0.0, "south": 1.0, "dead": (0.0, 0.0, 100.0)},
+        {"floor": 0.5, "south": 0.25, "dead": (0.0, 4000.0, 4000.0)},
+        {"floor": 0.0, "south": 0.06, "dead": (0.0, 0.0, 9000.0)},
         # Something else holds the cargo: a wall, or a terrain's edge.
         {"held": 0.5},
         {"held": 0.0},
@@ -121,9 +123,7 @@ def test_a_bridge_that_sinks_onto_a_tower(tasks, trajectory_of, car, sinks_at, s
     assert score(task, car, sunk).success == spans
 
 
-def test_a_cargo_that_slides_onto_a_terrain_is_no_longer_carried(
-    tasks, trajectory_of, car
-) -> None:
+def test_a_cargo_that_slides_onto_a_terrain_is_no_longer_carried(tasks, trajectory_of, car) -> None:
     trial = _carried(trajectory_of, car, north=lambda t: np.maximum(t - 4.0, 0.0))
     result = score(tasks["support-1"], car, _shared(trial))
     assert result.success
@@ -150,7 +150,7 @@ def test_without_contact_forces_the_rule_is_not_measured(tasks, trajectory_of, c
 
 
 def test_islands_in_the_gap_and_boxes_behind_belong_to_the_scenario(
-    tasks: dict[str, Task], trajectory_of, car
+    tasks: dict[str, Task],
 ) -> None:
     from buildarena_benchmark.scorers.spanning import terrain_sides
     from buildarena_simulation import Scenario

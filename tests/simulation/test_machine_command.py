@@ -177,6 +177,8 @@ def test_a_machine_that_breaks_a_constraint_is_not_simulated(
     assert "not simulated: unjoined_parts: block 2 (Water Cannon) is not joined" in done.stderr
     report = json.loads(done.stdout)
     assert (report["success"], report["indicator"], report["engine"]) == (False, 0.0, None)
+    repeated = run("simulate", str(file), "--seeds", "3", "--json", task_name="lift-2")
+    assert json.loads(repeated.stdout)["successes"] == 0
     checked = run("check", str(file), task_name="lift-2")
     assert checked.exit_code == 1
 

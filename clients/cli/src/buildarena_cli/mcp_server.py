@@ -154,8 +154,8 @@ def _manage(client: Client, tool: str, given: Arguments) -> types.CallToolResult
 def _ended(job: Mapping[str, Any]) -> str:
     if job["outcome"] is None:
         return f"not ended yet: {job['stage']} {job['state']}"
-    shown = {name: job[name] for name in ("outcome", "reason", "success", "indicator", "metrics")}
-    return json.dumps(shown)
+    names = ("outcome", "reason", "detail", "success", "indicator", "flags", "metrics")
+    return json.dumps({name: job[name] for name in names})
 
 
 def _result(text: str, *, failed: bool = False) -> types.CallToolResult:

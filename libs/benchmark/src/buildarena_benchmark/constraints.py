@@ -11,7 +11,7 @@ from collections import Counter
 from buildarena_benchmark.tasks.task import Task
 from buildarena_geometry import Machine
 
-_MOST_NAMED = 10
+_MAX_NAMED = 10
 
 
 def broken_constraint(task: Task, machine: Machine) -> tuple[str, str] | None:
@@ -24,31 +24,31 @@ def broken_constraint(task: Task, machine: Machine) -> tuple[str, str] | None:
     Returns:
         Class and sentence, or None when the machine may be simulated.
     """
-    constraints = task.constraints
     if not machine.started:
         return "empty_machine", "no machine was started"
     if len(machine.blocks) == 1 and not machine.connectors:
         return "empty_machine", "the machine is nothing but its starting block"
-    crowded = _crowded(task, machine)
-    if crowded is not None:
-        return "constraint_violated", crowded
+    for check in (_crowded, _wrong_modules, _wrong_structures):
+        problem = check(task, machine)
+        if problem is not None:
+            return "constraint_violated", problem
+    loose = _unjoined(machine)
+    return None if loose is None else ("unjoined_parts", loose)
+
+
+def _wrong_modules(task: Task, machine: Machine) -> str | None:
+    """Whether the machine has a module that is not allowed, or too few of one."""
+    constraints = task.constraints
     used = Counter(block.module.name for block in machine.blocks.values())
     used.update(connector.module.name for connector in machine.connectors.values())
     if constraints.modules is not None:
         foreign = set(used) - {*constraints.modules, machine.catalogue.start.name}
         if foreign:
-            return "constraint_violated", f"{min(foreign)} is not among the task's modules"
+            return f"{min(foreign)} is not among the task's modules"
     for name, least in constraints.min_modules.items():
         if used[name] < least:
-            return (
-                "constraint_violated",
-                f"the machine has {used[name]} of {name}, the task asks for {least} or more",
-            )
-    structures = _wrong_structures(task, machine)
-    if structures is not None:
-        return "constraint_violated", structures
-    loose = _unjoined(machine)
-    return None if loose is None else ("unjoined_parts", loose)
+            return f"the machine has {used[name]} of {name}, the task asks for {least} or more"
+    return None
 
 
 def _wrong_structures(task: Task, machine: Machine) -> str | None:
@@ -90,7 +90,7 @@ def _unjoined(machine: Machine) -> str | None:
     rest = [block for block in loose if machine.blocks[block].structure not in whole]
     named = [f"sub-structure {letter}" for letter in whole]
     named += [f"block {block} ({machine.blocks[block].module.name})" for block in rest]
-    shown = named[:_MOST_NAMED]
+    shown = named[:_MAX_NAMED]
     if len(named) > len(shown):
         shown.append(f"{len(named) - len(shown)} more")
     listed = shown[0] if len(shown) == 1 else f"{', '.join(shown[:-1])} and {shown[-1]}"

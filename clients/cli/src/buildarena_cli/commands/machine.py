@@ -81,19 +81,14 @@ def simulate_command(  # noqa: PLR0917 - the command line passes options by name
         if seeds is not None and single:
             raise CommandError(f"--seeds makes many trials, {single[0]} is for one; give either")
         chosen, machine = chosen_task(task), read_machine(file)
-<<<<<<< HEAD
-        broken, rollout = broken_constraint(chosen, machine), None
-        if broken is None:
-            rollout = _simulated(machine, chosen, engine or ENGINES[0], seed)
-        else:
-            warn(f"not simulated: {broken[0]}: {broken[1]}")
-=======
         engine = engine or ENGINES[0]
+        broken = broken_constraint(chosen, machine)
+        if broken is not None:
+            warn(f"not simulated: {broken[0]}: {broken[1]}")
         if seeds is not None:
             show_robustness(chosen, machine, engine, seeds, as_json=as_json)
             return
-        rollout = _simulated(machine, chosen, engine, seed)
->>>>>>> main
+        rollout = None if broken is not None else _simulated(machine, chosen, engine, seed)
         if rollout is None:
             result = failed_score(chosen, machine)
         else:

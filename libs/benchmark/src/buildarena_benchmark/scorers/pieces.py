@@ -1,6 +1,7 @@
 """Which blocks still belong to the machine: the piece that holds the starting block."""
 
 import math
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -34,7 +35,7 @@ def joined_to_start(machine: "Machine", trajectory: "Trajectory") -> Mask:
     rope_ends = np.searchsorted(trajectory.time_s, [end for _, _, end in ropes])
     edges = sorted({0, len(pieces), *(np.flatnonzero(changed) + 1), *rope_ends})
     joined = np.zeros(pieces.shape, dtype=bool)
-    for first, last in zip(edges, edges[1:], strict=False):
+    for first, last in pairwise(edges):
         row, time_s = pieces[first], trajectory.time_s[first]
         ties = [(row[a], row[b]) for a, b, end in ropes if time_s < end]
         joined[first:last] = np.isin(row, _reached(row[start], ties))

@@ -49,16 +49,16 @@ def driven_distances(
         path: (T, 2) or (T, 3) of what is transported.
 
     Returns:
-        None where the trajectory does not tell what bears the wheels.
+        None where the trajectory does not tell what bears the wheels, or how they move.
     """
     bearing = trajectory.bearing
-    if bearing is None:
-        return None
     index = {block: i for i, block in enumerate(trajectory.block_ids)}
+    if bearing is None or not index.keys() >= set(bearing.wheel_ids):
+        return None
     columns = [
         column
         for column, wheel in enumerate(bearing.wheel_ids)
-        if wheel in index and machine.blocks[wheel].module.spins
+        if machine.blocks[wheel].module.spins
     ]
     if not columns:
         return np.full(len(path), SLACK)
@@ -82,9 +82,7 @@ def driven_distances(
 def radius_of(wheel: "Block") -> float:
     """A wheel's radius, units."""
     radii = [solid.radius for solid in wheel.module.body if isinstance(solid, Cylinder)]
-    boxes = [
-        max(solid.size) / 2 for solid in wheel.module.body if not isinstance(solid, Cylinder)
-    ]
+    boxes = [max(solid.size) / 2 for solid in wheel.module.body if not isinstance(solid, Cylinder)]
     return float(max(radii or boxes, default=0.0))
 
 

@@ -12,20 +12,20 @@ from buildarena_simulation.scenario import SpanPlacement
 if TYPE_CHECKING:
     from buildarena_simulation import Scenario, Trajectory
 
-MOST_ON_FLOOR: Final = 0.1
+MAX_ON_FLOOR: Final = 0.1
 """Largest share of the vertical force that the gap's floor may bear."""
 
-MOST_GROWTH_ON_FLOOR: Final = 0.2
+MAX_GROWTH_ON_FLOOR: Final = 0.2
 """Largest share of a growing load that the floor may take up, however heavy the machine is."""
 
-LEAST_ON_TERRAIN: Final = 0.01
+MIN_ON_TERRAIN: Final = 0.01
 """Smallest share of the vertical force that each side's terrain must bear."""
 
-LEAST_GROWTH: Final = 0.05
+MIN_GROWTH: Final = 0.05
 """Smallest share of a growing load that each side's terrain must take up: dead weight that lies on
 a terrain beside the machine takes up nothing."""
 
-LEAST_CARRIED: Final = 0.9
+MIN_CARRIED: Final = 0.9
 """Smallest share of the force that holds the cargo up that must come from the machine."""
 
 _EDGE = 1e-6
@@ -55,11 +55,11 @@ class Span:
     def spans(self) -> bool:
         """Whether the load went to both terrains."""
         return (
-            self.floor <= MOST_ON_FLOOR
-            and self.floor_growth <= MOST_GROWTH_ON_FLOOR
-            and self.least_terrain >= LEAST_ON_TERRAIN
-            and self.least_growth >= LEAST_GROWTH
-            and self.carried >= LEAST_CARRIED
+            self.floor <= MAX_ON_FLOOR
+            and self.floor_growth <= MAX_GROWTH_ON_FLOOR
+            and self.least_terrain >= MIN_ON_TERRAIN
+            and self.least_growth >= MIN_GROWTH
+            and self.carried >= MIN_CARRIED
         )
 
 
@@ -125,8 +125,10 @@ def terrain_sides(scenario: "Scenario") -> tuple[list[int], list[int]] | None:
     if not isinstance(scenario.placement, SpanPlacement):
         return None
     edge = scenario.placement.gap / 2 - _EDGE
-    reach = [(box.center[1] - box.size[1] / 2, box.center[1] + box.size[1] / 2)
-             for box in scenario.terrain]
+    reach = [
+        (box.center[1] - box.size[1] / 2, box.center[1] + box.size[1] / 2)
+        for box in scenario.terrain
+    ]
     south = [i for i, (_, high) in enumerate(reach) if high <= -edge]
     north = [i for i, (low, _) in enumerate(reach) if low >= edge]
     return (south, north) if south and north else None

@@ -10,7 +10,8 @@ from buildarena_simulation.constants import GRAVITY
 
 if TYPE_CHECKING:
     from buildarena_geometry import Machine
-    from buildarena_simulation import Scenario, TerrainBox, Trajectory
+    from buildarena_simulation import Scenario, Trajectory
+    from buildarena_simulation.scenario import TerrainBox
 
 _MARGIN = 1.5
 _SLACK = 15.0
@@ -42,12 +43,13 @@ def is_unstable(
     samples = len(trajectory.time_s) if deciding is None else deciding.samples
     positions = trajectory.positions[:samples].astype(np.float64)
     members = (
-        np.ones(positions.shape[:2], dtype=bool)
-        if deciding is None
-        else deciding.members[:samples]
+        np.ones(positions.shape[:2], dtype=bool) if deciding is None else deciding.members[:samples]
     )
     cargo = trajectory.cargo_position if deciding is None or deciding.cargo else None
-    judged = [positions[members], trajectory.quaternions[:samples][members]]
+    judged: list[np.ndarray] = [
+        positions[members],
+        trajectory.quaternions[:samples][members],
+    ]
     if cargo is not None:
         judged.append(cargo[:samples].astype(np.float64))
     if not all(np.isfinite(values).all() for values in judged):
@@ -91,9 +93,7 @@ def _bound(
     fall = np.sqrt(2.0 * GRAVITY * height)
     modules = [machine.blocks[block].module for block in trajectory.block_ids]
     thrusts = np.array([module.thrust.heated if module.thrust else 0.0 for module in modules])
-    push = GRAVITY * (
-        ((weights > 0.0) @ thrusts) / np.maximum(weights.sum(axis=1), 1e-9)
-    )
+    push = GRAVITY * (((weights > 0.0) @ thrusts) / np.maximum(weights.sum(axis=1), 1e-9))
     gained = np.concatenate([[0.0], np.cumsum(push[1:] * np.diff(trajectory.time_s[: len(push)]))])
     spin = max((module.motor.speed for module in modules if module.motor), default=0.0)
     extent = start.max(axis=0) - start.min(axis=0)

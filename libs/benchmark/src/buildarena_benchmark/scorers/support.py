@@ -1,5 +1,6 @@
 """Support: how heavy a cargo a bridge carries before it falls into the gap."""
 
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -59,7 +60,8 @@ def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict
         "start_too_high": too_high,
         "does_not_span": lasted and not spans,
         "never_fell": success and decided is None,
-        "span_not_measured": trajectory.bearing is None and terrain_sides(task.scenario) is not None,
+        "span_not_measured": trajectory.bearing is None
+        and terrain_sides(task.scenario) is not None,
     }
     first = trajectory.breaks[0] if trajectory.breaks else None
     metrics: dict[str, Metric] = {
@@ -108,7 +110,7 @@ def _largest_piece(machine: "Machine", trajectory: "Trajectory") -> Mask:
     changed = np.any(np.diff(pieces, axis=0) != 0, axis=1)
     edges = [0, *(np.flatnonzero(changed) + 1), len(pieces)]
     largest = np.zeros(pieces.shape, dtype=bool)
-    for first, last in zip(edges, edges[1:], strict=False):
+    for first, last in pairwise(edges):
         labels, of = np.unique(pieces[first], return_inverse=True)
         largest[first:last] = pieces[first] == labels[np.bincount(of, masses).argmax()]
     return largest

@@ -59,7 +59,9 @@ def thrust_to_weight(
     """
     settled = trajectory.heated[trajectory.time_s >= _WARM_UP_S]
     share = settled.mean(axis=0) if len(settled) else np.zeros(len(trajectory.cannon_ids))
-    stays = dict(zip(trajectory.block_ids, joined[:samples].all(axis=0), strict=True))
+    stays = dict(
+        zip(trajectory.block_ids, np.atleast_1d(joined[:samples].all(axis=0)), strict=True)
+    )
     pushes, heated = [], 0
     for block_id, hot in zip(trajectory.cannon_ids, share >= _HEATED_SHARE, strict=True):
         block = machine.blocks[block_id]

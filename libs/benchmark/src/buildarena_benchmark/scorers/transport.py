@@ -48,7 +48,7 @@ def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict
     Flags:
         `no_wheels`: far enough without any wheel. `start_too_high`: something started at or above
         the limit. `not_driven`: far enough, but not by wheels. `drive_not_measured`: what bears
-        the wheels is not known, so any distance counts.
+        the wheels, or how they move, is not known, so any distance counts.
 
     Source: the paper, section "Evaluation"; thresholds as in the published evaluation.
     """
@@ -62,7 +62,10 @@ def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict
         )
     joined = joined_to_start(machine, trajectory)
     moved = np.linalg.norm(path[:, :2] - path[0, :2], axis=1)
-    counted = _counted(scoring, machine, trajectory, joined, path)
+    driven = driven_distances(machine, trajectory, joined, path)
+    counted = moved if driven is None else np.minimum(moved, driven)
+    if driven is not None and scoring.subject == "cargo":
+        counted = np.where(_is_borne(trajectory), counted, 0.0)
     distance, indicator = float(moved.max()), float(counted.max())
     start_height = (
         float(path[0, 2])
@@ -77,7 +80,7 @@ def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict
         "no_wheels": moved_enough and not wheels,
         "start_too_high": too_high,
         "not_driven": moved_enough and not reached,
-        "drive_not_measured": trajectory.bearing is None,
+        "drive_not_measured": driven is None,
     }
     settled = trajectory.time_s >= _SETTLED_S
     metrics: dict[str, Metric] = {
@@ -95,28 +98,8 @@ def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict
         indicator=rounded(indicator),
         metrics=metrics,
         flags=tuple(flag for flag, holds in flags.items() if holds),
-        deciding=Deciding(
-            samples=len(path), members=joined, cargo=scoring.subject == "cargo"
-        ),
+        deciding=Deciding(samples=len(path), members=joined, cargo=scoring.subject == "cargo"),
     )
-
-
-def _counted(
-    scoring: TransportScoring,
-    machine: "Machine",
-    trajectory: "Trajectory",
-    joined: Mask,
-    path: Series,
-) -> Series:
-    """How much of the subject's distance from its start counts at each sample, (T,), units."""
-    moved = np.asarray(np.linalg.norm(path[:, :2] - path[0, :2], axis=1))
-    driven = driven_distances(machine, trajectory, joined, path)
-    if driven is None:
-        return moved
-    counted = np.minimum(moved, driven)
-    if scoring.subject == "cargo":
-        counted = np.where(_is_borne(trajectory), counted, 0.0)
-    return counted
 
 
 def _is_borne(trajectory: "Trajectory") -> Mask:
