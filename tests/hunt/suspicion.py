@@ -85,8 +85,10 @@ def _gap(evidence: Evidence) -> float:
 def _reaches_no_terrain(evidence: Evidence) -> bool:
     """No block of the machine lies over one of the terrains at the start."""
     y = _path(evidence.trajectory)[0, :, 1]
+    modules = [evidence.machine.blocks[block].module for block in evidence.trajectory.block_ids]
+    reach = np.array([max(module.size or (1.0,)) / 2 for module in modules])
     half = _gap(evidence) / 2
-    return bool(y.max() + 0.5 < half or y.min() - 0.5 > -half)
+    return bool((y + reach).max() < half or (y - reach).min() > -half)
 
 
 def _near_the_floor(evidence: Evidence) -> bool:

@@ -37,21 +37,23 @@ def naive(task, machine, trajectory):
 
 def searched(scorer, generations: int = GENERATIONS) -> TaskSearch:
     """A short search from nothing but a starting block and one block on it."""
-    search = TaskSearch("support-1", seed=3, scorer=scorer)
+    search = TaskSearch("support-3", seed=3, scorer=scorer)
     block = {"op": "attach_block_to", "params": {"base_block": "1", "face": "A"}}
     block["params"]["new_block"] = "Small Wooden Block"
     with Crew(1) as crew:
         search.begin(crew, [Genome(actions=[*START.actions, block])])
         for _ in range(generations):
             search.advance(crew, batch=10)
+            if search.elites[0].success:
+                break
     return search
 
 
 def test_the_search_finds_a_planted_hole_and_its_checks_name_it() -> None:
     best = searched(naive).elites[0]
     assert best.success
-    assert {"reaches no terrain", "near the floor"} & set(best.suspicions)
-    closed = tried("support-1", best.genome)
+    assert "reaches no terrain" in best.suspicions
+    closed = tried("support-3", best.genome)
     assert closed is not None
     assert not closed.success
 
