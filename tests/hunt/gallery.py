@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -143,7 +143,7 @@ def _table(rows: Sequence[Confirmed]) -> list[str]:
     return [_HEAD, *map(line_of, rows), ""] if rows else []
 
 
-def _figure(told: dict[str, Any]) -> str:
+def _figure(told: Mapping[str, Any]) -> str:
     return f"{told['indicator']:.1f}" if told["success"] else "fails"
 
 

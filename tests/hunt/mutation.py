@@ -59,9 +59,7 @@ def _spliced(first: Actions, second: Actions, draw: Draw) -> Actions:
     return [*first[:head], *second[tail:]]
 
 
-def _changed(
-    log: Actions, available: Mapping[str, Machine], category: str, draw: Draw
-) -> Actions:
+def _changed(log: Actions, available: Mapping[str, Machine], category: str, draw: Draw) -> Actions:
     if draw.random() < 0.35:
         return _edited(log, category, draw)
     machine, kept = replayed(log, available)

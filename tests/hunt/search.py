@@ -88,7 +88,9 @@ class TaskSearch:
         """Keeps what is the best of its kind so far."""
         for finding in findings:
             if finding is not None:
-                self._archive.add_single(finding, finding.objective, np.array(finding.measures))
+                held = np.empty((), dtype=object)
+                held[()] = finding
+                self._archive.add_single(held, finding.objective, np.array(finding.measures))
 
     def begin(self, crew: Crew, seeds: Sequence[Genome]) -> None:
         """Tries the genomes that the search starts from."""
@@ -127,9 +129,7 @@ def _parent(elites: Sequence[Finding], draw: np.random.Generator) -> Finding:
     return elites[int(draw.integers(len(elites), size=several).min())]
 
 
-def hunted(
-    searches: Mapping[str, TaskSearch], crew: Crew, going_on: Callable[[], bool]
-) -> None:
+def hunted(searches: Mapping[str, TaskSearch], crew: Crew, going_on: Callable[[], bool]) -> None:
     """Takes the tasks in turns, a generation each, for as long as it may go on."""
     while True:
         for search in searches.values():

@@ -63,7 +63,7 @@ def seeds_of(task_name: str) -> list[Genome]:
     """Genomes to start from: all that suit the task's category and number of sub-structures."""
     tasks = builtin_tasks()
     task = tasks[task_name]
-    whole = task.constraints.min_sub_structures < 2  # noqa: PLR2004
+    whole = task.constraints.min_sub_structures < 2
     found = [Genome(actions=[{"op": "start", "params": {}, "makes": "1"}])] if whole else []
     for other, genome in _stored():
         if tasks[other].category == task.category and bool(genome.sub_structures) != whole:

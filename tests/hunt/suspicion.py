@@ -99,7 +99,7 @@ def _near_the_floor(evidence: Evidence) -> bool:
     path = _path(trajectory)
     within = np.abs(path[:, :, 1]) < _gap(evidence) / 2
     low = (within & (path[:, :, 2] < 1.0)).any(axis=1)
-    return bool((low & (trajectory.cargo_position[:, 2] > _TOP - 1.0)).sum() >= 25)  # noqa: PLR2004
+    return bool((low & (trajectory.cargo_position[:, 2] > _TOP - 1.0)).sum() >= 25)
 
 
 def _higher_than_long(evidence: Evidence) -> bool:
@@ -111,7 +111,9 @@ def _higher_than_long(evidence: Evidence) -> bool:
 def _cargo_beside(evidence: Evidence) -> bool:
     """The cargo ends up over a terrain and not over the gap, yet above the tops."""
     cargo = evidence.trajectory.cargo_position
-    return cargo is not None and bool(abs(cargo[-1, 1]) > _gap(evidence) / 2 and cargo[-1, 2] > _TOP)
+    return cargo is not None and bool(
+        abs(cargo[-1, 1]) > _gap(evidence) / 2 and cargo[-1, 2] > _TOP
+    )
 
 
 def _parts_for_the_gap(evidence: Evidence) -> bool:
@@ -122,7 +124,7 @@ def _parts_for_the_gap(evidence: Evidence) -> bool:
 def _stacked_connectors(evidence: Evidence) -> bool:
     """More than two connectors between the same two faces."""
     pairs = Counter(frozenset((c.start, c.end)) for c in evidence.machine.connectors.values())
-    return max(pairs.values(), default=0) > 2  # noqa: PLR2004
+    return max(pairs.values(), default=0) > 2
 
 
 # Transport
@@ -132,7 +134,7 @@ def _wheels_hang_in_the_air(evidence: Evidence) -> bool:
     """Its wheels are off the ground for most of the time."""
     rows = evidence.rows("wheel")
     heights = _path(evidence.trajectory)[:, rows, 2]
-    return not rows or bool((heights > 1.2).mean() > 0.6)  # noqa: PLR2004
+    return not rows or bool((heights > 1.2).mean() > 0.6)
 
 
 def _taller_than_its_way(evidence: Evidence) -> bool:
@@ -170,7 +172,7 @@ def _cargo_on_the_ground(evidence: Evidence) -> bool:
 
 
 def _few_wheels(evidence: Evidence) -> bool:
-    return len(evidence.rows("wheel")) < 3  # noqa: PLR2004
+    return len(evidence.rows("wheel")) < 3
 
 
 # Lift
@@ -179,20 +181,17 @@ def _few_wheels(evidence: Evidence) -> bool:
 def _pushes_aside(evidence: Evidence) -> bool:
     """The cannons' net push, as built, is not upwards."""
     blocks = evidence.machine.blocks.values()
-    pushes = [-block.pointing for block in blocks if block.pointing is not None and _fires(block)]
+    cannons = [block for block in blocks if block.module.kind == "cannon"]
+    pushes = [-block.pointing for block in cannons if block.pointing is not None]
     net = np.sum(pushes, axis=0) if pushes else np.zeros(3)
     return bool(net[2] <= _UPRIGHT * np.linalg.norm(net))
-
-
-def _fires(block: object) -> bool:
-    return getattr(block, "module").kind == "cannon"  # noqa: B009
 
 
 def _few_hot_cannons(evidence: Evidence) -> bool:
     """Even if all that flames touch at the end pushed upwards, it would not lift the machine."""
     hot = int(evidence.trajectory.heated[-1].sum()) if evidence.trajectory.heated.size else 0
     cold = len(evidence.trajectory.cannon_ids) - hot
-    return hot * 13.76 + cold * 1.6 <= evidence.machine.mass
+    return bool(hot * 13.76 + cold * 1.6 <= evidence.machine.mass)
 
 
 def _start_stays_behind(evidence: Evidence) -> bool:
@@ -218,7 +217,7 @@ def _no_cannon_with_the_start(evidence: Evidence) -> bool:
 def _idle_structure(evidence: Evidence) -> bool:
     """A sub-structure of a block or two, there to be counted."""
     sizes = Counter(block.structure for block in evidence.machine.blocks.values())
-    return len(sizes) > 1 and min(sizes.values()) <= 2  # noqa: PLR2004
+    return len(sizes) > 1 and min(sizes.values()) <= 2
 
 
 # All categories
@@ -233,7 +232,7 @@ def _engines_disagree(evidence: Evidence) -> bool:
 
 def _luck(evidence: Evidence) -> bool:
     """It fails with most seeds."""
-    return evidence.robust_share is not None and evidence.robust_share < 0.5  # noqa: PLR2004
+    return evidence.robust_share is not None and evidence.robust_share < 0.5
 
 
 def _falls_apart(evidence: Evidence) -> bool:

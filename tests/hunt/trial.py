@@ -158,9 +158,7 @@ def _nearness(task: Task, result: Score) -> float:
     return 0.99 * min(max(result.indicator, 0.0), 1.0)
 
 
-def _measures(
-    task: Task, machine: Machine, trajectory: Trajectory
-) -> tuple[float, float, float]:
+def _measures(task: Task, machine: Machine, trajectory: Trajectory) -> tuple[float, float, float]:
     modules = [block.module for block in machine.blocks.values()]
     wood = sum(module.kind in {"start", "block"} for module in modules)
     oddness = {"support": _slenderness, "transport": _airborne}.get(task.category, _cancelled)
@@ -189,7 +187,8 @@ def _airborne(machine: Machine, trajectory: Trajectory) -> float:
 def _cancelled(machine: Machine, trajectory: Trajectory) -> float:
     """Share of the cannons' pushes that cancel; 1 without cannons."""
     del trajectory
-    ways = [b.pointing for b in machine.blocks.values() if b.module.kind == "cannon"]
+    cannons = [block for block in machine.blocks.values() if block.module.kind == "cannon"]
+    ways = [cannon.pointing for cannon in cannons if cannon.pointing is not None]
     if not ways:
         return 1.0
     return 1.0 - float(np.linalg.norm(np.sum(ways, axis=0))) / len(ways)
