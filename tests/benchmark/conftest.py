@@ -8,8 +8,7 @@ import pytest
 
 from buildarena_benchmark import Task, builtin_tasks
 from buildarena_geometry import Machine
-from buildarena_simulation import Trajectory
-from buildarena_simulation.bearing import Bearing
+from buildarena_simulation import Bearing, Trajectory
 
 Path = Callable[[np.ndarray], np.ndarray]
 
