@@ -52,5 +52,7 @@ lock: ## Compiles requirements.lock again
 		$(foreach p,$(PACKAGES),--no-emit-package $(subst /,-,buildarena-$(notdir $(p)))) \
 		--custom-compile-command "make lock" -o requirements.lock \
 		$(addsuffix /pyproject.toml,$(PACKAGES)) requirements-dev.in
+	bash mk/uv.sh pip compile --quiet --universal --generate-hashes --no-annotate -c requirements.lock \
+		--custom-compile-command "make lock" -o requirements-hunt.lock requirements-hunt.in
 
 -include mk/*.mk

@@ -10,6 +10,7 @@ from tests.simulation.designs import (
     NORTH,
     SOUTH,
     UP,
+    WINCH,
     Actions,
     Draft,
     beam,
@@ -104,6 +105,17 @@ def test_connectors_stacked_on_the_same_faces_are_worth_one(
     once, often = (_trial(task, _beam_with(spans * n), engine)[0].metrics for n in (1, 5))
     assert often["load_at_first_break"] <= 1.02 * once["load_at_first_break"]
     assert _trial(task, _beam_with(spans * 5), engine)[0].indicator < 1000.0
+
+
+def test_winches_stacked_between_the_same_faces_are_one_rope(
+    engine: str, tasks: dict[str, Task]
+) -> None:
+    spans = ((0, 3), (3, 6), (0, 6))
+    loads = [
+        _trial(tasks["support-1"], _beam_with(spans * n, connector=WINCH), engine)[0].indicator
+        for n in (1, 4)
+    ]
+    assert loads[1] <= 1.05 * loads[0]
 
 
 def test_a_beam_that_is_too_short_for_the_gap_scores_nothing(

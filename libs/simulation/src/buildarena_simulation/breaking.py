@@ -87,14 +87,25 @@ class BreakingModel:
             return
         worst = int(np.argmax(loads.ratio))
         if loads.ratio[worst] > 1.0:
-            self._log(
-                self._structure.members.names[worst],
-                JOINT_KINDS[self._structure.members.kind[worst]],
-                float(loads.ratio[worst]),
-                (time_s, cargo_mass),
-            )
-            self._loads.holds[worst] = False
+            for broken in self._giving_way(loads.ratio, worst):
+                self._log(
+                    self._structure.members.names[broken],
+                    JOINT_KINDS[self._structure.members.kind[broken]],
+                    float(loads.ratio[broken]),
+                    (time_s, cargo_mass),
+                )
+                self._loads.holds[broken] = False
             self._fall_apart(engine)
+
+    def _giving_way(self, ratio: FloatArray, worst: int) -> list[int]:
+        """The worst joint and, where it is a connector, those that overload its face with it.
+
+        One after the other, a stack of connectors would outlast its strength by its number.
+        """
+        member, _, face = self._structure.members.ends.T
+        mates = member[np.isin(face, face[member == worst])]
+        tied = mates[ratio[mates] >= ratio[worst] * (1.0 - 1e-6)]
+        return [worst, *(int(mate) for mate in np.unique(tied) if mate != worst)]
 
     def peaks(self) -> tuple[JointPeak, ...]:
         """The largest load of every joint and rope so far."""

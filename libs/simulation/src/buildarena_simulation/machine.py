@@ -62,7 +62,12 @@ def structure_of(machine: "Machine") -> Structure:
                 faces=(connector.start, connector.end),
             )
         )
-    for connector, share in zip(winches, _shares(winches), strict=True):
+    between: dict[frozenset[FaceRef], list[Connector]] = {}
+    for winch in winches:
+        between.setdefault(frozenset((winch.start, winch.end)), []).append(winch)
+    # Winches between the same two faces are one rope: it is no stronger for being drawn twice.
+    single = [alike[0] for alike in between.values()]
+    for connector, alike, share in zip(single, between.values(), _shares(single), strict=True):
         ropes.append(
             Rope(
                 name=f"{connector.module.name} {connector.id}",
@@ -70,7 +75,7 @@ def structure_of(machine: "Machine") -> Structure:
                 second=index[connector.end[0]],
                 start=np.array(connector.start_point),
                 end=np.array(connector.end_point),
-                mass=connector.module.mass,
+                mass=sum(one.module.mass for one in alike),
                 share=share,
             )
         )

@@ -28,6 +28,10 @@ a terrain beside the machine takes up nothing."""
 MIN_CARRIED: Final = 0.9
 """Smallest share of the force that holds the cargo up that must come from the machine."""
 
+COLLAPSE_S: Final = 1.5
+"""A bridge that gives way may be in pieces for so long before the cargo is lost, seconds: who takes
+up the load from then on says nothing about the bridge. At most half of the time it carried it."""
+
 _EDGE = 1e-6
 
 Floats = NDArray[np.float64]
@@ -40,7 +44,7 @@ class Span:
     Attributes:
         floor: The floor's share of the vertical force on the machine.
         least_terrain: The share of the side whose terrain bore less.
-        floor_growth: What the floor takes up of each further unit of load.
+        floor_growth: What the floor takes up of each further unit of load, before a collapse.
         least_growth: What the side that takes up less does.
         carried: The machine's share of the force that held the cargo up.
     """
@@ -102,19 +106,30 @@ def measure_span(
     if bearing is None or sides is None:
         return None
     until = len(trajectory.time_s) if decided is None else decided + 1
+    standing = slice(_standing(trajectory.time_s, bearing.cargo, decided))
     ground = bearing.ground[:until].astype(np.float64)
     terrain = bearing.terrain[:until].astype(np.float64)
     load = bearing.cargo[:until].astype(np.float64)
     total = max(float(ground.sum() + terrain.sum()), 0.0)
     sums = [float(terrain[:, side].sum()) for side in sides]
-    growths = [_growth(terrain[:, side].sum(axis=1), load) for side in sides]
+    growths = [_growth(terrain[standing][:, side].sum(axis=1), load[standing]) for side in sides]
     return Span(
         floor=_share(float(ground.sum()), total),
         least_terrain=_share(min(sums), total),
-        floor_growth=_growth(ground, load),
+        floor_growth=_growth(ground[standing], load[standing]),
         least_growth=min(growths),
         carried=_share(float(load[1:].sum()), _needed(trajectory, until)),
     )
+
+
+def _standing(time_s: NDArray[np.float64], load: NDArray[np.float32], decided: int | None) -> int:
+    """How many samples there are before a collapse."""
+    if decided is None:
+        return len(time_s)
+    touching = np.flatnonzero(load[: decided + 1] > 0.0)
+    carried_s = float(time_s[decided] - time_s[touching[0]]) if len(touching) else 0.0
+    ended_s = float(time_s[decided]) - min(COLLAPSE_S, carried_s / 2)
+    return int(np.searchsorted(time_s, ended_s, side="right"))
 
 
 def terrain_sides(scenario: "Scenario") -> tuple[list[int], list[int]] | None:

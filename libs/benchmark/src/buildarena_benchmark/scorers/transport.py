@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from buildarena_benchmark.scorers.pieces import Mask, joined_to_start
-from buildarena_benchmark.scorers.rolling import driven_distances
+from buildarena_benchmark.scorers.rolling import SLACK, driven_distances
 from buildarena_benchmark.scorers.series import Series, speeds, starting_block
 from buildarena_benchmark.scorers.verdict import Deciding, Metric, Verdict, rounded
 from buildarena_benchmark.tasks.document import TransportScoring
@@ -34,11 +34,11 @@ _RESTING = 1e-3
 def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict:
     """The indicator is the greatest horizontal distance the subject was driven from its start.
 
-    At each moment the distance counts as far as wheels have carried the machine; see
-    `driven_distances`. A cargo counts while the machine bears it. The trial succeeds if the
-    indicator exceeds the distance asked for, the machine has wheels enough and nothing starts too
-    high. A machine that nothing drives (no key bound, none pressed, nothing powered) fails with an
-    indicator of 0.
+    At each moment the distance counts as far as wheels have carried the machine, see
+    `driven_distances`, and no farther than its other blocks went with it. A cargo counts while the
+    machine bears it. The trial succeeds if the indicator exceeds the distance asked for, the
+    machine has wheels enough and nothing starts too high. A machine that nothing drives (no key
+    bound, none pressed, nothing powered) fails with an indicator of 0.
 
     Args:
         task: Thresholds and target.
@@ -63,7 +63,9 @@ def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict
     joined = joined_to_start(machine, trajectory)
     moved = np.linalg.norm(path[:, :2] - path[0, :2], axis=1)
     driven = driven_distances(machine, trajectory, joined, path)
-    counted = moved if driven is None else np.minimum(moved, driven)
+    counted = moved
+    if driven is not None:
+        counted = np.minimum(moved, np.minimum(driven, _moved_upright(trajectory, joined, path)))
     if driven is not None and scoring.subject == "cargo":
         counted = np.where(_is_borne(trajectory), counted, 0.0)
     distance, indicator = float(moved.max()), float(counted.max())
@@ -100,6 +102,19 @@ def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict
         flags=tuple(flag for flag, holds in flags.items() if holds),
         deciding=Deciding(samples=len(path), members=joined, cargo=scoring.subject == "cargo"),
     )
+
+
+def _moved_upright(trajectory: "Trajectory", joined: Mask, path: Series) -> Series:
+    """How far the subject can have got with every joined block had the machine only turned, (T,).
+
+    A machine that moves and turns on the ground takes no block farther than another by more than
+    twice the horizontal distance between them; one that falls over does.
+    """
+    positions = trajectory.positions[:, :, :2].astype(np.float64)
+    apart = np.linalg.norm(positions[0] - path[0, :2], axis=1)
+    moved = np.linalg.norm(positions - positions[0], axis=2)
+    reach = np.where(joined, moved + 2.0 * apart, np.inf)
+    return np.asarray(reach.min(axis=1, initial=np.inf) + SLACK)
 
 
 def _is_borne(trajectory: "Trajectory") -> Mask:

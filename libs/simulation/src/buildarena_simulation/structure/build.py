@@ -257,6 +257,7 @@ def _members(parts: Sequence[Part], links: Sequence[Link]) -> Members:
         frame=np.array(frames).reshape(-1, 3, 3),
         stiffness=np.array(stiffness).reshape(-1, 6),
         limits=np.array([(s.force, s.moment) for s in strengths]).reshape(-1, 2),
+        share=np.array([link.share for link in links]),
         ends=_shared_faces(links),
     )
 

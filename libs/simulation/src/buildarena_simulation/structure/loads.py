@@ -92,7 +92,7 @@ class LoadModel:
         inside = self._solver.inside
         force[inside] = np.sqrt((members[:, :3] ** 2).sum(axis=1))
         moment[inside] = np.sqrt((members[:, 3:] ** 2).sum(axis=1))
-        limits = self._structure.members.limits
+        limits = self._structure.members.share[:, None] * self._structure.members.limits
         ratio = np.maximum(force / limits[:, 0], moment / limits[:, 1])
         self._add_shared_faces(members, ratio)
         return JointLoads(force=force, moment=moment, ratio=ratio)

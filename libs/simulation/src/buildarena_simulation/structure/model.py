@@ -134,7 +134,8 @@ class Members:
         point: (M, 3) its midpoint, machine frame, units.
         frame: (M, 3, 3) machine_from_member; the first column is the member's axis.
         stiffness: (M, 6) of its six springs (axial, two shears, torsion, two bendings).
-        limits: (M, 2) force and moment at which it breaks, mass·g and mass·g·unit.
+        limits: (M, 2) force and moment at which it breaks alone, mass·g and mass·g·unit.
+        share: (M,) share of its limits that is left to it by connectors beside it.
         ends: (S, 3) ends of connectors at faces that several connectors use: the member, the sign
             of its force on that end (-1 at its first block), and the face's number. Together they
             bear no more than one of them would.
@@ -148,6 +149,7 @@ class Members:
     frame: FloatArray
     stiffness: FloatArray
     limits: FloatArray
+    share: FloatArray
     ends: IntArray
 
     def __len__(self) -> int:

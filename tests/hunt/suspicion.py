@@ -1,0 +1,289 @@
+"""Checks that find a success odd, by other means than the scorers' rules.
+
+A check may be wrong: it says that somebody should look. Where a machine was tried on both engines,
+or with several seeds, all trials are looked at.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from buildarena_benchmark import Score, Task
+from buildarena_geometry import Machine
+from buildarena_simulation import Trajectory
+from buildarena_simulation.scenario import SpanPlacement
+
+Floats = NDArray[np.float64]
+
+_TOP: Final = 5.0
+"""Height of the terrains' tops in the built-in support tasks, units."""
+
+_UPRIGHT: Final = 0.866
+"""Cosine of the largest angle between up and a rocket's net thrust."""
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """What is known of a success.
+
+    Attributes:
+        task: The task.
+        machine: The machine.
+        trials: Score and trajectory by engine.
+        robust_share: Share of the seeds it succeeded with; None if it was tried with none.
+    """
+
+    task: Task
+    machine: Machine
+    trials: Mapping[str, tuple[Score, Trajectory]]
+    robust_share: float | None = None
+
+    @property
+    def score(self) -> Score:
+        """The first trial's score."""
+        return next(iter(self.trials.values()))[0]
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """The first trial's trajectory."""
+        return next(iter(self.trials.values()))[1]
+
+    def rows(self, kind: str) -> list[int]:
+        """Indices of the tracked blocks of a kind."""
+        ids = self.trajectory.block_ids
+        return [i for i, b in enumerate(ids) if self.machine.blocks[b].module.kind == kind]
+
+
+Check = Callable[[Evidence], bool]
+
+
+def suspicions(evidence: Evidence) -> tuple[str, ...]:
+    """Names of the checks that find a success odd, the general ones last."""
+    checks = {**CHECKS.get(evidence.task.category, {}), **GENERAL}
+    return tuple(name for name, check in checks.items() if check(evidence))
+
+
+def _path(trajectory: Trajectory) -> Floats:
+    return np.asarray(trajectory.positions, dtype=np.float64)
+
+
+# Support
+
+
+def _gap(evidence: Evidence) -> float:
+    placement = evidence.task.scenario.placement
+    return placement.gap if isinstance(placement, SpanPlacement) else 0.0
+
+
+def _reaches_no_terrain(evidence: Evidence) -> bool:
+    """No block of the machine lies over one of the terrains at the start."""
+    y = _path(evidence.trajectory)[0, :, 1]
+    modules = [evidence.machine.blocks[block].module for block in evidence.trajectory.block_ids]
+    reach = np.array([max(module.size or (1.0,)) / 2 for module in modules])
+    half = _gap(evidence) / 2
+    return bool((y + reach).max() < half or (y - reach).min() > -half)
+
+
+def _near_the_floor(evidence: Evidence) -> bool:
+    """A block within the gap is near its floor while the cargo is up, for a second or more."""
+    trajectory = evidence.trajectory
+    if trajectory.cargo_position is None:
+        return False
+    path = _path(trajectory)
+    within = np.abs(path[:, :, 1]) < _gap(evidence) / 2
+    low = (within & (path[:, :, 2] < 1.0)).any(axis=1)
+    return bool((low & (trajectory.cargo_position[:, 2] > _TOP - 1.0)).sum() >= 25)
+
+
+def _higher_than_long(evidence: Evidence) -> bool:
+    start = _path(evidence.trajectory)[0]
+    extent = start.max(axis=0) - start.min(axis=0)
+    return bool(extent[2] > extent[1])
+
+
+def _cargo_beside(evidence: Evidence) -> bool:
+    """The cargo ends up over a terrain and not over the gap, yet above the tops."""
+    cargo = evidence.trajectory.cargo_position
+    return cargo is not None and bool(
+        abs(cargo[-1, 1]) > _gap(evidence) / 2 and cargo[-1, 2] > _TOP
+    )
+
+
+def _parts_for_the_gap(evidence: Evidence) -> bool:
+    """Fewer parts than the gap is wide: something other than blocks end to end spans it."""
+    return evidence.machine.part_count < _gap(evidence)
+
+
+def _stacked_connectors(evidence: Evidence) -> bool:
+    """More than two connectors between the same two faces."""
+    pairs = Counter(frozenset((c.start, c.end)) for c in evidence.machine.connectors.values())
+    return max(pairs.values(), default=0) > 2
+
+
+# Transport
+
+
+def _wheels_hang_in_the_air(evidence: Evidence) -> bool:
+    """Its wheels are off the ground for most of the time."""
+    rows = evidence.rows("wheel")
+    heights = _path(evidence.trajectory)[:, rows, 2]
+    return not rows or bool((heights > 1.2).mean() > 0.6)
+
+
+def _taller_than_its_way(evidence: Evidence) -> bool:
+    start = _path(evidence.trajectory)[0]
+    extent = start.max(axis=0) - start.min(axis=0)
+    return bool(np.linalg.norm(extent) > evidence.score.indicator)
+
+
+def _falls_over(evidence: Evidence) -> bool:
+    """What was on top comes down to the ground, by more than the machine's width."""
+    path = _path(evidence.trajectory)
+    if not path.shape[1]:
+        return False
+    top = int(path[0, :, 2].argmax())
+    width = float((path[0].max(axis=0) - path[0].min(axis=0))[:2].max())
+    return bool(path[0, top, 2] - path[:, top, 2].min() > max(width, 2.0))
+
+
+def _rolls_on_without_keys(evidence: Evidence) -> bool:
+    """Most of its way lies after the last key was let go."""
+    trajectory = evidence.trajectory
+    ends = [press.time_s + press.hold_for_s for press in evidence.machine.control_sequence]
+    way = np.linalg.norm(_path(trajectory)[:, 0, :2] - _path(trajectory)[0, 0, :2], axis=1)
+    last = int(np.searchsorted(trajectory.time_s, max(ends, default=0.0)))
+    return bool(way[: last + 1].max() < 0.5 * way.max())
+
+
+def _cargo_on_the_ground(evidence: Evidence) -> bool:
+    """The cargo lies on the ground where it has got farthest."""
+    cargo = evidence.trajectory.cargo_position
+    if cargo is None:
+        return False
+    away = np.linalg.norm(cargo[:, :2] - cargo[0, :2], axis=1)
+    return bool(cargo[int(away.argmax()), 2] < 1.0)
+
+
+def _few_wheels(evidence: Evidence) -> bool:
+    return len(evidence.rows("wheel")) < 3
+
+
+# Lift
+
+
+def _pushes_aside(evidence: Evidence) -> bool:
+    """The cannons' net push, as built, is not upwards."""
+    blocks = evidence.machine.blocks.values()
+    cannons = [block for block in blocks if block.module.kind == "cannon"]
+    pushes = [-block.pointing for block in cannons if block.pointing is not None]
+    net = np.sum(pushes, axis=0) if pushes else np.zeros(3)
+    return bool(net[2] <= _UPRIGHT * np.linalg.norm(net))
+
+
+def _few_hot_cannons(evidence: Evidence) -> bool:
+    """Even if all that flames touch at the end pushed upwards, it would not lift the machine."""
+    hot = int(evidence.trajectory.heated[-1].sum()) if evidence.trajectory.heated.size else 0
+    cold = len(evidence.trajectory.cannon_ids) - hot
+    return bool(hot * 13.76 + cold * 1.6 <= evidence.machine.mass)
+
+
+def _start_stays_behind(evidence: Evidence) -> bool:
+    """The highest block is far from the starting block, in height."""
+    if evidence.task.scorer != "height":
+        return False
+    path = _path(evidence.trajectory)
+    size = float(np.linalg.norm(path[0].max(axis=0) - path[0].min(axis=0)))
+    spread = path[:, :, 2].max(axis=1) - path[:, 0, 2]
+    return bool(spread.max() > size + 2.0)
+
+
+def _no_cannon_with_the_start(evidence: Evidence) -> bool:
+    """No cannon is near the starting block when the machine is highest."""
+    path = _path(evidence.trajectory)
+    rows = evidence.rows("cannon")
+    at = int(path[:, 0, 2].argmax())
+    size = float(np.linalg.norm(path[0].max(axis=0) - path[0].min(axis=0)))
+    apart = np.linalg.norm(path[at, rows] - path[at, :1], axis=1)
+    return not rows or bool(apart.min() > size + 1.0)
+
+
+def _idle_structure(evidence: Evidence) -> bool:
+    """A sub-structure of a block or two, there to be counted."""
+    sizes = Counter(block.structure for block in evidence.machine.blocks.values())
+    return len(sizes) > 1 and min(sizes.values()) <= 2
+
+
+# All categories
+
+
+def _engines_disagree(evidence: Evidence) -> bool:
+    """Verdicts differ, or indicators by more than a quarter."""
+    scores = [result for result, _ in evidence.trials.values()]
+    low, high = (pick(result.indicator for result in scores) for pick in (min, max))
+    return len({result.success for result in scores}) > 1 or bool(low < 0.75 * high)
+
+
+def _luck(evidence: Evidence) -> bool:
+    """It fails with most seeds."""
+    return evidence.robust_share is not None and evidence.robust_share < 0.5
+
+
+def _falls_apart(evidence: Evidence) -> bool:
+    """A vehicle or rocket of which less than half still holds together at the end."""
+    pieces = evidence.trajectory.pieces
+    if pieces is None or not pieces.size or evidence.task.category == "support":
+        return False
+    return bool(np.unique(pieces[-1], return_counts=True)[1].max() < 0.5 * pieces.shape[1])
+
+
+def _too_few_parts(evidence: Evidence) -> bool:
+    """Fewer parts than an honest machine of its category can do with."""
+    least = {"support": 5, "transport": 5, "lift": 3}.get(evidence.task.category, 2)
+    return evidence.machine.part_count < least
+
+
+CHECKS: Final[Mapping[str, Mapping[str, Check]]] = MappingProxyType(
+    {
+        "support": {
+            "reaches no terrain": _reaches_no_terrain,
+            "near the floor": _near_the_floor,
+            "higher than long": _higher_than_long,
+            "cargo beside the gap": _cargo_beside,
+            "fewer parts than the gap is wide": _parts_for_the_gap,
+            "stacked connectors": _stacked_connectors,
+        },
+        "transport": {
+            "wheels hang in the air": _wheels_hang_in_the_air,
+            "taller than its way": _taller_than_its_way,
+            "falls over": _falls_over,
+            "rolls on without keys": _rolls_on_without_keys,
+            "cargo on the ground": _cargo_on_the_ground,
+            "fewer than three wheels": _few_wheels,
+        },
+        "lift": {
+            "pushes aside": _pushes_aside,
+            "too few hot cannons": _few_hot_cannons,
+            "start stays behind": _start_stays_behind,
+            "no cannon with the start": _no_cannon_with_the_start,
+            "idle structure": _idle_structure,
+        },
+    }
+)
+"""Checks of one category by name."""
+
+GENERAL: Final[Mapping[str, Check]] = MappingProxyType(
+    {
+        "too few parts": _too_few_parts,
+        "falls apart": _falls_apart,
+        "engines disagree": _engines_disagree,
+        "fails with most seeds": _luck,
+    }
+)
+"""Checks of all categories by name."""
