@@ -33,7 +33,7 @@ def start(
     """Begins the machine with its starting block, which becomes block 1.
 
     Args:
-        init_shift: Position of the block's center [east, north, up]; [0, 0, 0] if left out.
+        init_shift: Position of the block's centre [east, north, up]; [0, 0, 0] if left out.
         init_rotation: [yaw, pitch, roll] in degrees: yaw turns north to east, pitch north down,
             roll up to east; [0, 0, 0] if left out.
         note: What this machine is, in your words.
@@ -74,16 +74,16 @@ def attach_block_to(
     module = attachable_module(state, new_block)
     base = part(state, base_block)
     if isinstance(base, Connector) or face not in base.module.face_of_label:
-        free = state.free_faces(base) if isinstance(base, Block) else []
+        free = words.free_faces(state, base) if isinstance(base, Block) else "none"
         raise RefusalError(
             Cause.NO_SUCH_FACE,
-            f"{words.heading(base)} has no face {shown(face)}. Its free faces: {listing(free)}.",
+            f"{words.heading(base)} has no face {shown(face)}. Its free faces: {free}.",
         )
     if state.is_occupied(base, face):
         raise RefusalError(
             Cause.FACE_OCCUPIED,
-            f"Face {face} of {words.title(base)} is taken. "
-            f"Its free faces: {listing(state.free_faces(base))}.",
+            f"Face {words.face_name(base, face)} of {words.title(base)} is taken. "
+            f"Its free faces: {words.free_faces(state, base)}.",
         )
     block = _new_block(
         state,
@@ -176,7 +176,7 @@ def _with_face(found: Block | Connector, label: str) -> Block:
         raise RefusalError(
             Cause.NO_SUCH_FACE,
             f"{words.heading(found)} has no face {shown(label)}. "
-            f"Its faces: {listing(found.module.face_of_label)}.",
+            f"Its faces: {words.named_faces(found, found.module.face_of_label)}.",
         )
     return found
 

@@ -11,7 +11,7 @@ from buildarena_geometry.state import MachineState
 
 
 def get_machine_summary(state: MachineState) -> Change:
-    """Lists the parts: id, module, base/face it sits on, center [east, north, up], and its use."""
+    """Lists the parts: id, module, base/face it sits on, position [east, north, up] and use."""
     return _answer(state, lambda: words.summary(state))
 
 

@@ -30,11 +30,11 @@ def twist_block(state: MachineState, block_id: BlockId, angle: Number) -> Change
             f"{words.heading(found)} sits on no face and can't be twisted.",
         )
     turn = about_axis(_seat_normal(state, found), -angle)
-    turned = f"by {plain(angle)}°"
+    how = f"by {plain(angle)}°"
     if isinstance(found, Connector):
         pose = found.world_from_connector.turned(turn)
-        return _move_connector(state, found, pose, f"Twisted {turned}")
-    return _move(state, found, found.world_from_block.turned(turn), "twisted " + turned)
+        return _move_connector(state, found, pose, f"Twisted {how}")
+    return _move(state, found, found.world_from_block.turned(turn), f"twisted {how}", turned=True)
 
 
 def shift_block(state: MachineState, block_id: BlockId, shift_real: Triple) -> Change:
@@ -55,7 +55,8 @@ def shift_block(state: MachineState, block_id: BlockId, shift_real: Triple) -> C
     if isinstance(found, Connector):
         pose = found.world_from_connector.shifted(shift_real)
         return _move_connector(state, found, pose, f"Shifted {moved}")
-    return _move(state, found, found.world_from_block.shifted(shift_real), "shifted " + moved)
+    pose = found.world_from_block.shifted(shift_real)
+    return _move(state, found, pose, f"shifted {moved}", turned=False)
 
 
 def flip_spin(state: MachineState, block_id: BlockId) -> Change:
@@ -76,7 +77,7 @@ def flip_spin(state: MachineState, block_id: BlockId) -> Change:
     return Change(
         after=after,
         touched=(block.id,),
-        render=lambda: f"Flipped. {words.place_line(block)}.",
+        render=lambda: f"Flipped. {words.place_line(after, block)}.",
     )
 
 
@@ -89,16 +90,19 @@ def _seat_normal(state: MachineState, found: Block | Connector) -> Vector:
     return state.blocks[seat[0]].face_normal(seat[1])
 
 
-def _move(state: MachineState, block: Block, pose: Pose, how: str) -> Change:
+def _move(state: MachineState, block: Block, pose: Pose, how: str, *, turned: bool) -> Change:
     moved = replace(block, world_from_block=pose)
     after = state.with_blocks(moved)
+
+    def render() -> str:
+        sentences = [f"Moved. {words.place_line(after, moved)}."]
+        if turned and moved.module.faces:
+            sentences.append(f"Free faces: {words.free_faces(after, moved)}.")
+        sentences += words.seats(state, after, moved.id)
+        return " ".join([*sentences, *words.losses(state, after)])
+
     return Change(
-        after=after,
-        placed=(block.id,),
-        attempt=f"{words.heading(block)} {how}",
-        render=lambda: " ".join(
-            [f"Moved. {words.place_line(moved)}.", *words.loosened(after, [block.id])]
-        ),
+        after=after, placed=(block.id,), attempt=f"{words.heading(block)} {how}", render=render
     )
 
 
