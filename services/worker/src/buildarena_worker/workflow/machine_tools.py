@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from buildarena_geometry import Machine, Refused, load_catalogue, tool_definitions
+from buildarena_geometry.feedback.modules import modules_text as catalogue_text
 from buildarena_pipeline.transcript import ActionResult
 from buildarena_worker.session.dialogue import Act
 from buildarena_worker.session.messages import Tool, ToolCall
@@ -71,13 +72,6 @@ def modules_text(names: Sequence[str] | None = None) -> str:
     """The module list for people and models, generated from the catalogue.
 
     Args:
-        names: Only these modules; all that can be built by default.
+        names: Only these modules, and the starting block; all that can be built by default.
     """
-    lines = []
-    for module in load_catalogue().values():
-        if module.kind in {"start", "cargo"} or (names is not None and module.name not in names):
-            continue
-        size = "connector" if module.size is None else " x ".join(f"{e:g}" for e in module.size)
-        facts = f"{size}, mass {module.mass:g}"
-        lines.append(f"- {module.name} ({facts}): {module.description}")
-    return "\n".join(lines)
+    return catalogue_text(load_catalogue(), names)
