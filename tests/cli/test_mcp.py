@@ -14,24 +14,13 @@ from live_api import live_api
 from mcp import ClientSession, StdioServerParameters, stdio_client
 from mcp.client.streamable_http import streamable_http_client
 from running import wait_until
+from working import work
 
 from buildarena_cli.local import free_port
-from buildarena_pipeline.runtime.active_lease import LeaseKeeper
-from buildarena_pipeline.runtime.job_runner import JobRunner
-from buildarena_simworker.simulate import simulate_handler
 from buildarena_worker.builtin.designs import DESIGNS
 from buildarena_worker.wiring import verifier
 
 BUILDARENA = str(Path(sys.executable).parent / "buildarena")
-
-
-def simulate_all(context) -> None:
-    keeper = LeaseKeeper(context.store.leases, lambda: None)
-    keeper.start()
-    JobRunner(context.store.leases, simulate_handler(context), keeper, "w").process_next(
-        "simulate.mujoco", ""
-    )
-    keeper.stop()
 
 
 async def play(connected, simulate) -> dict[str, object]:
@@ -76,7 +65,7 @@ async def said(session: ClientSession, tool: str, arguments: dict[str, object]) 
 def test_an_agent_builds_a_bridge_and_gets_its_score(context) -> None:
     with live_api(context) as url:
         server = StdioServerParameters(command=BUILDARENA, args=["mcp", "--url", url])
-        result = asyncio.run(play(stdio_client(server), lambda: simulate_all(context)))
+        result = asyncio.run(play(stdio_client(server), lambda: work(context)))
     assert result["outcome"] == "success"
     assert result["indicator"] > 100
     (job,) = context.store.jobs.page(limit=2)
@@ -92,7 +81,7 @@ def test_an_agent_builds_over_streamable_http(context) -> None:
         try:
             wait_until(lambda: _answers(port), 60, "the MCP server answers")
             connected = streamable_http_client(f"http://127.0.0.1:{port}/mcp")
-            result = asyncio.run(play(connected, lambda: simulate_all(context)))
+            result = asyncio.run(play(connected, lambda: work(context)))
         finally:
             server.terminate()
             server.wait()

@@ -124,9 +124,9 @@ def connect_blocks(
 
     Args:
         block_a: Id of the block where the connector begins.
-        face_a: Label of that block's face.
+        face_a: Label of the face of block_a.
         block_b: Id of the block where it ends.
-        face_b: Label of that block's face.
+        face_b: Label of the face of block_b.
         connector: Name of the connector.
         note: What it is for, in your words.
     """

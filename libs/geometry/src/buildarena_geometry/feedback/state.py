@@ -52,12 +52,10 @@ def block_lines(state: MachineState, blocks: Iterable[Block]) -> list[str]:
 
 
 def block_lines_with_faces(state: MachineState, blocks: Iterable[Block]) -> list[str]:
-    """Blocks of the state, a line each, with the letters and sides of their free faces."""
+    """Blocks of the state, a line each, with the letters and sides of their faces."""
     heat = heating(state)
     return [
-        _place_line(state, block, heat)
-        + (f", free faces {free_faces(state, block)}" if block.module.faces else "")
-        + _note(block.note)
+        _place_line(state, block, heat) + _letters(state, block) + _note(block.note)
         for block in blocks
     ]
 
@@ -228,6 +226,14 @@ def _seat(block: Block, joint: Joint | None) -> list[str]:
         flush = joint.offset <= FLUSH_OFFSET
         return [f"on {joint.base}/{joint.face}" if flush else _gap(joint)]
     return [] if block.lost_mount is None else ["on nothing"]
+
+
+def _letters(state: MachineState, block: Block) -> str:
+    if not block.module.faces:
+        return ""
+    taken = [label for label in block.module.face_of_label if state.is_occupied(block, label)]
+    rest = f"; taken {named_faces(block, taken)}" if taken else ""
+    return f", free faces {free_faces(state, block)}{rest}"
 
 
 def _gap(joint: Joint) -> str:
