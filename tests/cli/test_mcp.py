@@ -92,3 +92,28 @@ def _answers(port: int) -> bool:
     with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", port), timeout=1):
         return True
     return False
+
+
+async def side_by_side(connected) -> list[str]:
+    async with connected as (read, write), ClientSession(read, write) as session:
+        await session.initialize()
+        wish = {"task": "support-1", "agent": "mcp"}
+        opened = await said(session, "open_session", wish)
+        assert await said(session, "open_session", wish) == opened
+        ids = {"session": opened.split()[1]}
+        await said(session, "start", ids)
+        block = {**ids, "face": "E", "new_block": "small wooden block"}
+        # Each needs the one before it.
+        rows = [{**block, "base_block": str(number)} for number in range(1, 13)]
+        results = await asyncio.gather(*(said(session, "attach_block_to", row) for row in rows))
+        again = await said(session, "open_session", wish)
+        assert "It was open already, and 13 calls were made" in again
+        return results
+
+
+def test_calls_sent_side_by_side_are_done_in_the_order_sent(context) -> None:
+    with live_api(context) as url:
+        server = StdioServerParameters(command=BUILDARENA, args=["mcp", "--url", url])
+        results = asyncio.run(side_by_side(stdio_client(server)))
+    blocks = [result.split(",")[0] for result in results]
+    assert blocks == [f"Attached. {number} Small Wooden Block" for number in range(2, 14)]
