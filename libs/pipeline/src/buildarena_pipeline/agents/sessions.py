@@ -36,7 +36,7 @@ from buildarena_store import (
 )
 from buildarena_store.accounts.names import claim_name
 from buildarena_store.jobs.job import configuration_hash
-from buildarena_store.states import simulate_queue
+from buildarena_store.states import EXTERNAL_PROVIDER, simulate_queue
 
 AGENT_NAME = re.compile(r"[A-Za-z0-9_.-]{1,80}")
 CACHED_BENCHES = 256
@@ -109,7 +109,7 @@ class ExternalSessions:
         """
         chosen = self._check(task, agent, simulator)
         track = external_track(simulator, briefing_digest())
-        config = {"name": f"agent/{agent}", "provider": "external", "model": agent}
+        config = {"name": f"agent/{agent}", "provider": EXTERNAL_PROVIDER, "model": agent}
         key = JobKey(
             task=task,
             task_version=chosen.version,
