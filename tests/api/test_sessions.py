@@ -60,15 +60,70 @@ def test_calls_survive_a_restart_of_the_api(api, context, session) -> None:
     assert act(api, session, "get_machine_summary", {}).json()["feedback"].count("Wooden") == 1
 
 
-def test_sub_structures_are_joined_in_the_assembly(api, session) -> None:
+def test_sub_structures_are_joined_in_the_assembly(api) -> None:
+    session = api.post("/v1/sessions", json={**OPEN, "task": "support-2"}).json()["id"]
     for machine in ("left", "right"):
         act(api, session, "start", START, machine=machine)
-    assert api.post(f"/v1/sessions/{session}/submit").status_code == 409
+        act(api, session, "attach_block_to", ATTACH, machine=machine)
+    early = api.post(f"/v1/sessions/{session}/submit")
+    assert early.status_code == 409
+    detail = early.json()["detail"]
+    assert "2 machines ('left', 'right') and no assembly" in detail
+    assert "put them together in the machine 'assembly'" in detail
+    _assemble(api, session)
+    joined = {"block_a": "A_1", "face_a": "C", "block_b": "B_1", "face_b": "C"}
+    joined |= {"connector": "Brace", "note": ""}
+    assert act(api, session, "connect_blocks", joined, machine="assembly").json()["ok"]
+    done = api.post(f"/v1/sessions/{session}/submit")
+    assert done.status_code == 202
+    assert done.json()["stage"] == "simulate"
+
+
+def _assemble(api, session: str) -> None:
     for machine, shift in (("left", [0, 0, 0]), ("right", [3, 0, 0])):
         arguments = {"machine_id": machine, "init_shift": shift, "init_rotation": [0, 0, 0]}
         done = act(api, session, "add_machine", arguments, machine="assembly").json()
         assert done["ok"], done
-    assert api.post(f"/v1/sessions/{session}/submit").status_code == 202
+
+
+@pytest.mark.parametrize(
+    ("task", "reason", "says"),
+    [
+        ("support-1", "constraint_violated", "has 2 sub-structures, the task asks for 1"),
+        ("support-2", "unjoined_parts", "sub-structure B is not joined"),
+        ("lift-3", "unjoined_parts", "sub-structure B is not joined"),
+    ],
+)
+def test_an_assembly_that_breaks_a_constraint_is_a_scored_failure(api, task, reason, says) -> None:
+    session = api.post("/v1/sessions", json={**OPEN, "task": task}).json()["id"]
+    for machine in ("left", "right"):
+        act(api, session, "start", START, machine=machine)
+        act(api, session, "attach_block_to", ATTACH, machine=machine)
+    _assemble(api, session)
+    job = api.post(f"/v1/sessions/{session}/submit").json()
+    assert (job["outcome"], job["reason"]) == ("construction_failed", reason)
+    assert says in job["detail"]
+    assert (job["success"], job["indicator"]) == (False, 0.0)
+
+
+def test_a_rocket_in_one_piece_is_no_answer_where_two_are_asked_for(api) -> None:
+    session = api.post("/v1/sessions", json={**OPEN, "task": "lift-3"}).json()["id"]
+    act(api, session, "start", START)
+    act(api, session, "attach_block_to", ATTACH)
+    job = api.post(f"/v1/sessions/{session}/submit").json()
+    assert (job["outcome"], job["reason"]) == ("construction_failed", "constraint_violated")
+    assert job["detail"] == "the machine has 1 sub-structure, the task asks for 2"
+
+
+def test_a_block_that_was_shifted_away_is_named(api, session) -> None:
+    act(api, session, "start", START)
+    act(api, session, "attach_block_to", {**ATTACH, "new_block": "Water Cannon"})
+    for _ in range(2):
+        moved = {"block_id": "2", "shift_real": [0.5, 0, 0]}
+        assert act(api, session, "shift_block", moved).json()["ok"]
+    job = api.post(f"/v1/sessions/{session}/submit").json()
+    assert (job["outcome"], job["reason"]) == ("construction_failed", "unjoined_parts")
+    assert job["detail"].startswith("block 2 (Water Cannon) is not joined")
 
 
 def test_a_session_is_over_once_it_was_submitted(api, session) -> None:

@@ -1,13 +1,14 @@
 """Trajectories made by hand: what a scorer sees, whichever simulator wrote it."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from buildarena_benchmark import Task, builtin_tasks
 from buildarena_geometry import Machine
-from buildarena_simulation import Trajectory
+from buildarena_simulation import Bearing, Trajectory
 
 Path = Callable[[np.ndarray], np.ndarray]
 
@@ -57,6 +58,43 @@ def make_trajectory(
         simulation_version="1",
         settings=settings or {},
     )
+
+
+def with_bearing(
+    trajectory: Trajectory,
+    *,
+    ground: object = 0.0,
+    south: object = 0.0,
+    north: object = 0.0,
+    cargo: object = 0.0,
+    wheels: object = 0.0,
+    wheel_ids: Sequence[str] = (),
+) -> Trajectory:
+    """The trajectory with vertical forces, each a number or (T,); of wheels (T, W), mass·g."""
+    count = len(trajectory.time_s)
+
+    def series(value: object, width: int | None = None) -> np.ndarray:
+        shape = (count,) if width is None else (count, width)
+        return np.broadcast_to(np.asarray(value, dtype=np.float32), shape).copy()
+
+    bearing = Bearing(
+        ground=series(ground),
+        terrain=np.column_stack([series(south), series(north)]),
+        cargo=series(cargo),
+        wheels=series(wheels, len(wheel_ids)),
+        wheel_ids=tuple(wheel_ids),
+    )
+    return replace(trajectory, bearing=bearing)
+
+
+def with_pieces(trajectory: Trajectory, *groups: Sequence[str], since_s: float = 0.0) -> Trajectory:
+    """The trajectory in which groups of blocks come off as pieces at a time."""
+    pieces = np.zeros(trajectory.positions.shape[:2], dtype=np.int16)
+    for group in groups:
+        columns = [trajectory.block_ids.index(block) for block in group]
+        for column in columns:
+            pieces[trajectory.time_s >= since_s, column] = columns[0]
+    return replace(trajectory, pieces=pieces)
 
 
 @pytest.fixture(scope="session")

@@ -33,7 +33,7 @@ def test_a_vehicle_that_goes_far_enough_passes(
     result = score(tasks["transport-1"], car, trajectory_of(car, 30.0, moved=_north_east(1.0)))
     assert result.success
     assert result.indicator == pytest.approx(30.0, abs=1e-3)
-    assert result.flags == ()
+    assert result.flags == ("drive_not_measured",)
     metrics = result.metrics
     assert metrics["wheels"] == 4
     assert metrics["intact"] is True
@@ -102,7 +102,7 @@ def test_success_without_wheels_is_flagged(
         ),
     )
     assert result.success
-    assert result.flags == ("no_wheels",)
+    assert result.flags == ("no_wheels", "drive_not_measured")
 
 
 def test_a_start_too_high_fails_and_is_flagged(
@@ -113,7 +113,7 @@ def test_a_start_too_high_fails_and_is_flagged(
     )
     result = score(tasks["transport-1"], car, high)
     assert not result.success
-    assert result.flags == ("start_too_high",)
+    assert result.flags == ("start_too_high", "drive_not_measured")
 
 
 def test_wheels_that_drift_apart_are_not_intact(
@@ -160,7 +160,7 @@ def test_the_load_is_the_cargos_mass_when_it_sinks(
     sample = np.ceil(below * 25) / 25
     assert result.indicator == pytest.approx(float(_ramp(np.array([sample]))[0]), abs=4.1)
     assert result.metrics["fall_time_s"] == pytest.approx(sample, abs=0.05)
-    assert result.flags == ()
+    assert result.flags == ("span_not_measured",)
 
 
 def test_a_cargo_that_never_falls_counts_in_full_and_is_flagged(
@@ -169,7 +169,7 @@ def test_a_cargo_that_never_falls_counts_in_full_and_is_flagged(
     result = score(tasks["support-1"], car, _carried(trajectory_of, car, None))
     assert result.success
     assert result.indicator == 1500.0
-    assert result.flags == ("never_fell",)
+    assert result.flags == ("never_fell", "span_not_measured")
 
 
 def test_a_cargo_that_is_not_up_for_two_seconds_scores_nothing(
@@ -186,7 +186,7 @@ def test_a_cargo_that_starts_too_high_scores_nothing(
 ) -> None:
     result = score(tasks["support-1"], car, _carried(trajectory_of, car, 8.0, start=20.5))
     assert (result.success, result.indicator) == (False, 0.0)
-    assert result.flags == ("start_too_high",)
+    assert result.flags == ("start_too_high", "span_not_measured")
 
 
 # Lift

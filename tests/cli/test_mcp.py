@@ -73,6 +73,33 @@ def test_an_agent_builds_a_bridge_and_gets_its_score(context) -> None:
     assert report["ok"], [check for check in report["checks"] if not check["ok"]]
 
 
+async def play_against_the_rules(connected) -> dict[str, object]:
+    async with connected as (read, write, *_), ClientSession(read, write) as session:
+        await session.initialize()
+        wanted = {"task": "lift-3", "agent": "mcp", "simulator": "mujoco"}
+        opened = await said(session, "open_session", wanted)
+        here = {"session": opened.split()[1]}
+        part = {"base_block": "1", "face": "A", "new_block": "Small Wooden Block"}
+        for machine in ("engine", "frame"):
+            await said(session, "start", {**here, "machine": machine})
+            await said(session, "attach_block_to", {**here, "machine": machine, **part})
+        early = await session.call_tool("submit", here)
+        assert early.is_error
+        assert "2 machines ('engine', 'frame') and no assembly" in early.content[0].text
+        for height, machine in enumerate(("engine", "frame")):
+            added = {"machine_id": machine, "init_shift": [0, 0, 2 * height]}
+            await said(session, "add_machine", {**here, "machine": "assembly", **added})
+        return json.loads(await said(session, "submit", here))
+
+
+def test_an_agent_reads_which_rule_its_machine_breaks(context) -> None:
+    with live_api(context) as url:
+        server = StdioServerParameters(command=BUILDARENA, args=["mcp", "--url", url])
+        result = asyncio.run(play_against_the_rules(stdio_client(server)))
+    assert (result["outcome"], result["reason"]) == ("construction_failed", "unjoined_parts")
+    assert result["detail"].startswith("sub-structure B is not joined to the starting block A_1")
+
+
 def test_an_agent_builds_over_streamable_http(context) -> None:
     port = free_port()
     with live_api(context) as url:

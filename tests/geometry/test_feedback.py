@@ -131,6 +131,7 @@ SEQUENCES = {
     "start with a long note": (("start", {"note": "a  note\nof many words " * 9}),),
     "start elsewhere": (("start", {"init_shift": [1, -2, 0.5], "init_rotation": [45, 0, 0]}),),
     "connect": (*CAR[:5], connect("1", "D", "4", "D")),
+    "connect a block with itself": (*BEAM, connect("1", "C", "1", "D")),
     "remove a block": (*BEAM, connect("1", "C", "3", "C"), ("remove_block", {"block_id": "3"})),
     "remove a connector": (*BEAM, connect("1", "C", "3", "C"), ("remove_block", {"block_id": "5"})),
     "reset": (START, ("reset", {})),

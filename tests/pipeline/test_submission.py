@@ -68,6 +68,18 @@ def test_everything_that_is_wrong_is_named_with_the_choices(context, submissions
     assert context.store.jobs.page(limit=1) == []
 
 
+@pytest.mark.parametrize("workflow", ["builder", "guidance-builder"])
+def test_a_workflow_of_one_structure_is_refused_tasks_that_ask_for_two(
+    submissions, workflow
+) -> None:
+    with pytest.raises(SubmissionError) as caught:
+        submissions.submit_sweep(spec(tasks=["lift-2", "lift-3"], workflow=workflow))
+    (issue,) = caught.value.issues
+    assert issue.path == "tasks[1]"
+    assert "lift-3 asks for several sub-structures" in issue.message
+    assert issue.choices == ("five-role",)
+
+
 def test_an_oversized_sweep_is_refused(context, submissions) -> None:
     with pytest.raises(SubmissionError, match="200,000 jobs; the largest accepted has 100,000"):
         submissions.submit_sweep(spec(seeds=None, samples=100_000))

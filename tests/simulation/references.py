@@ -88,7 +88,7 @@ def _table() -> dict[str, Reference]:
         "long-carrier-without-keys": ref(
             "transport-3", "bad", lambda: d.car(9, 2, deck_half=(2, 4), bound=False)
         ),
-        "one-shot-bridge": ref("support-1", "good", d.one_shot_bridge),
+        "one-shot-bridge": ref("support-1", "bad", d.one_shot_bridge),
         "beam-overlapping-braces": ref("support-1", "good", lambda: d.beam(7, "12")),
         "deck-cross-braced": ref("support-1", "good", lambda: d.deck(5, 7, cross=True)),
         "deck": ref("support-1", "mediocre", lambda: d.deck(5, 7)),
@@ -102,11 +102,11 @@ def _table() -> dict[str, Reference]:
         ),
         "wide-deck-on-nine-pillars": ref(
             "support-2",
-            "good",
+            "bad",
             lambda: d.deck(3, 13, cross=True, along="12", pillars=5, pillar_at=_NINE),
         ),
         "wide-deck-on-two-pillars": ref(
-            "support-2", "mediocre", lambda: d.deck(3, 13, cross=True, pillars=5)
+            "support-2", "bad", lambda: d.deck(3, 13, cross=True, pillars=5)
         ),
         "wide-deck": ref("support-2", "mediocre", lambda: d.deck(3, 13, cross=True)),
         "wide-beam-too-short": ref("support-2", "bad", lambda: d.beam(9, "tb")),
@@ -115,7 +115,7 @@ def _table() -> dict[str, Reference]:
         ),
         "long-deck-on-pillars": ref(
             "support-3",
-            "good",
+            "bad",
             lambda: d.deck(
                 3, 23, cross=True, along="12", pillars=5, pillar_at=((0, -6), (0, 0), (0, 6))
             ),

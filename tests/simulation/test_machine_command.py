@@ -6,7 +6,7 @@ from pathlib import Path
 import av
 import pytest
 from PIL import Image
-from tests.simulation.designs import beam, replayed
+from tests.simulation.designs import beam, loose_cannon, replayed
 from tests.simulation.references import DATA
 from typer.testing import CliRunner
 
@@ -162,3 +162,30 @@ def test_an_unknown_task_is_reported_with_the_known_ones(run) -> None:
     done = run("simulate", str(DATA / "beam.json"), task_name="support-9")
     assert done.exit_code == 1
     assert "support-3" in done.output
+
+
+@pytest.mark.parametrize("form", ["log", "document"])
+def test_a_machine_that_breaks_a_constraint_is_not_simulated(
+    run, tmp_path: Path, form: str
+) -> None:
+    machine = replayed(loose_cannon())
+    content = loose_cannon() if form == "log" else machine.to_document()
+    file = tmp_path / "loose.json"
+    file.write_text(json.dumps(content), encoding="utf-8")
+    done = run("simulate", str(file), "--json", task_name="lift-2")
+    assert done.exit_code == 0
+    assert "not simulated: unjoined_parts: block 2 (Water Cannon) is not joined" in done.stderr
+    report = json.loads(done.stdout)
+    assert (report["success"], report["indicator"], report["engine"]) == (False, 0.0, None)
+    repeated = run("simulate", str(file), "--seeds", "3", "--json", task_name="lift-2")
+    assert json.loads(repeated.stdout)["successes"] == 0
+    checked = run("check", str(file), task_name="lift-2")
+    assert checked.exit_code == 1
+
+
+def test_an_assembly_with_too_few_sub_structures_is_not_simulated(run) -> None:
+    done = run("simulate", str(DATA / "rocket-two.json"), "--json", task_name="lift-3")
+    assert "the machine has 1 sub-structure, the task asks for 2" in done.stderr
+    assert json.loads(done.stdout)["success"] is False
+    fine = run("check", str(DATA / "assembly-braced.json"), task_name="lift-3")
+    assert fine.exit_code == 0, fine.output

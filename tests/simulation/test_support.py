@@ -45,6 +45,14 @@ def test_a_braced_deck_carries_more_than_a_bare_one(engine: str, tasks: dict[str
     assert min(event.time_s for event in trajectory.breaks) > 5.0  # not while the cargo is light
 
 
+def test_the_one_shot_bridge_stands_in_the_gap(engine: str, tasks: dict[str, Task]) -> None:
+    result, _ = _trial(tasks["support-1"], one_shot_bridge(), engine)
+    assert result.metrics["load_when_decided"] >= 900.0
+    assert (result.success, result.indicator) == (False, 0.0)
+    assert result.flags == ("does_not_span",)
+    assert result.metrics["floor_share"] > 0.5  # its pillars reach the gap's floor
+
+
 def test_the_one_shot_bridge_breaks_where_the_paper_reports_its_load(
     engine: str, tasks: dict[str, Task]
 ) -> None:

@@ -160,7 +160,7 @@ def test_the_papers_suspension_bridge_is_built_from_parts_and_scored(
     assert_verified(context, job)
     if roped:
         assert (job.outcome, job.flags) == ("success", [])
-        assert 900 < job.indicator < 1400
+        assert 900 < job.indicator < 1500
     else:
         assert (job.outcome, job.reason) == ("construction_failed", "constraint_violated")
         assert "0 of Winch" in job.detail

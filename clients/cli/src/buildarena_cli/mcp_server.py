@@ -191,8 +191,8 @@ def _opened(session: Mapping[str, Any]) -> str:
 def _ended(job: Mapping[str, Any]) -> str:
     if job["outcome"] is None:
         return f"not ended yet: {job['stage']} {job['state']}"
-    shown = {name: job[name] for name in ("outcome", "reason", "success", "indicator", "metrics")}
-    return json.dumps(shown)
+    names = ("outcome", "reason", "detail", "success", "indicator", "flags", "metrics")
+    return json.dumps({name: job[name] for name in names})
 
 
 def _result(text: str, *, failed: bool = False) -> types.CallToolResult:

@@ -1,4 +1,8 @@
-"""What a task allows: checked on the machine, not only asked for."""
+"""What a task allows: checked on the machine, not only asked for.
+
+Every road by which a machine can come to a trial passes here: sessions of models, external agents'
+submissions, verification of what an archive brought, and the command `machine simulate`.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +10,8 @@ from collections import Counter
 
 from buildarena_benchmark.tasks.task import Task
 from buildarena_geometry import Machine
+
+_MAX_NAMED = 10
 
 
 def broken_constraint(task: Task, machine: Machine) -> tuple[str, str] | None:
@@ -18,27 +24,82 @@ def broken_constraint(task: Task, machine: Machine) -> tuple[str, str] | None:
     Returns:
         Class and sentence, or None when the machine may be simulated.
     """
-    constraints = task.constraints
     if not machine.started:
         return "empty_machine", "no machine was started"
     if len(machine.blocks) == 1 and not machine.connectors:
         return "empty_machine", "the machine is nothing but its starting block"
-    crowded = _crowded(task, machine)
-    if crowded is not None:
-        return "constraint_violated", crowded
+    for check in (_crowded, _wrong_modules, _wrong_structures):
+        problem = check(task, machine)
+        if problem is not None:
+            return "constraint_violated", problem
+    loose = _unjoined(machine)
+    return None if loose is None else ("unjoined_parts", loose)
+
+
+def _wrong_modules(task: Task, machine: Machine) -> str | None:
+    """Whether the machine has a module that is not allowed, or too few of one."""
+    constraints = task.constraints
     used = Counter(block.module.name for block in machine.blocks.values())
     used.update(connector.module.name for connector in machine.connectors.values())
     if constraints.modules is not None:
         foreign = set(used) - {*constraints.modules, machine.catalogue.start.name}
         if foreign:
-            return "constraint_violated", f"{min(foreign)} is not among the task's modules"
+            return f"{min(foreign)} is not among the task's modules"
     for name, least in constraints.min_modules.items():
         if used[name] < least:
-            return (
-                "constraint_violated",
-                f"the machine has {used[name]} of {name}, the task asks for {least} or more",
-            )
+            return f"the machine has {used[name]} of {name}, the task asks for {least} or more"
     return None
+
+
+def _wrong_structures(task: Task, machine: Machine) -> str | None:
+    """Whether the machine has too few or too many sub-structures, or an empty one.
+
+    Copies of one sub-structure are enough for the fewest and count once against the most, unless
+    the task asks for one.
+    """
+    used = {block.structure for block in machine.blocks.values()}
+    placed = {key: found for key, found in machine.sub_structures.items() if key in used}
+    copies = len(placed) or 1
+    least, most = task.constraints.min_sub_structures, task.constraints.max_sub_structures
+    kinds = len({found.source for found in placed.values()}) or 1
+    count = copies if most == 1 or copies < least else kinds
+    if copies < least or count > most:
+        allowed = str(most) if least == most else f"{least} to {most}"
+        named = "sub-structure" if count == 1 else "sub-structures"
+        return f"the machine has {count} {named}, the task asks for {allowed}"
+    sizes = Counter(block.structure for block in machine.blocks.values())
+    for letter in machine.sub_structures:
+        if sizes[letter] == 1:
+            return f"sub-structure {letter} is nothing but its starting block"
+    return None
+
+
+def _unjoined(machine: Machine) -> str | None:
+    """Which parts nothing joins to the first starting block, as a sentence.
+
+    Attachments and axles join while they hold, and so do braces and winches.
+    """
+    loose = machine.detached
+    if not loose:
+        return None
+    whole = [
+        letter
+        for letter in machine.sub_structures
+        if all(b.id in loose for b in machine.blocks.values() if b.structure == letter)
+    ]
+    rest = [block for block in loose if machine.blocks[block].structure not in whole]
+    named = [f"sub-structure {letter}" for letter in whole]
+    named += [f"block {block} ({machine.blocks[block].module.name})" for block in rest]
+    shown = named[:_MAX_NAMED]
+    if len(named) > len(shown):
+        shown.append(f"{len(named) - len(shown)} more")
+    listed = shown[0] if len(shown) == 1 else f"{', '.join(shown[:-1])} and {shown[-1]}"
+    first = next(iter(machine.blocks))
+    verb = "is" if len(named) == 1 else "are"
+    return (
+        f"{listed} {verb} not joined to the starting block {first}: join every part by an "
+        "attachment that holds, a brace or a winch"
+    )
 
 
 def _crowded(task: Task, machine: Machine) -> str | None:

@@ -1,9 +1,10 @@
-"""How a machine does when its trial is repeated: a result that a nudge changes is luck."""
+"""How a machine does when its trial is repeated: a result that a small shift changes is luck."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from buildarena_benchmark.constraints import broken_constraint
 from buildarena_benchmark.scores import failed_score, score
 from buildarena_simulation import MachineNotSimulable, simulate
 
@@ -46,6 +47,8 @@ def robustness(
 ) -> Robustness:
     """Tries a machine once per seed, its start varied as a fair repetition would vary it.
 
+    A machine that breaks one of the task's constraints fails every trial without being simulated.
+
     Args:
         task: The task.
         machine: What is tried.
@@ -54,6 +57,9 @@ def robustness(
         on_progress: Called after each trial with the share that is done.
     """
     scores = []
+    if broken_constraint(task, machine) is not None:
+        scores = [failed_score(task, machine)] * len(seeds)
+        return Robustness(seeds=tuple(seeds), scores=tuple(scores))
     for k, seed in enumerate(seeds, 1):
         try:
             trajectory = simulate(machine, task.scenario, engine, seed=seed)

@@ -53,9 +53,9 @@ def score(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Score:
     Returns:
         The score; a rollout that blew up is flagged `unstable` and is never a success.
     """
-    verdict = _SCORERS[task.scorer](task.scoring, machine, trajectory)
+    verdict = _SCORERS[task.scorer](task, machine, trajectory)
     metrics = {**_machine_metrics(machine), **_finite(verdict.metrics)}
-    if is_unstable(machine, trajectory):
+    if is_unstable(task.scenario, machine, trajectory, verdict.deciding):
         return Score(
             success=False,
             indicator=0.0,

@@ -3,7 +3,6 @@
 Importing this package loads no engine, no pyarrow and no scipy; `simulate` does, when called.
 """
 
-from buildarena_simulation.bearing import Bearing
 from buildarena_simulation.engines import ENGINES, engine_version
 from buildarena_simulation.errors import (
     BuildarenaSimulationError,
@@ -15,7 +14,7 @@ from buildarena_simulation.errors import (
 from buildarena_simulation.parquet import read_trajectory, write_trajectory
 from buildarena_simulation.rollout import SIMULATION_VERSION, simulate
 from buildarena_simulation.scenario import Scenario
-from buildarena_simulation.trajectory import Break, JointPeak, Trajectory
+from buildarena_simulation.trajectory import Bearing, Break, JointPeak, Trajectory
 
 __all__ = [
     "ENGINES",

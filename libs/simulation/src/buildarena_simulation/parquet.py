@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from buildarena_simulation.bearing import Bearing
 from buildarena_simulation.errors import TrajectoryFormatError
-from buildarena_simulation.trajectory import Break, JointPeak, Trajectory
+from buildarena_simulation.trajectory import Bearing, Break, JointPeak, Trajectory
 
 if TYPE_CHECKING:
     import pyarrow as pa

@@ -7,8 +7,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from buildarena_simulation.bearing import Bearing
-
 Setting = float | int | str
 
 POSE_GRAIN: Final = 2.0**-14
@@ -54,6 +52,42 @@ class Break:
     kind: str
     ratio: float
     cargo_mass: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Bearing:
+    """Vertical contact forces at T instants, each the mean over a moment before it, mass·g.
+
+    Upwards is positive. K terrain boxes, W wheels. Arrays are read-only.
+
+    Attributes:
+        ground: (T,) float32, of the ground on the machine.
+        terrain: (T, K) float32, of each terrain box on the machine.
+        cargo: (T,) float32, of the machine on the cargo.
+        wheels: (T, W) float32, of ground and terrain on each wheel.
+        wheel_ids: (W,) ids of the wheels.
+    """
+
+    ground: NDArray[np.float32]
+    terrain: NDArray[np.float32]
+    cargo: NDArray[np.float32]
+    wheels: NDArray[np.float32]
+    wheel_ids: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        """Checks that the arrays fit together, and closes them."""
+        count = len(self.ground)
+        shapes = {
+            "ground": (count,),
+            "terrain": (count, self.terrain.shape[-1]),
+            "cargo": (count,),
+            "wheels": (count, len(self.wheel_ids)),
+        }
+        for name, shape in shapes.items():
+            array = getattr(self, name)
+            if array.shape != shape:
+                raise ValueError(f"{name} has shape {array.shape}, expected {shape}")
+            array.setflags(write=False)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

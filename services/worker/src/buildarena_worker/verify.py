@@ -19,7 +19,7 @@ from typing import Any
 import structlog
 from sqlalchemy.exc import OperationalError
 
-from buildarena_benchmark import failed_score, score
+from buildarena_benchmark import broken_constraint, failed_score, score
 from buildarena_geometry import KeyPress, Machine
 from buildarena_pipeline.agents.workbench import Workbench
 from buildarena_pipeline.catalog.prompt_packs import PromptPacks
@@ -43,6 +43,7 @@ from buildarena_store import (
     ExternalCall,
     Job,
     JobState,
+    Outcome,
     RolloutRecord,
     Store,
     Usage,
@@ -183,6 +184,10 @@ class Verifier:
         machine = None if chosen is None else chosen[1]
         records = self._store.rollouts.read(job.id)
         if machine is not None:
+            if job.outcome != Outcome.LIMIT:
+                broken = broken_constraint(task_of(job, self._tasks), machine)
+                kept = None if records else job.reason
+                checks.append(_compare("reason", kept, None if broken is None else broken[0]))
             for record in records:
                 checks += self._rollout_checks(job, record, machine, None)
         return checks + self._score_checks(job, machine, records)

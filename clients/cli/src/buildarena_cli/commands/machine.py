@@ -67,7 +67,7 @@ def simulate_command(  # noqa: PLR0917 - the command line passes options by name
     as_json: Annotated[bool, typer.Option("--json", help="Print the score as JSON.")] = False,
 ) -> None:
     """Simulate a machine in a task's trial and score it."""
-    from buildarena_benchmark import failed_score, score
+    from buildarena_benchmark import broken_constraint, failed_score, score
     from buildarena_simulation import ENGINES, write_trajectory
 
     with shown_errors():
@@ -82,10 +82,13 @@ def simulate_command(  # noqa: PLR0917 - the command line passes options by name
             raise CommandError(f"--seeds makes many trials, {single[0]} is for one; give either")
         chosen, machine = chosen_task(task), read_machine(file)
         engine = engine or ENGINES[0]
+        broken = broken_constraint(chosen, machine)
+        if broken is not None:
+            warn(f"not simulated: {broken[0]}: {broken[1]}")
         if seeds is not None:
             show_robustness(chosen, machine, engine, seeds, as_json=as_json)
             return
-        rollout = _simulated(machine, chosen, engine, seed)
+        rollout = None if broken is not None else _simulated(machine, chosen, engine, seed)
         if rollout is None:
             result = failed_score(chosen, machine)
         else:

@@ -42,7 +42,8 @@ def check(
         chosen = None if task is None else chosen_task(task)
         broken = None if chosen is None else broken_constraint(chosen, machine)
         problems = [f"block {block} is attached to nothing" for block in machine.detached]
-        problems += [] if broken is None else [f"{broken[0]}: {broken[1]}"]
+        if broken is not None and not (problems and broken[0] == "unjoined_parts"):
+            problems.append(f"{broken[0]}: {broken[1]}")
         found = {**_facts(machine), "problems": problems}
         if as_json:
             print_json(found)

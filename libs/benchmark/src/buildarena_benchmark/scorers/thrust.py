@@ -1,14 +1,16 @@
 """Lift, level 1: thrust over weight."""
 
-from collections import Counter
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from buildarena_benchmark.scorers.verdict import Metric, Verdict, rounded
+from buildarena_benchmark.scorers.pieces import Mask, joined_to_start, mass_of
+from buildarena_benchmark.scorers.verdict import Deciding, Metric, Verdict, rounded
 from buildarena_benchmark.tasks.document import ThrustScoring
 
 if TYPE_CHECKING:
+    from buildarena_benchmark.tasks.task import Task
     from buildarena_geometry import Machine
     from buildarena_simulation import Trajectory
 
@@ -16,39 +18,61 @@ _WARM_UP_S = 1.0
 _HEATED_SHARE = 0.5
 
 
-def judge(scoring: ThrustScoring, machine: "Machine", trajectory: "Trajectory") -> Verdict:
-    """The indicator is the thrust of all cannons, heated and cold, over the total mass.
+def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict:
+    """The indicator is the net thrust's length over the weight.
 
     Args:
-        scoring: Thresholds.
-        machine: Gives the mass and the cannons' thrusts.
-        trajectory: Gives the heated cannons.
+        task: Thresholds.
+        machine: Gives the mass, the cannons' thrusts and directions.
+        trajectory: Gives the heated cannons, and those that stay joined.
 
-    Source: the paper, section "Evaluation".
+    Source: the paper, section "Evaluation", with thrusts added as vectors.
     """
-    ratio, metrics = thrust_to_weight(machine, trajectory)
-    return Verdict(success=ratio > scoring.min_ratio, indicator=rounded(ratio), metrics=metrics)
+    scoring = task.scoring
+    assert isinstance(scoring, ThrustScoring)  # noqa: S101 - the scorer is chosen by it
+    joined = joined_to_start(machine, trajectory)
+    count = len(trajectory.time_s)
+    ratio, metrics = thrust_to_weight(machine, trajectory, joined, count)
+    return Verdict(
+        success=ratio > scoring.min_ratio,
+        indicator=rounded(ratio),
+        metrics=metrics,
+        deciding=Deciding(samples=count, members=joined, cargo=False),
+    )
 
 
 def thrust_to_weight(
-    machine: "Machine", trajectory: "Trajectory"
+    machine: "Machine", trajectory: "Trajectory", joined: Mask, samples: int
 ) -> tuple[float, dict[str, Metric]]:
-    """Thrust over weight, and how many cannons are heated and cold.
+    """Net thrust over weight, and how many of its cannons are heated and cold.
 
-    A cannon counts as heated if a flame touches it for half the trial, its first second aside.
+    The thrusts are added as vectors, in the machine as it was built: cannons that push against
+    each other cancel. A cannon counts if it stays joined to the starting block; the weight is that
+    of everything joined to it at the start, so that nothing is gained by parts that come off. A
+    cannon counts as heated if a flame touches it for half the trial, its first second aside.
+
+    Args:
+        machine: The machine.
+        trajectory: The trial.
+        joined: As `joined_to_start` says.
+        samples: How many samples a cannon must stay joined for.
     """
     settled = trajectory.heated[trajectory.time_s >= _WARM_UP_S]
     share = settled.mean(axis=0) if len(settled) else np.zeros(len(trajectory.cannon_ids))
-    is_heated = share >= _HEATED_SHARE
-    heated = int(is_heated.sum())
-    cannons = [machine.blocks[block].module.thrust for block in trajectory.cannon_ids]
-    pushes = Counter(
-        thrust.heated if hot else thrust.cold
-        for thrust, hot in zip(cannons, is_heated, strict=True)
-        if thrust is not None
+    stays = dict(
+        zip(trajectory.block_ids, np.atleast_1d(joined[:samples].all(axis=0)), strict=True)
     )
-    # Counted first: products of equal pushes round alike, whatever the cannons' order.
-    total = sum(push * count for push, count in sorted(pushes.items()))
-    mass = float(machine.mass)
-    ratio = total / mass if mass > 0 else 0.0
-    return ratio, {"heated_cannons": heated, "cold_cannons": len(cannons) - heated}
+    pushes, heated = [], 0
+    for block_id, hot in zip(trajectory.cannon_ids, share >= _HEATED_SHARE, strict=True):
+        block = machine.blocks[block_id]
+        thrust, spray = block.module.thrust, block.pointing_xyz
+        if thrust is None or spray is None or not stays.get(block_id, True):
+            continue
+        heated += int(hot)
+        size = thrust.heated if hot else thrust.cold
+        pushes.append([-size * component for component in spray])
+    # Exact sums: they do not depend on the cannons' order.
+    net = [math.fsum(component) for component in zip(*pushes, strict=True)]
+    mass = mass_of(machine, trajectory, joined[0])
+    ratio = math.hypot(*net) / mass if mass > 0 else 0.0
+    return ratio, {"heated_cannons": heated, "cold_cannons": len(pushes) - heated}

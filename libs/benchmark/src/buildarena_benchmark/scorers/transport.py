@@ -5,11 +5,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from buildarena_benchmark.scorers.pieces import Mask, joined_to_start
+from buildarena_benchmark.scorers.rolling import driven_distances
 from buildarena_benchmark.scorers.series import Series, speeds, starting_block
-from buildarena_benchmark.scorers.verdict import Metric, Verdict, rounded
+from buildarena_benchmark.scorers.verdict import Deciding, Metric, Verdict, rounded
 from buildarena_benchmark.tasks.document import TransportScoring
 
 if TYPE_CHECKING:
+    from buildarena_benchmark.tasks.task import Task
     from buildarena_geometry import Machine
     from buildarena_simulation import Trajectory
 
@@ -19,52 +22,72 @@ _SETTLED_S = 2.0
 _INTACT_SPREAD = 1.0
 """Wheel-to-wheel distances of an intact vehicle vary by no more, units."""
 
+_BORNE_SAMPLES = 12
+"""Half a second: whether a machine bears its cargo is judged over so long."""
+
+_BORNE_SHARE = 0.5
+
 _RESTING = 1e-3
 """Slower movement has no direction worth judging, units/s."""
 
 
-def judge(scoring: TransportScoring, machine: "Machine", trajectory: "Trajectory") -> Verdict:
-    """The indicator is the greatest horizontal distance of the subject from its start.
+def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict:
+    """The indicator is the greatest horizontal distance the subject was driven from its start.
 
-    The trial succeeds if it exceeds the distance asked for, the machine has wheels enough and
-    nothing starts too high. A machine that nothing drives (no key bound, none pressed, nothing
-    powered) fails with an indicator of 0.
+    At each moment the distance counts as far as wheels have carried the machine; see
+    `driven_distances`. A cargo counts while the machine bears it. The trial succeeds if the
+    indicator exceeds the distance asked for, the machine has wheels enough and nothing starts too
+    high. A machine that nothing drives (no key bound, none pressed, nothing powered) fails with an
+    indicator of 0.
 
     Args:
-        scoring: Thresholds and target.
+        task: Thresholds and target.
         machine: Gives wheels and bindings.
         trajectory: The trial.
 
     Flags:
-        `no_wheels`: success without any wheel. `start_too_high`: something started at or above the
-        limit.
+        `no_wheels`: far enough without any wheel. `start_too_high`: something started at or above
+        the limit. `not_driven`: far enough, but not by wheels. `drive_not_measured`: what bears
+        the wheels, or how they move, is not known, so any distance counts.
 
     Source: the paper, section "Evaluation"; thresholds as in the published evaluation.
     """
+    scoring = task.scoring
+    assert isinstance(scoring, TransportScoring)  # noqa: S101 - the scorer is chosen by it
     path = _subject_path(scoring, machine, trajectory)
     wheels = [b.id for b in machine.blocks.values() if b.module.spins]
     if path is None or not _is_driven(machine, trajectory):
         return Verdict(
             success=False, indicator=0.0, metrics={"wheels": len(wheels), "driven": False}
         )
-    indicator = float(np.linalg.norm(path[:, :2] - path[0, :2], axis=1).max())
+    joined = joined_to_start(machine, trajectory)
+    moved = np.linalg.norm(path[:, :2] - path[0, :2], axis=1)
+    driven = driven_distances(machine, trajectory, joined, path)
+    counted = moved if driven is None else np.minimum(moved, driven)
+    if driven is not None and scoring.subject == "cargo":
+        counted = np.where(_is_borne(trajectory), counted, 0.0)
+    distance, indicator = float(moved.max()), float(counted.max())
     start_height = (
         float(path[0, 2])
         if scoring.subject == "cargo"
         else float(trajectory.positions[0, :, 2].max())
     )
     too_high = start_height >= scoring.max_start_height
-    reached = indicator > scoring.min_distance and len(wheels) >= scoring.min_wheels
-    flags = []
-    if reached and not wheels:
-        flags.append("no_wheels")
-    if too_high:
-        flags.append("start_too_high")
+    enough = len(wheels) >= scoring.min_wheels
+    reached = indicator > scoring.min_distance and enough
+    moved_enough = distance > scoring.min_distance and enough
+    flags = {
+        "no_wheels": moved_enough and not wheels,
+        "start_too_high": too_high,
+        "not_driven": moved_enough and not reached,
+        "drive_not_measured": driven is None,
+    }
     settled = trajectory.time_s >= _SETTLED_S
     metrics: dict[str, Metric] = {
         "wheels": len(wheels),
         "driven": True,
         "start_height": rounded(start_height),
+        "displacement": rounded(distance),
         "intact": _is_intact(trajectory, wheels),
         "max_speed": rounded(speeds(trajectory.time_s, path[:, None]).max(initial=0.0)),
         "broken_joints": len(trajectory.breaks),
@@ -74,8 +97,22 @@ def judge(scoring: TransportScoring, machine: "Machine", trajectory: "Trajectory
         success=reached and not too_high,
         indicator=rounded(indicator),
         metrics=metrics,
-        flags=tuple(flags),
+        flags=tuple(flag for flag, holds in flags.items() if holds),
+        deciding=Deciding(samples=len(path), members=joined, cargo=scoring.subject == "cargo"),
     )
+
+
+def _is_borne(trajectory: "Trajectory") -> Mask:
+    """At which samples the machine bears at least half of the cargo, over the last moments, (T,).
+
+    A cargo that hops on its deck is borne; one that was thrown, or lies on the ground, is not.
+    """
+    assert trajectory.bearing is not None  # noqa: S101 - the caller looked
+    assert trajectory.cargo_mass is not None  # noqa: S101
+    load = trajectory.bearing.cargo.astype(np.float64)
+    sums = np.cumsum([load, trajectory.cargo_mass], axis=1)
+    sums[:, _BORNE_SAMPLES:] -= sums[:, :-_BORNE_SAMPLES].copy()
+    return np.asarray(sums[0] >= _BORNE_SHARE * sums[1])
 
 
 def _subject_path(

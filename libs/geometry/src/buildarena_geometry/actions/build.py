@@ -160,7 +160,7 @@ def connect_blocks(
     return Change(
         after=after,
         touched=(link.id,),
-        render=lambda: f"Connected. {words.connector_line(link)}.",
+        render=lambda: f"Connected. {words.connector_line(link)}.{words.idle(link)}",
     )
 
 

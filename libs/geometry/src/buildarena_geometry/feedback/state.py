@@ -89,6 +89,13 @@ def free_faces(state: MachineState, block: Block) -> str:
     return named_faces(block, state.free_faces(block))
 
 
+def idle(link: Connector) -> str:
+    """A further sentence on a connector that begins and ends on one block; "" for others."""
+    if link.start[0] != link.end[0]:
+        return ""
+    return f" Both faces are block {link.start[0]}'s, so it joins and strengthens nothing."
+
+
 def faces(state: MachineState, block: Block) -> str:
     """The faces of a block: where they are, which way they look, what sits on them."""
     if not block.module.faces:

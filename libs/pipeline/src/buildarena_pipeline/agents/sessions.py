@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from threading import Lock
 from typing import Any
@@ -16,7 +16,7 @@ from buildarena_pipeline.agents.briefing import (
     briefing,
     briefing_digest,
 )
-from buildarena_pipeline.agents.workbench import Workbench, check_arguments, rebuild
+from buildarena_pipeline.agents.workbench import ASSEMBLY, Workbench, check_arguments, rebuild
 from buildarena_pipeline.catalog.tracks import SIMULATORS, external_track
 from buildarena_pipeline.errors import PipelineError, SubmissionError
 from buildarena_pipeline.runtime.context import Context
@@ -182,11 +182,10 @@ class ExternalSessions:
             lease = self._open_lease(job_id, connection)
             job = lease.job
             calls = context.store.external_calls.read(job_id, connection=connection)
-            chosen = rebuild(calls).result()
+            bench = rebuild(calls)
+            chosen = bench.result()
             if chosen is None:
-                raise NothingToSubmitError(
-                    "there is no machine to simulate: build one, or join several in 'assembly'"
-                )
+                raise NothingToSubmitError(_what_to_do(bench.machines))
             _, machine = chosen
             transcript = _transcript(calls)
             kept = context.artifacts.put(machine_bytes(machine), JSON)
@@ -265,6 +264,18 @@ class ExternalSessions:
             self._benches[job_id, count] = bench
             while len(self._benches) > CACHED_BENCHES:
                 self._benches.popitem(last=False)
+
+
+def _what_to_do(machines: Collection[str]) -> str:
+    """Why there is nothing to submit, and how there would be."""
+    if not machines:
+        return "there is no machine to simulate: build one, beginning with the tool 'start'"
+    listed = ", ".join(repr(name) for name in machines)
+    return (
+        f"there are {len(machines)} machines ({listed}) and no assembly: put them together in the "
+        f"machine {ASSEMBLY!r}, with add_machine for each and connect_blocks between them, then "
+        "submit again"
+    )
 
 
 def _unknown(field: str, value: str, choices: Sequence[str]) -> ValidationIssue:

@@ -10,6 +10,7 @@ from pathlib import Path
 from buildarena_pipeline.errors import StartupError
 
 BUILTIN_WORKFLOWS = ("five-role", "guidance-builder", "builder")
+ONE_STRUCTURE = frozenset({"guidance-builder", "builder"})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -21,12 +22,14 @@ class WorkflowSource:
         place: ``module`` or ``path/to/file.py``; "" for a built-in one.
         class_name: Name of the class there.
         digest: Hash of the file, part of the track; "" for built-in ones and installed modules.
+        one_structure: Whether it builds one structure and never puts several together.
     """
 
     name: str
     place: str = ""
     class_name: str = ""
     digest: str = ""
+    one_structure: bool = False
 
 
 def workflow_sources(settings: Mapping[str, str]) -> dict[str, WorkflowSource]:
@@ -38,7 +41,10 @@ def workflow_sources(settings: Mapping[str, str]) -> dict[str, WorkflowSource]:
     Raises:
         StartupError: An entry can't be used; the message names it.
     """
-    sources = {name: WorkflowSource(name=name) for name in BUILTIN_WORKFLOWS}
+    sources = {
+        name: WorkflowSource(name=name, one_structure=name in ONE_STRUCTURE)
+        for name in BUILTIN_WORKFLOWS
+    }
     for name, target in settings.items():
         place, colon, class_name = target.rpartition(":")
         if not colon or not place or not class_name.isidentifier():

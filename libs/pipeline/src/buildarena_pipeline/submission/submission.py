@@ -219,8 +219,27 @@ class Submissions:
             *_unknown("simulator", {"simulator": variant.simulator}, SIMULATORS),
             *_unknown("prompt pack", {"prompts": variant.prompts}, self._packs.names),
         ]
+        issues = issues or self._hopeless(variant.workflow, tasks, found)
         if issues:
             raise SubmissionError(issues)
+
+    def _hopeless(
+        self, workflow: str, tasks: Mapping[str, str], found: Mapping[str, Task]
+    ) -> list[ValidationIssue]:
+        """An issue for each task that asks for more sub-structures than the workflow builds."""
+        if not self._workflows[workflow].one_structure:
+            return []
+        able = sorted(name for name, kind in self._workflows.items() if not kind.one_structure)
+        return [
+            ValidationIssue(
+                path=path,
+                message=f"{name} asks for several sub-structures, and the workflow "
+                f"{workflow!r} builds one",
+                choices=tuple(able),
+            )
+            for path, name in tasks.items()
+            if found[name].constraints.min_sub_structures > 1
+        ]
 
     def _require_size(self, jobs: int) -> None:
         largest = self._context.settings.max_sweep_jobs

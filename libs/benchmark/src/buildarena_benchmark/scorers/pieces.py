@@ -1,0 +1,82 @@
+"""Which blocks still belong to the machine: the piece that holds the starting block."""
+
+import math
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from buildarena_benchmark.scorers.series import starting_block
+
+if TYPE_CHECKING:
+    from buildarena_geometry import Machine
+    from buildarena_simulation import Trajectory
+
+Mask = NDArray[np.bool_]
+
+
+def joined_to_start(machine: "Machine", trajectory: "Trajectory") -> Mask:
+    """Which tracked blocks are joined to the starting block at each sample, (T, N).
+
+    Joints, axles, braces and ropes join as long as they hold; of several starting blocks the first
+    counts. All blocks do where the trajectory does not tell pieces.
+
+    Args:
+        machine: Gives starting block and ropes.
+        trajectory: Gives pieces and breaks.
+    """
+    pieces = trajectory.pieces
+    if pieces is None:
+        return np.ones(trajectory.positions.shape[:2], dtype=bool)
+    start = starting_block(machine, trajectory)
+    ropes = _ropes(machine, trajectory)
+    changed = np.any(np.diff(pieces, axis=0) != 0, axis=1)
+    rope_ends = np.searchsorted(trajectory.time_s, [end for _, _, end in ropes])
+    edges = sorted({0, len(pieces), *(np.flatnonzero(changed) + 1), *rope_ends})
+    joined = np.zeros(pieces.shape, dtype=bool)
+    for first, last in pairwise(edges):
+        row, time_s = pieces[first], trajectory.time_s[first]
+        ties = [(row[a], row[b]) for a, b, end in ropes if time_s < end]
+        joined[first:last] = np.isin(row, _reached(row[start], ties))
+    return joined
+
+
+def mass_of(machine: "Machine", trajectory: "Trajectory", members: Mask) -> float:
+    """Mass of some of the tracked blocks, with half of each connector that ends on one.
+
+    Args:
+        machine: The machine.
+        trajectory: Names the tracked blocks; those that are not tracked count as members.
+        members: (N,) which of the tracked blocks.
+    """
+    lost = {i for i, member in zip(trajectory.block_ids, members, strict=True) if not member}
+    blocks = [block.module.mass for block in machine.blocks.values() if block.id not in lost]
+    halves = [
+        link.module.mass / 2
+        for link in machine.connectors.values()
+        for end in (link.start[0], link.end[0])
+        if end not in lost
+    ]
+    return math.fsum([*blocks, *halves])
+
+
+def _ropes(machine: "Machine", trajectory: "Trajectory") -> list[tuple[int, int, float]]:
+    """Tracked blocks that a rope ties, and when it gives way, seconds."""
+    index = {block: i for i, block in enumerate(trajectory.block_ids)}
+    broken = {event.joint: event.time_s for event in trajectory.breaks if event.kind == "rope"}
+    return [
+        (index[link.start[0]], index[link.end[0]], broken.get(f"{link.module.name} {key}", np.inf))
+        for key, link in machine.connectors.items()
+        if link.module.link == "rope" and link.start[0] in index and link.end[0] in index
+    ]
+
+
+def _reached(piece: int, ties: list[tuple[int, int]]) -> list[int]:
+    reached = {piece}
+    grown = True
+    while grown:
+        near = {b for a, b in ties if a in reached} | {a for a, b in ties if b in reached}
+        grown = not near <= reached
+        reached |= near
+    return list(reached)

@@ -1,0 +1,158 @@
+"""Whether a bridge spans: how long it carries the cargo, and where the load goes meanwhile."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from buildarena_simulation.constants import GRAVITY
+from buildarena_simulation.scenario import SpanPlacement
+
+if TYPE_CHECKING:
+    from buildarena_simulation import Scenario, Trajectory
+
+MAX_ON_FLOOR: Final = 0.1
+"""Largest share of the vertical force that the gap's floor may bear."""
+
+MAX_GROWTH_ON_FLOOR: Final = 0.2
+"""Largest share of a growing load that the floor may take up, however heavy the machine is."""
+
+MIN_ON_TERRAIN: Final = 0.01
+"""Smallest share of the vertical force that each side's terrain must bear."""
+
+MIN_GROWTH: Final = 0.05
+"""Smallest share of a growing load that each side's terrain must take up: dead weight that lies on
+a terrain beside the machine takes up nothing."""
+
+MIN_CARRIED: Final = 0.9
+"""Smallest share of the force that holds the cargo up that must come from the machine."""
+
+_EDGE = 1e-6
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Span:
+    """Where the load went; shares of sums over the time the cargo was carried.
+
+    Attributes:
+        floor: The floor's share of the vertical force on the machine.
+        least_terrain: The share of the side whose terrain bore less.
+        floor_growth: What the floor takes up of each further unit of load.
+        least_growth: What the side that takes up less does.
+        carried: The machine's share of the force that held the cargo up.
+    """
+
+    floor: float
+    least_terrain: float
+    floor_growth: float
+    least_growth: float
+    carried: float
+
+    @property
+    def spans(self) -> bool:
+        """Whether the load went to both terrains."""
+        return (
+            self.floor <= MAX_ON_FLOOR
+            and self.floor_growth <= MAX_GROWTH_ON_FLOOR
+            and self.least_terrain >= MIN_ON_TERRAIN
+            and self.least_growth >= MIN_GROWTH
+            and self.carried >= MIN_CARRIED
+        )
+
+
+def deciding_sample(
+    scenario: "Scenario", trajectory: "Trajectory", *, fall_height: float
+) -> int | None:
+    """The first sample at which the cargo is not carried any more; None if it always is.
+
+    From then on its centre is below the fall height, or beside the gap: what lies on a terrain is
+    not carried over the gap.
+
+    Args:
+        scenario: Gives the gap, if it has one.
+        trajectory: The trial, with cargo.
+        fall_height: Units.
+    """
+    assert trajectory.cargo_position is not None  # noqa: S101 - the caller looked
+    position = trajectory.cargo_position.astype(np.float64)
+    lost = ~(position[:, 2] >= fall_height)
+    if isinstance(scenario.placement, SpanPlacement):
+        lost |= np.abs(position[:, 1]) > scenario.placement.gap / 2 + _EDGE
+    found = np.flatnonzero(lost)
+    return int(found[0]) if len(found) else None
+
+
+def measure_span(
+    scenario: "Scenario", trajectory: "Trajectory", decided: int | None
+) -> Span | None:
+    """Where the load went until it was decided; None where that cannot be asked.
+
+    It cannot where the scenario has no gap between terrains, and where the trajectory does not
+    tell contact forces.
+
+    Args:
+        scenario: Gives gap and terrains.
+        trajectory: The trial, with cargo.
+        decided: As `deciding_sample` says.
+    """
+    bearing, sides = trajectory.bearing, terrain_sides(scenario)
+    if bearing is None or sides is None:
+        return None
+    until = len(trajectory.time_s) if decided is None else decided + 1
+    ground = bearing.ground[:until].astype(np.float64)
+    terrain = bearing.terrain[:until].astype(np.float64)
+    load = bearing.cargo[:until].astype(np.float64)
+    total = max(float(ground.sum() + terrain.sum()), 0.0)
+    sums = [float(terrain[:, side].sum()) for side in sides]
+    growths = [_growth(terrain[:, side].sum(axis=1), load) for side in sides]
+    return Span(
+        floor=_share(float(ground.sum()), total),
+        least_terrain=_share(min(sums), total),
+        floor_growth=_growth(ground, load),
+        least_growth=min(growths),
+        carried=_share(float(load[1:].sum()), _needed(trajectory, until)),
+    )
+
+
+def terrain_sides(scenario: "Scenario") -> tuple[list[int], list[int]] | None:
+    """Indices of the terrain boxes south and north of the gap; None unless both have some.
+
+    Boxes that stand in the gap are part of the scenario and belong to neither side.
+    """
+    if not isinstance(scenario.placement, SpanPlacement):
+        return None
+    edge = scenario.placement.gap / 2 - _EDGE
+    reach = [
+        (box.center[1] - box.size[1] / 2, box.center[1] + box.size[1] / 2)
+        for box in scenario.terrain
+    ]
+    south = [i for i, (_, high) in enumerate(reach) if high <= -edge]
+    north = [i for i, (low, _) in enumerate(reach) if low >= edge]
+    return (south, north) if south and north else None
+
+
+def _share(part: float, whole: float) -> float:
+    return part / whole if whole > 0.0 else 0.0
+
+
+def _growth(force: Floats, load: Floats) -> float:
+    """Slope of a force over the load, by least squares; 0 without any load."""
+    away = load - load.mean()
+    spread = float(away @ away)
+    return float(away @ (force - force.mean())) / spread if spread > 0.0 else 0.0
+
+
+def _needed(trajectory: "Trajectory", until: int) -> float:
+    """Sum of the vertical force that moved the cargo as it moved, mass·g times samples.
+
+    That is its weight, and its mass times its acceleration: a cargo in free fall needs none.
+    """
+    assert trajectory.cargo_position is not None  # noqa: S101 - the caller looked
+    assert trajectory.cargo_mass is not None  # noqa: S101
+    step = float(np.median(np.diff(trajectory.time_s)))
+    height = trajectory.cargo_position[:until, 2].astype(np.float64)
+    lift = np.diff(height, 2) / (step * step * GRAVITY)
+    return float((trajectory.cargo_mass[1 : until - 1] * (1.0 + lift)).sum())

@@ -1,0 +1,165 @@
+"""Support: the load must go to both terrains. Trajectories made by hand."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from tests.benchmark.conftest import with_bearing
+
+from buildarena_benchmark import Task, score
+from buildarena_geometry import Machine
+from buildarena_simulation import Trajectory
+from buildarena_simulation.constants import GRAVITY
+
+Make = Callable[..., Trajectory]
+Series = np.ndarray
+
+
+def _mass(t: Series) -> Series:
+    return 5 + 1495 * np.clip((t - 0.5) / 15, 0.005, 1)
+
+
+def _carried(
+    make: Make,
+    machine: Machine,
+    *,
+    fall_at: float | None = None,
+    north: Callable[[Series], Series] = np.zeros_like,
+) -> Trajectory:
+    """A cargo that is released at 9, lands at 6.75, and falls freely from a time on."""
+
+    def path(t: Series) -> Series:
+        height = np.maximum(9.0 - GRAVITY / 2 * t**2, 6.75)
+        if fall_at is not None:
+            height -= GRAVITY / 2 * np.maximum(t - fall_at, 0.0) ** 2
+        return np.column_stack([np.zeros_like(t), north(t), np.maximum(height, 0.75)])
+
+    return make(machine, 17.0, cargo=path, cargo_mass=_mass)
+
+
+def _shared(
+    trajectory: Trajectory,
+    *,
+    floor: float | Series = 0.0,
+    south: float | Series = 0.5,
+    dead: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    held: float = 1.0,
+    until: float = np.inf,
+) -> Trajectory:
+    """What the machine bears goes to floor and terrains by shares, besides dead weights on each."""
+    t, mass = trajectory.time_s, trajectory.cargo_mass
+    assert mass is not None
+    load = np.where((t > 0.4) & (t <= until), held * mass, 0.0)
+    return with_bearing(
+        trajectory,
+        ground=floor * load + dead[0],
+        south=south * load + dead[1],
+        north=(1.0 - floor - south) * load + dead[2],
+        cargo=load,
+    )
+
+
+def test_a_bridge_on_both_terrains_spans(tasks, trajectory_of, car) -> None:
+    result = score(tasks["support-1"], car, _shared(_carried(trajectory_of, car)))
+    assert (result.success, result.indicator, result.flags) == (True, 1500.0, ("never_fell",))
+    assert result.metrics["floor_share"] == pytest.approx(0.0, abs=1e-6)
+    assert result.metrics["carried_share"] == pytest.approx(1.0, abs=0.02)
+
+
+def test_a_bridge_that_breaks_spans_until_then(tasks, trajectory_of, car) -> None:
+    trial = _shared(_carried(trajectory_of, car, fall_at=6.0), until=6.0)
+    result = score(tasks["support-1"], car, trial)
+    assert result.success
+    assert result.flags == ()
+    fell = 6.0 + np.sqrt(2 * 2.75 / GRAVITY)
+    assert result.indicator == pytest.approx(float(_mass(np.array([fell]))[0]), abs=4.1)
+
+
+@pytest.mark.parametrize(
+    "shares",
+    [
+        {"floor": 1.0, "south": 0.0},  # a tower
+        {"floor": 0.5, "south": 0.25},  # pillars
+        {"floor": 0.12, "south": 0.44},
+        {"floor": 0.0, "south": 1.0},  # one side only
+        {"floor": 0.0, "south": 0.0},
+        {"floor": 0.09, "south": 0.90},  # the other side bears hardly more than nothing
+        # Dead weight besides: of a tower's companion that lies on the terrains, or of one side's.
+        {"floor": 1.0, "south": 0.0, "dead": (0.0, 4000.0, 4000.0)},
+        {"floor": 0.0, "south": 1.0, "dead": (0.0, 0.0, 100.0)},
+        {"floor": 0.5, "south": 0.25, "dead": (0.0, 4000.0, 4000.0)},
+        {"floor": 0.0, "south": 0.06, "dead": (0.0, 0.0, 9000.0)},
+        # Something else holds the cargo: a wall, or a terrain's edge.
+        {"held": 0.5},
+        {"held": 0.0},
+    ],
+)
+def test_a_load_that_goes_elsewhere_does_not_count(tasks, trajectory_of, car, shares) -> None:
+    result = score(tasks["support-1"], car, _shared(_carried(trajectory_of, car), **shares))
+    assert (result.success, result.indicator) == (False, 0.0)
+    assert result.flags == ("does_not_span",)
+
+
+@pytest.mark.parametrize(
+    "shares",
+    [
+        {"floor": 0.09, "south": 0.45},  # it scrapes the floor
+        {"south": 0.2},  # it rests unevenly
+        {"dead": (0.0, 30.0, 300.0)},  # a heavy end
+    ],
+)
+def test_an_odd_bridge_may_span(tasks, trajectory_of, car, shares) -> None:
+    assert score(tasks["support-1"], car, _shared(_carried(trajectory_of, car), **shares)).success
+
+
+@pytest.mark.parametrize(("sinks_at", "spans"), [(8.0, False), (12.0, False), (15.3, True)])
+def test_a_bridge_that_sinks_onto_a_tower(tasks, trajectory_of, car, sinks_at, spans) -> None:
+    trial = _carried(trajectory_of, car)
+    floor = np.where(trial.time_s > sinks_at, 1.0, 0.0)
+    short = _carried(trajectory_of, car, fall_at=15.6)
+    task = tasks["support-1"]
+    until = 15.6 if spans else np.inf
+    sunk = _shared(short if spans else trial, floor=floor, south=(1 - floor) / 2, until=until)
+    assert score(task, car, sunk).success == spans
+
+
+def test_a_cargo_that_slides_onto_a_terrain_is_no_longer_carried(tasks, trajectory_of, car) -> None:
+    trial = _carried(trajectory_of, car, north=lambda t: np.maximum(t - 4.0, 0.0))
+    result = score(tasks["support-1"], car, _shared(trial))
+    assert result.success
+    assert result.indicator == pytest.approx(float(_mass(np.array([6.52]))[0]), abs=4.1)
+    assert "never_fell" not in result.flags
+    wide = score(tasks["support-2"], car, _shared(trial))  # still over the wider gap
+    assert wide.indicator == pytest.approx(float(_mass(np.array([9.04]))[0]), abs=4.1)
+
+
+def test_a_cargo_that_slides_off_at_once_was_not_carried(tasks, trajectory_of, car) -> None:
+    slid = _carried(trajectory_of, car, north=lambda t: -np.maximum(t - 0.5, 0.0) * 3.0)
+    for trial in (slid, _shared(slid)):
+        result = score(tasks["support-1"], car, trial)
+        assert (result.success, result.indicator) == (False, 0.0)
+    aside = _carried(trajectory_of, car, north=lambda t: np.full_like(t, 9.0))
+    assert not score(tasks["support-1"], car, _shared(aside)).success
+
+
+def test_without_contact_forces_the_rule_is_not_measured(tasks, trajectory_of, car) -> None:
+    result = score(tasks["support-1"], car, _carried(trajectory_of, car))
+    assert result.success
+    assert result.flags == ("never_fell", "span_not_measured")
+    assert result.metrics["floor_share"] is None
+
+
+def test_islands_in_the_gap_and_boxes_behind_belong_to_the_scenario(
+    tasks: dict[str, Task],
+) -> None:
+    from buildarena_benchmark.scorers.spanning import terrain_sides
+    from buildarena_simulation import Scenario
+
+    content = tasks["support-2"].scenario.model_dump()
+    south, north = content["terrain"]
+    island = {"center": (0.0, 0.0, 2.0), "size": (4.0, 4.0, 4.0)}
+    scenario = Scenario.model_validate(content | {"terrain": [island, north, south]})
+    assert terrain_sides(scenario) == ([2], [1])
+    one = Scenario.model_validate(content | {"terrain": [south]})
+    assert terrain_sides(one) is None
+    assert terrain_sides(tasks["transport-1"].scenario) is None
