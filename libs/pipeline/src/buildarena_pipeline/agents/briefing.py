@@ -37,6 +37,16 @@ _CONTROL: Final = {
     "none": "No key is pressed in this trial, so you need not bind any.",
 }
 
+_CHECKS: Final = {
+    "always": (
+        "There is more than the starting block. Joints that hold and connectors join every part to "
+        "the first starting block. At most {own} blocks in a sub-structure, {all} in all."
+    ),
+    "modules": "Only the modules listed below.",
+    "least": "At least {count} x {name}.",
+    "wheels": "At least {count} powered wheels.",
+}
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SessionLimits:
@@ -91,7 +101,7 @@ def briefing(task: Task) -> str:
 @cache
 def briefing_digest() -> str:
     """Hash of the words around a statement: results of different ones don't compare."""
-    words = [_template().template, *_CONTROL.values()]
+    words = [_template().template, *_CONTROL.values(), *_CHECKS.values()]
     return sha256("\0".join(words).encode()).hexdigest()
 
 
@@ -112,13 +122,13 @@ def _sub_structures(task: Task) -> str:
 
 def _checks(task: Task) -> str:
     limits = task.constraints
-    checks = [
-        "There is more than the starting block.",
-        f"At most {limits.max_blocks} blocks in a sub-structure, {limits.most_blocks} in all.",
-    ]
+    checks = [_CHECKS["always"].format(own=limits.max_blocks, all=limits.most_blocks)]
     if limits.modules is not None:
-        checks.append("Only the modules listed below.")
-    checks += [f"At least {least} x {name}." for name, least in limits.min_modules.items()]
+        checks.append(_CHECKS["modules"])
+    checks += [
+        _CHECKS["least"].format(count=count, name=name)
+        for name, count in limits.min_modules.items()
+    ]
     if limits.min_wheels:
-        checks.append(f"At least {limits.min_wheels} powered wheels.")
+        checks.append(_CHECKS["wheels"].format(count=limits.min_wheels))
     return " ".join(checks)
