@@ -3,8 +3,16 @@
 from __future__ import annotations
 
 import json
+import re
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import pytest
+from tenants import new_tenant, operator
+
+from buildarena_benchmark import builtin_tasks
+from buildarena_geometry import load_catalogue
+from buildarena_pipeline.agents.briefing import briefing
 
 OPEN = {"task": "support-1", "agent": "me", "seed": 1, "simulator": "mujoco"}
 START = {"init_shift": [0, 0, 0], "init_rotation": [0, 0, 0], "note": ""}
@@ -138,12 +146,90 @@ def test_a_machine_that_breaks_the_rules_is_a_scored_failure(api, session) -> No
     )
 
 
-@pytest.mark.usefixtures("session")
-def test_each_seed_is_played_once(api) -> None:
+def test_a_session_that_is_over_is_not_opened_again(api, session) -> None:
+    act(api, session, "start", START)
+    api.post(f"/v1/sessions/{session}/submit")
     again = api.post("/v1/sessions", json=OPEN)
     assert again.status_code == 422
     assert again.json()["errors"][0]["field"] == "seed"
     assert api.post("/v1/sessions", json={**OPEN, "seed": 2}).status_code == 201
+
+
+def test_a_lost_answer_is_asked_for_again(api, context, session) -> None:
+    act(api, session, "start", START)
+    again = api.post("/v1/sessions", json=OPEN)
+    assert (again.status_code, again.json()["id"], again.json()["calls"]) == (200, session, 1)
+    assert again.headers["Location"] == f"/v1/jobs/{session}"
+    assert act(api, session, "attach_block_to", ATTACH).json()["ok"]
+    assert len(context.store.jobs.page(limit=9)) == 1
+
+
+@pytest.mark.parametrize(
+    "change", [{"seed": 2}, {"agent": "other"}, {"task": "support-2"}, {"simulator": "pybullet"}]
+)
+def test_another_wish_opens_another_session(api, session, change) -> None:
+    other = api.post("/v1/sessions", json={**OPEN, **change})
+    assert other.status_code == 201
+    assert other.json()["id"] != session
+
+
+def test_sessions_that_are_opened_side_by_side_are_one(api) -> None:
+    with ThreadPoolExecutor(8) as pool:
+        answers = list(pool.map(lambda _: api.post("/v1/sessions", json=OPEN), range(8)))
+    assert sorted(answer.status_code for answer in answers) == [200] * 7 + [201]
+    assert len({answer.json()["id"] for answer in answers}) == 1
+
+
+def test_nobody_gets_anothers_open_session(guarded) -> None:
+    ann, bob, admin = new_tenant(guarded, "A"), new_tenant(guarded, "B"), operator(guarded)
+
+    def opened(who, **change) -> tuple[int, str | None]:
+        answer = who.ask("POST", "/v1/sessions", json={**OPEN, **change})
+        return answer.status_code, answer.json().get("id")
+
+    status, mine = opened(ann)
+    assert status == 201
+    # The name is the first key's: nobody else can even ask for its sessions.
+    assert opened(bob) == (403, None)
+    # An admin may use the name, and gets no session of its owner's by it; nor the other way round.
+    assert opened(admin) == (422, None)
+    assert opened(admin, seed=2)[0] == 201
+    assert opened(ann, seed=2) == (422, None)
+    assert opened(ann) == (200, mine)
+
+
+@pytest.mark.parametrize("task", sorted(builtin_tasks()))
+def test_an_agent_is_told_all_it_needs(api, task) -> None:
+    opened = api.post("/v1/sessions", json={**OPEN, "task": task}).json()
+    text = opened["briefing"]
+    assert opened["statement"].strip() in text
+    for module in load_catalogue().values():
+        shown = f"- {module.name} (" in text and f"mass {module.mass:g}" in text
+        assert shown is (module.kind != "cargo"), module.name
+    for action in {action for module in load_catalogue().values() for action in module.actions}:
+        assert action in text
+    for said in ("x points east, y north, z up", "one trial", "machine `assembly`:", "2,000 calls"):
+        assert text.count(said) == 1, said
+    assert "$" not in text
+    speaks_of_trials = "three trials; the best" in opened["statement"]
+    assert ("You are the controller yourself" in text) is speaks_of_trials
+    assert opened["limits"]["calls"] == 2000
+    names = {tool["name"] for tool in opened["tools"]}
+    assert set(re.findall(r"`([a-z]+(?:_[a-z]+)+)`", text)) - {"machine_id"} <= names
+
+
+def test_a_task_with_its_own_modules_lists_those_alone() -> None:
+    task = builtin_tasks()["lift-3"]
+    narrow = task.constraints.model_copy(
+        update={"modules": ("Torch",), "min_modules": {"Torch": 3}}
+    )
+    text = briefing(replace(task, constraints=narrow))
+    assert re.findall(r"^- ([A-Z][^(]*) \(.*mass", text, re.MULTILINE) == [
+        "Starting Block",
+        "Torch",
+    ]
+    assert "Only the modules listed below. At least 3 x Torch." in text
+    assert "exactly 2 sub-structures" in text
 
 
 @pytest.mark.parametrize(

@@ -14,24 +14,13 @@ from live_api import live_api
 from mcp import ClientSession, StdioServerParameters, stdio_client
 from mcp.client.streamable_http import streamable_http_client
 from running import wait_until
+from working import work
 
 from buildarena_cli.local import free_port
-from buildarena_pipeline.runtime.active_lease import LeaseKeeper
-from buildarena_pipeline.runtime.job_runner import JobRunner
-from buildarena_simworker.simulate import simulate_handler
 from buildarena_worker.builtin.designs import DESIGNS
 from buildarena_worker.wiring import verifier
 
 BUILDARENA = str(Path(sys.executable).parent / "buildarena")
-
-
-def simulate_all(context) -> None:
-    keeper = LeaseKeeper(context.store.leases, lambda: None)
-    keeper.start()
-    JobRunner(context.store.leases, simulate_handler(context), keeper, "w").process_next(
-        "simulate.mujoco", ""
-    )
-    keeper.stop()
 
 
 async def play(connected, simulate) -> dict[str, object]:
@@ -76,7 +65,7 @@ async def said(session: ClientSession, tool: str, arguments: dict[str, object]) 
 def test_an_agent_builds_a_bridge_and_gets_its_score(context) -> None:
     with live_api(context) as url:
         server = StdioServerParameters(command=BUILDARENA, args=["mcp", "--url", url])
-        result = asyncio.run(play(stdio_client(server), lambda: simulate_all(context)))
+        result = asyncio.run(play(stdio_client(server), lambda: work(context)))
     assert result["outcome"] == "success"
     assert result["indicator"] > 100
     (job,) = context.store.jobs.page(limit=2)
@@ -119,7 +108,7 @@ def test_an_agent_builds_over_streamable_http(context) -> None:
         try:
             wait_until(lambda: _answers(port), 60, "the MCP server answers")
             connected = streamable_http_client(f"http://127.0.0.1:{port}/mcp")
-            result = asyncio.run(play(connected, lambda: simulate_all(context)))
+            result = asyncio.run(play(connected, lambda: work(context)))
         finally:
             server.terminate()
             server.wait()
@@ -130,3 +119,28 @@ def _answers(port: int) -> bool:
     with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", port), timeout=1):
         return True
     return False
+
+
+async def side_by_side(connected) -> list[str]:
+    async with connected as (read, write), ClientSession(read, write) as session:
+        await session.initialize()
+        wish = {"task": "support-1", "agent": "mcp"}
+        opened = await said(session, "open_session", wish)
+        assert await said(session, "open_session", wish) == opened
+        ids = {"session": opened.split()[1]}
+        await said(session, "start", ids)
+        block = {**ids, "face": "E", "new_block": "small wooden block"}
+        # Each needs the one before it.
+        rows = [{**block, "base_block": str(number)} for number in range(1, 13)]
+        results = await asyncio.gather(*(said(session, "attach_block_to", row) for row in rows))
+        again = await said(session, "open_session", wish)
+        assert "It was open already, and 13 calls were made" in again
+        return results
+
+
+def test_calls_sent_side_by_side_are_done_in_the_order_sent(context) -> None:
+    with live_api(context) as url:
+        server = StdioServerParameters(command=BUILDARENA, args=["mcp", "--url", url])
+        results = asyncio.run(side_by_side(stdio_client(server)))
+    blocks = [result.split(",")[0] for result in results]
+    assert blocks == [f"Attached. {number} Small Wooden Block" for number in range(2, 14)]

@@ -121,7 +121,7 @@ def test_blocks_may_touch_and_not_overlap(build, gap, fits):
         (("1", "B", "Brace"), Cause.CONNECTOR_MISUSE),
         (("1", "B", "Starting Block"), Cause.UNKNOWN_MODULE),
         (("1", "B", "Ballast"), Cause.UNKNOWN_MODULE),
-        (("1", "B", "torch"), Cause.UNKNOWN_MODULE),
+        (("1", "B", "torches"), Cause.UNKNOWN_MODULE),
     ],
 )
 def test_an_attach_that_makes_no_sense_is_refused_with_its_cause(build, arguments, cause):

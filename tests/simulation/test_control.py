@@ -16,9 +16,11 @@ from tests.simulation.designs import (
     replayed,
     rocket,
 )
+from tests.simulation.references import REFERENCES, load_machine
 
 from buildarena_benchmark import Task
 from buildarena_geometry import KeyPress, Machine, load_catalogue
+from buildarena_geometry.flames import heating
 from buildarena_simulation import Scenario, simulate
 from buildarena_simulation.control import heated_cannons, plan_schedule
 from buildarena_simulation.machine import bindings_of, structure_of
@@ -84,6 +86,20 @@ def _heated(flame: tuple[float, float, float]) -> bool:
     directions[structure.torches] = UP
     shown[structure.torches] = np.array(flame) - UP
     return bool(heated_cannons(structure, shown, directions)[0])
+
+
+@pytest.mark.parametrize("name", REFERENCES)
+def test_a_cannon_is_heated_in_the_simulation_if_its_builder_was_told_so(name: str) -> None:
+    machine = load_machine(name)
+    structure = structure_of(machine)
+    directions = np.zeros((len(structure), 3))
+    for row, part in enumerate(structure.parts):
+        if part.direction is not None:
+            directions[row] = part.direction
+    simulated = heated_cannons(structure, structure.shown, directions)
+    ids = [structure.block_ids[row] for row in structure.cannons]
+    told = {cannon: bool(torches) for cannon, torches in heating(machine.state).items()}
+    assert told == dict(zip(ids, simulated.tolist(), strict=True))
 
 
 def test_a_flame_heats_what_it_touches() -> None:

@@ -55,7 +55,7 @@ def play(context) -> Callable[..., Job]:
 
     def play_task(task: str, design: str = "support-1", seed: int = 0) -> Job:
         sessions = ExternalSessions(context)
-        job = sessions.open(task=task, agent="me", seed=seed, simulator="mujoco")
+        job = sessions.open(task=task, agent="me", seed=seed, simulator="mujoco").job
         for tool, arguments in next(iter(DESIGNS[design](0).parts.values())).actions:
             done = sessions.call(job.id, machine="main", tool=tool, arguments=arguments)
             assert done.ok, done.feedback
@@ -151,7 +151,7 @@ def test_the_papers_suspension_bridge_is_built_from_parts_and_scored(
 ) -> None:
     add(context, BRIDGE.read_text())
     sessions = ExternalSessions(context)
-    job = sessions.open(task="suspension-bridge", agent="me", seed=0, simulator="mujoco")
+    job = sessions.open(task="suspension-bridge", agent="me", seed=0, simulator="mujoco").job
     for machine, actions in suspension_bridge(roped=roped).items():
         for tool, arguments in actions:
             done = sessions.call(job.id, machine=machine, tool=tool, arguments=arguments)

@@ -115,3 +115,5 @@ def test_every_trial_is_in_one_bin(trials) -> None:
 def test_the_cost_of_a_success_includes_the_failures() -> None:
     assert cost_per_success([0.5, 0.25, 0.25], 2) == pytest.approx(0.5)
     assert cost_per_success([0.5], 0) is None
+    assert cost_per_success([None, None], 1) is None
+    assert cost_per_success([0.5, None], 1) is None

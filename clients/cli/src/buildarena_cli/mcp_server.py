@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import asyncio
 import json
+from collections import defaultdict
 from collections.abc import Mapping
+from importlib.metadata import version
 from typing import Any
 
 from mcp import types
@@ -19,16 +21,20 @@ from buildarena_cli.client import Client, at
 from buildarena_cli.errors import CommandError
 from buildarena_cli.ids import checked_id
 from buildarena_geometry import tool_definitions
+from buildarena_geometry.modules.names import CaselessNames
+from buildarena_pipeline.catalog.tracks import SIMULATORS
 
 GROUPS = ("build", "refine", "assemble", "control", "query")
 INSTRUCTIONS = """Build a machine for a BuildArena task. Call list_tasks, then open_session for one
-task; read the statement; call start and the other tools with the session's id until the machine is
-finished; then call submit, and get_result until the job has ended."""
+task; read its answer: the task, the rules and the modules; call start and the other tools with the
+session's id until the machine is finished; then call submit, and get_result until the job has
+ended. Calls of a session are carried out one at a time, in the order in which they arrive."""
 SESSION = {
     "session": {"type": "string", "description": "Id that open_session gave."},
     "machine": {
         "type": "string",
-        "description": "Sub-structure it is meant for; 'assembly' joins all others.",
+        "description": "Sub-structure it is meant for, a new one if there is none of this name; "
+        "'assembly' joins copies of all others.",
         "default": "main",
     },
 }
@@ -43,7 +49,9 @@ def make_server(client: Client) -> Server[Any]:
         client: The API.
     """
     tools = _tools()
-    machine_tools = {tool.name for tool in tool_definitions(GROUPS)}
+    machine_tools = CaselessNames(tool.name for tool in tool_definitions(GROUPS))
+    # Threads would carry out calls that were sent side by side in any order.
+    turns: defaultdict[object, asyncio.Lock] = defaultdict(asyncio.Lock)
 
     async def list_tools(
         _: ServerRequestContext[Any], __: types.PaginatedRequestParams | None
@@ -54,9 +62,11 @@ def make_server(client: Client) -> Server[Any]:
         _: ServerRequestContext[Any], params: types.CallToolRequestParams
     ) -> types.CallToolResult:
         given = dict(params.arguments or {})
+        tool = machine_tools.find(params.name)
         try:
-            if params.name in machine_tools:
-                answer = await asyncio.to_thread(_act, client, params.name, given)
+            if tool is not None:
+                async with turns[str(given.get("session"))]:
+                    answer = await asyncio.to_thread(_act, client, tool, given)
             else:
                 answer = await asyncio.to_thread(_manage, client, params.name, given)
         except (CommandError, KeyError) as error:
@@ -65,7 +75,11 @@ def make_server(client: Client) -> Server[Any]:
         return answer
 
     return Server(
-        "buildarena", instructions=INSTRUCTIONS, on_list_tools=list_tools, on_call_tool=call_tool
+        "buildarena",
+        version=version("buildarena-cli"),
+        instructions=INSTRUCTIONS,
+        on_list_tools=list_tools,
+        on_call_tool=call_tool,
     )
 
 
@@ -85,16 +99,29 @@ def _tools() -> list[types.Tool]:
         ),
         types.Tool(
             name="open_session",
-            description="Begin to build for a task; answers with the session and the statement.",
+            description="Begin to build for a task; answers with the session's id, the task, the "
+            "rules and the modules. Called again with the same arguments, it gives the same "
+            "session for as long as that is open.",
             input_schema={
                 "type": "object",
                 "properties": {
-                    "task": {"type": "string", "description": "Task name, e.g. support-1."},
-                    "agent": {"type": "string", "description": "Your name on the leaderboard."},
-                    "seed": {"type": "integer", "minimum": 0, "default": 0},
+                    "task": {"type": "string", "description": "A name that list_tasks gave."},
+                    "agent": {
+                        "type": "string",
+                        "description": "Your name on the leaderboard: letters, digits, dots, "
+                        "dashes and underscores.",
+                    },
+                    "seed": {
+                        "type": "integer",
+                        "minimum": 0,
+                        "default": 0,
+                        "description": "Each seed is one try at the task.",
+                    },
                     "simulator": {
                         "type": "string",
-                        "description": "The service's first by default.",
+                        "enum": list(SIMULATORS),
+                        "default": SIMULATORS[0],
+                        "description": "What simulates the machine.",
                     },
                 },
                 "required": ["task", "agent"],
@@ -142,13 +169,23 @@ def _manage(client: Client, tool: str, given: Arguments) -> types.CallToolResult
         return _result("\n".join(f"{task['name']}: {task['title']}" for task in tasks))
     if tool == "open_session":
         opened = client.post("/v1/sessions", given)
-        return _result(f"session: {opened['id']}\n\n{opened['statement']}")
+        return _result(_opened(opened))
     if tool == "submit":
         job = client.post(at("sessions", checked_id("job", given["session"]), "submit"), {})
         return _result(_ended(job))
     if tool == "get_result":
         return _result(_ended(client.get(at("jobs", checked_id("job", given["session"])))))
     return _result(f"there is no tool {tool!r}", failed=True)
+
+
+def _opened(session: Mapping[str, Any]) -> str:
+    lines = [f"session: {session['id']}"]
+    if session["calls"]:
+        lines.append(
+            f"It was open already, and {session['calls']} calls were made; get_machine_summary "
+            "tells what is built."
+        )
+    return "\n\n".join([*lines, session["briefing"]])
 
 
 def _ended(job: Mapping[str, Any]) -> str:

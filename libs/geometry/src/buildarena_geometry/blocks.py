@@ -59,6 +59,12 @@ class Block:
         return self.world_from_block.point(self.module.center)
 
     @property
+    def body_center_xyz(self) -> Vector:
+        """The middle of its body, as of a wheel's disc, world frame, units."""
+        body = self.module.body
+        return self.world_from_block.point(body[0].center) if body else self.center_xyz
+
+    @property
     def pointing(self) -> NDArray[np.float64] | None:
         """(3,) the way a cannon or torch points, world frame, unit length; None for the others."""
         towards = self.pointing_xyz

@@ -17,7 +17,7 @@ from buildarena_geometry.modules.catalogue import load_catalogue
 from buildarena_geometry.modules.parameters import LARGEST_NUMBER, RefusalError, shown
 from buildarena_geometry.outcomes import Accepted, Cause, Outcome, Refused
 from buildarena_geometry.state import MachineState
-from buildarena_geometry.tools import ACTIONS
+from buildarena_geometry.tools import ACTIONS, action_named
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -236,7 +236,7 @@ class Machine:
         return cls.restored(read_machine(document, catalogue=catalogue))
 
     def _propose(self, name: object, arguments: object) -> Change:
-        action = ACTIONS.get(name) if isinstance(name, str) else None
+        action = action_named(name) if isinstance(name, str) else None
         if action is None:
             raise RefusalError(
                 Cause.UNKNOWN_ACTION,

@@ -14,6 +14,7 @@ from typing import Annotated, Any, get_args, get_origin, get_type_hints
 from buildarena_geometry.actions import assemble, build, control, query, refine, remove
 from buildarena_geometry.changes import Change
 from buildarena_geometry.feedback.words import listing
+from buildarena_geometry.modules.names import CaselessNames
 from buildarena_geometry.modules.parameters import JsonSchema, Parameter, RefusalError, shown
 from buildarena_geometry.outcomes import Cause
 
@@ -199,3 +200,10 @@ ACTIONS: Mapping[str, Action] = {
     )
     for propose in proposers
 }
+_NAMES = CaselessNames(ACTIONS)
+
+
+def action_named(written: str) -> Action | None:
+    """The action a name means, whatever its case; None if there is none."""
+    name = _NAMES.find(written)
+    return None if name is None else ACTIONS[name]

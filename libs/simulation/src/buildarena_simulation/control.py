@@ -7,6 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
+from buildarena_geometry.flames import flames_touch
 from buildarena_simulation.constants import GRAVITY, KEY_DELAY_S
 from buildarena_simulation.scenario import Control
 from buildarena_simulation.structure.model import BoolArray, FloatArray, Structure
@@ -150,8 +151,8 @@ def effective_presses(bindings: Bindings, keys: Sequence[KeyHold]) -> int:
 def heated_cannons(structure: Structure, shown: FloatArray, directions: FloatArray) -> BoolArray:
     """Which cannons a flame touches, (C,).
 
-    A cannon's body is spheres in a row, so it is narrower between them; a flame heats it if the
-    two touch: the flame's centre lies within its radius of a sphere's surface.
+    A cannon's body is spheres in a row, so it is narrower between them; a flame heats it if it
+    touches one of them.
 
     Args:
         structure: The machine.
@@ -162,8 +163,7 @@ def heated_cannons(structure: Structure, shown: FloatArray, directions: FloatArr
     if not len(bodies) or not len(flames):
         return np.zeros(len(structure.cannons), dtype=bool)
     fires, targets = flames.centers(shown, directions), bodies.centers(shown, directions)
-    distance = np.linalg.norm(targets[:, None] - fires[None], axis=2) - bodies.radius[:, None]
-    touched = (distance <= flames.radius + 1e-9).any(axis=1)
+    touched = flames_touch(targets, bodies.radius, fires, flames.radius).any(axis=1)
     heated = np.zeros(len(structure), dtype=bool)
     heated[bodies.block[touched]] = True
     return np.asarray(heated[structure.cannons])

@@ -14,7 +14,7 @@ from buildarena_benchmark.flags import is_disqualified
 from buildarena_benchmark.leaderboard import EndedJob
 from buildarena_store.database import Database
 from buildarena_store.rows import columns_of, value_of
-from buildarena_store.states import JobState
+from buildarena_store.states import EXTERNAL_PROVIDER, JobState
 from buildarena_store.tables import board_changes, jobs, rollouts, sweep_jobs, tasks
 
 CHUNK = 5000
@@ -203,6 +203,7 @@ _COLUMNS = [
     jobs.c.id.label("job_id"),
     jobs.c.model_hash.label("configuration"),
     jobs.c.model_config["decoding"].label("decoding"),
+    (jobs.c.model_config["provider"].as_string() == EXTERNAL_PROVIDER).label("external"),
     jobs.c.limits,
     cast(jobs.c.metrics["parts"], Integer).label("parts"),
 ]
@@ -213,6 +214,8 @@ def _trials(connection: Connection, query: Any) -> Iterator[EndedJob]:
     decodings: dict[str, Mapping[str, Any]] = {}
     result = connection.execution_options(stream_results=True).execute(query)
     for row in result.yield_per(CHUNK):
+        # What an external agent used is unknown, which is not nothing.
+        known = not row.external
         yield EndedJob(
             job_id=row.job_id,
             track=sys.intern(row.track),
@@ -229,10 +232,10 @@ def _trials(connection: Connection, query: Any) -> Iterator[EndedJob]:
             parts=row.parts,
             flags=tuple(row.flags or ()),
             refusals=row.refusals or {},
-            requests=row.requests,
-            input_tokens=row.input_tokens,
-            output_tokens=row.output_tokens,
-            cost_usd=float(row.cost_usd),
+            requests=row.requests if known else None,
+            input_tokens=row.input_tokens if known else None,
+            output_tokens=row.output_tokens if known else None,
+            cost_usd=float(row.cost_usd) if known else None,
             actions=row.actions,
             refused_actions=row.refused_actions,
             finished_at=row.finished_at,

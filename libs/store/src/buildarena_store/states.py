@@ -14,6 +14,7 @@ from buildarena_benchmark.outcomes import Outcome
 
 __all__ = [
     "CONSTRUCT_QUEUE",
+    "EXTERNAL_PROVIDER",
     "EXTERNAL_QUEUE",
     "JOB_TRANSITIONS",
     "SWEEP_TRANSITIONS",
@@ -32,6 +33,8 @@ __all__ = [
 
 CONSTRUCT_QUEUE: Final = "construct"
 VERIFY_QUEUE: Final = "verify"
+EXTERNAL_PROVIDER: Final = "external"
+"""Provider in the configuration of external agents: nobody counts their requests and tokens."""
 EXTERNAL_QUEUE: Final = "external"
 """Where jobs of external agents are while they build: no worker serves it."""
 

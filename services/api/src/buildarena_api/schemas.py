@@ -38,14 +38,21 @@ class _Answer(BaseModel):
 
 
 class UsageView(_Answer):
-    """What a job's session used."""
+    """What a job's session used; null where an external agent reports nothing."""
 
-    requests: int
-    input_tokens: int
-    output_tokens: int
-    cached_tokens: int
-    reasoning_tokens: int
-    cost_usd: float
+    requests: int | None
+    input_tokens: int | None
+    output_tokens: int | None
+    cached_tokens: int | None
+    reasoning_tokens: int | None
+    cost_usd: float | None
+
+    @staticmethod
+    def of(job: Job) -> UsageView:
+        """What is known of a job's usage."""
+        if job.usage_is_known:
+            return UsageView.model_validate(job)
+        return UsageView.model_validate(dict.fromkeys(UsageView.model_fields))
 
 
 class AttemptView(_Answer):
@@ -101,7 +108,7 @@ class JobView(_Answer):
             {
                 **{name: getattr(job, name, None) for name in JobView.model_fields},
                 "censored": is_censored(job.flags or ()),
-                "usage": UsageView.model_validate(job),
+                "usage": UsageView.of(job),
             }
         )
 

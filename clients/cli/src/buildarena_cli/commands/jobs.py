@@ -127,8 +127,9 @@ def _show(job: dict[str, Any], *, as_json: bool) -> None:
         say(f"imported  from {job['imported_from']}; {state}")
     usage = job["usage"]
     say(
-        f"usage     {usage['requests']} requests, {usage['input_tokens']:,} tokens in, "
-        f"{usage['output_tokens']:,} out, ${usage['cost_usd']:.4f}"
+        f"usage     {number(usage['requests'], 0)} requests, "
+        f"{number(usage['input_tokens'], 0)} tokens in, "
+        f"{number(usage['output_tokens'], 0)} out, ${number(usage['cost_usd'], 4)}"
     )
     share = f" ({job['refused_actions'] / job['actions']:.1%})" if job["actions"] else ""
     say(f"actions   {job['actions']}, {job['refused_actions']} refused{share}")

@@ -33,7 +33,7 @@ class EndedJob:
         parts: Parts of its machine, if there was one.
         flags: Remarks on its score; see `buildarena_benchmark.flags`.
         refusals: Refused actions by refusal class.
-        requests: Model requests.
+        requests: Model requests; None, as the next three, for an external agent: it reports none.
         input_tokens: Tokens sent.
         output_tokens: Tokens received.
         cost_usd: US dollars.
@@ -59,10 +59,10 @@ class EndedJob:
     parts: int | None = None
     flags: tuple[str, ...] = ()
     refusals: Mapping[str, int] = field(default_factory=lambda: _NOTHING)
-    requests: int = 0
-    input_tokens: int = 0
-    output_tokens: int = 0
-    cost_usd: float = 0.0
+    requests: int | None = 0
+    input_tokens: int | None = 0
+    output_tokens: int | None = 0
+    cost_usd: float | None = 0.0
     actions: int = 0
     refused_actions: int = 0
     finished_at: datetime | None = None

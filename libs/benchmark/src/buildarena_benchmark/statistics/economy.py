@@ -72,6 +72,17 @@ def token_bins(output_tokens: Floats, indicators: Floats, *, bins: int = 8) -> l
     return found
 
 
-def cost_per_success(costs_usd: Sequence[float], successes: int) -> float | None:
-    """US dollars spent for each success, failures included; None without a success."""
-    return math.fsum(costs_usd) / successes if successes else None
+def cost_per_success(costs_usd: Sequence[float | None], successes: int) -> float | None:
+    """US dollars spent for each success, failures included.
+
+    Args:
+        costs_usd: Cost of each trial; None where nobody knows it.
+        successes: How many of them succeeded.
+
+    Returns:
+        None without a success, or with an unknown cost.
+    """
+    known = [cost for cost in costs_usd if cost is not None]
+    if not successes or len(known) < len(costs_usd):
+        return None
+    return math.fsum(known) / successes

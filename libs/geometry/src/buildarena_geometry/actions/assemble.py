@@ -8,7 +8,7 @@ from buildarena_geometry.actions.remove import removal_sentences, without
 from buildarena_geometry.blocks import Block, Connector, FaceRef
 from buildarena_geometry.changes import Change
 from buildarena_geometry.feedback import state as words
-from buildarena_geometry.feedback.words import point
+from buildarena_geometry.feedback.words import counted, listing, point
 from buildarena_geometry.modules.parameters import Name, RefusalError, Triple, shown
 from buildarena_geometry.outcomes import Cause
 from buildarena_geometry.poses import Pose
@@ -23,12 +23,14 @@ def add_machine(
     init_shift: Triple = ORIGIN,
     init_rotation: Triple = ORIGIN,
 ) -> Change:
-    """Adds a finished machine as a sub-structure; its block 3 becomes A_3, B_3, and so on.
+    """Adds a copy of a finished machine as a sub-structure; its block 3 becomes A_3, B_3 or so.
+
+    The same machine may be added several times.
 
     Args:
         machine_id: Name of the finished machine.
         init_shift: How far it moves from where it was built [east, north, up].
-        init_rotation: [yaw, pitch, roll] in degrees about its starting block's center: yaw turns
+        init_rotation: [yaw, pitch, roll] in degrees about its starting block's centre: yaw turns
             north to east, pitch north down, roll up to east.
     """
     source = state.available.get(machine_id)
@@ -62,7 +64,7 @@ def add_machine(
         placed=tuple(block.id for block in blocks),
         touched=tuple(link.id for link in links),
         attempt=f"Machine {machine_id}",
-        render=lambda: _rendered(after, letter, f"Added {machine_id} as sub-structure {letter}."),
+        render=lambda: _described(after, letter, f"Added {machine_id} as sub-structure {letter}"),
     )
 
 
@@ -74,11 +76,12 @@ def shift_machine(state: MachineState, machine_index: Name, position: Triple) ->
         position: How far to move it [east, north, up].
     """
     found = structure(state, machine_index)
-    return _motion(state, found, Pose(position=position), f"shifted by {point(position)}")
+    how = f"shifted by {point(position)}"
+    return _motion(state, found, Pose(position=position), how, turned=False)
 
 
 def rotate_machine(state: MachineState, machine_index: Name, rotation: Triple) -> Change:
-    """Turns a whole sub-structure about its starting block's center.
+    """Turns a whole sub-structure about its starting block's centre.
 
     Args:
         machine_index: Letter of the sub-structure, such as "A".
@@ -88,7 +91,7 @@ def rotate_machine(state: MachineState, machine_index: Name, rotation: Triple) -
     found = structure(state, machine_index)
     center = state.blocks[found.root].center_xyz
     motion = turn_about(center, turned(rotation))
-    return _motion(state, found, motion, f"rotated by {point(rotation)}")
+    return _motion(state, found, motion, f"rotated by {point(rotation)}", turned=True)
 
 
 def remove_machine(state: MachineState, machine_index: Name) -> Change:
@@ -106,12 +109,14 @@ def remove_machine(state: MachineState, machine_index: Name) -> Change:
         after=after,
         removed=(*(block.id for block in gone), *links),
         render=lambda: " ".join(
-            [f"Removed sub-structure {found.letter}.", *removal_sentences(after, links)]
+            [f"Removed sub-structure {found.letter}.", *removal_sentences(state, after, links)]
         ),
     )
 
 
-def _motion(state: MachineState, found: SubStructure, motion: Pose, how: str) -> Change:
+def _motion(
+    state: MachineState, found: SubStructure, motion: Pose, how: str, *, turned: bool
+) -> Change:
     members = state.members(found.letter)
     moved = [replace(block, world_from_block=motion @ block.world_from_block) for block in members]
     ids = tuple(block.id for block in moved)
@@ -121,16 +126,33 @@ def _motion(state: MachineState, found: SubStructure, motion: Pose, how: str) ->
         for key, link in after.connectors.items()
     }
     after = replace(after, connectors=connectors)
+    sentence = f"Sub-structure {found.letter} {how}"
     return Change(
         after=after,
         placed=ids,
-        attempt=f"Sub-structure {found.letter} {how}",
-        render=lambda: _rendered(after, found.letter, f"Sub-structure {found.letter} {how}."),
+        attempt=sentence,
+        render=lambda: _moved(state, after, found.letter, f"{sentence}.", turned=turned),
     )
 
 
-def _rendered(state: MachineState, letter: str, sentence: str) -> str:
-    return "\n".join([sentence, *words.block_lines(state, state.members(letter))])
+def _described(state: MachineState, letter: str, sentence: str) -> str:
+    """A sub-structure that was just added: its blocks with their free faces, its connectors."""
+    members = state.members(letter)
+    links = [link for link in state.connectors.values() if link.structure == letter]
+    count = counted(len(members), "block")
+    ids = f"{sentence}: {count} {members[0].id} to {members[-1].id}"
+    lines = [f"{ids}; connectors: {listing(link.id for link in links)}."]
+    lines += words.block_lines_with_faces(state, members)
+    return "\n".join([*lines, *map(words.connector_line, links)])
+
+
+def _moved(
+    before: MachineState, after: MachineState, letter: str, sentence: str, *, turned: bool
+) -> str:
+    """A sub-structure that was moved; turning it changes the sides its faces look to."""
+    members = after.members(letter)
+    lines = (words.block_lines_with_faces if turned else words.block_lines)(after, members)
+    return "\n".join([sentence, *lines, *words.losses(before, after)])
 
 
 def _letter(count: int) -> str:

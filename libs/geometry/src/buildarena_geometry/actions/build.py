@@ -33,10 +33,10 @@ def start(
     """Begins the machine with its starting block, which becomes block 1.
 
     Args:
-        init_shift: Position of the block's center [east, north, up]; [0, 0, 0] if left out.
+        init_shift: Its centre [east, north, up]; [0, 0, 0] if left out.
         init_rotation: [yaw, pitch, roll] in degrees: yaw turns north to east, pitch north down,
             roll up to east; [0, 0, 0] if left out.
-        note: What this machine is, in your words.
+        note: What this is.
     """
     if state.is_assembly:
         raise RefusalError(
@@ -65,25 +65,25 @@ def attach_block_to(
     """Attaches a new block to a free face of a block.
 
     Args:
-        base_block: Id of the block that carries the new one.
-        face: Label of the base block's face, such as "A".
-        new_block: Name of the module to attach; connectors go in with connect_blocks.
-        note: What the new block is for, in your words.
+        base_block: Id.
+        face: Letter of a free face of it.
+        new_block: Module; no connector.
+        note: What it is for.
     """
     require_started(state)
     module = attachable_module(state, new_block)
     base = part(state, base_block)
     if isinstance(base, Connector) or face not in base.module.face_of_label:
-        free = state.free_faces(base) if isinstance(base, Block) else []
+        free = words.free_faces(state, base) if isinstance(base, Block) else "none"
         raise RefusalError(
             Cause.NO_SUCH_FACE,
-            f"{words.heading(base)} has no face {shown(face)}. Its free faces: {listing(free)}.",
+            f"{words.heading(base)} has no face {shown(face)}. Its free faces: {free}.",
         )
     if state.is_occupied(base, face):
         raise RefusalError(
             Cause.FACE_OCCUPIED,
-            f"Face {face} of {words.title(base)} is taken. "
-            f"Its free faces: {listing(state.free_faces(base))}.",
+            f"Face {words.face_name(base, face)} of {words.title(base)} is taken. "
+            f"Its free faces: {words.free_faces(state, base)}.",
         )
     block = _new_block(
         state,
@@ -123,12 +123,12 @@ def connect_blocks(
     """Joins two faces of existing blocks with a connector; the faces may be taken.
 
     Args:
-        block_a: Id of the block where the connector begins.
-        face_a: Label of that block's face.
-        block_b: Id of the block where it ends.
-        face_b: Label of that block's face.
-        connector: Name of the connector.
-        note: What it is for, in your words.
+        block_a: Id.
+        face_a: Letter.
+        block_b: Id.
+        face_b: Letter.
+        connector: Module.
+        note: What it is for.
     """
     require_started(state)
     module = connector_module(state, connector)
@@ -176,7 +176,7 @@ def _with_face(found: Block | Connector, label: str) -> Block:
         raise RefusalError(
             Cause.NO_SUCH_FACE,
             f"{words.heading(found)} has no face {shown(label)}. "
-            f"Its faces: {listing(found.module.face_of_label)}.",
+            f"Its faces: {words.named_faces(found, found.module.face_of_label)}.",
         )
     return found
 

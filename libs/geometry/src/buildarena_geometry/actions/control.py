@@ -93,11 +93,11 @@ def reset_control_sequence(state: MachineState) -> Change:
     return Change(after=after, render=lambda: words.control_sequence(after))
 
 
-def _bind(state: MachineState, block_id: str, action: str, key: str, *, keep: bool) -> Change:
+def _bind(state: MachineState, block_id: str, written: str, key: str, *, keep: bool) -> Change:
     part(state, block_id)
     if key not in KEYS:
         raise RefusalError(Cause.BAD_KEY, f"There is no key {shown(key)}. Keys: {KEYS_IN_WORDS}.")
-    block = powered(state, block_id, action)
+    block, action = powered(state, block_id, written)
     had = block.bindings.get(action, ()) if keep else ()
     keys = had if key in had else (*had, key)
     bound = replace(block, bindings={**block.bindings, action: keys})

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from buildarena_geometry.feedback.state import heading
 from buildarena_geometry.feedback.words import listing
+from buildarena_geometry.modules.names import CaselessNames
 from buildarena_geometry.modules.parameters import RefusalError, shown
 from buildarena_geometry.outcomes import Cause
 
@@ -46,8 +47,8 @@ def part(state: MachineState, part_id: str) -> Block | Connector:
     return found
 
 
-def powered(state: MachineState, block_id: str, action: str) -> Block:
-    """The block with an id, if it has an action that takes keys.
+def powered(state: MachineState, block_id: str, written: str) -> tuple[Block, str]:
+    """The block with an id and the action of it that is meant, if it has one that takes keys.
 
     Raises:
         RefusalError: no such block, a block without keys, or one without this action.
@@ -60,12 +61,13 @@ def powered(state: MachineState, block_id: str, action: str) -> Block:
             Cause.NO_LOCOMOTION,
             f"{heading(found)} takes no keys. Blocks that do: {keyed}.",
         )
-    if action not in actions:
+    action = CaselessNames(actions).find(written)
+    if action is None:
         raise RefusalError(
             Cause.BAD_ACTION,
-            f"{heading(found)} has no action {shown(action)}; its actions: {listing(actions)}.",
+            f"{heading(found)} has no action {shown(written)}; its actions: {listing(actions)}.",
         )
-    return state.blocks[block_id]
+    return state.blocks[block_id], action
 
 
 def attachable_module(state: MachineState, name: str) -> Module:
@@ -74,11 +76,11 @@ def attachable_module(state: MachineState, name: str) -> Module:
     Raises:
         RefusalError: there is none, or it is a connector.
     """
-    module = state.catalogue.get(name)
+    module = state.catalogue.named(name)
     if module is not None and module.kind == "connector":
         raise RefusalError(
             Cause.CONNECTOR_MISUSE,
-            f"A {name} joins two faces and can't be attached to one; use connect_blocks.",
+            f"A {module.name} joins two faces and can't be attached to one; use connect_blocks.",
         )
     if module is None or not module.attachable:
         choices = listing(state.catalogue.attachable)
@@ -94,7 +96,7 @@ def connector_module(state: MachineState, name: str) -> Module:
     Raises:
         RefusalError: there is none, or it is not a connector.
     """
-    module = state.catalogue.get(name)
+    module = state.catalogue.named(name)
     if module is None or module.kind != "connector":
         cause = Cause.UNKNOWN_CONNECTOR if module is None else Cause.BASIC_AS_CONNECTOR
         choices = listing(state.catalogue.connectors)

@@ -11,7 +11,7 @@ from buildarena_geometry.state import MachineState
 
 
 def get_machine_summary(state: MachineState) -> Change:
-    """Lists the parts: id, module, base/face it sits on, center [east, north, up], and its use."""
+    """Lists the parts: id, module, base/face it sits on, position [east, north, up] and use."""
     return _answer(state, lambda: words.summary(state))
 
 
@@ -19,7 +19,7 @@ def get_block_details(state: MachineState, block_id: BlockId) -> Change:
     """Tells everything about one block: position, faces, what sits on them, keys.
 
     Args:
-        block_id: Id of the block or connector.
+        block_id: Id.
     """
     found = part(state, block_id)
     if isinstance(found, Block):

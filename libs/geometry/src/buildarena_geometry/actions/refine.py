@@ -17,11 +17,11 @@ LARGEST_SHIFT = 0.5  # units a call in each direction
 
 
 def twist_block(state: MachineState, block_id: BlockId, angle: Number) -> Change:
-    """Turns one block on the face it sits on; blocks that sit on it stay where they are.
+    """Turns one block on its seat by degrees, clockwise seen from outside; what it carries stays.
 
     Args:
-        block_id: Id of the block.
-        angle: Degrees, clockwise seen from outside that face.
+        block_id: Id.
+        angle: Degrees.
     """
     found = part(state, block_id)
     if found.module.kind == "start":
@@ -30,19 +30,19 @@ def twist_block(state: MachineState, block_id: BlockId, angle: Number) -> Change
             f"{words.heading(found)} sits on no face and can't be twisted.",
         )
     turn = about_axis(_seat_normal(state, found), -angle)
-    turned = f"by {plain(angle)}°"
+    how = f"by {plain(angle)}°"
     if isinstance(found, Connector):
         pose = found.world_from_connector.turned(turn)
-        return _move_connector(state, found, pose, f"Twisted {turned}")
-    return _move(state, found, found.world_from_block.turned(turn), "twisted " + turned)
+        return _move_connector(state, found, pose, f"Twisted {how}")
+    return _move(state, found, found.world_from_block.turned(turn), f"twisted {how}", turned=True)
 
 
 def shift_block(state: MachineState, block_id: BlockId, shift_real: Triple) -> Change:
-    """Moves one block; blocks that sit on it stay where they are.
+    """Moves one block by at most 0.5 along each axis; what it carries stays.
 
     Args:
-        block_id: Id of the block.
-        shift_real: [east, north, up], each between -0.5 and 0.5.
+        block_id: Id.
+        shift_real: [east, north, up].
     """
     found = part(state, block_id)
     if max(map(abs, shift_real)) > LARGEST_SHIFT:
@@ -55,14 +55,15 @@ def shift_block(state: MachineState, block_id: BlockId, shift_real: Triple) -> C
     if isinstance(found, Connector):
         pose = found.world_from_connector.shifted(shift_real)
         return _move_connector(state, found, pose, f"Shifted {moved}")
-    return _move(state, found, found.world_from_block.shifted(shift_real), "shifted " + moved)
+    pose = found.world_from_block.shifted(shift_real)
+    return _move(state, found, pose, f"shifted {moved}", turned=False)
 
 
 def flip_spin(state: MachineState, block_id: BlockId) -> Change:
     """Reverses the direction a wheel spins and rolls.
 
     Args:
-        block_id: Id of the wheel.
+        block_id: Id of a wheel.
     """
     found = part(state, block_id)
     if isinstance(found, Connector) or not found.module.spins:
@@ -76,7 +77,7 @@ def flip_spin(state: MachineState, block_id: BlockId) -> Change:
     return Change(
         after=after,
         touched=(block.id,),
-        render=lambda: f"Flipped. {words.place_line(block)}.",
+        render=lambda: f"Flipped. {words.place_line(after, block)}.",
     )
 
 
@@ -89,16 +90,19 @@ def _seat_normal(state: MachineState, found: Block | Connector) -> Vector:
     return state.blocks[seat[0]].face_normal(seat[1])
 
 
-def _move(state: MachineState, block: Block, pose: Pose, how: str) -> Change:
+def _move(state: MachineState, block: Block, pose: Pose, how: str, *, turned: bool) -> Change:
     moved = replace(block, world_from_block=pose)
     after = state.with_blocks(moved)
+
+    def render() -> str:
+        sentences = [f"Moved. {words.place_line(after, moved)}."]
+        if turned and moved.module.faces:
+            sentences.append(f"Free faces: {words.free_faces(after, moved)}.")
+        sentences += words.seats(state, after, moved.id)
+        return " ".join([*sentences, *words.losses(state, after)])
+
     return Change(
-        after=after,
-        placed=(block.id,),
-        attempt=f"{words.heading(block)} {how}",
-        render=lambda: " ".join(
-            [f"Moved. {words.place_line(moved)}.", *words.loosened(after, [block.id])]
-        ),
+        after=after, placed=(block.id,), attempt=f"{words.heading(block)} {how}", render=render
     )
 
 

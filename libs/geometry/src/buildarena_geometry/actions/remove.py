@@ -13,23 +13,23 @@ from buildarena_geometry.state import MachineState
 
 
 def remove_block(state: MachineState, block_id: BlockId) -> Change:
-    """Removes a block or connector; blocks that sit on it stay where they are.
+    """Removes a block or connector; what it carries stays.
 
     Args:
-        block_id: Id of the block or connector.
+        block_id: Id.
     """
     gone = part(state, block_id)
     if isinstance(gone, Connector):
         kept = {key: link for key, link in state.connectors.items() if key != gone.id}
         after = replace(state, connectors=kept)
-        return _removal(after, gone, ())
+        return _removal(state, after, gone, ())
     if gone.module.kind == "start":
         raise RefusalError(
             Cause.START_BLOCK,
             f"{words.heading(gone)} can't be removed; reset starts anew.",
         )
     after, links = without(state, [gone])
-    return _removal(after, gone, links)
+    return _removal(state, after, gone, links)
 
 
 def reset(state: MachineState) -> Change:
@@ -67,20 +67,25 @@ def without(state: MachineState, gone: list[Block]) -> tuple[MachineState, tuple
     return replace(state, blocks=blocks, occupants=occupants, connectors=connectors), links
 
 
-def removal_sentences(after: MachineState, links: tuple[str, ...]) -> list[str]:
-    """Sentences about the connectors a removal took along and the blocks that hang in the air."""
+def removal_sentences(
+    before: MachineState, after: MachineState, links: tuple[str, ...]
+) -> list[str]:
+    """Sentences about what a removal took along, what hangs in the air, and what went cold."""
     sentences = []
     if links:
         sentences.append(f"Connectors that ended on it went too: {listing(links)}.")
     sentences.extend(words.detached(after, after.joints()))
+    sentences.extend(words.cooled(before, after))
     return sentences
 
 
-def _removal(after: MachineState, gone: Block | Connector, links: tuple[str, ...]) -> Change:
+def _removal(
+    before: MachineState, after: MachineState, gone: Block | Connector, links: tuple[str, ...]
+) -> Change:
     return Change(
         after=after,
         removed=(gone.id, *links),
         render=lambda: " ".join(
-            [f"Removed {words.title(gone)}.", *removal_sentences(after, links)]
+            [f"Removed {words.title(gone)}.", *removal_sentences(before, after, links)]
         ),
     )

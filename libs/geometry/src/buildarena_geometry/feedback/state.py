@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from buildarena_geometry.blocks import JOINT_REACH
 from buildarena_geometry.feedback.words import (
     caption,
     counted,
@@ -13,16 +14,20 @@ from buildarena_geometry.feedback.words import (
     point,
     rolling,
 )
+from buildarena_geometry.flames import heating
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping
 
     from buildarena_geometry.blocks import Block, Connector, Joint
     from buildarena_geometry.rotations import Vector
     from buildarena_geometry.state import MachineState
 
+    Heating = Mapping[str, tuple[str, ...]]  # by cannon, the blocks whose flames touch it
+
 LONGEST_NOTE = 80  # characters of a note that are shown
 FLUSH_OFFSET = 1e-6  # units; a joint whose sides are nearer sits flush
+NO_JOINT = f"More than {JOINT_REACH} off there is no joint: without connectors the two come apart."
 
 
 def title(part: Block | Connector) -> str:
@@ -35,34 +40,29 @@ def heading(part: Block | Connector) -> str:
     return f"B{title(part)[1:]}"
 
 
-def block_line(block: Block, joint: Joint | None) -> str:
-    """A block in one line, without its faces.
-
-    Args:
-        block: the block.
-        joint: what holds it to the face it sits on.
-    """
-    broken = ""
-    if joint is not None and not joint.holds:
-        broken = f", joint broken ({number(joint.offset)} apart)"
-    return f"{place_line(block)}{broken}{_note(block.note)}"
+def block_line(state: MachineState, block: Block) -> str:
+    """A block in one line, without its faces."""
+    return place_line(state, block) + _note(block.note)
 
 
 def block_lines(state: MachineState, blocks: Iterable[Block]) -> list[str]:
     """Blocks of the state, a line each."""
-    return [block_line(block, state.joint(block)) for block in blocks]
+    heat = heating(state)
+    return [_place_line(state, block, heat) + _note(block.note) for block in blocks]
 
 
-def place_line(block: Block) -> str:
+def block_lines_with_faces(state: MachineState, blocks: Iterable[Block]) -> list[str]:
+    """Blocks of the state, a line each, with the letters and sides of their faces."""
+    heat = heating(state)
+    return [
+        _place_line(state, block, heat) + _letters(state, block) + _note(block.note)
+        for block in blocks
+    ]
+
+
+def place_line(state: MachineState, block: Block) -> str:
     """A block in one line: what it sits on, where it is and what it does there."""
-    facts = [f"{block.id} {block.module.name}"]
-    if block.mount is not None:
-        facts.append(f"on {block.mount[0]}/{block.mount[1]}")
-    elif block.lost_mount is not None:
-        facts.append("on nothing")
-    facts.append(f"at {point(block.center_xyz)}")
-    facts.extend(_use(block))
-    return ", ".join(facts)
+    return _place_line(state, block, heating(state))
 
 
 def connector_line(link: Connector) -> str:
@@ -72,6 +72,21 @@ def connector_line(link: Connector) -> str:
         f"{link.id} {link.module.name}, {start}/{start_face} {point(link.start_xyz)} to "
         f"{end}/{end_face} {point(link.end_xyz)}{_note(link.note)}"
     )
+
+
+def named_faces(block: Block, labels: Iterable[str]) -> str:
+    """Faces of a block by letter and side: "A <East>, B <West>", or "none"."""
+    return listing(face_name(block, label) for label in labels)
+
+
+def face_name(block: Block, label: str) -> str:
+    """A face of a block by letter and side: "B <West>"."""
+    return f"{label} {caption(block.face_normal(label))}"
+
+
+def free_faces(state: MachineState, block: Block) -> str:
+    """The faces of a block that take another one, by letter and side."""
+    return named_faces(block, state.free_faces(block))
 
 
 def idle(link: Connector) -> str:
@@ -87,20 +102,21 @@ def faces(state: MachineState, block: Block) -> str:
         return "No faces."
     rendered = []
     for face in block.module.faces:
-        place = f"{face.label} {caption(block.face_normal(face.label))}"
-        place += f" {point(block.face_center(face.label), 3)}"
+        place = f"{face_name(block, face.label)} {point(block.face_center(face.label), 3)}"
         rendered.append(place + _use_of_face(state, block, face.label))
     return f"Faces: {'; '.join(rendered)}."
 
 
 def placement(state: MachineState, block: Block) -> str:
-    """A block with its faces: what a model has to know to build on."""
-    return f"{block_line(block, state.joint(block))}.\n{faces(state, block)}"
+    """A block with its free faces: what a model has to know to build on."""
+    if not block.module.faces:
+        return f"{block_line(state, block)}. No faces."
+    return f"{block_line(state, block)}. Free faces: {free_faces(state, block)}."
 
 
 def block_details(state: MachineState, block: Block) -> str:
     """Everything a model can ask about one block."""
-    lines = [placement(state, block)]
+    lines = [f"{block_line(state, block)}.", faces(state, block)]
     bound = [f"{action} {listing(keys)}" for action, keys in block.bindings.items()]
     if bound:
         lines.append(f"Keys: {'; '.join(bound)}.")
@@ -120,10 +136,9 @@ def summary(state: MachineState) -> str:
         f"Sub-structure {structure.letter}: {structure.source}."
         for structure in state.structures.values()
     )
-    joints = {joint.part: joint for joint in state.joints()}
-    lines.extend(block_line(block, joints.get(block.id)) for block in state.blocks.values())
+    lines.extend(block_lines(state, state.blocks.values()))
     lines.extend(connector_line(link) for link in state.connectors.values())
-    lines.extend(detached(state, joints.values()))
+    lines.extend(detached(state, state.joints()))
     return "\n".join(lines)
 
 
@@ -162,26 +177,88 @@ def powered_blocks(state: MachineState) -> str:
     return "\n".join(lines) or "No block is powered."
 
 
-def loosened(state: MachineState, moved: Iterable[str]) -> list[str]:
-    """Sentences about joints at the moved blocks whose two sides no longer meet."""
+def seats(before: MachineState, after: MachineState, moved_id: str) -> list[str]:
+    """Sentences about the joints at a block that was moved or turned.
+
+    Args:
+        before: the state before the action.
+        after: the state after it.
+        moved_id: id of the block; it sat where it sits.
+    """
+    moved = after.blocks[moved_id]
+    sentences, parted = [], False
+    for block in (moved, *after.children(moved)):
+        joint, earlier = after.joint(block), before.joint(before.blocks[block.id])
+        if joint is None or earlier is None:
+            continue
+        parted = parted or not joint.holds
+        # The moved block's own gap stands in its line.
+        if joint.offset > FLUSH_OFFSET and block is not moved:
+            sentences.append(f"Block {joint.part} is {_gap(joint)}.")
+        if joint.offset <= FLUSH_OFFSET < earlier.offset:
+            sentences.append(f"Block {joint.part} sits flush on {joint.base}/{joint.face} again.")
+    return [*sentences, NO_JOINT] if parted else sentences
+
+
+def losses(before: MachineState, after: MachineState) -> list[str]:
+    """Sentences about what an action parted: blocks from the first one, flames from cannons."""
+    parted = after.detached(after.joints())
+    if parted == before.detached(before.joints()):
+        return cooled(before, after)
+    return [*detached(after, after.joints()), *cooled(before, after)]
+
+
+def cooled(before: MachineState, after: MachineState) -> list[str]:
+    """Sentences about the cannons that a flame reached before an action and not after it."""
+    now = heating(after)
     rendered = []
-    for block in (state.blocks[moved_id] for moved_id in moved):
-        joints = [state.joint(block), *(state.joint(child) for child in state.children(block))]
-        for joint in joints:
-            if joint is None or joint.offset <= FLUSH_OFFSET:
-                continue
-            verdict = "" if joint.holds else " and no longer holds"
+    for cannon, torches in heating(before).items():
+        lost = [torch for torch in torches if cannon in now and torch not in now[cannon]]
+        if lost:
             rendered.append(
-                f"Block {joint.part} no longer sits flush on {joint.base}/{joint.face} "
-                f"({number(joint.offset)} apart){verdict}."
+                f"{heading(after.blocks[cannon])} is no longer heated by {listing(lost)}."
             )
     return rendered
+
+
+def _place_line(state: MachineState, block: Block, heat: Heating) -> str:
+    facts = [f"{block.id} {block.module.name}"]
+    facts.extend(_seat(block, state.joint(block)))
+    facts.append(f"at {point(block.center_xyz)}")
+    facts.extend(_use(block))
+    facts.extend(_heat(block, heat))
+    return ", ".join(facts)
+
+
+def _seat(block: Block, joint: Joint | None) -> list[str]:
+    if joint is not None:
+        flush = joint.offset <= FLUSH_OFFSET
+        return [f"on {joint.base}/{joint.face}" if flush else _gap(joint)]
+    return [] if block.lost_mount is None else ["on nothing"]
+
+
+def _letters(state: MachineState, block: Block) -> str:
+    if not block.module.faces:
+        return ""
+    taken = [label for label in block.module.face_of_label if state.is_occupied(block, label)]
+    rest = f"; taken {named_faces(block, taken)}" if taken else ""
+    return f", free faces {free_faces(state, block)}{rest}"
+
+
+def _gap(joint: Joint) -> str:
+    """How far a block is off its face, and what that means: "0.25 off 2/A; still holds"."""
+    apart, verdict = number(joint.offset), "still holds"
+    if not joint.holds:
+        verdict = "no longer joined"
+        # Two decimals would show the reach itself for what is just beyond it.
+        apart = apart if float(apart) > JOINT_REACH else plain(joint.offset)
+    return f"{apart} off {joint.base}/{joint.face}; {verdict}"
 
 
 def _use(block: Block) -> list[str]:
     if block.module.spins:
         forward = rolling(block.axis_xyz, clockwise=block.forward_is_clockwise)
-        return [forward + _flipped(block)]
+        return [f"centre {point(block.body_center_xyz)}", forward + _flipped(block)]
     towards = block.pointing_xyz
     if towards is None:
         return []
@@ -190,6 +267,17 @@ def _use(block: Block) -> list[str]:
         for mark in block.module.landmarks
     ]
     return [f"points {caption(towards)}", *marks]
+
+
+def _heat(block: Block, heat: Heating) -> list[str]:
+    facts = []
+    if block.id in heat:
+        torches = heat[block.id]
+        facts.append(f"heated by {listing(torches)}" if torches else "not heated")
+    if block.module.flames:
+        cannons = [cannon for cannon, torches in heat.items() if block.id in torches]
+        facts.append(f"heats {', '.join(cannons) or 'nothing'}")
+    return facts
 
 
 def _flipped(block: Block) -> str:

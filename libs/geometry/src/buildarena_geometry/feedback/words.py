@@ -21,13 +21,13 @@ _QUADRANTS = ("Northeast", "Southeast", "Southwest", "Northwest")
 
 
 def number(value: float, decimals: int = 2) -> str:
-    """The number with so many decimals, and never "-0.00"."""
-    text = f"{value:.{decimals}f}"
-    return text.lstrip("-") if float(text) == 0 else text
+    """The number with at most so many decimals: "1.25", "-3", "0"."""
+    text = f"{value:.{decimals}f}".rstrip("0").rstrip(".")
+    return "0" if text in {"-0", ""} else text
 
 
 def point(vector: Vector, decimals: int = 2) -> str:
-    """A place or offset, east, north, up: "[1.00, 0.00, -0.50]"."""
+    """A place or offset, east, north, up: "[1, 0, -0.5]"."""
     return f"[{', '.join(number(value, decimals) for value in vector)}]"
 
 

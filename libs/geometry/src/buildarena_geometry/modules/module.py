@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Literal, get_args
 
+from buildarena_geometry.modules.names import CaselessNames
 from buildarena_geometry.poses import Pose
 from buildarena_geometry.rotations import ORIGIN, Vector, distance, from_axes
 
@@ -92,6 +93,11 @@ class Cylinder:
         return distance(self.base, self.top)
 
     @property
+    def center(self) -> Vector:
+        """(3,) its middle, block frame, units."""
+        return _middle(self.base, self.top)
+
+    @property
     def block_from_axis(self) -> Pose:
         """The frame of its middle in the block's, +z along its axis."""
         scale = 1 / self.length
@@ -101,7 +107,7 @@ class Cylinder:
         norm = distance(across, ORIGIN)
         x_axis = (across[0] / norm, across[1] / norm, across[2] / norm)
         turn = from_axes(x_axis, (x, y, z))
-        return Pose(position=_middle(self.base, self.top), quaternion=turn)
+        return Pose(position=self.center, quaternion=turn)
 
 
 Solid = Box | Cylinder
@@ -292,7 +298,7 @@ class Module:
 class Catalogue(Mapping[str, Module]):
     """The modules a machine may be made of, by name, in the order of their files."""
 
-    __slots__ = ("_modules", "start")
+    __slots__ = ("_modules", "_names", "start")
 
     def __init__(self, modules: tuple[Module, ...]) -> None:
         """Takes modules with distinct names, exactly one of them a starting block.
@@ -301,6 +307,7 @@ class Catalogue(Mapping[str, Module]):
             ValueError: two modules of one name, or not exactly one starting block.
         """
         self._modules = {module.name: module for module in modules}
+        self._names = CaselessNames(self._modules)
         starts = [module for module in modules if module.kind == "start"]
         if len(self._modules) != len(modules) or len(starts) != 1:
             raise ValueError("a catalogue holds distinct names and exactly one starting block")
@@ -317,6 +324,11 @@ class Catalogue(Mapping[str, Module]):
 
     def __repr__(self) -> str:
         return f"Catalogue({', '.join(self._modules)})"
+
+    def named(self, written: str) -> Module | None:
+        """The module a name means, whatever its case and spaces; None if there is none."""
+        name = self._names.find(written)
+        return None if name is None else self._modules[name]
 
     @property
     def attachable(self) -> tuple[str, ...]:

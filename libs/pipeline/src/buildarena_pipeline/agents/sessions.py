@@ -5,10 +5,17 @@ from __future__ import annotations
 import re
 from collections import OrderedDict
 from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 from threading import Lock
 from typing import Any
 
 from buildarena_benchmark import Task, ValidationIssue, broken_constraint
+from buildarena_pipeline.agents.briefing import (
+    MAX_CALLS,
+    MAX_SESSION_BYTES,
+    briefing,
+    briefing_digest,
+)
 from buildarena_pipeline.agents.workbench import ASSEMBLY, Workbench, check_arguments, rebuild
 from buildarena_pipeline.catalog.tracks import SIMULATORS, external_track
 from buildarena_pipeline.errors import PipelineError, SubmissionError
@@ -29,12 +36,9 @@ from buildarena_store import (
 )
 from buildarena_store.accounts.names import claim_name
 from buildarena_store.jobs.job import configuration_hash
-from buildarena_store.states import simulate_queue
+from buildarena_store.states import EXTERNAL_PROVIDER, simulate_queue
 
 AGENT_NAME = re.compile(r"[A-Za-z0-9_.-]{1,80}")
-MAX_CALLS = 2000
-MAX_SESSION_BYTES = 8 << 20
-"""What a session's arguments and feedback may have together: 4 kB for each of its calls."""
 CACHED_BENCHES = 256
 JSON = "application/json"
 
@@ -45,6 +49,23 @@ class SessionClosedError(PipelineError):
 
 class NothingToSubmitError(PipelineError):
     """There is no machine, or there are several without an assembly."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OpenedSession:
+    """An open session.
+
+    Attributes:
+        job: Its job.
+        task: What is to be built.
+        briefing: What its agent must know to play.
+        again: Whether it was open already.
+    """
+
+    job: Job
+    task: Task
+    briefing: str
+    again: bool
 
 
 class ExternalSessions:
@@ -68,8 +89,10 @@ class ExternalSessions:
         simulator: str,
         owner: str | None = None,
         force: bool = False,
-    ) -> Job:
+    ) -> OpenedSession:
         """Opens a session for one task, which belongs to the key that opened it.
+
+        A session that is open already is given again to its owner: the first answer may be lost.
 
         Args:
             task: The task's name.
@@ -80,12 +103,13 @@ class ExternalSessions:
             force: Play under another key's name, as an admin may.
 
         Raises:
-            SubmissionError: Something is unknown, or this agent played this seed already.
+            SubmissionError: Something is unknown, or the agent's session of this seed is over or
+                another key's.
             NameTakenError: The agent's name is another key's.
         """
         chosen = self._check(task, agent, simulator)
-        track = external_track(simulator)
-        config = {"name": f"agent/{agent}", "provider": "external", "model": agent}
+        track = external_track(simulator, briefing_digest())
+        config = {"name": f"agent/{agent}", "provider": EXTERNAL_PROVIDER, "model": agent}
         key = JobKey(
             task=task,
             task_version=chosen.version,
@@ -104,10 +128,19 @@ class ExternalSessions:
         with self._context.store.database.transaction() as connection:
             claim_name("agent", agent, owner=owner, connection=connection, force=force)
             self._context.store.jobs.add([new], connection=connection)
-            if not self._context.store.external_calls.open(key.job_id, connection=connection):
-                message = f"agent {agent!r} has played seed {seed} of {task}: take another seed"
-                raise SubmissionError([ValidationIssue(path="seed", message=message)])
-        return self._context.store.jobs.get(key.job_id)
+            calls = self._context.store.external_calls
+            again = not calls.open(key.job_id, connection=connection)
+            if again:
+                lease = calls.lease(key.job_id, connection=connection)
+                if lease is None or lease.job.owner != owner:
+                    message = f"agent {agent!r} has played seed {seed} of {task}: take another seed"
+                    raise SubmissionError([ValidationIssue(path="seed", message=message)])
+        return OpenedSession(
+            job=self._context.store.jobs.get(key.job_id),
+            task=chosen,
+            briefing=briefing(chosen),
+            again=again,
+        )
 
     def call(self, job_id: str, *, machine: str, tool: str, arguments: Any) -> ExternalCall:
         """Carries out one tool call and keeps it.

@@ -66,14 +66,19 @@ class Track:
         return {name: getattr(self, name) for name in self.__dataclass_fields__}
 
 
-def external_track(simulator: str) -> Track:
-    """The track of external agents, which bring their own prompts."""
+def external_track(simulator: str, briefing_digest: str) -> Track:
+    """The track of external agents, which bring their own prompts.
+
+    Args:
+        simulator: Simulator name.
+        briefing_digest: Hash of what they read around a task's statement.
+    """
     return Track(
         workflow=EXTERNAL_WORKFLOW,
         simulator=simulator,
         simulation_version=SIMULATION_VERSION,
         prompts="own",
-        prompts_digest="",
+        prompts_digest=briefing_digest,
         feedback_version=FEEDBACK_VERSION,
     )
 

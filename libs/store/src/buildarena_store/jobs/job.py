@@ -10,6 +10,7 @@ from typing import Any
 
 from buildarena_store.ids import content_hash
 from buildarena_store.rows import columns_of
+from buildarena_store.states import EXTERNAL_PROVIDER
 from buildarena_store.tables import jobs
 
 
@@ -114,6 +115,11 @@ class Job:
     created_at: datetime
     started_at: datetime | None
     finished_at: datetime | None
+
+    @property
+    def usage_is_known(self) -> bool:
+        """Whether its requests, tokens and cost were counted: an external agent reports none."""
+        return self.model_config.get("provider") != EXTERNAL_PROVIDER
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -70,10 +70,12 @@ class Result(BaseModel):
     parts: int | None
     flags: list[str]
     refusals: dict[str, int]
-    requests: int
-    input_tokens: int
-    output_tokens: int
-    cost_usd: float
+    requests: int | None = Field(
+        description="null, as the next three, for an external agent: it reports none"
+    )
+    input_tokens: int | None
+    output_tokens: int | None
+    cost_usd: float | None
     actions: int
     refused_actions: int
     imported: bool

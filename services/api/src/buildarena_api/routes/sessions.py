@@ -12,12 +12,12 @@ from buildarena_api.dependencies import ContextDep, ExternalDep
 from buildarena_api.http.access import Caller, CallerDep
 from buildarena_api.http.problems import ProblemError, problem_responses
 from buildarena_api.schemas import JobView
+from buildarena_pipeline.agents.briefing import LIMITS
 from buildarena_pipeline.agents.sessions import NothingToSubmitError, SessionClosedError
 from buildarena_pipeline.agents.workbench import ASSEMBLY, MAIN, agent_tools
 from buildarena_pipeline.catalog.specs import Name, Seed
 from buildarena_pipeline.catalog.tracks import SIMULATORS
 from buildarena_pipeline.runtime.context import Context
-from buildarena_pipeline.runtime.scoring import task_of
 from buildarena_store import UnknownIdError
 
 router = APIRouter(prefix="/v1/sessions", tags=["sessions"])
@@ -50,12 +50,29 @@ class ToolView(BaseModel):
     parameters: dict[str, Any] = Field(description="JSON schema of its arguments")
 
 
+class LimitsView(BaseModel):
+    """How much a session may do."""
+
+    model_config = ConfigDict(from_attributes=True)
+
+    calls: int = Field(description="Calls it may make")
+    session_bytes: int = Field(description="Bytes of all arguments and answers")
+    call_bytes: int = Field(description="Bytes of one call's arguments")
+    idle_s: int = Field(description="Seconds without a call after which it is cancelled")
+
+
 class SessionOpened(BaseModel):
     """An open session."""
 
     id: str = Field(description="Also the id of the job that will hold the score")
-    statement: str = Field(description="What to build")
+    briefing: str = Field(
+        description="All that an agent must know, as Markdown: how it plays, the statement, the "
+        "frame, the rules and the modules with sizes, masses, face letters and actions"
+    )
+    statement: str = Field(description="What to build; part of the briefing")
     tools: list[ToolView]
+    limits: LimitsView
+    calls: int = Field(description="Calls made so far; more than 0 if it was open already")
 
 
 class ToolCall(BaseModel):
@@ -81,16 +98,25 @@ class ToolOutcome(BaseModel):
     feedback: str = Field(description="The state in words, or what would have been allowed")
 
 
-@router.post("", status_code=201, responses=problem_responses(403, 422, 503))
+@router.post(
+    "",
+    status_code=201,
+    responses={
+        200: {"model": SessionOpened, "description": "It was open already"},
+        **problem_responses(403, 422, 503),
+    },
+)
 def open_session(
     body: OpenSession,
     response: Response,
     sessions: ExternalDep,
-    context: ContextDep,
     caller: CallerDep,
 ) -> SessionOpened:
-    """Opens a session in which an agent of yours builds for one task."""
-    job = sessions.open(
+    """Opens a session in which an agent of yours builds for one task.
+
+    The same agent, task, seed and simulator give the same session for as long as it is open.
+    """
+    opened = sessions.open(
         task=body.task,
         agent=body.agent,
         seed=body.seed,
@@ -98,10 +124,15 @@ def open_session(
         owner=caller.key_id,
         force=caller.is_admin,
     )
-    response.headers["Location"] = f"/v1/jobs/{job.id}"
+    response.headers["Location"] = f"/v1/jobs/{opened.job.id}"
+    if opened.again:
+        response.status_code = 200
     return SessionOpened(
-        id=job.id,
-        statement=task_of(job, context.tasks).statement,
+        id=opened.job.id,
+        briefing=opened.briefing,
+        statement=opened.task.statement,
+        limits=LimitsView.model_validate(LIMITS),
+        calls=opened.job.actions,
         tools=[
             ToolView(name=tool.name, description=tool.description, parameters=dict(tool.parameters))
             for tool in agent_tools()

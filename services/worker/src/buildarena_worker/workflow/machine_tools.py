@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from buildarena_geometry import Machine, Refused, load_catalogue, tool_definitions
+from buildarena_geometry.feedback.modules import modules_text as catalogue_text
 from buildarena_pipeline.transcript import ActionResult
 from buildarena_worker.session.dialogue import Act
 from buildarena_worker.session.messages import Tool, ToolCall
@@ -45,10 +47,23 @@ def tools_named(names: Sequence[str]) -> list[Tool]:
         Tool(
             name=name,
             description=known[name].description,
-            parameters=known[name].parameters,
+            parameters=_in_short(known[name].parameters),
         )
         for name in names
     ]
+
+
+def _in_short(schema: Mapping[str, Any]) -> dict[str, Any]:
+    """A schema without what refusals say as well, and words that say no more than a name."""
+
+    def kept(key: str, value: object) -> bool:
+        return " " in str(value) if key == "description" else key != "maxLength"
+
+    properties = {
+        name: {key: value for key, value in told.items() if kept(key, value)}
+        for name, told in schema["properties"].items()
+    }
+    return {"type": "object", "properties": properties, "required": schema["required"]}
 
 
 def acting_on(machine: Machine) -> Act:
@@ -71,16 +86,9 @@ def modules_text(names: Sequence[str] | None = None) -> str:
     """The module list for people and models, generated from the catalogue.
 
     Args:
-        names: Only these modules; all that can be built by default.
+        names: Only these modules, and the starting block; all that can be built by default.
     """
-    lines = []
-    for module in load_catalogue().values():
-        if module.kind in {"start", "cargo"} or (names is not None and module.name not in names):
-            continue
-        size = "connector" if module.size is None else " x ".join(f"{e:g}" for e in module.size)
-        facts = f"{size}, mass {module.mass:g}"
-        lines.append(f"- {module.name} ({facts}): {module.description}")
-    return "\n".join(lines)
+    return catalogue_text(load_catalogue(), names)
 
 
 def parts_text(names: Sequence[str] | None = None) -> str:
@@ -111,7 +119,4 @@ def connectors_of(names: Sequence[str] | None = None) -> list[str]:
 
 def tools_text(names: Sequence[str]) -> str:
     """Tools and their limits for somebody who does not hold them, one line each."""
-    return "\n".join(
-        f"- {tool.name}({', '.join(tool.parameters['properties'])}): {tool.description}"
-        for tool in tools_named(names)
-    )
+    return "\n".join(f"- {tool.name}: {tool.description}" for tool in tools_named(names))

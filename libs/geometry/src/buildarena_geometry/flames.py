@@ -1,0 +1,78 @@
+"""Which flames reach which cannons."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from numpy.typing import NDArray
+
+    from buildarena_geometry.blocks import Block
+    from buildarena_geometry.modules.module import Sphere
+    from buildarena_geometry.state import MachineState
+
+_CONTACT = 1e-9  # units; rounding must not part spheres that just touch
+
+
+def flames_touch(
+    bodies: NDArray[np.float64],
+    body_radii: NDArray[np.float64],
+    flames: NDArray[np.float64],
+    flame_radii: NDArray[np.float64],
+) -> NDArray[np.bool_]:
+    """Which flames touch which spheres of cannons.
+
+    Args:
+        bodies: (B, 3) centres of the cannons' spheres, units.
+        body_radii: (B,) units.
+        flames: (F, 3) centres of the flames, in the same frame, units.
+        flame_radii: (F,) units.
+
+    Returns:
+        (B, F) whether sphere and flame touch.
+    """
+    distances = np.linalg.norm(bodies[:, None] - flames[None], axis=2) - body_radii[:, None]
+    return np.asarray(distances <= flame_radii + _CONTACT)
+
+
+def heating(state: MachineState) -> Mapping[str, tuple[str, ...]]:
+    """What heats each cannon where the machine stands as it is built.
+
+    Returns:
+        For each block that a flame can heat, in the order of the blocks, the ids of the blocks
+        whose flames touch it.
+    """
+    cannons = [block for block in state.blocks.values() if heatable(block)]
+    torches = [block for block in state.blocks.values() if block.module.flames]
+    if not cannons or not torches:
+        return {cannon.id: () for cannon in cannons}
+    bodies = [(cannon.id, cannon, sphere) for cannon in cannons for sphere in _body(cannon)]
+    fires = [(torch.id, torch, flame) for torch in torches for flame in torch.module.flames]
+    touching = flames_touch(*_spheres(bodies), *_spheres(fires))
+    found: dict[str, dict[str, None]] = {cannon.id: {} for cannon in cannons}
+    for row, column in np.argwhere(touching):
+        found[bodies[row][0]][fires[column][0]] = None
+    order = {torch.id: place for place, torch in enumerate(torches)}
+    return {cannon: tuple(sorted(by, key=order.__getitem__)) for cannon, by in found.items()}
+
+
+def heatable(block: Block) -> bool:
+    """Whether a flame can heat the block."""
+    return bool(_body(block))
+
+
+def _body(block: Block) -> tuple[Sphere, ...]:
+    thrust = block.module.thrust
+    return () if thrust is None else thrust.spheres
+
+
+def _spheres(
+    carried: Iterable[tuple[str, Block, Sphere]],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Centres, (K, 3), and radii, (K,), of spheres that blocks carry."""
+    pairs = [(block.landmark(sphere.along), sphere.radius) for _, block, sphere in carried]
+    return np.array([center for center, _ in pairs]), np.array([radius for _, radius in pairs])

@@ -1,0 +1,30 @@
+"""Names that are found whatever the case and the spaces they are written with."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+
+class CaselessNames:
+    """Finds the name that is meant: the same one, or the only one that differs in case alone."""
+
+    __slots__ = ("_exact", "_loose")
+
+    def __init__(self, names: Iterable[str]) -> None:
+        """Takes the canonical names."""
+        self._exact = frozenset(names)
+        counts = Counter(map(_folded, self._exact))
+        # Own modules may differ in case alone: then only the exact name is clear.
+        self._loose = {_folded(name): name for name in self._exact if counts[_folded(name)] == 1}
+
+    def find(self, written: str) -> str | None:
+        """The canonical name, or None."""
+        return written if written in self._exact else self._loose.get(_folded(written))
+
+
+def _folded(name: str) -> str:
+    return " ".join(name.split()).casefold()
