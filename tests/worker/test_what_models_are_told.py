@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 
 import pytest
+from what_a_model_sees import PAGE, page
 
 from buildarena_benchmark import builtin_tasks
 from buildarena_geometry import load_catalogue, tool_definitions
@@ -212,3 +213,7 @@ def test_the_controller_keeps_its_past(play, rollout) -> None:
             assert all(action in lines[0] for action in block.module.actions)
     for fact in FACTS["control", "controller"]:
         assert fact in first[0].text + opening
+
+
+def test_the_page_of_what_models_see_is_as_sessions_are_now() -> None:
+    assert page() == PAGE.read_text(encoding="utf-8"), "run `make what-a-model-sees` and look at it"
