@@ -1,8 +1,9 @@
-"""Models for session tests that reply as scripted."""
+"""Models for session tests: some reply as scripted, some remember what they were asked."""
 
 from __future__ import annotations
 
 from buildarena_store import Usage
+from buildarena_worker.builtin import BuiltinClient
 from buildarena_worker.session.messages import Answer, Reply, Request, ToolCall
 
 
@@ -24,3 +25,16 @@ class Scripted:
 
 def call(name: str, /, **arguments: object) -> Reply:
     return Reply(text="", calls=(ToolCall(id="c1", name=name, arguments=arguments),))
+
+
+class Recording:
+    """A built-in model, with every request kept."""
+
+    def __init__(self, name: str = "expert") -> None:
+        self._model = BuiltinClient(name)
+        self.requests: list[Request] = []
+
+    def complete(self, request: Request, patience: object = None) -> Answer:
+        del patience
+        self.requests.append(request)
+        return self._model.complete(request)

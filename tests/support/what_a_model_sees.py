@@ -11,10 +11,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from player import Player
+from scripted import Recording
 
 from buildarena_store import RolloutRecord
-from buildarena_worker.builtin import BuiltinClient
-from buildarena_worker.session.messages import Answer, Message, Request
+from buildarena_worker.session.messages import Message
 from buildarena_worker.workflow.rounds import Loop
 
 PAGE = Path(__file__).parents[2] / "docs" / "what-a-model-sees.md"
@@ -27,19 +27,6 @@ One whole session of each category in the default workflow, played by `builtin/e
 everything that each role reads: its system message, what it reads first, and then what is new in
 each request. Replies are indented. `make what-a-model-sees` writes this page.
 """
-
-
-class Recording:
-    """The expert, with every request kept."""
-
-    def __init__(self) -> None:
-        self._expert = BuiltinClient("expert")
-        self.requests: list[Request] = []
-
-    def complete(self, request: Request, patience: object = None) -> Answer:
-        del patience
-        self.requests.append(request)
-        return self._expert.complete(request)
 
 
 def page() -> str:

@@ -8,12 +8,12 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 
 import pytest
+from scripted import Recording
 from what_a_model_sees import PAGE, page
 
 from buildarena_benchmark import builtin_tasks
 from buildarena_geometry import load_catalogue, tool_definitions
-from buildarena_worker.builtin import BuiltinClient
-from buildarena_worker.session.messages import Answer, Request
+from buildarena_worker.session.messages import Request
 from buildarena_worker.workflow.rounds import Loop
 
 TASKS = ("support-1", "support-3", "transport-1", "transport-2", "lift-2", "lift-3")
@@ -48,19 +48,6 @@ FACTS: dict[tuple[str, str], tuple[str, ...]] = {
     ("control", "controller"): ("UpArrow", "spinning_forward", "## Plan", "no key"),
 }
 """What a role must be able to read, by phase and role."""
-
-
-class Recording:
-    """The expert, with every request kept."""
-
-    def __init__(self) -> None:
-        self._expert = BuiltinClient("expert")
-        self.requests: list[Request] = []
-
-    def complete(self, request: Request, patience: object = None) -> Answer:
-        del patience
-        self.requests.append(request)
-        return self._expert.complete(request)
 
 
 @pytest.fixture(scope="module")

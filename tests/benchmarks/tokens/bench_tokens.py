@@ -15,10 +15,11 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[3]))
 
 from tests.support.player import Player
+from tests.support.scripted import Recording
 
 from buildarena_benchmark import builtin_tasks
-from buildarena_worker.builtin import CHARACTERS_PER_TOKEN, BuiltinClient
-from buildarena_worker.session.messages import Answer, Request
+from buildarena_worker.builtin import CHARACTERS_PER_TOKEN
+from buildarena_worker.session.messages import Request
 
 PARTS = ("schemas", "system", "opening", "own words", "others", "tool answers")
 BASELINE = {"support-1": (30, 46279), "transport-1": (36, 56810), "lift-3": (67, 98181)}
@@ -26,19 +27,6 @@ BASELINE = {"support-1": (30, 46279), "transport-1": (36, 56810), "lift-3": (67,
 PUBLISHED = {"support-1": (67, 630_000)}
 """Mean requests and input tokens of the paper's models."""
 BAR = 2 / 3
-
-
-class Recording:
-    """The expert, with every request kept."""
-
-    def __init__(self) -> None:
-        self._expert = BuiltinClient("expert")
-        self.requests: list[Request] = []
-
-    def complete(self, request: Request, patience: object = None) -> Answer:
-        del patience
-        self.requests.append(request)
-        return self._expert.complete(request)
 
 
 def parts_of(request: Request) -> dict[str, int]:
