@@ -211,8 +211,8 @@ def test_an_agent_is_told_all_it_needs(api, task) -> None:
     for said in ("x points east, y north, z up", "one trial", "machine `assembly`:", "2,000 calls"):
         assert text.count(said) == 1, said
     assert "$" not in text
-    speaks_of_trials = "three trials; the best" in opened["statement"]
-    assert ("You are the controller yourself" in text) is speaks_of_trials
+    driven = "keys are bound to the actions" in opened["statement"]
+    assert ("You write the key presses yourself" in text) is driven
     assert opened["limits"]["calls"] == 2000
     names = {tool["name"] for tool in opened["tools"]}
     assert set(re.findall(r"`([a-z]+(?:_[a-z]+)+)`", text)) - {"machine_id"} <= names

@@ -159,7 +159,7 @@ def test_sub_structures_must_be_joined(tasks, connector) -> None:
     assert reason == "unjoined_parts"
     assert sentence == (
         "sub-structure B is not joined to the starting block A_1: join every part by an "
-        "attachment that holds, a brace or a winch"
+        "attachment that holds or a connector"
     )
 
 

@@ -167,7 +167,7 @@ class Newcomer:
         for line in text.splitlines():
             begins = re.match(r"(?:(?:Started|Attached|Moved)\. )?([A-Z]*_?\d+) [A-Z]", line)
             block = begins[1] if begins else block
-            listed = re.search(r"(?:^Faces: |free faces )(.*)", line)
+            listed = re.search(r"(?:[Ff]aces: |free faces )(.*)", line)
             if block is not None and listed:
                 faces = {side: label for label, side in _FACE.findall(listed[1])}
                 self._faces[self.machine, block] = faces

@@ -33,10 +33,10 @@ def start(
     """Begins the machine with its starting block, which becomes block 1.
 
     Args:
-        init_shift: Its centre [east, north, up]; [0, 0, 0] if left out.
+        init_shift: Position of the block's centre [east, north, up]; [0, 0, 0] if left out.
         init_rotation: [yaw, pitch, roll] in degrees: yaw turns north to east, pitch north down,
             roll up to east; [0, 0, 0] if left out.
-        note: What this is.
+        note: What this machine is, in your words.
     """
     if state.is_assembly:
         raise RefusalError(
@@ -65,10 +65,10 @@ def attach_block_to(
     """Attaches a new block to a free face of a block.
 
     Args:
-        base_block: Id.
-        face: Letter of a free face of it.
-        new_block: Module; no connector.
-        note: What it is for.
+        base_block: Id of the block that carries the new one.
+        face: Label of the base block's face, such as "A".
+        new_block: Name of the module to attach; connectors go in with connect_blocks.
+        note: What it is for, in your words.
     """
     require_started(state)
     module = attachable_module(state, new_block)
@@ -123,12 +123,12 @@ def connect_blocks(
     """Joins two faces of existing blocks with a connector; the faces may be taken.
 
     Args:
-        block_a: Id.
-        face_a: Letter.
-        block_b: Id.
-        face_b: Letter.
-        connector: Module.
-        note: What it is for.
+        block_a: Id of the block where the connector begins.
+        face_a: Label of the face of block_a.
+        block_b: Id of the block where it ends.
+        face_b: Label of the face of block_b.
+        connector: Name of the connector.
+        note: What it is for, in your words.
     """
     require_started(state)
     module = connector_module(state, connector)

@@ -19,7 +19,7 @@ def get_block_details(state: MachineState, block_id: BlockId) -> Change:
     """Tells everything about one block: position, faces, what sits on them, keys.
 
     Args:
-        block_id: Id.
+        block_id: Id of the block or connector.
     """
     found = part(state, block_id)
     if isinstance(found, Block):

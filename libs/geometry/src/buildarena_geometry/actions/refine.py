@@ -20,8 +20,8 @@ def twist_block(state: MachineState, block_id: BlockId, angle: Number) -> Change
     """Turns one block on its seat by degrees, clockwise seen from outside; what it carries stays.
 
     Args:
-        block_id: Id.
-        angle: Degrees.
+        block_id: Id of the block.
+        angle: Degrees, clockwise seen from outside that face.
     """
     found = part(state, block_id)
     if found.module.kind == "start":
@@ -41,8 +41,8 @@ def shift_block(state: MachineState, block_id: BlockId, shift_real: Triple) -> C
     """Moves one block by at most 0.5 along each axis; what it carries stays.
 
     Args:
-        block_id: Id.
-        shift_real: [east, north, up].
+        block_id: Id of the block.
+        shift_real: [east, north, up], each between -0.5 and 0.5.
     """
     found = part(state, block_id)
     if max(map(abs, shift_real)) > LARGEST_SHIFT:
@@ -63,7 +63,7 @@ def flip_spin(state: MachineState, block_id: BlockId) -> Change:
     """Reverses the direction a wheel spins and rolls.
 
     Args:
-        block_id: Id of a wheel.
+        block_id: Id of the wheel.
     """
     found = part(state, block_id)
     if isinstance(found, Connector) or not found.module.spins:

@@ -16,7 +16,7 @@ def remove_block(state: MachineState, block_id: BlockId) -> Change:
     """Removes a block or connector; what it carries stays.
 
     Args:
-        block_id: Id.
+        block_id: Id of the block or connector.
     """
     gone = part(state, block_id)
     if isinstance(gone, Connector):

@@ -26,12 +26,10 @@ MAX_SESSION_BYTES: Final = 8 << 20
 """What a session's arguments and feedback may have together: 4 kB for each of its calls."""
 _CONTROL: Final = {
     "agent": (
-        "Where the task below speaks of a plan, a controller or three trials, that is how models "
-        "play in workflows. You are the controller yourself, and write the key presses before you "
-        "submit: bind a key to each action that shall be used with `change_control_key`, and say "
-        "when which key is held with `add_control_sequence`, both on the machine that is "
-        "simulated. An assembly keeps the bindings of its sub-structures and has a sequence of its "
-        "own."
+        "You write the key presses yourself, before you submit: bind a key to each action that "
+        "shall be used with `change_control_key`, and say when which key is held with "
+        "`add_control_sequence`, both on the machine that is simulated. An assembly keeps the "
+        "bindings of its sub-structures and has a sequence of its own."
     ),
     "held": "You need not bind any key: every water cannon fires from t = {from_s:g} s on.",
     "none": "No key is pressed in this trial, so you need not bind any.",

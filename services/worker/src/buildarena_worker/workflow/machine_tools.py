@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Final
 
 from buildarena_geometry import Machine, Refused, load_catalogue, tool_definitions
 from buildarena_geometry.feedback.modules import modules_text as catalogue_text
@@ -53,14 +53,18 @@ def tools_named(names: Sequence[str]) -> list[Tool]:
     ]
 
 
+_TOLD: Final = frozenset({"init_rotation", "rotation", "machine_id", "machine_index"})
+"""Arguments whose descriptions say more than their names and the tools' own words."""
+
+
 def _in_short(schema: Mapping[str, Any]) -> dict[str, Any]:
-    """A schema without what refusals say as well, and words that say no more than a name."""
-
-    def kept(key: str, value: object) -> bool:
-        return " " in str(value) if key == "description" else key != "maxLength"
-
+    """A schema without what names, prompts and refusals say as well."""
     properties = {
-        name: {key: value for key, value in told.items() if kept(key, value)}
+        name: {
+            key: value
+            for key, value in told.items()
+            if key != "maxLength" and (key != "description" or name in _TOLD)
+        }
         for name, told in schema["properties"].items()
     }
     return {"type": "object", "properties": properties, "required": schema["required"]}
