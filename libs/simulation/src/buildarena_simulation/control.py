@@ -7,6 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
+from buildarena_geometry.blocks import KeyPress
 from buildarena_geometry.flames import flames_touch
 from buildarena_simulation.constants import GRAVITY, KEY_DELAY_S
 from buildarena_simulation.scenario import Control
@@ -29,15 +30,6 @@ class KeyHold(Protocol):
         """For how long, seconds."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TimedHold:
-    """A key hold at its own times; fields as in `KeyHold`."""
-
-    time_s: float
-    key: str
-    hold_for_s: float
-
-
 def varied_presses(
     keys: Sequence[KeyHold], control: Control, seed: int
 ) -> tuple[Sequence[KeyHold], Control]:
@@ -50,7 +42,7 @@ def varied_presses(
     """
     delays = KEY_DELAY_S * np.random.default_rng([seed, 1]).random(1 + 2 * len(keys))
     holds = [
-        TimedHold(
+        KeyPress(
             time_s=press.time_s + early,
             key=press.key,
             hold_for_s=max(0.0, press.hold_for_s + late - early),

@@ -1,7 +1,7 @@
 """From a machine of the geometry library to the arrays the simulation works on."""
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, TypedDict
 
 import numpy as np
 
@@ -51,12 +51,8 @@ def structure_of(machine: "Machine") -> Structure:
     for connector, share in zip(braces, _shares(braces), strict=True):
         links.append(
             Link(
-                name=f"{connector.module.name} {connector.id}",
-                first=index[connector.start[0]],
-                second=index[connector.end[0]],
+                **_span(connector, index),
                 kind=JointKind.BRACE,
-                start=np.array(connector.start_point),
-                end=np.array(connector.end_point),
                 mass=connector.module.mass,
                 share=share,
                 faces=(connector.start, connector.end),
@@ -70,16 +66,32 @@ def structure_of(machine: "Machine") -> Structure:
     for connector, alike, share in zip(single, between.values(), _shares(single), strict=True):
         ropes.append(
             Rope(
-                name=f"{connector.module.name} {connector.id}",
-                first=index[connector.start[0]],
-                second=index[connector.end[0]],
-                start=np.array(connector.start_point),
-                end=np.array(connector.end_point),
+                **_span(connector, index),
                 mass=sum(one.module.mass for one in alike),
                 share=share,
             )
         )
     return build_structure(parts, links, ropes)
+
+
+class _Span(TypedDict):
+    """What a brace and a rope have in common; see `Link`."""
+
+    name: str
+    first: int
+    second: int
+    start: FloatArray
+    end: FloatArray
+
+
+def _span(connector: "Connector", index: Mapping[str, int]) -> _Span:
+    return {
+        "name": f"{connector.module.name} {connector.id}",
+        "first": index[connector.start[0]],
+        "second": index[connector.end[0]],
+        "start": np.array(connector.start_point),
+        "end": np.array(connector.end_point),
+    }
 
 
 def _shares(connectors: "Sequence[Connector]") -> list[float]:

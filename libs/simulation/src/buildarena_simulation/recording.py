@@ -1,7 +1,7 @@
 """Collects a trial's samples and makes its trajectory."""
 
 import itertools
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -88,17 +88,21 @@ class Recorder:
         directions = turned(motion.rotation[clusters.cluster_of], structure.directions)
         return heated_cannons(structure, shown, directions)
 
+    def _runs(self) -> Iterator[tuple[Clusters, list[Motion]]]:
+        """The samples, together as long as no cluster broke."""
+        for _, run in itertools.groupby(self._seen, key=lambda seen: id(seen[0])):
+            samples = list(run)
+            yield samples[0][0], [motion for _, motion in samples]
+
     def _pieces(self) -> NDArray[np.int16]:
         """(T, N) the articulated piece each tracked block belongs to, by its first block."""
         rows = []
-        for _, run in itertools.groupby(self._seen, key=lambda seen: id(seen[0])):
-            samples = list(run)
-            clusters = samples[0][0]
+        for clusters, motions in self._runs():
             first = np.array([blocks[0] for blocks in clusters.blocks])
             lowest = np.full(len(clusters), len(self._structure), dtype=np.int64)
             np.minimum.at(lowest, clusters.root, first)
             piece = lowest[clusters.root][clusters.cluster_of[self._tracked]]
-            rows.append(np.tile(piece.astype(np.int16), (len(samples), 1)))
+            rows.append(np.tile(piece.astype(np.int16), (len(motions), 1)))
         return np.concatenate(rows)
 
     def _poses(self) -> tuple[FloatArray, FloatArray]:
@@ -106,11 +110,10 @@ class Recorder:
         structure, tracked = self._structure, self._tracked
         shown, turns = structure.shown[tracked], structure.rotations[tracked]
         positions, quaternions = [], []
-        for _, run in itertools.groupby(self._seen, key=lambda seen: id(seen[0])):
-            samples = list(run)
-            of = samples[0][0].cluster_of[tracked]
-            rotation = np.array([motion.rotation for _, motion in samples])[:, of]
-            origin = np.array([motion.position for _, motion in samples])[:, of]
+        for clusters, motions in self._runs():
+            of = clusters.cluster_of[tracked]
+            rotation = np.array([motion.rotation for motion in motions])[:, of]
+            origin = np.array([motion.position for motion in motions])[:, of]
             positions.append(origin + (rotation @ shown[:, :, None])[..., 0])
             quaternions.append(quaternion_of(rotation @ turns))
         return np.concatenate(positions), np.concatenate(quaternions)

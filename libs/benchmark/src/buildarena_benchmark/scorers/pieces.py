@@ -1,6 +1,7 @@
 """Which blocks still belong to the machine: the piece that holds the starting block."""
 
 import math
+from collections.abc import Iterable, Iterator
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -31,15 +32,24 @@ def joined_to_start(machine: "Machine", trajectory: "Trajectory") -> Mask:
         return np.ones(trajectory.positions.shape[:2], dtype=bool)
     start = starting_block(machine, trajectory)
     ropes = _ropes(machine, trajectory)
-    changed = np.any(np.diff(pieces, axis=0) != 0, axis=1)
     rope_ends = np.searchsorted(trajectory.time_s, [end for _, _, end in ropes])
-    edges = sorted({0, len(pieces), *(np.flatnonzero(changed) + 1), *rope_ends})
     joined = np.zeros(pieces.shape, dtype=bool)
-    for first, last in pairwise(edges):
+    for first, last in spans_of(pieces, rope_ends.tolist()):
         row, time_s = pieces[first], trajectory.time_s[first]
         ties = [(row[a], row[b]) for a, b, end in ropes if time_s < end]
         joined[first:last] = np.isin(row, _reached(row[start], ties))
     return joined
+
+
+def spans_of(pieces: NDArray[np.int16], further: Iterable[int] = ()) -> Iterator[tuple[int, int]]:
+    """First sample, and the one after the last, of each time in which no piece breaks.
+
+    Args:
+        pieces: (T, N) as in `Trajectory`.
+        further: Samples at which another time begins as well.
+    """
+    changed = np.flatnonzero(np.any(np.diff(pieces, axis=0) != 0, axis=1)) + 1
+    yield from pairwise(sorted({0, len(pieces), *changed.tolist(), *further}))
 
 
 def mass_of(machine: "Machine", trajectory: "Trajectory", members: Mask) -> float:

@@ -1,11 +1,10 @@
 """Support: how heavy a cargo a bridge carries before it falls into the gap."""
 
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from buildarena_benchmark.scorers.pieces import Mask
+from buildarena_benchmark.scorers.pieces import Mask, spans_of
 from buildarena_benchmark.scorers.spanning import (
     Span,
     deciding_sample,
@@ -107,10 +106,8 @@ def _largest_piece(machine: "Machine", trajectory: "Trajectory") -> Mask:
     if pieces is None or not pieces.shape[1]:
         return np.ones(trajectory.positions.shape[:2], dtype=bool)
     masses = np.array([machine.blocks[block].module.mass for block in trajectory.block_ids])
-    changed = np.any(np.diff(pieces, axis=0) != 0, axis=1)
-    edges = [0, *(np.flatnonzero(changed) + 1), len(pieces)]
     largest = np.zeros(pieces.shape, dtype=bool)
-    for first, last in pairwise(edges):
+    for first, last in spans_of(pieces):
         labels, of = np.unique(pieces[first], return_inverse=True)
         largest[first:last] = pieces[first] == labels[np.bincount(of, masses).argmax()]
     return largest

@@ -6,8 +6,8 @@ from typing import Final
 
 import numpy as np
 
-from buildarena_simulation.constants import COLLISION_MARGIN
-from buildarena_simulation.structure.model import FloatArray, IntArray, ShapeKind, Structure
+from buildarena_simulation.structure.model import FloatArray, IntArray, Structure
+from buildarena_simulation.structure.solids import collision_half_extents
 
 _TIE: Final = 0.02
 """A contact within this distance of several blocks is shared among them, units."""
@@ -63,13 +63,9 @@ class ShapeTable:
 def shape_table(structure: Structure, blocks: Sequence[int] | IntArray) -> ShapeTable:
     """The shapes of some blocks."""
     owned = [(int(i), shape) for i in blocks for shape in structure.parts[i].shapes]
-    halves = [
-        shape.half_extents - (0.0 if shape.kind is ShapeKind.CYLINDER else COLLISION_MARGIN)
-        for _, shape in owned
-    ]
     return ShapeTable(
         block=np.array([i for i, _ in owned], dtype=np.int64),
         center=np.array([shape.center for _, shape in owned]),
         rotation=np.array([shape.rotation for _, shape in owned]),
-        half=np.array(halves),
+        half=np.array([collision_half_extents(shape) for _, shape in owned]),
     )

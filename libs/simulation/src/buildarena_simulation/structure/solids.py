@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 from buildarena_simulation.constants import COLLISION_MARGIN
-from buildarena_simulation.structure.model import FloatArray, Part, ShapeKind, Structure
+from buildarena_simulation.structure.model import FloatArray, Part, Shape, ShapeKind, Structure
 
 _GRAIN: Final = 1e-5
 """Faces nearer than this are one plane, units."""
@@ -66,6 +66,12 @@ class Solids:
         return self._known[key]
 
 
+def collision_half_extents(shape: Shape) -> FloatArray:
+    """Half-extents of a shape as an engine has it: a box's less the margin, (3,), units."""
+    margin = COLLISION_MARGIN if shape.kind is ShapeKind.BOX else 0.0
+    return np.asarray(shape.half_extents - margin)
+
+
 def _solids(structure: Structure, blocks: Sequence[int]) -> Iterator[Solid]:
     groups: list[tuple[FloatArray, float, list[int]]] = []
     for i in blocks:
@@ -100,12 +106,11 @@ def _merges(part: Part) -> bool:
 
 def _own_solids(block: int, part: Part) -> Iterator[Solid]:
     for shape in part.shapes:
-        margin = COLLISION_MARGIN if shape.kind is ShapeKind.BOX else 0.0
         yield Solid(
             kind=shape.kind,
             center=shape.center,
             rotation=shape.rotation,
-            half_extents=shape.half_extents - margin,
+            half_extents=collision_half_extents(shape),
             blocks=(block,),
             friction=part.physics.friction,
             is_wheel=part.is_wheel,

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from buildarena_pipeline.transcript import ActionResult
 from buildarena_worker.session.messages import Message, Reply, Tool, ToolCall
-from buildarena_worker.session.results import ObjectionError
+from buildarena_worker.session.results import ConstructionFailedError
 from buildarena_worker.session.session import Session
 
 _LAST_LINE = re.compile(r"(?:^|\n)[\s*_`'\"#]*TERMINATE[\s*_`'\".!]*\Z")
@@ -103,7 +103,7 @@ class Dialogue:
         """Lets a role speak and carries out the tool it calls.
 
         Raises:
-            ObjectionError: The role raised an objection.
+            ConstructionFailedError: The role raised an objection.
         """
         reply, entry = self._session.ask(
             self._view(role), role.tools, phase=self._phase, role=role.name
@@ -120,7 +120,7 @@ class Dialogue:
         )
         for action in actions:
             if action.name == OBJECTION.name and action.ok:
-                raise ObjectionError("objection", f"{role.name}: {action.feedback}")
+                raise ConstructionFailedError("objection", f"{role.name}: {action.feedback}")
         return reply
 
     def _view(self, role: Role) -> list[Message]:
@@ -130,20 +130,20 @@ class Dialogue:
             if isinstance(said, _Remark):
                 received += [said.text] if said.to == role.name else []
             elif said.role == role.name:
-                if not received and messages[-1].role == "assistant":
-                    received = [self._session.pack.say("go_on")]
-                messages += _joined(received)
+                self._hear(messages, received)
                 messages += _own(said)
                 received = []
             else:
                 received.append(_rendered(said))
+        self._hear(messages, received)
+        return messages
+
+    def _hear(self, messages: list[Message], received: Sequence[str]) -> None:
+        """Adds what was received; a role that spoke last and received nothing is told to go on."""
         if not received and messages[-1].role == "assistant":
             received = [self._session.pack.say("go_on")]
-        return messages + _joined(received)
-
-
-def _joined(received: list[str]) -> list[Message]:
-    return [Message(role="user", text="\n\n".join(received))] if received else []
+        if received:
+            messages.append(Message(role="user", text="\n\n".join(received)))
 
 
 def _own(utterance: _Utterance) -> list[Message]:

@@ -124,7 +124,3 @@ class ConstructionFailedError(SessionEnded):
     def __init__(self, reason: str, detail: str) -> None:
         super().__init__(Failed(reason=reason, detail=detail))
         self.reason = reason
-
-
-class ObjectionError(ConstructionFailedError):
-    """What a dialogue raises when a role objects: the work cannot be done."""

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from buildarena_geometry import Machine, Refused, load_catalogue, tool_definitions
+from buildarena_geometry.feedback.modules import modules_in_short as catalogue_in_short
 from buildarena_geometry.feedback.modules import modules_text as catalogue_text
 from buildarena_pipeline.transcript import ActionResult
 from buildarena_worker.session.dialogue import Act
@@ -96,20 +97,12 @@ def modules_text(names: Sequence[str] | None = None) -> str:
 
 
 def parts_text(names: Sequence[str] | None = None) -> str:
-    """The module list in short: sizes, masses, and which way each acts; the start included.
+    """The module list in short: sizes, masses and actions, without descriptions.
 
     Args:
         names: Only these modules and the start; all that can be built by default.
     """
-    lines = []
-    for module in load_catalogue().values():
-        chosen = names is None or module.name in names or module.kind == "start"
-        if module.kind == "cargo" or not chosen:
-            continue
-        size = "connector" if module.size is None else " x ".join(f"{e:g}" for e in module.size)
-        actions = f", does {', '.join(module.actions)}" if module.actions else ""
-        lines.append(f"- {module.name}: {size}, mass {module.mass:g}{actions}")
-    return "\n".join(lines)
+    return catalogue_in_short(load_catalogue(), names)
 
 
 def connectors_of(names: Sequence[str] | None = None) -> list[str]:
