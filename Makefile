@@ -5,7 +5,7 @@ PYTHON ?=
 export PYTHON
 VENV := .venv
 BIN := $(VENV)/bin
-PACKAGES := libs/geometry libs/simulation libs/benchmark libs/store libs/pipeline services/api services/worker services/simworker clients/cli
+PACKAGES := libs/geometry libs/simulation libs/besiege libs/benchmark libs/store libs/pipeline services/api services/worker services/simworker clients/cli
 CODE := $(addsuffix /src,$(PACKAGES)) migrations tests
 STAMP := $(VENV)/.installed
 WORKERS ?= $(shell getconf _NPROCESSORS_ONLN)
