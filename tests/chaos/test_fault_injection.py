@@ -104,7 +104,7 @@ def test_nothing_is_lost_or_done_twice(folder, play) -> None:
             httpx.Client(base_url=stack.url, timeout=30) as client,
             skewed_worker(environment, logs / "skewed.log", "buildarena_worker"),
             skewed_worker(
-                environment, logs / "skewed.log", "buildarena_simworker", "--engine", ENGINE
+                environment, logs / "skewed.log", "buildarena_simworker", "--simulator", ENGINE
             ),
             Fire(stack=stack, rng=rng, every_s=EVERY_S) as fire,
         ):

@@ -75,7 +75,7 @@ def test_a_worker_takes_the_commands_place(monkeypatch) -> None:
     assert started == [
         (
             sys.executable,
-            [sys.executable, "-m", "buildarena_simworker", "--engine", "mujoco"],
+            [sys.executable, "-m", "buildarena_simworker", "--simulator", "mujoco"],
         )
     ]
     refused = run("worker", "start", "paint")

@@ -77,11 +77,11 @@ def test_a_changed_sentence_changes_the_packs_hash_and_the_track(tmp_path: Path)
     (copy / "planner.md").write_text("# Role: planner\n\nPlan well.")
     assert read_pack(copy, name="mine").digest != original
     five_role = workflow_sources({})["five-role"]
-    plain = make_track(five_role, "pybullet", packs.load("default"))
+    plain = make_track(five_role, "pybullet", packs.load("default"), version="2")
     assert original[:8] in plain.id
     loop = ClosedLoop(rounds=5, analyst=True)
     varied = make_track(
-        five_role, "pybullet", packs.load("default"), one_shot=True, closed_loop=loop
+        five_role, "pybullet", packs.load("default"), version="2", one_shot=True, closed_loop=loop
     )
     assert varied.id.startswith("five-role+one-shot+5-rounds-analyst/pybullet-")
 

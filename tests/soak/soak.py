@@ -44,7 +44,7 @@ READ_EVERY_S = 0.5
 STEADY = {
     "api, never killed": ("buildarena_api",),
     "construct worker, never killed": ("buildarena_worker",),
-    "simulation worker, never killed": ("buildarena_simworker", "--engine", "mujoco"),
+    "simulation worker, never killed": ("buildarena_simworker", "--simulator", "mujoco"),
 }
 
 

@@ -5,10 +5,13 @@ from __future__ import annotations
 from concurrent.futures import ThreadPoolExecutor
 
 from buildarena_pipeline.catalog.models import load_registry
+from buildarena_pipeline.catalog.simulators import ENGINE_SIMULATORS
 from buildarena_pipeline.runtime.active_lease import LeaseKeeper
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.job_runner import JobRunner
 from buildarena_simworker.simulate import simulate_handler
+from buildarena_simworker.simulators.engines import EngineSimulator
+from buildarena_store.states import simulate_queue
 from buildarena_worker.wiring import construct_handler
 
 
@@ -24,15 +27,18 @@ def work(context: Context, *, steps: int = 1000, threads: int = 1) -> None:
     keeper.start()
     handlers = {
         "construct": construct_handler(context, load_registry()),
-        "simulate": simulate_handler(context),
+        **{
+            simulate_queue(engine): simulate_handler(context, EngineSimulator(engine))
+            for engine in ENGINE_SIMULATORS
+        },
     }
     runners = {
-        stage: JobRunner(context.store.leases, made, keeper, "w")
-        for stage, made in handlers.items()
+        queue: JobRunner(context.store.leases, made, keeper, "w")
+        for queue, made in handlers.items()
     }
     with ThreadPoolExecutor(threads) as pool:
         while steps > 0 and (waiting := context.store.jobs.page(limit=100, state="queued")):
             waiting = waiting[:steps]
             steps -= len(waiting)
-            list(pool.map(lambda job: runners[job.stage].process_next(job.queue, job.id), waiting))
+            list(pool.map(lambda job: runners[job.queue].process_next(job.queue, job.id), waiting))
     keeper.stop()

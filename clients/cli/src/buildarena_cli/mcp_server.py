@@ -22,7 +22,7 @@ from buildarena_cli.errors import CommandError
 from buildarena_cli.ids import checked_id
 from buildarena_geometry import tool_definitions
 from buildarena_geometry.modules.names import CaselessNames
-from buildarena_pipeline.catalog.tracks import SIMULATORS
+from buildarena_pipeline.catalog.simulators import SIMULATORS
 
 GROUPS = ("build", "refine", "assemble", "control", "query")
 INSTRUCTIONS = """Build a machine for a BuildArena task. Call list_tasks, then open_session for one

@@ -278,6 +278,7 @@ rollouts = Table(
     Column("trajectory_hash", Text),
     Column("trace", JSON),
     Column("versions", JSONB),
+    Column("annotations", JSONB),
     Column("wall_s", Double),
     _time("created_at", now=True),
     _time("finished_at"),

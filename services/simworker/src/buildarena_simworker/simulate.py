@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,14 +16,14 @@ from buildarena_pipeline.runtime.active_lease import ActiveLease
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.notify import Notifier
 from buildarena_pipeline.runtime.scoring import best_rollout, rollout_score, task_of
-from buildarena_simulation import (
-    SIMULATION_VERSION,
-    MachineNotSimulable,
-    SimulationError,
-    Trajectory,
-    engine_version,
-    simulate,
-    write_trajectory,
+from buildarena_simulation import Trajectory, write_trajectory
+from buildarena_simworker.simulators.simulator import (
+    File,
+    MachineRefusedError,
+    Simulated,
+    Simulator,
+    SimulatorFaultError,
+    Trial,
 )
 from buildarena_store import (
     ArtifactInfo,
@@ -42,10 +42,8 @@ PARQUET = "application/vnd.apache.parquet"
 class _Done:
     """A rollout that was simulated, or that could not be because of the machine."""
 
-    score: Score
-    trajectory: ArtifactInfo | None
-    trace: Sequence[Sequence[float]]
-    wall_s: float
+    values: Mapping[str, Any]
+    artifacts: Mapping[str, ArtifactInfo]
 
 
 class SimulateHandler:
@@ -56,15 +54,23 @@ class SimulateHandler:
         artifacts: Where machines and trajectories are.
         queues: Where construct workers are notified.
         tasks: The tasks.
+        simulator: What runs them.
     """
 
     def __init__(
-        self, *, store: Store, artifacts: ArtifactStore, queues: Notifier, tasks: TaskCatalog
+        self,
+        *,
+        store: Store,
+        artifacts: ArtifactStore,
+        queues: Notifier,
+        tasks: TaskCatalog,
+        simulator: Simulator,
     ) -> None:
         self._store = store
         self._artifacts = artifacts
         self._queues = queues
         self._tasks = tasks
+        self._simulator = simulator
 
     def __call__(self, active: ActiveLease) -> None:
         """Simulates the job's waiting rollout; the job ends, or goes back to its session."""
@@ -75,20 +81,17 @@ class SimulateHandler:
         if not waiting:
             raise PermanentError("no rollout waits", reason="no_rollout")
         request = waiting[0]
-        same = _same_trial(request, records)
+        same = _same_trial(request, records) if self._simulator.repeatable else None
         if same is not None:
             values = {name: getattr(same, name) for name in MADE} | {"wall_s": 0.0}
-            trajectory = None
+            done = _Done(values=values, artifacts={})
         else:
-            task = task_of(job, self._tasks)
-            done = self._simulate(task, request, lambda: _require(active))
-            values, trajectory = _values(request, done), done.trajectory
+            done = self._simulated(active, request)
         with store.database.transaction() as connection:
-            if trajectory is not None:
-                made = {f"trajectory-{request.number}": trajectory}
-                store.results.attach(job.id, made, connection=connection)
+            if done.artifacts:
+                store.results.attach(job.id, done.artifacts, connection=connection)
             completed = store.rollouts.complete(
-                job.id, request.number, connection=connection, **values
+                job.id, request.number, connection=connection, **done.values
             )
             if request.final:
                 final = rollout_score(job, best_rollout([*records, completed]))
@@ -100,60 +103,90 @@ class SimulateHandler:
         if not request.final:
             self._queues.notify_one(CONSTRUCT_QUEUE, job.id)
 
-    def _simulate(
-        self, task: Task, request: RolloutRecord, require_held: Callable[[], None]
-    ) -> _Done:
+    def _simulated(self, active: ActiveLease, request: RolloutRecord) -> _Done:
+        """Runs the trial and scores it; what shows a fault is kept before it is reported."""
         started = time.perf_counter()
-        machine = self._machine(request.machine_hash)
+        job = active.lease.job
+        task, machine = task_of(job, self._tasks), self._machine(request.machine_hash)
         try:
-            trajectory = simulate(
-                machine,
-                task.scenario,
-                engine=request.engine,
-                controls=_controls(request.controls),
-                on_progress=lambda _: require_held(),
+            simulated = self._simulator.run(
+                Trial(
+                    job_id=job.id,
+                    number=request.number,
+                    token=active.lease.token,
+                    version=str(job.track_config["simulation_version"]),
+                    task=task,
+                    machine=machine,
+                    controls=_controls(request.controls),
+                    require_held=lambda: _require(active),
+                )
             )
-        except MachineNotSimulable:
-            return _Done(
-                score=failed_score(task, machine),
-                trajectory=None,
-                trace=(),
-                wall_s=time.perf_counter() - started,
-            )
-        except SimulationError as error:
-            raise TransientError(str(error), reason="simulator_fault", delay_s=2.0) from error
+        except MachineRefusedError:
+            values = _scored(failed_score(task, machine)) | {"trajectory_hash": None, "trace": []}
+            values["versions"] = dict(self._simulator.versions)
+            values["wall_s"] = time.perf_counter() - started
+            return _Done(values=values, artifacts={})
+        except SimulatorFaultError as fault:
+            self._keep_evidence(job.id, fault)
+            raise TransientError(
+                str(fault),
+                reason="simulator_fault",
+                delay_s=fault.delay_s,
+                endless=fault.endless,
+            ) from fault
+        return self._kept(request, simulated, task, machine, started)
+
+    def _kept(
+        self,
+        request: RolloutRecord,
+        simulated: Simulated,
+        task: Task,
+        machine: Machine,
+        started: float,
+    ) -> _Done:
+        trajectory = simulated.trajectory
         kept = self._artifacts.put(write_trajectory(trajectory), PARQUET)
-        return _Done(
-            score=score(task, machine, trajectory),
-            trajectory=kept,
-            trace=_trace(trajectory),
-            wall_s=time.perf_counter() - started,
-        )
+        artifacts = {f"trajectory-{request.number}": kept, **self._put(simulated.files)}
+        values = {
+            **_scored(score(task, machine, trajectory)),
+            "trajectory_hash": kept.hash,
+            "trace": _trace(trajectory),
+            "versions": dict(simulated.versions),
+            "wall_s": time.perf_counter() - started,
+        }
+        if simulated.annotations is not None:
+            values["annotations"] = dict(simulated.annotations)
+        return _Done(values=values, artifacts=artifacts)
+
+    def _keep_evidence(self, job_id: str, fault: SimulatorFaultError) -> None:
+        if fault.files:
+            kept = self._put(fault.files)
+            with self._store.database.transaction() as connection:
+                self._store.results.attach(job_id, kept, connection=connection)
+
+    def _put(self, files: Mapping[str, File]) -> dict[str, ArtifactInfo]:
+        return {
+            name: self._artifacts.put(file.data, file.media_type) for name, file in files.items()
+        }
 
     def _machine(self, digest: str) -> Machine:
         document: dict[str, Any] = json.loads(self._artifacts.get(digest))
         return Machine.from_document(document)
 
 
-def simulate_handler(context: Context) -> SimulateHandler:
+def simulate_handler(context: Context, simulator: Simulator) -> SimulateHandler:
     """What does the simulate stage, from a process' connections."""
     return SimulateHandler(
         store=context.store,
         artifacts=context.artifacts,
         queues=context.queues,
         tasks=context.tasks,
+        simulator=simulator,
     )
 
 
-MADE = (
-    "success",
-    "indicator",
-    "metrics",
-    "flags",
-    "trajectory_hash",
-    "trace",
-    "versions",
-)
+SCORED = ("success", "indicator", "metrics", "flags")
+MADE = (*SCORED, "trajectory_hash", "trace", "versions", "annotations")
 """What a simulation adds to a rollout's row."""
 
 
@@ -169,20 +202,12 @@ def _same_trial(request: RolloutRecord, records: Sequence[RolloutRecord]) -> Rol
     return None
 
 
-def _values(request: RolloutRecord, done: _Done) -> dict[str, Any]:
+def _scored(found: Score) -> dict[str, Any]:
     return {
-        "success": done.score.success,
-        "indicator": done.score.indicator,
-        "metrics": dict(done.score.metrics),
-        "flags": list(done.score.flags),
-        "trajectory_hash": None if done.trajectory is None else done.trajectory.hash,
-        "trace": [list(row) for row in done.trace],
-        "versions": {
-            "simulation": SIMULATION_VERSION,
-            "engine": request.engine,
-            "engine_version": engine_version(request.engine),
-        },
-        "wall_s": done.wall_s,
+        "success": found.success,
+        "indicator": found.indicator,
+        "metrics": dict(found.metrics),
+        "flags": list(found.flags),
     }
 
 

@@ -136,9 +136,9 @@ def _interrupt_on_terminate() -> None:
 
 
 def _tell_simulators() -> None:
-    from buildarena_pipeline.catalog.tracks import SIMULATORS
+    from buildarena_pipeline.catalog.simulators import ENGINE_SIMULATORS
 
-    if "pybullet" not in SIMULATORS:
+    if "pybullet" not in ENGINE_SIMULATORS:
         _tell("PyBullet is not installed: machines are simulated with MuJoCo alone")
 
 

@@ -24,8 +24,10 @@ def start_worker(
 ) -> None:
     """Serve a queue from this process, with the servers that BUILDARENA_* name, until Ctrl-C."""
     from buildarena_cli.local.programs import programs
+    from buildarena_pipeline.catalog.simulators import SIMULATORS
 
-    workers = {program.queue: program.words for program in programs() if program.queue}
+    known = programs(SIMULATORS)
+    workers = {program.queue: program.words for program in known if program.queue}
     if queue not in workers:
         raise CommandError(
             f"there is no queue {queue!r}; choose from {', '.join(workers)}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from buildarena_pipeline.catalog.tracks import SIMULATORS
+from buildarena_pipeline.catalog.simulators import ENGINE_SIMULATORS
 from buildarena_store.states import CONSTRUCT_QUEUE, simulate_queue
 
 
@@ -24,7 +24,7 @@ class Program:
     queue: str | None = None
 
 
-def programs(simulators: Sequence[str] = SIMULATORS) -> list[Program]:
+def programs(simulators: Sequence[str] = ENGINE_SIMULATORS) -> list[Program]:
     """All programs in the order in which they are started.
 
     Args:
@@ -36,7 +36,7 @@ def programs(simulators: Sequence[str] = SIMULATORS) -> list[Program]:
         *(
             Program(
                 name=f"{simulator} worker",
-                words=["buildarena_simworker", "--engine", simulator],
+                words=["buildarena_simworker", "--simulator", simulator],
                 queue=simulate_queue(simulator),
             )
             for simulator in simulators

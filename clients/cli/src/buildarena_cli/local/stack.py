@@ -27,7 +27,7 @@ from buildarena_cli.local import (
 from buildarena_cli.local.programs import programs
 from buildarena_cli.local.service import LOCK, READY, RUN, log_name, unwritable
 from buildarena_cli.wire import Failure, Wire
-from buildarena_pipeline.catalog.tracks import SIMULATORS
+from buildarena_pipeline.catalog.simulators import ENGINE_SIMULATORS
 from buildarena_pipeline.errors import StartupError
 from buildarena_pipeline.runtime.processes import PARENT, dying_with_me, tree_memory_bytes
 from buildarena_pipeline.runtime.settings import Settings
@@ -57,7 +57,7 @@ class Stack:
         settings: Settings,
         *,
         tell: Callable[[str], None] = lambda _: None,
-        simulators: tuple[str, ...] = SIMULATORS,
+        simulators: tuple[str, ...] = ENGINE_SIMULATORS,
     ) -> None:
         self.settings = settings
         self.admin_key: str | None = None

@@ -17,7 +17,8 @@ from buildarena_pipeline.agents.briefing import (
     briefing_digest,
 )
 from buildarena_pipeline.agents.workbench import ASSEMBLY, Workbench, check_arguments, rebuild
-from buildarena_pipeline.catalog.tracks import SIMULATORS, external_track
+from buildarena_pipeline.catalog.simulators import simulation_version, simulator_issues
+from buildarena_pipeline.catalog.tracks import external_track
 from buildarena_pipeline.errors import PipelineError, SubmissionError
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.machine_documents import machine_bytes
@@ -108,7 +109,8 @@ class ExternalSessions:
             NameTakenError: The agent's name is another key's.
         """
         chosen = self._check(task, agent, simulator)
-        track = external_track(simulator, briefing_digest())
+        version = simulation_version(simulator, self._context.settings.besiege_version)
+        track = external_track(simulator, version, briefing_digest())
         config = {"name": f"agent/{agent}", "provider": EXTERNAL_PROVIDER, "model": agent}
         key = JobKey(
             task=task,
@@ -231,8 +233,7 @@ class ExternalSessions:
         found = self._context.tasks.named([task]).get(task)
         if found is None:
             errors.append(_unknown("task", task, sorted(self._context.tasks.newest())))
-        if simulator not in SIMULATORS:
-            errors.append(_unknown("simulator", simulator, SIMULATORS))
+        errors += simulator_issues(simulator, self._context.settings.besiege_version)
         if not AGENT_NAME.fullmatch(agent):
             message = "1 to 80 letters, digits, dots, dashes and underscores"
             errors.append(ValidationIssue(path="agent", message=message))

@@ -10,12 +10,9 @@ from buildarena_geometry import FEEDBACK_VERSION
 from buildarena_pipeline.catalog.prompt_packs import PromptPack
 from buildarena_pipeline.catalog.specs import ClosedLoop
 from buildarena_pipeline.catalog.workflows import WorkflowSource
-from buildarena_simulation import ENGINES, SIMULATION_VERSION
 
 EXTERNAL_WORKFLOW = "external"
 """What external agents play: their own."""
-SIMULATORS = tuple(ENGINES)
-"""Simulators that jobs can name, the first by default; each has a queue of its own."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,7 +22,7 @@ class Track:
     Attributes:
         workflow: Workflow name.
         simulator: Simulator name.
-        simulation_version: Version of the physics.
+        simulation_version: Version of our physics, or of the game and its mod.
         prompts: Prompt pack name.
         prompts_digest: Hash of the pack.
         feedback_version: Version of the words in which geometry answers a model.
@@ -66,17 +63,18 @@ class Track:
         return {name: getattr(self, name) for name in self.__dataclass_fields__}
 
 
-def external_track(simulator: str, briefing_digest: str) -> Track:
+def external_track(simulator: str, version: str, briefing_digest: str) -> Track:
     """The track of external agents, which bring their own prompts.
 
     Args:
         simulator: Simulator name.
+        version: Its version, see `simulation_version`.
         briefing_digest: Hash of what they read around a task's statement.
     """
     return Track(
         workflow=EXTERNAL_WORKFLOW,
         simulator=simulator,
-        simulation_version=SIMULATION_VERSION,
+        simulation_version=version,
         prompts="own",
         prompts_digest=briefing_digest,
         feedback_version=FEEDBACK_VERSION,
@@ -88,14 +86,24 @@ def make_track(
     simulator: str,
     pack: PromptPack,
     *,
+    version: str,
     one_shot: bool = False,
     closed_loop: ClosedLoop | None = None,
 ) -> Track:
-    """The track of a submission, with the versions that are installed now."""
+    """The track of a submission, with the prompts and feedback that are installed now.
+
+    Args:
+        workflow: The workflow.
+        simulator: Simulator name.
+        pack: The prompts.
+        version: The simulator's version, see `simulation_version`.
+        one_shot: Whether an example construction is shown.
+        closed_loop: The closed loop, if there is one.
+    """
     return Track(
         workflow=workflow.name,
         simulator=simulator,
-        simulation_version=SIMULATION_VERSION,
+        simulation_version=version,
         prompts=pack.name,
         prompts_digest=pack.digest,
         feedback_version=FEEDBACK_VERSION,

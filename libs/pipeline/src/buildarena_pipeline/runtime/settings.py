@@ -10,6 +10,7 @@ from pydantic import Field, SecretStr, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 DEFAULT_PORT = 8321
+VERSION = r"^[A-Za-z0-9._-]{0,40}$"
 
 
 class Settings(BaseSettings):
@@ -72,6 +73,17 @@ class Settings(BaseSettings):
         int, Field(description="Simulations one worker runs at once", ge=1)
     ] = 2
     max_sweep_jobs: Annotated[int, Field(description="Largest sweep accepted", ge=1)] = 100_000
+    besiege_game: Annotated[
+        str,
+        Field(
+            description="Version of the game Besiege that workers play, for example 1.75-23370; "
+            "jobs for the game are taken once this and BESIEGE_MOD are set",
+            pattern=VERSION,
+        ),
+    ] = ""
+    besiege_mod: Annotated[
+        str, Field(description="Version of the game's Lua Scripting Mod", pattern=VERSION)
+    ] = ""
     otlp_endpoint: Annotated[
         str | None, Field(description="OTLP/HTTP collector of traces; none are made without")
     ] = None
@@ -94,6 +106,13 @@ class Settings(BaseSettings):
     def artifacts_location(self) -> str:
         """Where artifacts are kept."""
         return self.artifacts_url or str(self.data.absolute() / "artifacts")
+
+    @property
+    def besiege_version(self) -> str | None:
+        """The game and mod that workers play, as tracks name them; None without a game."""
+        if not (self.besiege_game and self.besiege_mod):
+            return None
+        return f"{self.besiege_game}-{self.besiege_mod}"
 
     def required_database_url(self) -> str:
         """The database's URL.

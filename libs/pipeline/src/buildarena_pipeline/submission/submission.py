@@ -9,8 +9,9 @@ from typing import Any
 from buildarena_benchmark import Task, ValidationIssue
 from buildarena_pipeline.catalog.models import ModelRegistry
 from buildarena_pipeline.catalog.prompt_packs import PromptPacks
+from buildarena_pipeline.catalog.simulators import simulation_version, simulator_issues
 from buildarena_pipeline.catalog.specs import Budget, Decoding, JobSpec, SweepSpec, Variant
-from buildarena_pipeline.catalog.tracks import SIMULATORS, make_track
+from buildarena_pipeline.catalog.tracks import make_track
 from buildarena_pipeline.catalog.workflows import workflow_sources
 from buildarena_pipeline.errors import SubmissionError
 from buildarena_pipeline.runtime.context import Context
@@ -174,6 +175,7 @@ class Submissions:
             self._workflows[variant.workflow],
             variant.simulator,
             self._packs.load(variant.prompts),
+            version=simulation_version(variant.simulator, self._context.settings.besiege_version),
             one_shot=variant.one_shot,
             closed_loop=variant.closed_loop,
         )
@@ -216,7 +218,7 @@ class Submissions:
             *_unknown("task", tasks, found),
             *_unknown("model", models, self._registry.models),
             *_unknown("workflow", {"workflow": variant.workflow}, self._workflows),
-            *_unknown("simulator", {"simulator": variant.simulator}, SIMULATORS),
+            *simulator_issues(variant.simulator, self._context.settings.besiege_version),
             *_unknown("prompt pack", {"prompts": variant.prompts}, self._packs.names),
         ]
         issues = issues or self._hopeless(variant.workflow, tasks, found)

@@ -266,6 +266,7 @@ class RolloutRow(_Row):
     trajectory_hash: Digest | None
     trace: JsonList | None
     versions: JsonObject | None
+    annotations: JsonObject | None = None
     wall_s: Annotated[Figure | None, Field(ge=0)]
     created_at: Time
     finished_at: Time | None

@@ -39,6 +39,7 @@ class RolloutRecord:
     """A rollout as the database has it; the score is None until it was simulated.
 
     Attributes:
+        annotations: What our engines say of the machine, by engine; only of trials in the game.
         trace: The tracked body at 1 Hz, rows of time, x, y, z (seconds, units, world frame).
         wall_s: How long the simulation took; the other names are those of the columns.
     """
@@ -55,6 +56,7 @@ class RolloutRecord:
     trajectory_hash: str | None
     trace: Sequence[Sequence[float]] | None
     versions: Mapping[str, Any] | None
+    annotations: Mapping[str, Any] | None = None
     wall_s: float | None
     created_at: datetime
     finished_at: datetime | None

@@ -14,7 +14,7 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from buildarena_api.dependencies import ContextDep
 from buildarena_api.http.concurrency import anybodys_turn
-from buildarena_pipeline.catalog.tracks import SIMULATORS
+from buildarena_pipeline.catalog.simulators import served
 from buildarena_pipeline.runtime.context import Context
 from buildarena_store import ArtifactStore, ArtifactStoreError
 from buildarena_store.states import CONSTRUCT_QUEUE, simulate_queue
@@ -137,7 +137,8 @@ def _workers(context: Context, database: Check) -> list[Check]:
         return []
     alive = [worker for worker in context.store.workers.all() if worker.alive]
     checks = []
-    for queue in [CONSTRUCT_QUEUE, *(simulate_queue(engine) for engine in SIMULATORS)]:
+    simulators = served(context.settings.besiege_version)
+    for queue in [CONSTRUCT_QUEUE, *map(simulate_queue, simulators)]:
         serving = [worker for worker in alive if queue in worker.queues]
         checks.append(
             Check(

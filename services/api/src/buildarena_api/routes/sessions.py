@@ -15,8 +15,8 @@ from buildarena_api.schemas import JobView
 from buildarena_pipeline.agents.briefing import LIMITS
 from buildarena_pipeline.agents.sessions import NothingToSubmitError, SessionClosedError
 from buildarena_pipeline.agents.workbench import ASSEMBLY, MAIN, agent_tools
+from buildarena_pipeline.catalog.simulators import SIMULATORS
 from buildarena_pipeline.catalog.specs import Name, Seed
-from buildarena_pipeline.catalog.tracks import SIMULATORS
 from buildarena_pipeline.runtime.context import Context
 from buildarena_store import UnknownIdError
 

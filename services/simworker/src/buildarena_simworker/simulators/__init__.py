@@ -1,0 +1,1 @@
+"""Simulators: whatever runs a machine in a task's trial, behind one protocol."""
