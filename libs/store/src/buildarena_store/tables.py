@@ -278,7 +278,7 @@ rollouts = Table(
     Column("trajectory_hash", Text),
     Column("trace", JSON),
     Column("versions", JSONB),
-    Column("annotations", JSONB),
+    Column("annotations", JSONB(none_as_null=True)),
     Column("wall_s", Double),
     _time("created_at", now=True),
     _time("finished_at"),

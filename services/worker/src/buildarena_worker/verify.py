@@ -19,10 +19,18 @@ from typing import Any
 import structlog
 from sqlalchemy.exc import OperationalError
 
-from buildarena_benchmark import broken_constraint, failed_score, score
+from buildarena_benchmark import Task, broken_constraint, failed_score, score
+from buildarena_besiege import (
+    GameLog,
+    LogIncompleteError,
+    MachineNotPlayableError,
+    prepare_run,
+    trajectory_of,
+)
 from buildarena_geometry import KeyPress, Machine
 from buildarena_pipeline.agents.workbench import Workbench
 from buildarena_pipeline.catalog.prompt_packs import PromptPacks
+from buildarena_pipeline.catalog.simulators import BESIEGE
 from buildarena_pipeline.catalog.tasks import TaskCatalog
 from buildarena_pipeline.catalog.tracks import EXTERNAL_WORKFLOW
 from buildarena_pipeline.errors import PermanentError
@@ -31,6 +39,7 @@ from buildarena_pipeline.runtime.scoring import best_rollout, task_of
 from buildarena_simulation import (
     SIMULATION_VERSION,
     MachineNotSimulable,
+    Trajectory,
     read_trajectory,
     simulate,
     write_trajectory,
@@ -218,18 +227,24 @@ class Verifier:
     ) -> list[Check]:
         name = f"rollout {record.number}"
         checks = [_compare(f"{name}: machine", record.machine_hash, _hash(machine_bytes(machine)))]
-        simulated_by = (record.versions or {}).get("simulation")
-        checks.append(_compare(f"{name}: simulation version", simulated_by, SIMULATION_VERSION))
         task = task_of(job, self._tasks)
         try:
-            trajectory = simulate(
-                machine,
-                task.scenario,
-                record.engine,
-                controls=None if controls is None else tuple(controls),
-            )
-        except MachineNotSimulable:
+            if record.engine == BESIEGE:
+                trajectory = self._played(job, record, machine, task)
+            else:
+                simulated_by = (record.versions or {}).get("simulation")
+                version = f"{name}: simulation version"
+                checks.append(_compare(version, simulated_by, SIMULATION_VERSION))
+                trajectory = simulate(
+                    machine,
+                    task.scenario,
+                    record.engine,
+                    controls=None if controls is None else tuple(controls),
+                )
+        except (MachineNotSimulable, MachineNotPlayableError):
             again, digest = failed_score(task, machine), None
+        except LogIncompleteError as error:
+            return [*checks, Check(name=f"{name}: log", ok=False, kept="", found=str(error))]
         else:
             again, digest = score(task, machine, trajectory), _hash(write_trajectory(trajectory))
         checks.append(_compare(f"{name}: trajectory", record.trajectory_hash, digest))
@@ -237,6 +252,28 @@ class Verifier:
             kept = _plain(getattr(record, field))
             checks.append(_compare(f"{name}: {field}", kept, _plain(getattr(again, field))))
         return checks
+
+    def _played(self, job: Job, record: RolloutRecord, machine: Machine, task: Task) -> Trajectory:
+        """What the kept log of a trial in the game tells; the game itself plays nothing again.
+
+        Raises:
+            LogIncompleteError: There is no log, or it does not tell enough.
+            MachineNotPlayableError: The game takes no such machine, so there is no log.
+        """
+        digest = self._artifact(job, f"log-{record.number}.txt")
+        if digest is None:
+            prepare_run(machine, task.scenario, name="again", run_id="again")
+            raise LogIncompleteError("the log of the trial was not kept")
+        versions = record.versions or {}
+        game = GameLog(str(versions.get("run")))
+        game.read(self._artifacts.get(digest).decode("utf-8", "replace"))
+        return trajectory_of(
+            game,
+            machine,
+            task.scenario,
+            game=str(versions.get("game")),
+            mod=str(versions.get("mod")),
+        )
 
     def _score_checks(
         self, job: Job, machine: Machine | None, records: Sequence[RolloutRecord]

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
+
+NEAR: Final = 0.25
+"""Indicators are near each other when they differ by no more than this share of the larger."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -17,6 +21,8 @@ class Agreement:
         same_verdict: Share on which both said success or both did not.
         kappa: Cohen's kappa of the verdicts: 1 is full agreement, 0 what chance would give; None
             when chance alone would agree always.
+        near: Share of those trials that both call a success whose indicators differ by no more than
+            a quarter of the larger; None when they never both do.
         rank_correlation: Spearman's correlation of the indicators; None when one of them says
             the same of every trial.
     """
@@ -24,6 +30,7 @@ class Agreement:
     trials: int
     same_verdict: float
     kappa: float | None
+    near: float | None
     rank_correlation: float | None
 
 
@@ -46,9 +53,15 @@ def agreement(
     chance = float(said_1.mean() * said_2.mean() + (1 - said_1.mean()) * (1 - said_2.mean()))
     values_1, values_2 = (np.array([v for _, v in side], float) for side in (first, second))
     varied = np.ptp(values_1) > 0 and np.ptp(values_2) > 0
+    both = [
+        abs(one - other) <= NEAR * max(abs(one), abs(other))
+        for (good, one), (fine, other) in zip(first, second, strict=True)
+        if good and fine
+    ]
     return Agreement(
         trials=len(first),
         same_verdict=same,
         kappa=(same - chance) / (1 - chance) if chance < 1 else None,
+        near=float(np.mean(both)) if both else None,
         rank_correlation=float(spearmanr(values_1, values_2).statistic) if varied else None,
     )

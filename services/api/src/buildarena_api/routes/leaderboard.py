@@ -12,6 +12,7 @@ from buildarena_api.dependencies import ContextDep, RegistryDep
 from buildarena_api.http.access import CallerDep
 from buildarena_api.http.etags import conditional
 from buildarena_api.http.problems import problem_responses
+from buildarena_api.leaderboard.agreement import AgreementTable, agreement_rows
 from buildarena_api.leaderboard.filters import BoardsDep, SelectionDep, unknown
 from buildarena_api.leaderboard.views import Board, ChangePage, ChangeView, board_view
 from buildarena_api.routes.verifications import request_verifications
@@ -162,6 +163,15 @@ def compare(
         second=second,
         tasks=[TaskDuelView.model_validate(task) for task in tasks],
     )
+
+
+@router.get("/leaderboard/agreement", responses=problem_responses(422, 503))
+def agreement_table(context: ContextDep, selection: SelectionDep) -> AgreementTable:
+    """How far our engines say the same as the game, task by task, of the machines it tried."""
+    if selection.track is None:
+        return AgreementTable(track=None, rows=[])
+    found = context.store.results.boards.annotated(selection.track)
+    return AgreementTable(track=selection.track, rows=agreement_rows(found))
 
 
 @router.get("/leaderboard/changes", responses=problem_responses(422, 503))

@@ -1,0 +1,1 @@
+"""The game as a simulator: a runner that loads machines into Besiege and reads its log."""
