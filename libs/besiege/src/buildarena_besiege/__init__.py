@@ -1,1 +1,25 @@
 """Machines for the game Besiege: machine files, scripts and levels out, files and logs in."""
+
+from buildarena_besiege.errors import (
+    BesiegeError,
+    LogIncompleteError,
+    MachineFileError,
+    MachineNotPlayableError,
+)
+from buildarena_besiege.game_log import GameLog
+from buildarena_besiege.level import level_file
+from buildarena_besiege.run import GameRun, plain_machine_file, prepare_run
+from buildarena_besiege.trajectories import trajectory_of
+
+__all__ = [
+    "BesiegeError",
+    "GameLog",
+    "GameRun",
+    "LogIncompleteError",
+    "MachineFileError",
+    "MachineNotPlayableError",
+    "level_file",
+    "plain_machine_file",
+    "prepare_run",
+    "trajectory_of",
+]

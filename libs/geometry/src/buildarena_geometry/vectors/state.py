@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from buildarena_geometry.besiege_components import besiege_point, besiege_rotation, besiege_span
 from buildarena_geometry.outcomes import Cause, Refused
 from buildarena_geometry.rotations import scaled
-from buildarena_geometry.vectors.besiege import besiege_point, besiege_rotation, besiege_span
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

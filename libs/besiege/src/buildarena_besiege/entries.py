@@ -1,0 +1,103 @@
+"""A block's entries in a machine file: what they say, before they are written down."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from buildarena_besiege.names import key_entries
+from buildarena_geometry.besiege_components import besiege_frame, besiege_offset
+from buildarena_geometry.rotations import Quaternion, Vector, subtract
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from buildarena_geometry import Machine
+    from buildarena_geometry.blocks import Block, Connector, FaceRef
+    from buildarena_geometry.modules.module import Module
+    from buildarena_geometry.poses import Pose
+
+Value = str | int | float | bool | Vector | tuple[str, ...]
+Entry = tuple[str, str, Value]
+"""Type, key and value, as in `<Type key="key">value</Type>`."""
+
+
+def block_entries(block: Block, keys: Mapping[str, Sequence[str]]) -> list[Entry]:
+    """The entries of a block, in the order of the published files.
+
+    Args:
+        block: The block.
+        keys: The keys of each of its actions.
+    """
+    module = block.module
+    lists = key_lists(module, keys)
+    if module.kind == "start":
+        return [("Integer", "bmt-version", 1), *lists]
+    given: list[Entry] = [(kind, key, _typed(kind, value)) for kind, key, value in _data(module)]
+    before = [entry for entry in given if entry[1] in _BEFORE_KEYS]
+    after = [entry for entry in given if entry[1] not in _BEFORE_KEYS]
+    found = [*before, *lists, *after]
+    if module.spins:
+        found.append(("Boolean", "flipped", block.flipped))
+    return found
+
+
+def key_lists(module: Module, keys: Mapping[str, Sequence[str]]) -> list[Entry]:
+    """The lists of the keys of a module's actions; none twice in a list."""
+    return [
+        ("StringArray", entry, tuple(dict.fromkeys(keys.get(action, ()))))
+        for action, entry in key_entries(module).items()
+    ]
+
+
+def connector_entries(machine: Machine, link: Connector) -> list[Entry]:
+    """The four entries of a brace or winch: its ends as they are now, in its start face's frame."""
+    frame = frame_of(machine, link.start)
+    across = frame.inverse().direction(subtract(link.end_xyz, link.start_xyz))
+    return [
+        ("Vector3", "start-position", (0.0, 0.0, 0.0)),
+        ("Vector3", "end-position", besiege_offset(across)),
+        ("Vector3", "start-rotation", end_rotation(frame)),
+        ("Vector3", "end-rotation", end_rotation(frame_of(machine, link.end))),
+    ]
+
+
+def frame_of(machine: Machine, face: FaceRef) -> Pose:
+    """The frame of a face of one of the machine's blocks, world frame."""
+    block, label = face
+    return machine.blocks[block].world_from_face(label)
+
+
+def end_rotation(world_from_face: Pose) -> Vector:
+    """A face's frame as the game's connectors hold it: ZYZ angles in degrees, 270 on the first."""
+    w, x, y, z = besiege_frame(world_from_face.wxyz)
+    half_sum, half_difference = math.atan2(z, w), math.atan2(x, y)
+    tilt = 2.0 * math.atan2(math.hypot(x, y), math.hypot(z, w))
+    first, last = half_sum - half_difference, half_sum + half_difference
+    return (math.degrees(first) + 270.0, math.degrees(tilt), math.degrees(last))
+
+
+_BEFORE_KEYS = frozenset(
+    {
+        "bmt-version",
+        "bmt-speed",
+        "bmt-acceleration",
+        "bmt-automatic",
+        "bmt-toggle-mode",
+        "bmt-auto-brake",
+    }
+)
+
+
+def _data(module: Module) -> tuple[tuple[str, str, str | int | float | bool], ...]:
+    return module.besiege_data
+
+
+def _typed(kind: str, value: str | float | bool) -> Value:
+    return float(value) if kind == "Single" else value
+
+
+def turned_xyzw(rotation: Quaternion) -> tuple[float, float, float, float]:
+    """A quaternion in the order of the file's attributes."""
+    w, x, y, z = rotation
+    return (x, y, z, w)

@@ -1,0 +1,105 @@
+"""What a script's first lines tell of the machine that its file's blocks cannot.
+
+A machine file names no block, tells nothing of faces and keeps no control sequence. Our scripts
+begin with a comment that holds all this as JSON, tied to the blocks by their guids and by a digest
+of their places, so that it is believed only as long as nobody has moved a block.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from typing import TYPE_CHECKING, Any, Final
+
+from buildarena_geometry.blocks import Block
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from buildarena_besiege.machine_file import BlockRecord
+    from buildarena_geometry import KeyPress, Machine
+    from buildarena_geometry.blocks import Connector
+
+MARK: Final = "buildarena machine "
+HEADER_VERSION: Final = 1
+_DIGITS: Final = 5  # decimals of a coordinate that count
+
+
+def header_lines(
+    machine: Machine, records: Sequence[BlockRecord], presses: Sequence[KeyPress]
+) -> list[str]:
+    """The comment lines of a machine's script.
+
+    Args:
+        machine: The machine.
+        records: Its blocks in the file.
+        presses: The control sequence it is played with.
+    """
+    state = machine.state
+    parts = {part.id: part for part in state.parts}
+    content = {
+        "version": HEADER_VERSION,
+        "digest": places_digest((record.guid, *_numbers(record)) for record in records),
+        "order": list(parts),
+        "parts": {
+            record.guid: _part(parts[record.part], record)
+            for record in records
+            if record.part in parts
+        },
+        "control_sequence": [[press.time_s, press.key, press.hold_for_s] for press in presses],
+        "structures": [
+            [found.letter, found.source, found.root] for found in state.structures.values()
+        ],
+        "structures_made": state.structures_made,
+        "next_id": state.next_id,
+    }
+    return [
+        "Plays a trial of BuildArena. The next line tells what the blocks of this file do not.",
+        MARK + json.dumps(content, separators=(",", ":"), ensure_ascii=True),
+    ]
+
+
+def places_digest(parts: Iterable[Sequence[str | float]]) -> str:
+    """A digest of blocks and their places.
+
+    Args:
+        parts: For each, its guid and the numbers of its position and rotation.
+    """
+    rows = sorted(
+        ",".join(
+            one if isinstance(one, str) else f"{round(one, _DIGITS) + 0.0:.{_DIGITS}f}"
+            for one in part
+        )
+        for part in parts
+    )
+    return hashlib.sha256("\n".join(rows).encode()).hexdigest()[:32]
+
+
+def _numbers(record: BlockRecord) -> tuple[float, ...]:
+    return (*record.position, *record.rotation)
+
+
+def _part(part: Block | Connector, record: BlockRecord) -> dict[str, Any]:
+    found: dict[str, Any] = {"id": part.id}
+    if part.structure:
+        found["structure"] = part.structure
+    if part.note:
+        found["note"] = part.note
+    if not isinstance(part, Block):
+        pose = part.world_from_connector
+        return {
+            **found,
+            "start": list(part.start),
+            "end": list(part.end),
+            "pose": [*pose.xyz, *pose.wxyz],
+            "span": list(part.span),
+        }
+    if part.mount is not None:
+        found["mount"] = list(part.mount)
+    if part.lost_mount is not None:
+        found["lost_mount"] = list(part.lost_mount)
+    written = {key: value for kind, key, value in record.entries if kind == "StringArray"}
+    bound = [tuple(dict.fromkeys(keys)) for keys in part.bindings.values()]
+    if sorted(bound) != sorted(value for value in written.values() if isinstance(value, tuple)):
+        found["bindings"] = {action: list(keys) for action, keys in part.bindings.items()}
+    return found

@@ -1,0 +1,140 @@
+"""When each key goes down and up: the edges of the holds of a control sequence."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+from buildarena_besiege.errors import MachineNotPlayableError
+from buildarena_geometry.keys import KEYS, KEYS_IN_WORDS
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from buildarena_geometry import KeyPress, Machine
+    from buildarena_simulation.scenario import Control
+
+UPDATES_PER_S: Final = 100
+"""How often a second the game calls the script, by its own time."""
+
+HELD_KEY: Final = "Alpha1"
+"""The key that fires every cannon of a trial whose cannons are held."""
+
+_LATEST_S: Final = 1e6
+"""A hold ends here at the latest, seconds; no trial lasts as long."""
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Edge:
+    """A key's change.
+
+    Attributes:
+        update: the script's update in which it changes, from 1.
+        key: which key.
+        down: whether it goes down.
+    """
+
+    update: int
+    key: str
+    down: bool
+
+
+def key_edges(presses: Iterable[KeyPress]) -> tuple[Edge, ...]:
+    """The edges of some holds, in order of time.
+
+    Start and end of a hold are each rounded to a tenth of a second, as the published runner does.
+    Of one key, holds that overlap or touch are one hold; one without a length is none.
+
+    Args:
+        presses: In any order.
+
+    Raises:
+        MachineNotPlayableError: A time is not a number, or the game has no such key.
+    """
+    holds: dict[str, list[tuple[int, int]]] = {}
+    for press in presses:
+        _require_sound(press)
+        start = _update(press.time_s)
+        end = _update(press.time_s + press.hold_for_s)
+        if max(start, 1) < end:
+            holds.setdefault(press.key, []).append((max(start, 1), end))
+    edges = [
+        edge
+        for key, spans in holds.items()
+        for start, end in _united(spans)
+        for edge in (Edge(start, key, down=True), Edge(end, key, down=False))
+    ]
+    return tuple(sorted(edges))
+
+
+def bound_presses(presses: Sequence[KeyPress], machine: Machine) -> tuple[KeyPress, ...]:
+    """The presses whose key some action of the machine is bound to; others reach nothing."""
+    bound = set(machine.state.keys_in_use())
+    return tuple(press for press in presses if press.key in bound)
+
+
+def held_edges(machine: Machine, control: Control) -> tuple[Edge, ...]:
+    """The edges of a trial whose cannons are held: one key goes down, and stays so.
+
+    From 0 s on no key is pressed at all: there, only whether cannons burn counts.
+    """
+    if control.from_s <= 0.0 or not cannons(machine):
+        return ()
+    return (Edge(max(_update(control.from_s), 1), HELD_KEY, down=True),)
+
+
+def bindings_of(machine: Machine, control: Control | None) -> dict[str, dict[str, tuple[str, ...]]]:
+    """The keys of each block's actions, as a trial has them.
+
+    Args:
+        machine: Gives the bindings it was built with.
+        control: The trial's; where cannons are held, each also fires with the key for that.
+    """
+    fired_by_us = control is not None and control.mode == "held" and control.from_s > 0.0
+    found: dict[str, dict[str, tuple[str, ...]]] = {}
+    for block in machine.blocks.values():
+        bindings = {action: tuple(keys) for action, keys in block.bindings.items()}
+        for keys in bindings.values():
+            for key in keys:
+                _require_key(key, f"Block {block.id} is bound to")
+        if fired_by_us and block.module.thrust is not None:
+            action = block.module.thrust.action
+            bindings[action] = (*bindings.get(action, ()), HELD_KEY)
+        found[block.id] = bindings
+    return found
+
+
+def cannons(machine: Machine) -> tuple[str, ...]:
+    """Ids of all cannons."""
+    return tuple(block.id for block in machine.blocks.values() if block.module.thrust is not None)
+
+
+def _update(time_s: float) -> int:
+    """The first update at or after a time that is rounded to a tenth of a second."""
+    tenths = float(f"{min(time_s, _LATEST_S):.1f}")
+    return round(tenths * UPDATES_PER_S)
+
+
+def _united(spans: list[tuple[int, int]]) -> list[tuple[int, int]]:
+    united: list[tuple[int, int]] = []
+    for start, end in sorted(spans):
+        if united and start <= united[-1][1]:
+            united[-1] = (united[-1][0], max(united[-1][1], end))
+        else:
+            united.append((start, end))
+    return united
+
+
+def _require_sound(press: KeyPress) -> None:
+    _require_key(press.key, "The control sequence presses")
+    if math.isnan(press.time_s) or math.isnan(press.hold_for_s) or press.time_s == -math.inf:
+        raise MachineNotPlayableError(
+            f"The control sequence holds {press.key} from {press.time_s} for {press.hold_for_s}: "
+            f"times are numbers of seconds."
+        )
+
+
+def _require_key(key: str, who: str) -> None:
+    if key not in KEYS:
+        raise MachineNotPlayableError(f"{who} the key {key!r}; the keys are {KEYS_IN_WORDS}.")

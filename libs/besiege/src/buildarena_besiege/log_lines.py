@@ -1,0 +1,116 @@
+"""The lines that a script of ours prints, read one by one.
+
+    ba,<run>,b,<version>,<presses>,<digest>,<sum>
+    ba,<run>,s,<update>,<part>,<parts>{,<number>,<state>,<x>,<y>,<z>},<sum>
+    ba,<run>,e,<update>,<sum>
+
+A number counts the reported blocks from 1, the cargo last. A state is the cargo's mass, whether a
+cannon burns (0 or 1), or "-". Coordinates are Besiege's: x east, y up, z north.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+from buildarena_besiege.check_sums import check_sum
+
+if TYPE_CHECKING:
+    from buildarena_geometry.rotations import Vector
+
+LINE_VERSION: Final = 1
+LONGEST_LINE: Final = 2000
+"""Characters; a line with eight blocks far away from the origin has fewer than 500."""
+
+_NUMBER = r"(?:0|[1-9][0-9]{0,9})"
+_DECIMAL = r"(?:-?[0-9]{1,7}\.[0-9]{4}|nan)"
+_STATE = rf"(?:-|[01]|{_DECIMAL})"
+_ENTRY = rf",{_NUMBER},{_STATE},{_DECIMAL},{_DECIMAL},{_DECIMAL}"
+_FIELDS_OF_ENTRY: Final = 5
+_BEGIN: Final = re.compile(rf",b,({_NUMBER}),({_NUMBER}),({_NUMBER})", re.ASCII)
+_SAMPLE: Final = re.compile(rf",s,({_NUMBER}),({_NUMBER}),({_NUMBER})((?:{_ENTRY})*)", re.ASCII)
+_END: Final = re.compile(rf",e,({_NUMBER})", re.ASCII)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Entry:
+    """What a sample line says of one block.
+
+    Attributes:
+        state: as written.
+        position: Besiege's components, units.
+    """
+
+    state: str
+    position: Vector
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Line:
+    """A line that counts.
+
+    Attributes:
+        kind: "b", "s" or "e".
+        update: the script's update it tells of; 0 of a begin line.
+        part: which part of a sample, from 1; 0 elsewhere.
+        parts: how many parts the sample has; 0 elsewhere.
+        fields: of a begin line: version, key presses, digest.
+        entries: of a sample line: what it says of each block, by number.
+        text: the whole line.
+    """
+
+    kind: str
+    text: str
+    update: int = 0
+    part: int = 0
+    parts: int = 0
+    fields: tuple[int, ...] = ()
+    entries: tuple[tuple[int, Entry], ...] = ()
+
+    @property
+    def key(self) -> tuple[int, int, int]:
+        """What it tells of; lines of one key must be alike. Sorts into the order of printing."""
+        return ("bse".index(self.kind), self.update, self.part)
+
+
+def line_of(text: str, prefix: str) -> Line | None:
+    """The line that a text is; None unless it is whole, sound and of the run.
+
+    Args:
+        text: A line without its end.
+        prefix: What the run's lines begin with.
+    """
+    if len(text) > LONGEST_LINE or not text.startswith(prefix + ","):
+        return None
+    body, _, last = text.rpartition(",")
+    if not body.isascii() or last != str(check_sum(body)):
+        return None
+    return _read(text, body[len(prefix) :])
+
+
+def _read(text: str, rest: str) -> Line | None:
+    if found := _SAMPLE.fullmatch(rest):
+        update, part, parts = (int(found[i]) for i in (1, 2, 3))
+        sound = 1 <= part <= parts and update > 0
+        entries = _entries(found[4])
+        line = Line(kind="s", text=text, update=update, part=part, parts=parts, entries=entries)
+        return line if sound else None
+    if found := _END.fullmatch(rest):
+        return Line(kind="e", text=text, update=int(found[1]))
+    found = _BEGIN.fullmatch(rest)
+    return found and Line(kind="b", text=text, fields=tuple(int(found[i]) for i in (1, 2, 3)))
+
+
+def _entries(text: str) -> tuple[tuple[int, Entry], ...]:
+    fields = text.split(",")[1:]
+    rows = [fields[i : i + _FIELDS_OF_ENTRY] for i in range(0, len(fields), _FIELDS_OF_ENTRY)]
+    return tuple(
+        (int(number), Entry(state=state, position=(_float(x), _float(y), _float(z))))
+        for number, state, x, y, z in rows
+    )
+
+
+def _float(text: str) -> float:
+    return math.nan if text == "nan" else float(text)

@@ -1,0 +1,272 @@
+"""Writes the game's machine files (.bsg)."""
+
+from __future__ import annotations
+
+import html
+import math
+import uuid
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+from buildarena_besiege.entries import Entry, Value, block_entries, connector_entries, frame_of
+from buildarena_besiege.errors import MachineNotPlayableError
+from buildarena_besiege.names import CARGO, CARGO_ID, type_name
+from buildarena_besiege.placement import UPRIGHT_CARGO, GlobalPose
+from buildarena_geometry.besiege_components import besiege_frame, besiege_point, besiege_rotation
+from buildarena_geometry.blocks import Block
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping, Sequence
+
+    from buildarena_geometry import Machine
+    from buildarena_geometry.blocks import Connector
+    from buildarena_geometry.modules.module import Module
+    from buildarena_geometry.rotations import Quaternion, Vector
+
+BSG_VERSION: Final = "1.4"
+INDENT: Final = "    "
+_NO_SCALE: Final = (1.0, 1.0, 1.0)
+_GUID_TRIES: Final = 100
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BlockRecord:
+    """One block of a machine file, in Besiege's components.
+
+    Attributes:
+        part: the id of the block or connector in our machine; "Ballast" for the cargo.
+        module: what it is.
+        guid: the game's own id of it.
+        position: of its root, units.
+        rotation: (w, x, y, z).
+        scale: along its own axes.
+        entries: its data but for the script's two.
+    """
+
+    part: str
+    module: Module
+    guid: str
+    position: Vector
+    rotation: Quaternion
+    entries: tuple[Entry, ...]
+    scale: Vector = _NO_SCALE
+
+    @property
+    def reference_key(self) -> str:
+        """What the script calls it."""
+        return f"{type_name(self.module)}_{self.guid[:8]}"
+
+    @property
+    def all_entries(self) -> tuple[Entry, ...]:
+        """Its data, the script's two entries last."""
+        return (
+            *self.entries,
+            ("String", "bmt-lua_module", "default"),
+            ("String", "bmt-lua_ref_key", self.reference_key),
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CargoBox:
+    """The cargo as it is put into a machine file.
+
+    Attributes:
+        size: full extents along east, north and up before the machine is turned, units.
+        root: of its underside's centre, Besiege's components of the machine, units.
+    """
+
+    size: Vector
+    root: Vector
+
+
+class Guids:
+    """Draws guids whose first eight digits differ, as reference keys hold no more of them."""
+
+    def __init__(self, new_guid: Callable[[], uuid.UUID] = uuid.uuid4) -> None:
+        self._new, self._used = new_guid, set[str]()
+
+    def draw(self) -> str:
+        """The next one.
+
+        Raises:
+            ValueError: The source repeats itself.
+        """
+        for _ in range(_GUID_TRIES):
+            guid = str(self._new())
+            if guid[:8] not in self._used:
+                self._used.add(guid[:8])
+                return guid
+        raise ValueError(f"the source of guids repeats itself: {guid}")
+
+
+def block_records(
+    machine: Machine,
+    guids: Guids,
+    *,
+    keys: Mapping[str, Mapping[str, Sequence[str]]],
+    cargo: CargoBox | None = None,
+) -> list[BlockRecord]:
+    """All blocks of a machine's file: the starting block first, the cargo last.
+
+    Args:
+        machine: With at least one block.
+        guids: Gives each block its guid.
+        keys: The keys of each block's actions, by block id.
+        cargo: The cargo, if the file has one.
+    """
+    first = next(iter(machine.blocks), None)
+    parts = sorted(machine.state.parts, key=lambda part: (part.id != first, _number(part)))
+    records = [
+        _block_record(part, guids.draw(), keys.get(part.id, part.bindings))
+        if isinstance(part, Block)
+        else _connector_record(machine, part, guids.draw())
+        for part in parts
+    ]
+    if cargo is not None:
+        module = next(one for one in machine.catalogue.values() if one.besiege_id == CARGO)
+        records.append(_cargo_record(module, guids.draw(), cargo))
+    _require_finite(records)
+    return records
+
+
+def machine_text(name: str, pose: GlobalPose, records: Sequence[BlockRecord], script: str) -> str:
+    """A machine file's text.
+
+    Args:
+        name: Stem of the file.
+        pose: Where the game puts the machine.
+        records: Its blocks.
+        script: The Lua script.
+    """
+    lines = [
+        '<?xml version="1.0" encoding="utf-8"?>',
+        "<!--Besiege machine save file.-->",
+        f'<Machine version="1" bsgVersion="{BSG_VERSION}" name="{_escaped(name)}">',
+        f"{INDENT}<!--The machine's position and rotation.-->",
+        f"{INDENT}<Global>",
+        f"{INDENT * 2}<Position {_coordinates(pose.position)} />",
+        f"{INDENT * 2}<Rotation {_turn(pose.rotation)} />",
+        f"{INDENT}</Global>",
+        f"{INDENT}<!--The machine's additional data or modded data.-->",
+        f"{INDENT}<Data>",
+        *(line for entry in global_entries(script) for line in _entry_lines(entry, INDENT * 2)),
+        f"{INDENT}</Data>",
+        f"{INDENT}<!--The machine's blocks.-->",
+        f"{INDENT}<Blocks>",
+        *(line for record in records for line in _record_lines(record, INDENT * 2)),
+        f"{INDENT}</Blocks>",
+        "</Machine>",
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def global_entries(script: str) -> tuple[Entry, ...]:
+    """The machine's own data: the script and where the mod keeps it."""
+    return (
+        ("StringArray", "lua_files", "LuaRoot/main.lua"),
+        ("StringArray", "lua_data", script),
+        ("StringArray", "lua_modules_names", "default"),
+        ("StringArray", "lua_modules_paths", "LuaRoot/main.lua"),
+        ("Boolean", "lua", True),
+        ("StringArray", "requiredMods", ()),
+    )
+
+
+def _number(part: Block | Connector) -> tuple[int, int]:
+    """The order of creation, as the ids count blocks and connectors together."""
+    digits = part.id.rpartition("_")[2]
+    return (len(part.structure) == 0, int(digits) if digits.isdecimal() else 0)
+
+
+def _block_record(block: Block, guid: str, keys: Mapping[str, Sequence[str]]) -> BlockRecord:
+    return BlockRecord(
+        part=block.id,
+        module=block.module,
+        guid=guid,
+        position=besiege_point(block.world_from_block.xyz),
+        rotation=besiege_rotation(block),
+        entries=tuple(block_entries(block, keys)),
+    )
+
+
+def _connector_record(machine: Machine, link: Connector, guid: str) -> BlockRecord:
+    frame = frame_of(machine, link.start)
+    return BlockRecord(
+        part=link.id,
+        module=link.module,
+        guid=guid,
+        position=besiege_point(link.start_xyz),
+        rotation=besiege_frame(frame.wxyz),
+        entries=tuple(connector_entries(machine, link)),
+    )
+
+
+def _cargo_record(module: Module, guid: str, cargo: CargoBox) -> BlockRecord:
+    return BlockRecord(
+        part=CARGO_ID,
+        module=module,
+        guid=guid,
+        position=cargo.root,
+        rotation=UPRIGHT_CARGO,
+        scale=cargo.size,
+        entries=tuple(
+            (kind, key, float(value) if kind == "Single" else value)
+            for kind, key, value in module.besiege_data
+        ),
+    )
+
+
+def _require_finite(records: Sequence[BlockRecord]) -> None:
+    for record in records:
+        if not all(map(math.isfinite, (*record.position, *record.rotation))):
+            raise MachineNotPlayableError(f"Block {record.part} has no place in the game's world.")
+
+
+def _record_lines(record: BlockRecord, indent: str) -> Iterator[str]:
+    inner, innermost = indent + INDENT, indent + INDENT * 2
+    yield f'{indent}<Block id="{record.module.besiege_id}" guid="{record.guid}">'
+    yield f"{inner}<Transform>"
+    yield f"{innermost}<Position {_coordinates(record.position)} />"
+    yield f"{innermost}<Rotation {_turn(record.rotation)} />"
+    yield f"{innermost}<Scale {_coordinates(record.scale)} />"
+    yield f"{inner}</Transform>"
+    yield f"{inner}<Data>"
+    for entry in record.all_entries:
+        yield from _entry_lines(entry, innermost)
+    yield f"{inner}</Data>"
+    yield f"{indent}</Block>"
+
+
+def _entry_lines(entry: Entry, indent: str) -> Iterator[str]:
+    kind, key, value = entry
+    opening = f'{indent}<{kind} key="{_escaped(key)}">'
+    if kind == "Vector3" and isinstance(value, tuple):
+        yield opening
+        for axis, number in zip("XYZ", value, strict=True):
+            yield f"{indent}{INDENT}<{axis}>{number!r}</{axis}>"
+        yield f"{indent}</{kind}>"
+    elif value == ():
+        yield f'{indent}<{kind} key="{_escaped(key)}" />'
+    else:
+        yield f"{opening}{_value(value)}</{kind}>"
+
+
+def _value(value: Value) -> str:
+    if isinstance(value, tuple):
+        return "".join(f"<String>{_escaped(str(item))}</String>" for item in value)
+    return _escaped(str(value))
+
+
+def _coordinates(vector: Vector) -> str:
+    x, y, z = vector
+    return f'x="{x!r}" y="{y!r}" z="{z!r}"'
+
+
+def _turn(rotation: Quaternion) -> str:
+    w, x, y, z = rotation
+    return f'x="{x!r}" y="{y!r}" z="{z!r}" w="{w!r}"'
+
+
+def _escaped(text: str) -> str:
+    return html.escape(text)

@@ -1,0 +1,45 @@
+"""The game's own names and numbers for what machine files hold."""
+
+from __future__ import annotations
+
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from buildarena_geometry.modules.module import Module
+
+START, CARGO = 0, 35
+
+_TYPE_NAMES: Final[Mapping[int, str]] = MappingProxyType(
+    {
+        START: "StartingBlock",
+        15: "SingleWoodenBlock",
+        2: "Wheel",
+        7: "Brace",
+        45: "Winch",
+        47: "Torch",
+        56: "WaterCannon",
+        CARGO: "Ballast",
+    }
+)
+CARGO_ID: Final = "Ballast"
+"""What logs and normalised forms call the cargo in place of a block's id."""
+
+
+def type_name(module: Module) -> str:
+    """What a reference key calls a type: the game's name without blanks."""
+    known = _TYPE_NAMES.get(module.besiege_id)
+    return known or "".join(c for c in module.name if c.isascii() and c.isalnum()) or "Block"
+
+
+def key_entries(module: Module) -> dict[str, str]:
+    """The entry that holds the keys of each of a module's actions."""
+    entries: dict[str, str] = {}
+    if module.motor is not None:
+        entries[module.motor.forward] = "bmt-forward"
+        entries[module.motor.backward] = "bmt-backward"
+    if module.thrust is not None:
+        entries[module.thrust.action] = "bmt-shoot"
+    return entries

@@ -1,0 +1,219 @@
+"""A machine prepared for one trial in the game."""
+
+from __future__ import annotations
+
+import re
+import uuid
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+from urllib.parse import quote
+
+from buildarena_besiege.errors import MachineNotPlayableError
+from buildarena_besiege.header import header_lines
+from buildarena_besiege.keys import (
+    UPDATES_PER_S,
+    bindings_of,
+    bound_presses,
+    cannons,
+    held_edges,
+    key_edges,
+)
+from buildarena_besiege.level import level_file
+from buildarena_besiege.machine_file import CargoBox, Guids, block_records, machine_text
+from buildarena_besiege.names import CARGO_ID
+from buildarena_besiege.placement import AS_BUILT, GlobalPose, cargo_root, global_pose
+from buildarena_besiege.script import FIRST_BLOCK, Reported, Telling, script_text
+from buildarena_besiege.tracking import begin_fields, tracked_blocks
+from buildarena_simulation.constants import MAX_PARTS
+from buildarena_simulation.scenario import SpanPlacement
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from buildarena_besiege.machine_file import BlockRecord
+    from buildarena_geometry import KeyPress, Machine
+    from buildarena_simulation import Scenario
+
+_NAME: Final = re.compile(r"[a-z0-9_-]{1,100}")
+_LONGEST_RUN_ID: Final = 200
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GameRun:
+    """A machine prepared for one trial in the game.
+
+    Attributes:
+        name: Stem of the machine file, which is typed into the load box.
+        run_id: Stands in every line of the log.
+        machine_file: The .bsg with the script inside.
+        script: The same Lua script.
+        tracked: Ids of the blocks the script reports, the cargo apart.
+        duration_s: Length of the trial by the script's own time, seconds.
+        set_ground: Whether "set ground" must be clicked before the start.
+        level: The level to be opened (.blv); None for the flat sandbox.
+    """
+
+    name: str
+    run_id: str
+    machine_file: bytes
+    script: str
+    tracked: tuple[str, ...]
+    duration_s: float
+    set_ground: bool
+    level: bytes | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PreparedMachine:
+    """A machine file before it is written down.
+
+    Attributes:
+        pose: Where the game puts the machine.
+        records: Its blocks.
+        script: Its script.
+        tracked: Ids of the blocks the script reports, the cargo apart.
+    """
+
+    pose: GlobalPose
+    records: tuple[BlockRecord, ...]
+    script: str
+    tracked: tuple[str, ...] = ()
+
+
+def prepare_run(
+    machine: Machine,
+    scenario: Scenario,
+    *,
+    name: str,
+    run_id: str,
+    controls: Sequence[KeyPress] | None = None,
+    new_guid: Callable[[], uuid.UUID] = uuid.uuid4,
+) -> GameRun:
+    """Prepares a machine for a trial in the game.
+
+    Args:
+        machine: The machine.
+        scenario: What it is put through; it decides everything about the run.
+        name: Stem of the machine file: lower case letters, digits, "-" and "_".
+        run_id: Of this run; stands in every line of the log.
+        controls: The control sequence; the machine's own if left out.
+        new_guid: Draws the blocks' guids.
+
+    Raises:
+        MachineNotPlayableError: The game cannot take the machine.
+        ValueError: The name or the run's id cannot be used.
+    """
+    _require_names(name, run_id)
+    prepared = prepared_machine(
+        machine, scenario, run_id=run_id, controls=controls, new_guid=new_guid
+    )
+    text = machine_text(name, prepared.pose, prepared.records, prepared.script)
+    return GameRun(
+        name=name,
+        run_id=run_id,
+        machine_file=text.encode("utf-8"),
+        script=prepared.script,
+        tracked=prepared.tracked,
+        duration_s=scenario.duration_s,
+        set_ground=not isinstance(scenario.placement, SpanPlacement),
+        level=level_file(scenario) if scenario.terrain else None,
+    )
+
+
+def plain_machine_file(
+    machine: Machine, *, name: str, new_guid: Callable[[], uuid.UUID] = uuid.uuid4
+) -> bytes:
+    """The machine file of a machine as it was built, for no trial; its keys play by themselves.
+
+    Args:
+        machine: The machine.
+        name: Stem of the file.
+        new_guid: Draws the blocks' guids.
+
+    Raises:
+        MachineNotPlayableError: The game cannot take the machine.
+    """
+    prepared = prepared_machine(machine, None, new_guid=new_guid)
+    return machine_text(name, prepared.pose, prepared.records, prepared.script).encode("utf-8")
+
+
+def prepared_machine(
+    machine: Machine,
+    scenario: Scenario | None,
+    *,
+    run_id: str = "",
+    controls: Sequence[KeyPress] | None = None,
+    new_guid: Callable[[], uuid.UUID] = uuid.uuid4,
+) -> PreparedMachine:
+    """A machine's file before it is written down; arguments as `prepare_run`, None for no trial."""
+    _require_playable(machine)
+    presses = tuple(machine.control_sequence if controls is None else controls)
+    control = None if scenario is None else scenario.control
+    effective = bound_presses(presses, machine)
+    played = effective if control is None or control.mode == "agent" else ()
+    edges = key_edges(played)
+    if control is not None and control.mode == "held":
+        edges = held_edges(machine, control)
+    box = None
+    if scenario is not None and scenario.cargo is not None:
+        root = cargo_root(machine, scenario.cargo.drop_height)
+        box = CargoBox(size=scenario.cargo.size, root=root)
+    records = block_records(machine, Guids(new_guid), keys=bindings_of(machine, control), cargo=box)
+    tracked = () if scenario is None else tracked_blocks(machine, scenario)
+    references = {record.part: record.reference_key for record in records}
+    references[records[0].part] = FIRST_BLOCK
+    telling = None
+    if scenario is not None:
+        telling = Telling(
+            prefix=marked(run_id),
+            begin=begin_fields(machine, scenario, tracked, len(played)),
+            last_update=round(scenario.duration_s * UPDATES_PER_S),
+            blocks=_reported(machine, scenario, tracked, references),
+        )
+    script = script_text(
+        header_lines(machine, records, presses),
+        edges,
+        cargo=None if scenario is None else scenario.cargo,
+        cargo_reference=references.get(CARGO_ID, ""),
+        telling=telling,
+    )
+    return PreparedMachine(
+        pose=AS_BUILT if scenario is None else global_pose(machine, scenario),
+        records=tuple(records),
+        script=script,
+        tracked=tracked,
+    )
+
+
+def marked(run_id: str) -> str:
+    """What every line of a run's log begins with: any id, made safe for a line of fields."""
+    return f"ba,{quote(run_id, safe='')}"
+
+
+def _reported(
+    machine: Machine, scenario: Scenario, tracked: tuple[str, ...], references: Mapping[str, str]
+) -> tuple[Reported, ...]:
+    hot = set(cannons(machine))
+    blocks = [Reported(reference=references[one], burns=one in hot) for one in tracked]
+    if scenario.cargo is not None:
+        blocks.append(Reported(reference=references[CARGO_ID], cargo=True))
+    return tuple(blocks)
+
+
+def _require_playable(machine: Machine) -> None:
+    if not machine.blocks:
+        raise MachineNotPlayableError("The machine has no blocks.")
+    if machine.part_count > MAX_PARTS:
+        raise MachineNotPlayableError(
+            f"The machine has {machine.part_count} parts; more than {MAX_PARTS} are not played."
+        )
+
+
+def _require_names(name: str, run_id: str) -> None:
+    if not _NAME.fullmatch(name):
+        raise ValueError(
+            f"{name!r} cannot be typed into the game's load box: use 1 to 100 lower case letters, "
+            "digits, - and _"
+        )
+    if not run_id or len(quote(run_id, safe="", errors="replace")) > _LONGEST_RUN_ID:
+        raise ValueError(f"a run's id is a text of 1 to {_LONGEST_RUN_ID} characters")

@@ -1,0 +1,302 @@
+"""From a log to a trajectory: 25 samples a second in our world frame."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from buildarena_besiege.errors import LogIncompleteError
+from buildarena_besiege.keys import UPDATES_PER_S, cannons
+from buildarena_besiege.log_lines import LINE_VERSION
+from buildarena_besiege.placement import global_pose
+from buildarena_besiege.script import BLOCKS_PER_LINE, SAMPLE_EVERY
+from buildarena_besiege.tracking import run_digest, tracked_blocks
+from buildarena_geometry.besiege_components import besiege_turn
+from buildarena_geometry.poses import Pose
+from buildarena_geometry.rotations import Quaternion, multiply
+from buildarena_simulation.constants import SAMPLE_RATE_HZ
+from buildarena_simulation.trajectory import (
+    Setting,
+    Trajectory,
+    rounded_positions,
+    rounded_quaternions,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from buildarena_besiege.game_log import GameLog
+    from buildarena_besiege.log_lines import Line
+    from buildarena_geometry import Machine
+    from buildarena_simulation import Scenario
+
+ENGINE: Final = "besiege"
+READING_VERSION: Final = "1"
+"""Rises with every change of how logs become trajectories."""
+
+LONGEST_GAP_S: Final = 0.2
+"""From one known sample to the next; what lies between is filled in linearly."""
+
+JOINED_DRIFT: Final = 1.0
+"""A block whose distance from the starting block has changed by more is no longer joined, units."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Samples:
+    """Everything a log told, on the trajectory's own instants.
+
+    Attributes:
+        block_ids: (N,) the tracked blocks.
+        positions: (T, N, 3) Besiege's components, units.
+        burning: (T, N) bool; False where not told.
+        cargo: (T, 3) Besiege's components, units; None without cargo.
+        mass: (T,) the cargo's; None without cargo.
+        quaternions: (T, N, 4) world_from_block, where the log tells them.
+    """
+
+    block_ids: tuple[str, ...]
+    positions: NDArray[np.float64]
+    burning: NDArray[np.bool_]
+    cargo: NDArray[np.float64] | None = None
+    mass: NDArray[np.float64] | None = None
+    quaternions: NDArray[np.float64] | None = None
+    settings: Mapping[str, Setting] = field(default_factory=dict)
+
+
+def trajectory_of(
+    log: GameLog, machine: Machine, scenario: Scenario, *, game: str, mod: str
+) -> Trajectory:
+    """The trajectory that a run's log tells.
+
+    Args:
+        log: The run's log.
+        machine: The machine that was played.
+        scenario: The scenario it was prepared for.
+        game: Version of the game.
+        mod: Version of the mod that runs the script.
+
+    Raises:
+        LogIncompleteError: Something is missing, or two lines contradict each other.
+    """
+    tracked = tracked_blocks(machine, scenario)
+    presses = _require_whole(log, machine, scenario, tracked)
+    count = len(tracked) + (scenario.cargo is not None)
+    told = _told(log, scenario, count)
+    known = ~np.isnan(told[:, :, 0]) if count else np.ones((len(told), 0), dtype=bool)
+    filled, longest = _filled(told, known, _names(tracked, scenario))
+    positions = filled[:, : len(tracked), 1:4]
+    samples = Samples(
+        block_ids=tracked,
+        positions=positions,
+        burning=_latest(told[:, : len(tracked), 4], known[:, : len(tracked)]) > 0.0,
+        cargo=filled[:, -1, 1:4] if scenario.cargo is not None else None,
+        mass=filled[:, -1, 4] if scenario.cargo is not None else None,
+        settings={
+            "effective_key_presses": presses,
+            "filled_samples": int((~known[1:]).any(axis=1).sum()) if count else 0,
+            "longest_gap_s": round(longest / SAMPLE_RATE_HZ, 6),
+            "lag": "not told by the log",
+            "run": hashlib.sha256(log.run_id.encode()).hexdigest()[:16],
+            "log": hashlib.sha256(log.text().encode()).hexdigest()[:16],
+        },
+    )
+    return made_trajectory(samples, machine, scenario, version=f"{game}-{mod}")
+
+
+def made_trajectory(
+    samples: Samples, machine: Machine, scenario: Scenario, *, version: str
+) -> Trajectory:
+    """The trajectory of samples that are complete.
+
+    Positions are those the game gives for its blocks, in our world frame.
+
+    Args:
+        samples: What was told.
+        machine: The machine.
+        scenario: What it was put through.
+        version: Of game and mod.
+    """
+    ids = samples.block_ids
+    count = len(samples.positions)
+    turn = besiege_turn(global_pose(machine, scenario).rotation)
+    hot = cannons(machine)
+    heated = np.zeros((count, len(hot)), dtype=bool)
+    for column, block in enumerate(hot):
+        if block in ids:
+            heated[:, column] = samples.burning[:, ids.index(block)]
+    quaternions, source = samples.quaternions, "the log"
+    if quaternions is None:
+        quaternions, source = _as_placed(machine, ids, turn, count), "as placed at the start"
+    cargo = samples.cargo
+    return Trajectory(
+        time_s=np.arange(count) / SAMPLE_RATE_HZ,
+        block_ids=ids,
+        positions=rounded_positions(_ours(samples.positions)),
+        quaternions=rounded_quaternions(quaternions),
+        cargo_position=None if cargo is None else rounded_positions(_ours(cargo)),
+        cargo_quaternion=None
+        if cargo is None
+        else rounded_quaternions(np.tile(np.array(turn), (count, 1))),
+        cargo_mass=samples.mass,
+        cargo_size=scenario.cargo.size
+        if scenario.cargo is not None and cargo is not None
+        else None,
+        cannon_ids=hot,
+        heated=heated,
+        pieces=pieces_of(machine, ids, samples.positions),
+        joint_peaks=(),
+        breaks=(),
+        engine=ENGINE,
+        engine_version=version,
+        simulation_version=READING_VERSION,
+        settings={
+            **samples.settings,
+            "quaternions": source,
+            "cannons_not_reported": sum(block not in ids for block in hot),
+            "scenario": hashlib.sha256(scenario.model_dump_json().encode()).hexdigest()[:16],
+        },
+    )
+
+
+def pieces_of(
+    machine: Machine, block_ids: tuple[str, ...], positions: NDArray[np.float64]
+) -> NDArray[np.int16] | None:
+    """(T, N) which piece each tracked block belongs to, as far as distances tell.
+
+    From the moment its distance from the first starting block differs by more than `JOINED_DRIFT`
+    from that at the start, a block is a piece of its own.
+
+    Args:
+        machine: Gives the order of the blocks.
+        block_ids: (N,) the tracked blocks.
+        positions: (T, N, 3) units.
+
+    Returns:
+        None if no starting block is tracked.
+    """
+    order = {block: number for number, block in enumerate(machine.blocks)}
+    starts = [i for i, one in enumerate(block_ids) if machine.blocks[one].module.kind == "start"]
+    if not starts:
+        return None
+    first = min(starts, key=lambda i: order[block_ids[i]])
+    apart = np.linalg.norm(positions - positions[:, first : first + 1], axis=2)
+    held = np.abs(apart - apart[0]) <= JOINED_DRIFT
+    joined = np.logical_and.accumulate(held, axis=0)
+    joined[:, first] = True
+    own = np.array([order[block] for block in block_ids], dtype=np.int16)
+    return np.where(joined, own[first], own[None, :]).astype(np.int16)
+
+
+def _require_whole(
+    log: GameLog, machine: Machine, scenario: Scenario, tracked: tuple[str, ...]
+) -> int:
+    """Refuses logs that cannot be believed; how many key presses reached something."""
+    begins = [line for line in log.lines if line.kind == "b"]
+    if not begins:
+        raise LogIncompleteError(f"The begin line of run {log.run_id} is missing.")
+    if log.disputed:
+        key = min(log.disputed)
+        raise LogIncompleteError(
+            f"Two different lines tell of the same moment, {key[1] / UPDATES_PER_S:.2f} s: "
+            "none of them is believed."
+        )
+    version, presses, digest = begins[0].fields
+    if version != LINE_VERSION:
+        raise LogIncompleteError(f"The log is of format {version}, not {LINE_VERSION}.")
+    if digest != run_digest(machine, scenario, tracked):
+        raise LogIncompleteError("The log is of another machine or another scenario.")
+    if not log.ended:
+        raise LogIncompleteError(
+            f"The end line is missing: the log ends at {log.time_s:.2f} s "
+            f"of {scenario.duration_s:g} s."
+        )
+    return presses
+
+
+def _told(log: GameLog, scenario: Scenario, count: int) -> NDArray[np.float64]:
+    """(T, count, 5) what the log tells: 1, position and state; NaN where it tells nothing."""
+    told = np.full((scenario.sample_count, count, 5), np.nan)
+    parts = max(-(-count // BLOCKS_PER_LINE), 1)
+    for line in log.lines:
+        if line.kind != "s":
+            continue
+        row, rest = divmod(line.update, SAMPLE_EVERY)
+        if rest or row >= len(told) or line.parts != parts or not _fits(line, count):
+            raise LogIncompleteError(
+                f"The line of {line.update / UPDATES_PER_S:.2f} s tells of other blocks or moments "
+                "than this machine's."
+            )
+        for number, entry in line.entries:
+            state = 0.0 if entry.state == "-" else float(entry.state)
+            told[row, number - 1] = (1.0, *entry.position, state)
+    return told
+
+
+def _fits(line: Line, count: int) -> bool:
+    first = (line.part - 1) * BLOCKS_PER_LINE + 1
+    wanted = range(first, min(first + BLOCKS_PER_LINE, count + 1))
+    return [number for number, _ in line.entries] == list(wanted)
+
+
+def _filled(
+    told: NDArray[np.float64], known: NDArray[np.bool_], names: list[str]
+) -> tuple[NDArray[np.float64], int]:
+    """What was told with its short gaps filled, and the longest gap in samples."""
+    filled, longest = told.copy(), 0
+    rows = np.arange(len(told))
+    most = round(LONGEST_GAP_S * SAMPLE_RATE_HZ)
+    for column, name in enumerate(names):
+        seen = np.flatnonzero(known[:, column])
+        if not len(seen):
+            raise LogIncompleteError(f"The log tells nothing of {name}.")
+        # Nothing is told of the start itself: the first sample is one interval later.
+        bounds = np.concatenate([[0], seen, [len(told) - 1]])
+        gaps = np.diff(bounds)
+        worst = int(gaps.argmax())
+        longest = max(longest, int(gaps[worst]))
+        if gaps[worst] > most:
+            start, end = bounds[worst] / SAMPLE_RATE_HZ, bounds[worst + 1] / SAMPLE_RATE_HZ
+            raise LogIncompleteError(
+                f"Between {start:.2f} s and {end:.2f} s nothing is told of {name}; "
+                f"gaps of up to {LONGEST_GAP_S:g} s are filled."
+            )
+        for component in range(1, told.shape[2]):
+            filled[:, column, component] = np.interp(rows, seen, told[seen, column, component])
+    return filled, longest
+
+
+def _latest(values: NDArray[np.float64], known: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Each column's values, where not known the last known one, or the first."""
+    found = np.zeros(values.shape)
+    rows = np.arange(len(values))
+    for column in range(values.shape[1]):
+        seen = np.flatnonzero(known[:, column])
+        at = seen[np.maximum(np.searchsorted(seen, rows, side="right") - 1, 0)]
+        found[:, column] = values[at, column]
+    return found
+
+
+def _names(tracked: tuple[str, ...], scenario: Scenario) -> list[str]:
+    cargo = ["the cargo"] if scenario.cargo is not None else []
+    return [*(f"block {block}" for block in tracked), *cargo]
+
+
+def _as_placed(
+    machine: Machine, block_ids: tuple[str, ...], turn: Quaternion, count: int
+) -> NDArray[np.float64]:
+    placed = [
+        Pose(quaternion=multiply(turn, machine.blocks[block].world_from_block.wxyz)).wxyz
+        for block in block_ids
+    ]
+    rows = np.array(placed, np.float64).reshape(1, len(block_ids), 4)
+    return np.repeat(rows, count, axis=0)
+
+
+def _ours(positions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Positions in Besiege's components as positions in our world frame."""
+    return np.asarray(positions[..., [0, 2, 1]])

@@ -1,0 +1,76 @@
+"""Poses in Besiege's components and back: for its machine files, its logs, and the golden vectors.
+
+Besiege (Unity) is left-handed: x east, y up, z north. A point maps by swapping its last two
+components. A block's frame there has +z away from the face it sits on, as ours; for handedness ours
+has its x axis the other way round. The starting block's frame has the world's axes in both.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from buildarena_geometry.poses import Pose
+from buildarena_geometry.rotations import Quaternion, Vector, multiply, positive
+
+if TYPE_CHECKING:
+    from buildarena_geometry.blocks import Block, Connector
+    from buildarena_geometry.modules.module import Module
+
+# Our block axes in swapped components: x mirrored and the last two swapped is this half turn.
+_BLOCK_FROM_SWAPPED: Quaternion = (0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5))
+_SWAPPED_FROM_BLOCK: Quaternion = (0.0, 0.0, -math.sqrt(0.5), -math.sqrt(0.5))
+
+
+def besiege_point(world: Vector) -> Vector:
+    """A point or offset of the world frame in Besiege's components."""
+    x, y, z = world
+    return (x, z, y)
+
+
+def besiege_turn(world: Quaternion) -> Quaternion:
+    """A rotation of the world frame in Besiege's components; (w, x, y, z), its own inverse."""
+    w, x, y, z = world
+    # Swapping two axes mirrors the world, which turns every rotation's sense round.
+    return positive((w, -x, -z, -y))
+
+
+def besiege_rotation(part: Block | Connector) -> Quaternion:
+    """A part's orientation in Besiege's components, a unit quaternion (w, x, y, z)."""
+    if hasattr(part, "world_from_connector"):
+        return besiege_frame(part.world_from_connector.wxyz)
+    if part.module.kind == "start":
+        return besiege_turn(part.world_from_block.wxyz)
+    return besiege_frame(part.world_from_block.wxyz)
+
+
+def besiege_frame(world_from_face: Quaternion) -> Quaternion:
+    """The orientation of a face's frame, or of a block on it, in Besiege's components."""
+    return besiege_turn(multiply(world_from_face, _BLOCK_FROM_SWAPPED))
+
+
+def pose_from_besiege(module: Module, position: Vector, rotation: Quaternion) -> Pose:
+    """The pose world_from_block (or world_from_connector) of a part of Besiege's.
+
+    Args:
+        module: what it is.
+        position: in Besiege's components, units.
+        rotation: in Besiege's components, (w, x, y, z), of any length but zero.
+
+    Raises:
+        ValueError: a number that is not finite, or a rotation without a length.
+    """
+    turn = besiege_turn(rotation)
+    wxyz = turn if module.kind == "start" else multiply(turn, _SWAPPED_FROM_BLOCK)
+    return Pose(position=besiege_point(position), quaternion=wxyz)
+
+
+def besiege_span(link: Connector) -> Vector:
+    """From a connector's start to its end in its own frame, in Besiege's components."""
+    return besiege_offset(link.span)
+
+
+def besiege_offset(within: Vector) -> Vector:
+    """An offset in a face's frame in Besiege's components; its own inverse."""
+    x, y, z = within
+    return (-x, y, z)

@@ -1,0 +1,107 @@
+"""A game that runs a script of ours in a real Lua: the mod's functions, and blocks on given paths."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+Path = Callable[[int, int], tuple[float, float, float]]
+"""Where block number i of the file is after n updates, Besiege's components."""
+
+VERSIONS = ("lua51", "lua52", "lua53", "lua54", "lua55", "luajit21")
+
+
+def golden_path(i: int, n: int) -> tuple[float, float, float]:
+    return (
+        0.5 * i + 0.0137 * n + 0.003,
+        1 + 0.25 * i + 0.0021 * n + 0.004,
+        -0.75 * i - 0.0053 * n + 0.002,
+    )
+
+
+def golden_burning(i: int, n: int) -> bool:
+    return n >= 500 and i % 2 == 1
+
+
+@dataclass
+class LuaGame:
+    """Plays a script; what it did stands in the attributes.
+
+    Arguments of the mod's functions are checked as the mod does: they are called with a dot.
+    """
+
+    references: dict[object, int]
+    version: str = "lua54"
+    path: Path = golden_path
+    burning: Callable[[int, int], bool] = golden_burning
+    updates: int = 0
+    lines: list[str] = field(default_factory=list)
+    calls: dict[str, list[tuple[int, bool]]] = field(default_factory=dict)
+    slider: list[tuple[int, str, float]] = field(default_factory=list)
+
+    def play(self, script: str, updates: int) -> LuaGame:
+        runtime = importlib.import_module(f"lupa.{self.version}").LuaRuntime(
+            unpack_returned_tuples=True, register_eval=False, register_builtins=False
+        )
+        globals_ = runtime.globals()
+        globals_["print"] = lambda text: self.lines.append(text)
+        globals_["machine"] = runtime.table_from(
+            {
+                "new_key_emulator": lambda key: self._emulator(runtime, key),
+                "get_refs_control": lambda key: self._control(runtime, key),
+                "get_machine_info": lambda: runtime.table_from(
+                    {"get_block_info": lambda key: self._info(runtime, key)}
+                ),
+            }
+        )
+        module = runtime.execute(script)
+        assert set(module) == {"play", "update", "late_update", "fixed_update", "on_gui"}
+        module["play"]()
+        for n in range(1, updates + 1):
+            self.updates = n
+            module["fixed_update"]()
+        for name in ("update", "late_update", "on_gui"):
+            module[name]()
+        return self
+
+    def held(self, key: str) -> list[list[int | None]]:
+        """When a key was down: first update, and the one in which it was let go."""
+        state: dict[int, bool] = dict(self.calls.get(key, []))
+        spans: list[list[int | None]] = []
+        down = False
+        for n, now in sorted(state.items()):
+            if now and not down:
+                spans.append([n, None])
+            elif down and not now:
+                spans[-1][1] = n
+            down = now
+        return spans
+
+    def _emulator(self, runtime, key):
+        assert isinstance(key, str)
+        assert key not in self.calls, "the mod refuses a second emulator of a key"
+        self.calls[key] = []
+        return runtime.table_from(
+            {
+                "start": lambda: self.calls[key].append((self.updates, True)),
+                "stop": lambda: self.calls[key].append((self.updates, False)),
+            }
+        )
+
+    def _control(self, runtime, key):
+        self.references[key]
+        return runtime.table_from(
+            {"set_slider": lambda name, v: self.slider.append((self.updates, name, v))}
+        )
+
+    def _info(self, runtime, key):
+        number = self.references[key]
+
+        def position():
+            x, y, z = self.path(number, self.updates)
+            return runtime.table_from({"x": x, "y": y, "z": z})
+
+        return runtime.table_from(
+            {"position": position, "burning": lambda: self.burning(number, self.updates)}
+        )
