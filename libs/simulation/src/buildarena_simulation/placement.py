@@ -1,5 +1,6 @@
 """Where machine and cargo are at the start of a trial, and what a seed varies about it."""
 
+import hashlib
 import math
 from dataclasses import dataclass
 
@@ -55,6 +56,15 @@ def start_of(structure: Structure, scenario: Scenario, seed: int | None = None) 
         rotation=rotation,
         cargo=_cargo_at_start(structure, scenario.cargo, position, rotation, cargo_shift),
     )
+
+
+def start_digest(start: Start) -> str:
+    """A short digest of a start's figures, for the settings of a trajectory."""
+    arrays = [start.position, start.rotation]
+    if start.cargo is not None:
+        arrays += [start.cargo.size, start.cargo.position]
+    figures = np.concatenate([np.asarray(array, np.float64).ravel() for array in arrays])
+    return hashlib.sha256(figures.tobytes()).hexdigest()[:16]
 
 
 def place(

@@ -20,7 +20,7 @@ from buildarena_simulation.engines import ENGINES, create_engine, engine_version
 from buildarena_simulation.engines.base import Engine, World
 from buildarena_simulation.errors import BuildarenaSimulationError, SimulationError
 from buildarena_simulation.machine import bindings_of, structure_of
-from buildarena_simulation.placement import start_of
+from buildarena_simulation.placement import Start, start_digest, start_of
 from buildarena_simulation.recording import Recorder
 from buildarena_simulation.scenario import Scenario
 from buildarena_simulation.structure.clusters import find_clusters
@@ -44,6 +44,7 @@ def simulate(
     engine: str = ENGINES[0],
     *,
     controls: Sequence[KeyHold] | None = None,
+    start: Start | None = None,
     seed: int | None = None,
     finer: int = 1,
     on_progress: Callable[[float], None] | None = None,
@@ -55,6 +56,7 @@ def simulate(
         scenario: What it is put through.
         engine: Name of the engine; see `ENGINES`.
         controls: A control sequence to use in place of the machine's own.
+        start: Where machine and cargo start, in place of where the scenario puts them.
         seed: Varies the start as a fair repetition would, see `start_of`; None for the exact one.
         finer: By how much the engine's steps are shorter than usual, to tell a result of the model
             from one of the steps.
@@ -66,6 +68,7 @@ def simulate(
     Raises:
         MachineNotSimulable: The machine is empty, unplaceable or too large; a failed trial.
         UnknownEngineError: No engine has this name.
+        ValueError: A start and a seed are given, or only one of start and scenario has a cargo.
         SimulationError: The simulator failed; never scored.
     """
     structure = structure_of(machine)
@@ -75,6 +78,7 @@ def simulate(
         engine,
         bindings=bindings_of(machine),
         controls=machine.control_sequence if controls is None else controls,
+        start=start,
         seed=seed,
         finer=finer,
         on_progress=on_progress,
@@ -88,6 +92,7 @@ def simulate_structure(
     *,
     bindings: Bindings = (),
     controls: Sequence[KeyHold] = (),
+    start: Start | None = None,
     seed: int | None = None,
     finer: int = 1,
     on_progress: Callable[[float], None] | None = None,
@@ -100,11 +105,16 @@ def simulate_structure(
         engine: Name of the engine.
         bindings: (N,) the keys of each block's actions; may be empty if nothing is pressed.
         controls: The control sequence.
+        start: See `simulate`.
         seed: See `simulate`.
         finer: See `simulate`.
         on_progress: Called now and then with the share of the trial that is done.
     """
-    given, start = scenario, start_of(structure, scenario, seed)
+    given, placed = scenario, start is not None
+    if start is None:
+        start = start_of(structure, scenario, seed)
+    else:
+        _check_start(start, scenario, seed)
     world = World(
         structure=structure,
         ground=True,
@@ -131,6 +141,7 @@ def simulate_structure(
                 "gravity": GRAVITY,
                 "effective_key_presses": effective_presses(bindings, controls),
                 **({} if seed is None else {"seed": seed}),
+                **({"start": start_digest(start)} if placed else {}),
                 "scenario": hashlib.sha256(given.model_dump_json().encode()).hexdigest()[:16],
             },
         )
@@ -140,6 +151,14 @@ def simulate_structure(
         raise SimulationError(f"{engine} failed: {error}") from error
     finally:
         adapter.close()
+
+
+def _check_start(start: Start, scenario: Scenario, seed: int | None) -> None:
+    if seed is not None:
+        raise ValueError("a start is exact, and a seed varies it: give one of them")
+    if (start.cargo is None) != (scenario.cargo is None):
+        lacking = "start" if start.cargo is None else "scenario"
+        raise ValueError(f"the {lacking} has no cargo, and the other one has")
 
 
 class _Trial:

@@ -1,0 +1,84 @@
+"""A trial that starts at an exact place of the caller's own."""
+
+import json
+
+import numpy as np
+import pytest
+
+from buildarena_geometry import Machine
+from buildarena_simulation import Scenario, simulate
+from buildarena_simulation.engines.base import CargoBox
+from buildarena_simulation.machine import structure_of
+from buildarena_simulation.placement import Start, start_of
+from buildarena_simulation.scenario import Cargo
+
+QUARTER = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+SHORT = Scenario(duration_s=0.4)
+LOADED = Scenario(duration_s=0.4, cargo=Cargo(size=(1, 1, 1), final_mass=6, ramp_s=1))
+
+
+@pytest.fixture
+def beam() -> Machine:
+    machine = Machine()
+    machine.act("start", {})
+    machine.act(
+        "attach_block_to", {"base_block": "1", "face": "E", "new_block": "Small Wooden Block"}
+    )
+    return machine
+
+
+def test_the_scenarios_own_place_given_as_a_start_changes_nothing(
+    beam: Machine, engine: str
+) -> None:
+    there = start_of(structure_of(beam), LOADED)
+    given = simulate(beam, LOADED, engine, start=there)
+    usual = simulate(beam, LOADED, engine)
+    assert np.array_equal(given.positions, usual.positions)
+    assert np.array_equal(given.quaternions, usual.quaternions)
+    assert given.cargo_position is not None
+    assert usual.cargo_position is not None
+    assert np.array_equal(given.cargo_position, usual.cargo_position)
+
+
+def test_machine_and_cargo_start_where_they_are_put(beam: Machine, engine: str) -> None:
+    box = CargoBox(size=np.ones(3), position=np.array([40.0, 2.0, 9.0]), mass=5.0)
+    start = Start(position=np.array([7.0, -3.0, 6.0]), rotation=QUARTER, cargo=box)
+    trajectory = simulate(beam, LOADED, engine, start=start)
+    assert np.allclose(trajectory.positions[0], [[7, -3, 6], [6, -3, 6]], atol=1e-4)
+    assert trajectory.cargo_position is not None
+    assert np.allclose(trajectory.cargo_position[0], [40, 2, 9], atol=1e-4)
+    fall = trajectory.positions[0, :, 2] - trajectory.positions[-1, :, 2]
+    assert (fall > 1).all()  # nothing holds it up there
+
+
+def test_the_settings_tell_one_start_from_another(beam: Machine) -> None:
+    high = [
+        Start(position=np.array([0.0, 0.0, z]), rotation=np.eye(3), cargo=None) for z in (2, 2, 3)
+    ]
+    first, same, other = (
+        simulate(beam, SHORT, "mujoco", start=start).settings["start"] for start in high
+    )
+    assert first == same != other
+    assert "start" not in simulate(beam, SHORT, "mujoco").settings
+    json.dumps(first)
+
+
+@pytest.mark.parametrize(
+    ("scenario", "cargo", "seed", "message"),
+    [
+        (SHORT, None, 3, "a seed varies it"),
+        (LOADED, None, None, "the start has no cargo"),
+        (
+            SHORT,
+            CargoBox(size=np.ones(3), position=np.zeros(3), mass=1.0),
+            None,
+            "the scenario has no cargo",
+        ),
+    ],
+)
+def test_a_start_that_contradicts_the_rest_is_refused(
+    beam: Machine, scenario: Scenario, cargo: CargoBox | None, seed: int | None, message: str
+) -> None:
+    start = Start(position=np.zeros(3), rotation=np.eye(3), cargo=cargo)
+    with pytest.raises(ValueError, match=message):
+        simulate(beam, scenario, "mujoco", start=start, seed=seed)

@@ -1,0 +1,51 @@
+"""Where everything is in the window, in fractions of its width and height."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+
+@dataclass(frozen=True, slots=True)
+class Box:
+    """A rectangle: left, top, right, bottom."""
+
+    left: float
+    top: float
+    right: float
+    bottom: float
+
+    def holds(self, x: float, y: float) -> bool:
+        """Whether a point lies in it."""
+        return self.left <= x < self.right and self.top <= y < self.bottom
+
+
+def around(x: float, y: float, width: float, height: float) -> Box:
+    """The box of a size with its middle at a point."""
+    return Box(x - width / 2, y - height / 2, x + width / 2, y + height / 2)
+
+
+# The middles are what the published runner clicks at.
+TOOLBAR: Final = {
+    "start": around(0.021, 0.016, 0.036, 0.030),
+    "open_folder": around(0.202, 0.035, 0.034, 0.040),
+    "set_ground": around(0.403, 0.0185, 0.060, 0.032),
+    "delete": around(0.707, 0.038, 0.034, 0.040),
+}
+BAR: Final = Box(0.0, 0.0, 1.0, 0.070)
+LOAD_PANEL: Final = Box(0.370, 0.120, 0.700, 0.420)
+LOAD_ITEMS: Final = {
+    "name_box": around(0.476, 0.215, 0.190, 0.040),
+    "open_machine": around(0.638, 0.209, 0.090, 0.046),
+}
+LUA_PANEL: Final = Box(0.040, 0.090, 0.360, 0.400)
+LUA_ITEMS: Final = {"log_window": Box(0.050, 0.130, 0.350, 0.390)}
+CONFIRM_PANEL: Final = Box(0.380, 0.420, 0.640, 0.640)
+CONFIRM_ITEMS: Final = {
+    "confirm": around(0.538, 0.586, 0.080, 0.050),
+    "cancel": around(0.440, 0.586, 0.080, 0.050),
+}
+DIALOG_PANEL: Final = Box(0.300, 0.300, 0.700, 0.600)
+DIALOG_ITEMS: Final = {"dialog_ok": around(0.500, 0.540, 0.080, 0.050)}
+EMPTY_SPACE: Final = (0.034, 0.726)
+"""Where the published runner takes the focus away: nothing may ever be here."""

@@ -1,0 +1,57 @@
+"""The mod's log window: newest line first, a limited number of lines."""
+
+from __future__ import annotations
+
+import random
+from collections import deque
+from collections.abc import Sequence
+
+from stand_in_game.faults import Fault
+
+
+class LogWindow:
+    """What the log window shows.
+
+    Args:
+        limit: how many lines it keeps.
+        seed: draws which lines faults strike.
+    """
+
+    def __init__(self, limit: int, seed: int) -> None:
+        self._lines: deque[str] = deque(maxlen=limit)
+        self._draw = random.Random(seed)
+        self.version = 0
+
+    def append(self, printed: Sequence[str], faults: Sequence[Fault]) -> None:
+        """Takes the lines printed since the last frame, oldest first, through the faults."""
+        for line in printed:
+            for shown in self._through(line, faults):
+                self._lines.appendleft(shown)
+                self.version += 1
+
+    def clear(self) -> None:
+        """Empties it, as a new simulation does."""
+        self._lines.clear()
+        self.version += 1
+
+    def text(self, *, below: int = 0) -> str:
+        """All its lines.
+
+        Args:
+            below: how many of the newest are scrolled out of reach.
+        """
+        return "\n".join(list(self._lines)[below:])
+
+    def __len__(self) -> int:
+        return len(self._lines)
+
+    def _through(self, line: str, faults: Sequence[Fault]) -> list[str]:
+        shown = [line]
+        for fault in faults:
+            if fault.kind == "cut_lines":
+                shown = [text[: int(fault.number("column", 40))] for text in shown]
+            elif fault.kind == "lost_lines" and self._draw.random() < fault.number("share", 0.3):
+                shown = []
+            elif fault.kind == "repeat_lines" and self._draw.random() < fault.number("share", 0.3):
+                shown = shown * 2
+        return shown

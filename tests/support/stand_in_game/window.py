@@ -1,0 +1,204 @@
+"""The game's window."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+import tkinter as tk
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from stand_in_game.breakage import Breakage
+from stand_in_game.drawing import Scene
+from stand_in_game.faults import Fault
+from stand_in_game.game import Game
+from stand_in_game.interface import Interface
+from stand_in_game.panels import Panels
+from stand_in_game.report import Report
+
+TITLE: Final = "Besiege (stand-in)"
+_CONTROL: Final = 0x4
+_LOCK: Final = 0x2
+_MODIFIERS: Final = ("Control", "Shift", "Alt", "Super", "Meta")
+_REPORT_EVERY_S: Final = 0.2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Frame:
+    """The window's measures.
+
+    Attributes:
+        size: width and height, pixels.
+        place: left and top on the screen, pixels.
+        rate: frames a second.
+    """
+
+    size: tuple[int, int] = (1280, 800)
+    place: tuple[int, int] = (0, 0)
+    rate: float = 30.0
+
+
+class Window:
+    """The window with everything in it.
+
+    Args:
+        game: what is played.
+        machines: the folder with the machine files.
+        report: what tells others about it.
+        frame: its measures.
+    """
+
+    def __init__(self, game: Game, machines: Path, report: Report, frame: Frame) -> None:
+        self._game, self._report, self._frame = game, report, frame
+        self._root = tk.Tk(className="Besiege")
+        self._root.title(TITLE)
+        (width, height), (left, top) = frame.size, frame.place
+        self._root.geometry(f"{width}x{height}+{left}+{top}")
+        self._root.resizable(width=False, height=False)
+        self._canvas = tk.Canvas(self._root, width=width, height=height, highlightthickness=0)
+        self._canvas.pack()
+        self._breakage = Breakage(self._root)
+        self._shown = Interface(game, machines, self)
+        self._scene = Scene(self._canvas, frame.size)
+        self._panels = Panels(self._canvas, frame.size)
+        self._modifiers: set[str] = set()
+        self._caps_lock = False
+        self._pressed_on = ""
+        self._drawn: object = None
+        self._reported_s = 0.0
+        self._last_s = time.monotonic()
+        self._bind()
+
+    def run(self) -> None:
+        """Shows the window until it is closed."""
+        self._root.after(0, self._frame_due)
+        try:
+            self._root.mainloop()
+        finally:
+            self._breakage.close()
+
+    def later(self, seconds: float, work: Callable[[], None]) -> None:
+        """Does something after some time of the wall clock."""
+        self._root.after(max(1, round(seconds * 1000)), work)
+
+    def copy(self, text: str) -> None:
+        """Puts a text into the clipboard."""
+        self._root.clipboard_clear()
+        self._root.clipboard_append(text)
+
+    def paste(self) -> str:
+        """The clipboard's text; "" if nobody has any."""
+        with contextlib.suppress(tk.TclError):
+            return str(self._root.clipboard_get())
+        return ""
+
+    def strike(self, fault: Fault) -> None:
+        """Carries out a fault that is the window's business."""
+        self._breakage.strike(fault)
+
+    def _bind(self) -> None:
+        self._canvas.bind("<ButtonPress-1>", self._mouse_down)
+        self._canvas.bind("<ButtonRelease-1>", self._mouse_up)
+        self._root.bind("<KeyPress>", self._key_down)
+        self._root.bind("<KeyRelease>", self._key_up)
+        # Without a window manager nobody gives a new window the keyboard.
+        self._root.bind("<Map>", lambda _: self._root.focus_force(), add=True)
+        self._root.bind("<FocusOut>", lambda _: self._modifiers.clear(), add=True)
+        self._root.protocol("WM_DELETE_WINDOW", self._root.destroy)
+
+    def _fractions(self, event: tk.Event[tk.Misc]) -> tuple[float, float]:
+        width, height = self._frame.size
+        return event.x / width, event.y / height
+
+    def _mouse_down(self, event: tk.Event[tk.Misc]) -> None:
+        self._root.focus_force()
+        self._pressed_on = self._shown.item_at(*self._fractions(event))
+
+    def _mouse_up(self, event: tk.Event[tk.Misc]) -> None:
+        item = self._shown.item_at(*self._fractions(event))
+        if item == self._pressed_on:
+            self._shown.click(item)
+        self._pressed_on = ""
+
+    def _key_down(self, event: tk.Event[tk.Misc]) -> None:
+        state = event.state if isinstance(event.state, int) else 0
+        self._caps_lock = bool(state & _LOCK)
+        name = event.keysym.removesuffix("_L").removesuffix("_R")
+        if name in _MODIFIERS:
+            self._modifiers.add(name)
+        elif name == "Caps_Lock":
+            self._caps_lock = not self._caps_lock
+        else:
+            self._shown.key(event.keysym, event.char, control=bool(state & _CONTROL))
+
+    def _key_up(self, event: tk.Event[tk.Misc]) -> None:
+        self._modifiers.discard(event.keysym.removesuffix("_L").removesuffix("_R"))
+
+    def _frame_due(self) -> None:
+        now = time.monotonic()
+        passed, self._last_s = now - self._last_s, now
+        self._game.frame(passed)
+        if self._game.simulating:
+            for fault in self._game.faults.at("simulating", self._game.time_s):
+                self._shown.carry_out(fault)
+        self._draw()
+        self._tell(now)
+        spent = time.monotonic() - now
+        self._root.after(max(1, round((1 / self._frame.rate - spent) * 1000)), self._frame_due)
+
+    def _draw(self) -> None:
+        game, shown = self._game, self._shown
+        state = (
+            game.machine_name,
+            game.grounded,
+            game.message,
+            game.counts["loads"],
+            game.simulating and game.time_s,
+        )
+        panels = (
+            game.log.version if shown.lua_panel else None,
+            *(shown.phase, shown.loading, shown.confirm, shown.lua_panel, shown.dialog),
+            *(shown.focus, shown.log_selected, shown.name_box.text, shown.name_box.selected),
+        )
+        if (state, panels) == self._drawn:
+            return
+        self._drawn = (state, panels)
+        self._scene.draw(game)
+        self._panels.draw(shown)
+
+    def _tell(self, now: float) -> None:
+        state = self._state()
+        quick = {key: value for key, value in state.items() if key not in _SLOW}
+        if quick != self._told or now - self._reported_s >= _REPORT_EVERY_S:
+            self._told, self._reported_s = quick, now
+            self._report.write(state)
+
+    _told: object = None
+
+    def _state(self) -> dict[str, object]:
+        game, shown = self._game, self._shown
+        return {
+            "title": TITLE,
+            "phase": shown.phase,
+            "machine": game.machine_name,
+            "loading": shown.loading,
+            "rollout_ready": game.rollout_ready,
+            "grounded": game.grounded,
+            "lua_panel": shown.lua_panel,
+            "dialog": shown.dialog,
+            "focus": shown.focus,
+            "name_box": shown.name_box.text,
+            "message": game.message,
+            "keys_held": sorted(game.stage.held) if game.stage is not None else [],
+            "modifiers": sorted(self._modifiers),
+            "caps_lock": self._caps_lock,
+            "counts": dict(game.counts),
+            "faults": list(game.faults.struck),
+            "time_s": round(game.time_s, 2),
+            "log_lines": len(game.log),
+        }
+
+
+_SLOW: Final = ("time_s", "log_lines")
