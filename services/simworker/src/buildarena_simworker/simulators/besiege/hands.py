@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import io
+import os
 import subprocess
 import sys
 import time
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from buildarena_simworker.simulators.besiege.errors import DesktopError, NotSetUpError
@@ -36,6 +38,7 @@ class Hands:
 
     def __init__(self, pace: float = 1.0) -> None:
         self._pace = pace
+        _need_no_authority()
         try:
             import pyautogui
             import pyperclip
@@ -145,6 +148,14 @@ class Hands:
         except FileNotFoundError as error:
             raise NotSetUpError("the clipboard needs the program xclip: install it") from error
         return done.stdout.decode("utf-8", "replace") if done.returncode == 0 else None
+
+
+def _need_no_authority() -> None:
+    """Python's Xlib insists on a file of authorities, also on a screen that asks for none."""
+    if sys.platform in {"win32", "darwin"} or "XAUTHORITY" in os.environ:
+        return
+    if not Path("~/.Xauthority").expanduser().exists():
+        os.environ["XAUTHORITY"] = os.devnull
 
 
 def difference(one: Image, other: Image) -> float:

@@ -45,6 +45,14 @@ class GameProcess:
         """Where what it prints is written."""
         return self._settings.state / "game.log"
 
+    def last_words(self) -> str:
+        """The last line that it printed."""
+        try:
+            lines = self.output.read_text(encoding="utf-8", errors="replace").split("\n")
+        except OSError:
+            lines = []
+        return next((line.strip() for line in reversed(lines) if line.strip()), "it said nothing")
+
     @property
     def level(self) -> str | None:
         """Digest of the level it was started with; None when it was not started here."""

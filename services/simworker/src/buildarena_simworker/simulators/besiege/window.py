@@ -211,16 +211,21 @@ class WindowDesktop:
         self._process.kill()
         self._process.start(level)
         self._panel_shown = False
-        found = wait_for(
-            lambda: None if self._windows.find(self._settings.title) else "no window",
-            timeout_s=START_S,
-        )
-        if found is not None:
+        title = self._settings.title
+        finding = wait_for(lambda: self._no_window(title), timeout_s=START_S)
+        if finding is not None:
             raise GameGoneError(
-                f"the game showed no window with {self._settings.title!r} in its title within "
-                f"{START_S:.0f} s; what it printed is in {self._process.output}"
+                f"the game showed no window with {title!r} in its title within {START_S:.0f} s: "
+                f"{finding}"
             )
         self._hands.wait(1.0)
+
+    def _no_window(self, title: str) -> str | None:
+        if not self._process.is_running():
+            raise GameGoneError(f"the game ended as it started: {self._process.last_words()}")
+        if self._windows.find(title) is None:
+            return f"what it printed is in {self._process.output}"
+        return None
 
     def _open_level(self) -> str:
         """Digest of the level that the owner says is open."""
