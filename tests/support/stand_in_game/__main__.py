@@ -15,7 +15,10 @@ from stand_in_game.report import Report
 
 def main() -> int:
     """Starts the game with the options of the command line."""
-    options = _parser().parse_args()
+    parser = _parser()
+    options, unknown = parser.parse_known_args()
+    if unknown and not options.headless:
+        parser.error(f"unknown options: {' '.join(unknown)}")
     try:
         faults = read_faults(options.faults) if options.faults else []
         if options.random_faults is not None:
@@ -36,7 +39,11 @@ def main() -> int:
 
 
 def _show(game: Game, options: argparse.Namespace) -> int:
-    # Imported here: a headless game runs where there is no toolkit.
+    # Each imported where it is used: a headless game runs where there is no toolkit.
+    if options.headless:
+        from stand_in_game.headless import Headless
+
+        return Headless(game, Report(options.report), ip=options.ip, port=options.port).run()
     from stand_in_game.window import Frame, Window
 
     frame = Frame(size=options.size, place=options.place, rate=options.frame_rate)
@@ -60,6 +67,8 @@ def _parser() -> argparse.ArgumentParser:
     add("--report", type=Path, metavar="FILE", help="kept up to date with what the game does")
     add("--seed", type=int, default=0, help="draws everything random")
     add("--headless", action="store_true", help="no window: the protocol of BesiegeField")
+    add("--ip", default="127.0.0.1", help="headless: where it listens")
+    add("--port", type=int, default=6890, help="headless: where it listens; 0 for a free one")
     return parser
 
 

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import subprocess
-import time
 import tkinter as tk
 from typing import Final
 
 from stand_in_game.faults import Fault
+from stand_in_game.stopping import crash, freeze
 
 _SOON_MS: Final = 30
 """After this a stolen clipboard is another's: right after the copy, before anybody reads it."""
-
-_CRASHED: Final = 139
-"""The exit status a shell shows for a segmentation fault."""
 
 
 class Breakage:
@@ -77,18 +73,6 @@ class Breakage:
         other.lift()
         other.focus_force()
         self._root.after(round(fault.number("seconds", 3.0) * 1000), other.destroy)
-
-
-def freeze(fault: Fault) -> None:
-    """Does nothing for the fault's seconds, or for ever: no event is answered."""
-    end = time.monotonic() + fault.number("seconds", 0.0)
-    while fault.for_ever or time.monotonic() < end:
-        time.sleep(0.05)
-
-
-def crash() -> None:
-    """Ends the process at once, with nothing tidied up."""
-    os._exit(_CRASHED)
 
 
 def press_caps_lock() -> None:

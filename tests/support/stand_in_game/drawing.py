@@ -86,7 +86,7 @@ class Scene:
         canvas, width, height = self._canvas, self._width, self._height
         floor = float(self._pixel(np.zeros((1, 2)))[0, 1])
         canvas.create_rectangle(0, 0, width, height, fill="#cfe0ea", width=0, tags="scene")
-        for box in game.settings.terrain:
+        for box in game.terrain:
             (x, _, z), (wide, _, tall) = box.center, box.size
             corners = np.array([[x - wide / 2, z + tall / 2], [x + wide / 2, z - tall / 2]])
             (a, b), (c, d) = self._pixel(corners)
@@ -133,7 +133,7 @@ def _corners(type_id: int) -> Array:
         return _WHEEL_CORNERS
     low, high = _SIZES.get(type_id, ((-0.3, -0.3, 0.0), (0.3, 0.3, 0.6)))
     steps = np.array(np.meshgrid([0, 1], [0, 1], [0, 1])).reshape(3, 8).T
-    return np.array(low) + steps * (np.array(high) - np.array(low))
+    return np.asarray(np.array(low) + steps * (np.array(high) - np.array(low)))
 
 
 def _color(type_id: int, shade: float) -> str:

@@ -16,7 +16,7 @@ from stand_in_game.log_window import LogWindow
 from stand_in_game.machine_file import FileMachine, GameFileError, read_machine_file
 from stand_in_game.script import Script, ScriptError
 from stand_in_game.stage import Stage, as_built, rehearse
-from stand_in_game.trial import UPDATES_PER_S, Flight, Inputs, Part, Placed
+from stand_in_game.trial import UPDATES_PER_S, Flight, Inputs, Part, Placed, holds
 
 _LONGEST_FRAME_S: Final = 0.25
 """A frame that took longer than this makes the game lag instead of jump."""
@@ -81,6 +81,7 @@ class Game:
     def __init__(self, settings: Settings, faults: Faults, *, scripted: bool = True) -> None:
         self.settings, self.faults = settings, faults
         self._scripted = scripted
+        self.terrain = settings.terrain
         self._draw = random.Random(settings.seed)
         self.log = LogWindow(settings.log_lines, settings.seed)
         self.machine_name: str | None = None
@@ -142,6 +143,8 @@ class Game:
         """Ends the simulation; the machine is as it was built."""
         if self.simulating:
             self.counts["stops"] += 1
+        if self.placed is not None and self._by_hand:
+            self._place(self.placed.file, on_ground=self.grounded)
         self.simulating, self._script, self.stage = False, None, None
 
     def frame(self, passed_s: float) -> None:
@@ -165,6 +168,11 @@ class Game:
         self._printed = []
 
     @property
+    def _by_hand(self) -> bool:
+        """Whether keys were pressed by hand: then no other simulation goes like this one."""
+        return not self._scripted and self.stage is not None and bool(self.stage.edges)
+
+    @property
     def time_s(self) -> float:
         """Game time since the simulation's start, seconds."""
         return self.stage.time_s if self.stage is not None else 0.0
@@ -183,15 +191,20 @@ class Game:
         """A block of the loaded machine as it is now."""
         return self._part(place, self.time_s)
 
-    def press(self, presses: Callable[[float], Inputs]) -> None:
-        """Works the simulation out again, with other keys; it goes on where it is.
+    def hold(self, key: str, *, down: bool) -> None:
+        """Presses or lets go a key by hand: what comes is worked out again from the start."""
+        if self.placed is None or self.stage is None:
+            return
+        self.stage.press(key.lower(), down)
+        placed, seconds = self.placed, self.settings.horizon_s
+        inputs = Inputs(presses=holds(self.stage.edges, seconds))
+        self._rollout = Rollout(lambda: self._fly(placed, inputs))
 
-        Args:
-            presses: gives the inputs up to a time.
-        """
+    def play_in(self, terrain: tuple[TerrainBox, ...]) -> None:
+        """Changes the level."""
+        self.terrain = terrain
         if self.placed is not None:
-            placed, inputs = self.placed, presses(self.settings.horizon_s)
-            self._rollout = Rollout(lambda: self._fly(placed, inputs))
+            self._place(self.placed.file, on_ground=self.grounded)
 
     def _place(self, file: FileMachine, *, on_ground: bool) -> None:
         placed = Placed(file, on_ground=on_ground)
@@ -204,8 +217,7 @@ class Game:
         return rehearse(placed, duration_s=self.settings.horizon_s)
 
     def _fly(self, placed: Placed, inputs: Inputs) -> Flight:
-        settings = self.settings
-        return Flight(placed, settings.terrain, inputs, duration_s=settings.horizon_s)
+        return Flight(placed, self.terrain, inputs, duration_s=self.settings.horizon_s)
 
     def _part(self, place: int, time_s: float) -> Part:
         assert self.placed is not None

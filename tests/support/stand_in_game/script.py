@@ -13,6 +13,8 @@ from typing import Any, Final, Protocol
 
 from lupa import lua52
 
+from stand_in_game.trial import Part
+
 Point = tuple[float, float, float]
 
 _HIDDEN: Final = ("python", "io", "os", "require", "package", "debug", "dofile", "loadfile")
@@ -38,17 +40,6 @@ KEY_NAMES: Final = (
 """The keys an emulator can be made for, in lower case: the mod ignores case."""
 
 
-class BlockView(Protocol):
-    """What a script can ask of one block at the present update."""
-
-    type_id: int
-    position: Point
-    right: Point
-    up: Point
-    forward: Point
-    burning: bool
-
-
 class World(Protocol):
     """What a script sees and moves."""
 
@@ -60,7 +51,7 @@ class World(Protocol):
     def block_count(self) -> int:
         """How many blocks the machine has."""
 
-    def block(self, place: int) -> BlockView:
+    def block(self, place: int) -> Part:
         """A block as it is now."""
 
     def press(self, key: str, down: bool) -> None:
@@ -218,7 +209,7 @@ class Script:
         )
 
 
-def euler_angles(block: BlockView) -> Point:
+def euler_angles(block: Part) -> Point:
     """Unity's angles of a block, degrees in [0, 360): first about z, then x, then y."""
     right, up, forward = block.right, block.up, block.forward
     x = math.degrees(math.asin(max(-1.0, min(1.0, -forward[1]))))

@@ -245,7 +245,7 @@ def _simulated(
     if start.cargo is not None:
         masses = inputs.masses or (start.cargo.mass,)
         cargo = ScriptedCargo(
-            size=tuple(float(edge) for edge in start.cargo.size),
+            size=_plain(start.cargo.size),
             final_mass=masses[-1],
             ramp_s=1.0,
             masses=tuple(max(mass, 0.01) for mass in masses),
