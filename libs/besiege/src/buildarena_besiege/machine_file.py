@@ -8,11 +8,11 @@ import uuid
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-from buildarena_besiege.entries import Entry, Value, block_entries, connector_entries, frame_of
+from buildarena_besiege.entries import Entry, Value, block_entries, connector_entries, typed
 from buildarena_besiege.errors import MachineNotPlayableError
 from buildarena_besiege.names import CARGO, CARGO_ID, type_name
 from buildarena_besiege.placement import UPRIGHT_CARGO, GlobalPose
-from buildarena_geometry.besiege_components import besiege_frame, besiege_point, besiege_rotation
+from buildarena_geometry.besiege_components import besiege_point, besiege_rotation
 from buildarena_geometry.blocks import Block
 
 if TYPE_CHECKING:
@@ -191,13 +191,12 @@ def _block_record(block: Block, guid: str, keys: Mapping[str, Sequence[str]]) ->
 
 
 def _connector_record(machine: Machine, link: Connector, guid: str) -> BlockRecord:
-    frame = frame_of(machine, link.start)
     return BlockRecord(
         part=link.id,
         module=link.module,
         guid=guid,
         position=besiege_point(link.start_xyz),
-        rotation=besiege_frame(frame.wxyz),
+        rotation=besiege_rotation(link),
         entries=tuple(connector_entries(machine, link)),
     )
 
@@ -210,10 +209,7 @@ def _cargo_record(module: Module, guid: str, cargo: CargoBox) -> BlockRecord:
         position=cargo.root,
         rotation=UPRIGHT_CARGO,
         scale=cargo.size,
-        entries=tuple(
-            (kind, key, float(value) if kind == "Single" else value)
-            for kind, key, value in module.besiege_data
-        ),
+        entries=tuple((kind, key, typed(kind, value)) for kind, key, value in module.besiege_data),
     )
 
 

@@ -1,7 +1,7 @@
 """Where the game puts a machine and its cargo: the published runner's rules.
 
 All means and extents are of the parts' centres in Besiege's components (x east, y up, z north),
-each part with weight 1; a connector's centre is that of its start face. The published rule centres
+each part with weight 1; a connector's centre is where its own frame is. The published rule centres
 a turned machine with the wrong sign; this one does not.
 """
 
@@ -95,7 +95,7 @@ def centers_of(machine: Machine) -> list[Vector]:
     if not machine.blocks:
         raise MachineNotPlayableError("The machine has no blocks.")
     return [
-        besiege_point(part.center_xyz if isinstance(part, Block) else part.start_xyz)
+        besiege_point(part.center_xyz if isinstance(part, Block) else part.world_from_connector.xyz)
         for part in machine.state.parts
     ]
 
