@@ -7,6 +7,7 @@ from buildarena_besiege.errors import (
     MachineNotPlayableError,
 )
 from buildarena_besiege.game_log import GameLog
+from buildarena_besiege.importing.machine import ImportedMachine, read_machine_file
 from buildarena_besiege.level import level_file
 from buildarena_besiege.run import GameRun, plain_machine_file, prepare_run
 from buildarena_besiege.trajectories import trajectory_of
@@ -15,11 +16,13 @@ __all__ = [
     "BesiegeError",
     "GameLog",
     "GameRun",
+    "ImportedMachine",
     "LogIncompleteError",
     "MachineFileError",
     "MachineNotPlayableError",
     "level_file",
     "plain_machine_file",
     "prepare_run",
+    "read_machine_file",
     "trajectory_of",
 ]

@@ -31,6 +31,9 @@ UPRIGHT_CARGO: Final[Quaternion] = (math.sqrt(0.5), -math.sqrt(0.5), 0.0, 0.0)
 """(w, x, y, z): the cargo's own z axis points up."""
 
 
+_TIE: Final = 1e-9  # units; what rounding may make of equal extents
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GlobalPose:
     """A machine file's Global: Besiege's components.
@@ -69,7 +72,7 @@ def global_pose(machine: Machine, scenario: Scenario) -> GlobalPose:
         return GlobalPose(position=(-east, START_HEIGHT, -north))
     height = placement.lowest_center - min(center[1] for center in centers)
     wide, long = _extent(centers, 0), _extent(centers, 2)
-    if long <= placement.gap and wide >= long:
+    if long <= placement.gap + _TIE and wide >= long - _TIE:
         return GlobalPose(position=(-north, height, east), rotation=QUARTER_TURN)
     return GlobalPose(position=(-east, height, -north))
 
