@@ -114,19 +114,23 @@ def block_records(
         keys: The keys of each block's actions, by block id.
         cargo: The cargo, if the file has one.
     """
-    first = next(iter(machine.blocks), None)
-    parts = sorted(machine.state.parts, key=lambda part: (part.id != first, _number(part)))
     records = [
         _block_record(part, guids.draw(), keys.get(part.id, part.bindings))
         if isinstance(part, Block)
         else _connector_record(machine, part, guids.draw())
-        for part in parts
+        for part in parts_in_file_order(machine)
     ]
     if cargo is not None:
         module = next(one for one in machine.catalogue.values() if one.besiege_id == CARGO)
         records.append(_cargo_record(module, guids.draw(), cargo))
     _require_finite(records)
     return records
+
+
+def parts_in_file_order(machine: Machine) -> list[Block | Connector]:
+    """All parts in the order of a machine's file: the first block, then the order of creation."""
+    first = next(iter(machine.blocks), None)
+    return sorted(machine.state.parts, key=lambda part: (part.id != first, _number(part)))
 
 
 def machine_text(name: str, pose: GlobalPose, records: Sequence[BlockRecord], script: str) -> str:
@@ -173,10 +177,11 @@ def global_entries(script: str) -> tuple[Entry, ...]:
     )
 
 
-def _number(part: Block | Connector) -> tuple[int, int]:
-    """The order of creation, as the ids count blocks and connectors together."""
-    digits = part.id.rpartition("_")[2]
-    return (len(part.structure) == 0, int(digits) if digits.isdecimal() else 0)
+def _number(part: Block | Connector) -> tuple[bool, str, int]:
+    """The order of creation, as ids count blocks and connectors together."""
+    letter, _, digits = part.id.rpartition("_")
+    number = int(digits) if digits.isascii() and digits.isdecimal() and len(digits) < 10 else 0  # noqa: PLR2004
+    return (not letter, letter, number)
 
 
 def _block_record(block: Block, guid: str, keys: Mapping[str, Sequence[str]]) -> BlockRecord:
