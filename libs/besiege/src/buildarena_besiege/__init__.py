@@ -7,19 +7,27 @@ from buildarena_besiege.errors import (
     MachineNotPlayableError,
 )
 from buildarena_besiege.game_log import GameLog
+from buildarena_besiege.importing.machine import ImportedMachine, read_machine_file
 from buildarena_besiege.level import level_file
+from buildarena_besiege.published import looks_published, published_trajectory
 from buildarena_besiege.run import GameRun, plain_machine_file, prepare_run
+from buildarena_besiege.state_log import StateLog
 from buildarena_besiege.trajectories import trajectory_of
 
 __all__ = [
     "BesiegeError",
     "GameLog",
     "GameRun",
+    "ImportedMachine",
     "LogIncompleteError",
     "MachineFileError",
     "MachineNotPlayableError",
+    "StateLog",
     "level_file",
+    "looks_published",
     "plain_machine_file",
     "prepare_run",
+    "published_trajectory",
+    "read_machine_file",
     "trajectory_of",
 ]

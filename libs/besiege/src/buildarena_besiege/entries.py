@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 from buildarena_besiege.names import key_entries
 from buildarena_geometry.besiege_components import besiege_frame, besiege_offset
-from buildarena_geometry.rotations import Quaternion, Vector, subtract
+from buildarena_geometry.rotations import Vector
+from buildarena_geometry.state import span_in
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -33,7 +34,9 @@ def block_entries(block: Block, keys: Mapping[str, Sequence[str]]) -> list[Entry
     lists = key_lists(module, keys)
     if module.kind == "start":
         return [("Integer", "bmt-version", 1), *lists]
-    given: list[Entry] = [(kind, key, _typed(kind, value)) for kind, key, value in _data(module)]
+    given: list[Entry] = [
+        (kind, key, typed(kind, value)) for kind, key, value in module.besiege_data
+    ]
     before = [entry for entry in given if entry[1] in _BEFORE_KEYS]
     after = [entry for entry in given if entry[1] not in _BEFORE_KEYS]
     found = [*before, *lists, *after]
@@ -51,19 +54,17 @@ def key_lists(module: Module, keys: Mapping[str, Sequence[str]]) -> list[Entry]:
 
 
 def connector_entries(machine: Machine, link: Connector) -> list[Entry]:
-    """The four entries of a brace or winch: its ends as they are now, in its start face's frame."""
-    frame = frame_of(machine, link.start)
-    across = frame.inverse().direction(subtract(link.end_xyz, link.start_xyz))
+    """The four entries of a brace or winch: its ends as they are now, in its own frame."""
+    across = span_in(link.world_from_connector, link)
     return [
         ("Vector3", "start-position", (0.0, 0.0, 0.0)),
         ("Vector3", "end-position", besiege_offset(across)),
-        ("Vector3", "start-rotation", end_rotation(frame)),
-        ("Vector3", "end-rotation", end_rotation(frame_of(machine, link.end))),
+        ("Vector3", "start-rotation", end_rotation(_frame(machine, link.start))),
+        ("Vector3", "end-rotation", end_rotation(_frame(machine, link.end))),
     ]
 
 
-def frame_of(machine: Machine, face: FaceRef) -> Pose:
-    """The frame of a face of one of the machine's blocks, world frame."""
+def _frame(machine: Machine, face: FaceRef) -> Pose:
     block, label = face
     return machine.blocks[block].world_from_face(label)
 
@@ -89,15 +90,6 @@ _BEFORE_KEYS = frozenset(
 )
 
 
-def _data(module: Module) -> tuple[tuple[str, str, str | int | float | bool], ...]:
-    return module.besiege_data
-
-
-def _typed(kind: str, value: str | float | bool) -> Value:
+def typed(kind: str, value: str | float | bool) -> Value:
+    """A value of the catalogue as its type in machine files wants it."""
     return float(value) if kind == "Single" else value
-
-
-def turned_xyzw(rotation: Quaternion) -> tuple[float, float, float, float]:
-    """A quaternion in the order of the file's attributes."""
-    w, x, y, z = rotation
-    return (x, y, z, w)

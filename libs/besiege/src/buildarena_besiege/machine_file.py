@@ -8,11 +8,11 @@ import uuid
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-from buildarena_besiege.entries import Entry, Value, block_entries, connector_entries, frame_of
+from buildarena_besiege.entries import Entry, Value, block_entries, connector_entries, typed
 from buildarena_besiege.errors import MachineNotPlayableError
 from buildarena_besiege.names import CARGO, CARGO_ID, type_name
 from buildarena_besiege.placement import UPRIGHT_CARGO, GlobalPose
-from buildarena_geometry.besiege_components import besiege_frame, besiege_point, besiege_rotation
+from buildarena_geometry.besiege_components import besiege_point, besiege_rotation
 from buildarena_geometry.blocks import Block
 
 if TYPE_CHECKING:
@@ -114,19 +114,23 @@ def block_records(
         keys: The keys of each block's actions, by block id.
         cargo: The cargo, if the file has one.
     """
-    first = next(iter(machine.blocks), None)
-    parts = sorted(machine.state.parts, key=lambda part: (part.id != first, _number(part)))
     records = [
         _block_record(part, guids.draw(), keys.get(part.id, part.bindings))
         if isinstance(part, Block)
         else _connector_record(machine, part, guids.draw())
-        for part in parts
+        for part in parts_in_file_order(machine)
     ]
     if cargo is not None:
         module = next(one for one in machine.catalogue.values() if one.besiege_id == CARGO)
         records.append(_cargo_record(module, guids.draw(), cargo))
     _require_finite(records)
     return records
+
+
+def parts_in_file_order(machine: Machine) -> list[Block | Connector]:
+    """All parts in the order of a machine's file: the first block, then the order of creation."""
+    first = next(iter(machine.blocks), None)
+    return sorted(machine.state.parts, key=lambda part: (part.id != first, _number(part)))
 
 
 def machine_text(name: str, pose: GlobalPose, records: Sequence[BlockRecord], script: str) -> str:
@@ -173,10 +177,11 @@ def global_entries(script: str) -> tuple[Entry, ...]:
     )
 
 
-def _number(part: Block | Connector) -> tuple[int, int]:
-    """The order of creation, as the ids count blocks and connectors together."""
-    digits = part.id.rpartition("_")[2]
-    return (len(part.structure) == 0, int(digits) if digits.isdecimal() else 0)
+def _number(part: Block | Connector) -> tuple[bool, str, int]:
+    """The order of creation, as ids count blocks and connectors together."""
+    letter, _, digits = part.id.rpartition("_")
+    number = int(digits) if digits.isascii() and digits.isdecimal() and len(digits) < 10 else 0  # noqa: PLR2004
+    return (not letter, letter, number)
 
 
 def _block_record(block: Block, guid: str, keys: Mapping[str, Sequence[str]]) -> BlockRecord:
@@ -191,13 +196,12 @@ def _block_record(block: Block, guid: str, keys: Mapping[str, Sequence[str]]) ->
 
 
 def _connector_record(machine: Machine, link: Connector, guid: str) -> BlockRecord:
-    frame = frame_of(machine, link.start)
     return BlockRecord(
         part=link.id,
         module=link.module,
         guid=guid,
         position=besiege_point(link.start_xyz),
-        rotation=besiege_frame(frame.wxyz),
+        rotation=besiege_rotation(link),
         entries=tuple(connector_entries(machine, link)),
     )
 
@@ -210,10 +214,7 @@ def _cargo_record(module: Module, guid: str, cargo: CargoBox) -> BlockRecord:
         position=cargo.root,
         rotation=UPRIGHT_CARGO,
         scale=cargo.size,
-        entries=tuple(
-            (kind, key, float(value) if kind == "Single" else value)
-            for kind, key, value in module.besiege_data
-        ),
+        entries=tuple((kind, key, typed(kind, value)) for kind, key, value in module.besiege_data),
     )
 
 

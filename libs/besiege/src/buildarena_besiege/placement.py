@@ -1,7 +1,7 @@
 """Where the game puts a machine and its cargo: the published runner's rules.
 
 All means and extents are of the parts' centres in Besiege's components (x east, y up, z north),
-each part with weight 1; a connector's centre is that of its start face. The published rule centres
+each part with weight 1; a connector's centre is where its own frame is. The published rule centres
 a turned machine with the wrong sign; this one does not.
 """
 
@@ -29,6 +29,9 @@ QUARTER_TURN: Final[Quaternion] = (math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0)
 
 UPRIGHT_CARGO: Final[Quaternion] = (math.sqrt(0.5), -math.sqrt(0.5), 0.0, 0.0)
 """(w, x, y, z): the cargo's own z axis points up."""
+
+
+_TIE: Final = 1e-9  # units; what rounding may make of equal extents
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,7 +72,7 @@ def global_pose(machine: Machine, scenario: Scenario) -> GlobalPose:
         return GlobalPose(position=(-east, START_HEIGHT, -north))
     height = placement.lowest_center - min(center[1] for center in centers)
     wide, long = _extent(centers, 0), _extent(centers, 2)
-    if long <= placement.gap and wide >= long:
+    if long <= placement.gap + _TIE and wide >= long - _TIE:
         return GlobalPose(position=(-north, height, east), rotation=QUARTER_TURN)
     return GlobalPose(position=(-east, height, -north))
 
@@ -95,7 +98,7 @@ def centers_of(machine: Machine) -> list[Vector]:
     if not machine.blocks:
         raise MachineNotPlayableError("The machine has no blocks.")
     return [
-        besiege_point(part.center_xyz if isinstance(part, Block) else part.start_xyz)
+        besiege_point(part.center_xyz if isinstance(part, Block) else part.world_from_connector.xyz)
         for part in machine.state.parts
     ]
 

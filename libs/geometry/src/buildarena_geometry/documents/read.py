@@ -42,7 +42,11 @@ _CONNECTOR = ("id", "module", "start", "end", "position", "quaternion", "span")
 
 
 def read_machine(
-    document: object, *, catalogue: Catalogue | None = None, where: str = "document"
+    document: object,
+    *,
+    catalogue: Catalogue | None = None,
+    where: str = "document",
+    overlaps: bool = False,
 ) -> LoggedState:
     """The machine a document describes, with its log.
 
@@ -50,6 +54,8 @@ def read_machine(
         document: JSON values.
         catalogue: the modules it is made of; the basic ones if left out.
         where: what messages call the document.
+        overlaps: whether blocks may overlap, as those of other programs' machines do; the actions
+            of this library never make such a machine.
 
     Raises:
         DocumentError: it is not a machine; the message names the entry.
@@ -59,7 +65,7 @@ def read_machine(
     if fields["version"].integer() != DOCUMENT_VERSION:
         fields["version"].fail(f"version {DOCUMENT_VERSION}")
     available = {
-        name: read_machine(entry.value, catalogue=catalogue, where=entry.where)
+        name: read_machine(entry.value, catalogue=catalogue, where=entry.where, overlaps=overlaps)
         for name, entry in fields["available"].entries()
     }
     blocks = _read_blocks(fields["blocks"], catalogue)
@@ -77,6 +83,8 @@ def read_machine(
         next_id=fields["next_id"].integer(least=1),
     )
     _check_whole(state, fields)
+    if not overlaps:
+        _check_apart(state, fields)
     records = tuple(_record(entry) for entry in fields["log"].items())
     return LoggedState(state=state, records=records, available=available)
 
@@ -194,6 +202,10 @@ def _check_whole(state: MachineState, fields: Fields) -> None:
     for block in state.blocks.values():
         if block.structure != "" and block.structure not in state.structures:
             raise DocumentError(f"{where}: block {block.id} is of an unknown sub-structure")
+
+
+def _check_apart(state: MachineState, fields: Fields) -> None:
+    where = fields["blocks"].where
     world = CollisionWorld()
     for block in state.blocks.values():
         pairs = world.overlaps([block])

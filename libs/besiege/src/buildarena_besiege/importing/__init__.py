@@ -1,0 +1,1 @@
+"""Reads the game's machine files (.bsg), our own and anybody's."""

@@ -1,0 +1,200 @@
+"""From a file's blocks to ours: what each is, and which of its entries say something new."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Final
+
+from buildarena_besiege.errors import MachineFileError
+from buildarena_besiege.importing.xml_file import FileBlock, FileEntry, number_of, shown
+from buildarena_besiege.names import key_entries
+from buildarena_geometry.besiege_components import besiege_offset, pose_from_besiege
+from buildarena_geometry.keys import KEYS
+from buildarena_geometry.rotations import ORIGIN
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from buildarena_geometry.modules.module import Catalogue, Module
+    from buildarena_geometry.poses import Pose
+    from buildarena_geometry.rotations import Vector
+
+_SCRIPTING: Final = ("bmt-lua_module", "bmt-lua_ref_key")
+_ENDS: Final = ("start-position", "end-position")
+_END_ROTATIONS: Final = ("start-rotation", "end-rotation")
+_SAME: Final = 1e-6  # what a number may miss by being written in single precision
+_MOST_REMARKS: Final = 200
+
+
+class Remarks:
+    """What was not understood, in order, each once; bounded."""
+
+    def __init__(self) -> None:
+        self._found: dict[str, None] = {}
+        self._further = 0
+
+    def add(self, text: str) -> None:
+        """Notes one thing."""
+        if text in self._found:
+            return
+        if len(self._found) >= _MOST_REMARKS:
+            self._further += 1
+            return
+        self._found[text] = None
+
+    def all(self) -> tuple[str, ...]:
+        """Everything noted."""
+        more = (f"and {self._further} more",) if self._further else ()
+        return (*self._found, *more)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Part:
+    """A block of a file that is one of our modules.
+
+    Attributes:
+        number: which of the file's blocks it is, from 1.
+        guid: its id in the game.
+        module: what it is.
+        pose: world_from_block, or world_from_connector.
+        flipped: whether its spin is reversed.
+        bindings: the keys of its actions.
+        start: of a connector: where it begins, in its own frame, units.
+        end: of a connector: where it ends, in its own frame, units.
+        end_rotation: of a connector: its end face's frame as the file has it; None if not told.
+    """
+
+    number: int
+    guid: str
+    module: Module
+    pose: Pose
+    flipped: bool = False
+    bindings: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    start: Vector = ORIGIN
+    end: Vector = ORIGIN
+    end_rotation: Vector | None = None
+
+    @property
+    def name(self) -> str:
+        """What remarks call it."""
+        return f"block {self.number} ({self.module.name})"
+
+
+def part_of(block: FileBlock, catalogue: Catalogue, remarks: Remarks) -> Part | None:
+    """The part a block of a file is; None if it is left out, which is remarked.
+
+    Raises:
+        MachineFileError: A number of it is not one.
+    """
+    module = next((one for one in catalogue.values() if one.besiege_id == block.type), None)
+    if module is None:
+        remarks.add(f"block {block.number}: no module is of the game's type {block.type}: left out")
+        return None
+    if module.kind == "cargo":
+        remarks.add(f"block {block.number} ({module.name}): a cargo is the task's: left out")
+        return None
+    where = f"block {block.number} ({module.name})"
+    if any(abs(one - 1.0) > _SAME for one in block.scale):
+        remarks.add(f"{where}: Scale {_numbers(block.scale)} is read as 1 1 1")
+    try:
+        pose = pose_from_besiege(module, block.position, block.rotation)
+    except ValueError as error:
+        raise MachineFileError(f"{where}: {error}") from error
+    ends = _ends(block, where) if module.kind == "connector" else {}
+    for remark in _entry_remarks(block, module):
+        remarks.add(f"{where}: {remark}")
+    return Part(
+        number=block.number,
+        guid=block.guid,
+        module=module,
+        pose=pose,
+        flipped=module.spins and _truth(block, "flipped"),
+        bindings=dict(_bindings(block, module)),
+        start=besiege_offset(ends.get("start-position", ORIGIN)),
+        end=besiege_offset(ends.get("end-position", ORIGIN)),
+        end_rotation=ends.get("end-rotation"),
+    )
+
+
+def _ends(block: FileBlock, where: str) -> dict[str, Vector]:
+    found: dict[str, Vector] = {}
+    for entry in block.entries:
+        if entry.key in _ENDS or (entry.key == "end-rotation" and len(entry.components) == 3):  # noqa: PLR2004
+            if len(entry.components) != 3:  # noqa: PLR2004  x, y and z
+                raise MachineFileError(f"{where}: {entry.key} has no X, Y and Z")
+            x, y, z = (number_of(one, f"{where}: {entry.key}") for one in entry.components)
+            found[entry.key] = (x, y, z)
+    if "end-position" not in found:
+        raise MachineFileError(f"{where}: it has no end-position")
+    return found
+
+
+def _bindings(block: FileBlock, module: Module) -> Iterator[tuple[str, tuple[str, ...]]]:
+    entries = {entry.key: entry for entry in block.entries}
+    of_action = key_entries(module)
+    for action in module.actions:
+        entry = entries.get(of_action.get(action, ""))
+        keys = () if entry is None else _keys(entry)
+        yield action, tuple(dict.fromkeys(key for key in keys if key in KEYS))
+
+
+def _keys(entry: FileEntry) -> tuple[str, ...]:
+    return entry.items or ((entry.text,) if entry.text else ())
+
+
+def _truth(block: FileBlock, key: str) -> bool:
+    return any(entry.key == key and entry.text.lower() == "true" for entry in block.entries)
+
+
+def _entry_remarks(block: FileBlock, module: Module) -> Iterator[str]:
+    """The entries that say what a machine of ours cannot hold."""
+    usual = {key: value for _, key, value in module.besiege_data}
+    lists, known = set(key_entries(module).values()), _known_entries(module)
+    seen: set[str] = set()
+    for entry in block.entries:
+        if entry.key in seen:
+            yield f"{shown(entry.key)} stands there twice"
+        seen.add(entry.key)
+        if entry.key in known:
+            continue
+        if entry.key in lists:
+            wrong = [key for key in _keys(entry) if key not in KEYS]
+            yield from (f"{shown(entry.key)}: there is no key {shown(key)}" for key in wrong)
+        elif entry.key == "flipped":
+            yield from _flip_remarks(entry.text, module)
+        elif entry.key not in usual:
+            yield f"{shown(entry.key or entry.text)} is not understood"
+        elif not _is(entry.text, usual[entry.key]):
+            yield f"{shown(entry.key)} is {shown(entry.text)}, read as {usual[entry.key]}"
+
+
+def _known_entries(module: Module) -> frozenset[str]:
+    """The entries that are read whatever they say, or say nothing of the machine."""
+    if module.kind == "connector":
+        return frozenset((*_SCRIPTING, *_ENDS, *_END_ROTATIONS))
+    if module.kind == "start":
+        return frozenset((*_SCRIPTING, "bmt-version"))
+    return frozenset(_SCRIPTING)
+
+
+def _flip_remarks(text: str, module: Module) -> Iterator[str]:
+    if text.lower() not in {"true", "false"}:
+        yield f"'flipped' is {shown(text)}, read as False"
+    elif text.lower() == "true" and not module.spins:
+        yield "'flipped' is True of what does not spin"
+
+
+def _is(text: str, value: str | float | bool) -> bool:
+    if isinstance(value, bool):
+        return text.lower() == str(value).lower()
+    if isinstance(value, str):
+        return text == value
+    try:
+        return math.isclose(float(text), value, rel_tol=_SAME, abs_tol=_SAME)
+    except ValueError:
+        return False
+
+
+def _numbers(vector: Vector) -> str:
+    return " ".join(f"{one:g}" for one in vector)

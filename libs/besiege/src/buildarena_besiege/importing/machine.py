@@ -1,0 +1,308 @@
+"""Reads machine files (.bsg): our own back as they were, anybody's as far as they can be."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from buildarena_besiege.errors import MachineFileError
+from buildarena_besiege.importing.blocks import Part, Remarks, part_of
+from buildarena_besiege.importing.own_header import (
+    HeaderError,
+    described_machine,
+    header_of,
+    is_untouched,
+    presses_of,
+    sub_document,
+)
+from buildarena_besiege.importing.seats import Faces, Seat, ends_of, faces_of, mounts_of
+from buildarena_besiege.importing.xml_file import FileMachine, parse_file, shown
+from buildarena_geometry import Machine, load_catalogue
+from buildarena_geometry.documents.read import read_machine
+from buildarena_geometry.errors import DocumentError
+from buildarena_geometry.keys import KEYS
+from buildarena_geometry.rotations import NO_ROTATION, subtract
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from buildarena_geometry.modules.module import Catalogue
+
+_VERSIONS = ("1.3", "1.4")
+_OWN_DATA = frozenset(
+    {"lua_files", "lua_data", "lua_modules_names", "lua_modules_paths", "lua", "requiredMods"}
+)
+_NO_SCRIPT = "the Lua script is not ours: what it does, and the keys it presses, are not read"
+_QUARTER = math.sqrt(0.5)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ImportedMachine:
+    """A machine that was read from a file of the game's.
+
+    Attributes:
+        machine: The machine.
+        name: What the file calls it.
+        not_understood: What the file says that the machine does not hold, a sentence each.
+    """
+
+    machine: Machine
+    name: str
+    not_understood: tuple[str, ...]
+
+
+def read_machine_file(data: bytes, *, catalogue: Catalogue | None = None) -> ImportedMachine:
+    """The machine of a machine file.
+
+    A file of ours comes back as the machine it was made from, as long as its blocks are where they
+    were. Of any other file the connections are found by places: a block sits on the face its root
+    touches. The cargo, unknown blocks and settings that a machine of ours cannot hold are left out
+    and named.
+
+    Args:
+        data: The file.
+        catalogue: The modules it is made of; the basic ones if left out.
+
+    Raises:
+        MachineFileError: It is not a machine file, or breaks a bound.
+    """
+    catalogue = load_catalogue() if catalogue is None else catalogue
+    file, remarks = parse_file(data), Remarks()
+    header = _header(file, remarks)
+    found = [part_of(block, catalogue, remarks) for block in file.blocks]
+    parts = [part for part in found if part is not None]
+    if not any(part.module.kind == "start" for part in parts):
+        raise MachineFileError("the file has no starting block (type 0)")
+    machine = None
+    if header is not None:
+        machine = _as_described(header, file, parts, catalogue, remarks)
+    if machine is None:
+        machine = _as_placed(parts, catalogue, header, remarks)
+    return ImportedMachine(machine=machine, name=file.name, not_understood=remarks.all())
+
+
+def _header(file: FileMachine, remarks: Remarks) -> dict[str, Any] | None:
+    if file.version not in _VERSIONS:
+        remarks.add(f"bsgVersion {shown(file.version)} is read as {_VERSIONS[-1]}")
+    for tag in file.strays:
+        remarks.add(f"the machine's {shown(tag)} is not understood")
+    for entry in file.entries:
+        if entry.key == "requiredMods" and (entry.text or entry.items):
+            remarks.add(f"the machine wants mods: {shown(' '.join((entry.text, *entry.items)))}")
+        elif entry.key not in _OWN_DATA:
+            remarks.add(f"the machine's data {shown(entry.key or entry.text)} is not understood")
+    script = next((one.text for one in file.entries if one.key == "lua_data"), "")
+    try:
+        header = header_of(script)
+    except HeaderError as error:
+        remarks.add(f"the script's own description is not believed: {error}")
+        return None
+    if script and header is None:
+        remarks.add(_NO_SCRIPT)
+    turn = file.rotation
+    if header is None and abs(turn[0]) < 1.0 - 1e-6 and turn != NO_ROTATION:
+        remarks.add("the machine's own turn in the world is left out: tasks place machines")
+    return header
+
+
+def _as_described(
+    header: dict[str, Any],
+    file: FileMachine,
+    parts: Sequence[Part],
+    catalogue: Catalogue,
+    remarks: Remarks,
+) -> Machine | None:
+    if not is_untouched(header, file):
+        remarks.add(
+            "blocks were changed after the script was written: names and connections are found by "
+            "places"
+        )
+        return None
+    try:
+        return Machine.restored(described_machine(header, parts, catalogue))
+    except HeaderError as error:
+        remarks.add(f"the script's own description is not believed: {error}")
+        return None
+
+
+def _as_placed(
+    parts: Sequence[Part],
+    catalogue: Catalogue,
+    header: dict[str, Any] | None,
+    remarks: Remarks,
+) -> Machine:
+    """The machine of a file that describes nothing but its blocks' places."""
+    document = _Placed(parts, remarks).document()
+    if header is not None:
+        document["control_sequence"] = _sound_presses(header, remarks)
+    try:
+        return Machine.restored(read_machine(document, catalogue=catalogue))
+    except DocumentError as error:
+        where = str(error).removeprefix("document.blocks: ")
+        remarks.add(f"a document of this machine would not be read back: {where}")
+    except ValueError as error:
+        raise MachineFileError(f"its blocks make no machine: {error}") from error
+    try:
+        logged = read_machine(document, catalogue=catalogue, overlaps=True)
+    except ValueError as error:
+        raise MachineFileError(f"its blocks make no machine: {error}") from error
+    return Machine.restored(logged)
+
+
+def _sound_presses(header: dict[str, Any], remarks: Remarks) -> list[dict[str, Any]]:
+    try:
+        presses = presses_of(header)
+        sound = all(
+            press["key"] in KEYS
+            and 0 <= float(press["time_s"]) < math.inf
+            and 0 < float(press["hold_for_s"]) < math.inf
+            for press in presses
+        )
+    except (KeyError, TypeError, ValueError):
+        sound = False
+    if not sound:
+        remarks.add("the script's control sequence is not sound: left out")
+        return []
+    return presses
+
+
+class _Placed:
+    """A document made of parts and the faces they are found to sit on."""
+
+    def __init__(self, parts: Sequence[Part], remarks: Remarks) -> None:
+        starts = [part for part in parts if part.module.kind == "start"]
+        others = [part for part in parts if part.module.kind not in {"start", "connector"}]
+        self._remarks = remarks
+        self._blocks: list[Part] = [*starts, *others]
+        self._links = [part for part in parts if part.module.kind == "connector"]
+        self._faces: Faces = faces_of(self._blocks)
+        self._mounts = mounts_of(self._blocks, self._faces)
+        self._starts = len(starts)
+        self._letters = _letters(self._mounts, self._starts)
+        self._places = {part.number: i for i, part in enumerate(self._blocks)}
+        self._ids: dict[int, str] = {}
+        counts: dict[str, int] = {}
+        for part in sorted((*self._blocks, *self._links), key=_in_file_order):
+            letter = self._letter_of(part)
+            counts[letter] = counts.get(letter, 0) + 1
+            self._ids[part.number] = f"{letter}_{counts[letter]}" if letter else str(counts[letter])
+        self._next = 1 if len(starts) > 1 else len(self._ids) + 1
+
+    def document(self) -> dict[str, Any]:
+        """The machine document, to be checked by reading it."""
+        for part, mount in zip(self._blocks, self._mounts, strict=True):
+            if mount is None and part.module.kind != "start":
+                self._remarks.add(f"{part.name} sits on no face of another block")
+        several = self._starts > 1
+        document: dict[str, Any] = {
+            "version": 1,
+            "blocks": [self._block(i) for i in self._based_first()],
+            "joints": [],
+            "connectors": [one for link in self._links for one in self._link(link)],
+            "control_sequence": [],
+            "structures": [
+                {"letter": self._letters[i], "source": f"part {self._letters[i]}", "root": root}
+                for i, root in self._roots()
+            ]
+            if several
+            else [],
+            "structures_made": self._starts if several else 0,
+            "next_id": self._next,
+            "available": {},
+            "log": [],
+        }
+        document["available"] = {
+            one["source"]: sub_document(document, one["letter"]) for one in document["structures"]
+        }
+        return document
+
+    def _roots(self) -> list[tuple[int, str]]:
+        return [(i, self._ids[self._blocks[i].number]) for i in range(self._starts)]
+
+    def _letter_of(self, part: Part) -> str:
+        if self._starts < 2:  # noqa: PLR2004  one machine has no sub-structures
+            return ""
+        if part.module.kind != "connector":
+            return self._letters[self._places[part.number]]
+        start, _ = ends_of(part, self._blocks, self._faces)
+        return self._letters[0 if start is None else start[0]]
+
+    def _based_first(self) -> list[int]:
+        """The blocks' places in an order in which each comes after the one it sits on."""
+        order: list[int] = []
+        done: set[int] = set()
+        for i in range(len(self._blocks)):
+            chain: list[int] = []
+            at: int | None = i
+            while at is not None and at not in done:
+                chain.append(at)
+                mount = self._mounts[at]
+                at = None if mount is None else mount[0]
+            order += reversed(chain)
+            done.update(chain)
+        return order
+
+    def _block(self, i: int) -> dict[str, Any]:
+        part, mount = self._blocks[i], self._mounts[i]
+        return {
+            **self._common(part),
+            "mount": None if mount is None else self._face(mount),
+            "flipped": part.flipped,
+            "bindings": {action: list(keys) for action, keys in part.bindings.items()},
+            "structure": self._letters[i],
+        }
+
+    def _link(self, link: Part) -> list[dict[str, Any]]:
+        start, end = ends_of(link, self._blocks, self._faces)
+        if start is None or end is None or start == end:
+            which = "beginning" if start is None else "end"
+            self._remarks.add(f"{link.name}: its {which} is on no face of its own: left out")
+            return []
+        return [
+            {
+                **self._common(link),
+                "start": self._face(start),
+                "end": self._face(end),
+                "span": list(subtract(link.end, link.start)),
+                "structure": self._letters[start[0]],
+            }
+        ]
+
+    def _common(self, part: Part) -> dict[str, Any]:
+        return {
+            "id": self._ids[part.number],
+            "module": part.module.name,
+            "position": list(part.pose.xyz),
+            "quaternion": list(part.pose.wxyz),
+        }
+
+    def _face(self, seat: Seat) -> list[str]:
+        return [self._ids[self._blocks[seat[0]].number], seat[1]]
+
+
+def _in_file_order(part: Part) -> tuple[bool, int]:
+    return (part.module.kind != "start", part.number)
+
+
+def _letters(mounts: Sequence[Seat | None], starts: int) -> list[str]:
+    """The sub-structure of each block by the starting block it leads to; "" of a single machine."""
+    if starts < 2:  # noqa: PLR2004  one machine has no sub-structures
+        return [""] * len(mounts)
+    found = []
+    for i in range(len(mounts)):
+        at = i
+        while (mount := mounts[at]) is not None:
+            at = mount[0]
+        found.append(_letter(at if at < starts else 0))
+    return found
+
+
+def _letter(count: int) -> str:
+    """A to Z, then AA, AB and so on, as an assembly's sub-structures are called."""
+    letters = ""
+    count += 1
+    while count:
+        count, digit = divmod(count - 1, 26)
+        letters = chr(ord("A") + digit) + letters
+    return letters

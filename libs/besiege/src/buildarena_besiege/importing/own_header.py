@@ -1,0 +1,172 @@
+"""What our own scripts tell of the machine they play, read back and doubted.
+
+Nothing in it is believed unless every word of it fits the blocks of the file.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+from buildarena_besiege.header import HEADER_VERSION, MARK, places_digest
+from buildarena_geometry.documents.log import LoggedState
+from buildarena_geometry.documents.read import read_machine
+from buildarena_geometry.errors import DocumentError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from buildarena_besiege.importing.blocks import Part
+    from buildarena_besiege.importing.xml_file import FileMachine
+    from buildarena_geometry.modules.module import Catalogue
+
+
+class HeaderError(ValueError):
+    """A script's own description does not fit its file; the message says where."""
+
+
+def header_of(script: str) -> dict[str, Any] | None:
+    """The description a script of ours begins with; None if it is not ours.
+
+    Raises:
+        HeaderError: It is ours, and damaged.
+    """
+    mark = f"-- {MARK}"
+    for line in script.splitlines()[:10]:
+        if line.startswith(mark):
+            try:
+                content = json.loads(line[len(mark) :])
+            except (ValueError, RecursionError) as error:
+                raise HeaderError("it is not valid JSON") from error
+            if not isinstance(content, dict) or content.get("version") != HEADER_VERSION:
+                raise HeaderError(f"it is not of version {HEADER_VERSION}")
+            return content
+    return None
+
+
+def is_untouched(header: dict[str, Any], file: FileMachine) -> bool:
+    """Whether the blocks are where they were when the script was written."""
+    places = ((one.guid, *one.position, *one.rotation) for one in file.blocks)
+    return bool(header.get("digest") == places_digest(places))
+
+
+def described_machine(
+    header: dict[str, Any], parts: Sequence[Part], catalogue: Catalogue
+) -> LoggedState:
+    """The machine that a file's blocks and its script's description make together.
+
+    Args:
+        header: The description.
+        parts: All blocks and connectors of the file that are ours.
+        catalogue: The modules.
+
+    Raises:
+        HeaderError: They do not fit, or are no sound machine.
+    """
+    try:
+        told = header["parts"]
+        by_id = {told[part.guid]["id"]: (part, told[part.guid]) for part in parts}
+        order = header["order"]
+        if len(by_id) != len(parts) or sorted(order) != sorted(by_id) or len(told) != len(parts):
+            raise HeaderError("it tells of other blocks than the file's")
+        entries = [_entry(*by_id[one]) for one in order]
+        document = {
+            "version": 1,
+            "blocks": [entry for entry in entries if "span" not in entry],
+            "joints": [],
+            "connectors": [entry for entry in entries if "span" in entry],
+            "control_sequence": presses_of(header),
+            "structures": [
+                {"letter": letter, "source": source, "root": root}
+                for letter, source, root in header["structures"]
+            ],
+            "structures_made": header["structures_made"],
+            "next_id": header["next_id"],
+            "available": {},
+            "log": [],
+        }
+        document["available"] = _sources(document)
+        return read_machine(document, catalogue=catalogue)
+    except DocumentError as error:
+        raise HeaderError(str(error)) from error
+    except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
+        if isinstance(error, HeaderError):
+            raise
+        raise HeaderError(f"{type(error).__name__}: {error}") from error
+
+
+def presses_of(header: dict[str, Any]) -> list[dict[str, Any]]:
+    """The control sequence as a machine document has it; checked when that is read."""
+    return [
+        {"time_s": time_s, "key": key, "hold_for_s": hold_for_s}
+        for time_s, key, hold_for_s in header["control_sequence"]
+    ]
+
+
+def _entry(part: Part, told: dict[str, Any]) -> dict[str, Any]:
+    found: dict[str, Any] = {
+        "id": told["id"],
+        "module": part.module.name,
+        "position": list(part.pose.xyz),
+        "quaternion": list(part.pose.wxyz),
+        "structure": told.get("structure", ""),
+        "note": told.get("note", ""),
+    }
+    if part.module.kind == "connector":
+        pose = told["pose"]
+        return {
+            **found,
+            "position": pose[:3],
+            "quaternion": pose[3:],
+            "start": told["start"],
+            "end": told["end"],
+            "span": told["span"],
+        }
+    return {
+        **found,
+        "mount": told.get("mount"),
+        "lost_mount": told.get("lost_mount"),
+        "flipped": part.flipped,
+        "bindings": told.get(
+            "bindings", {action: list(keys) for action, keys in part.bindings.items()}
+        ),
+    }
+
+
+def _sources(document: dict[str, Any]) -> dict[str, Any]:
+    """The machines an assembly was made of, as its sub-structures are now."""
+    return {
+        one["source"]: sub_document(document, one["letter"])
+        for one in reversed(document["structures"])
+    }
+
+
+def sub_document(document: dict[str, Any], letter: str) -> dict[str, Any]:
+    """A sub-structure as a machine of its own: its blocks with the ids they had there."""
+    prefix = f"{letter}_"
+
+    def inside(one: dict[str, Any]) -> bool:
+        faces = [one[name] for name in ("mount", "start", "end") if one.get(name)]
+        return one["id"].startswith(prefix) and all(face[0].startswith(prefix) for face in faces)
+
+    def renamed(one: dict[str, Any]) -> dict[str, Any]:
+        faces = {
+            name: [one[name][0].removeprefix(prefix), one[name][1]]
+            for name in ("mount", "lost_mount", "start", "end")
+            if one.get(name)
+        }
+        return {**one, **faces, "id": one["id"].removeprefix(prefix), "structure": ""}
+
+    blocks = [renamed(one) for one in document["blocks"] if inside(one)]
+    connectors = [renamed(one) for one in document["connectors"] if inside(one)]
+    numbers = [int(one["id"]) for one in (*blocks, *connectors) if one["id"].isdecimal()]
+    return {
+        **document,
+        "blocks": blocks,
+        "connectors": connectors,
+        "control_sequence": [],
+        "structures": [],
+        "structures_made": 0,
+        "next_id": max(numbers, default=0) + 1,
+        "available": {},
+    }

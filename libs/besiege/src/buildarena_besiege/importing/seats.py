@@ -1,0 +1,149 @@
+"""Which face each block sits on, and which faces a connector joins, as far as places tell."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from buildarena_besiege.entries import end_rotation
+from buildarena_geometry.blocks import JOINT_REACH
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
+
+    from buildarena_besiege.importing.blocks import Part
+    from buildarena_geometry.rotations import Vector
+
+_TOUCHING: Final = 1e-3  # units; a root so near to a face's centre sits on it
+_ALIGNED: Final = 0.9995  # cosine; a block's axis is the normal of the face it sits on
+_ALIKE: Final = 1e-3  # of quaternions
+_NEAR: Final = JOINT_REACH + _TOUCHING
+
+Seat = tuple[int, str]
+"""A block, by its place in the list, and the label of one of its faces."""
+
+
+@dataclass(frozen=True, slots=True)
+class Faces:
+    """The faces of all blocks: (F, 3) centres and normals, world frame, and whose they are."""
+
+    seats: tuple[Seat, ...]
+    centers: NDArray[np.float64]
+    normals: NDArray[np.float64]
+
+
+def faces_of(parts: Sequence[Part]) -> Faces:
+    """The faces of some blocks."""
+    seats, centers, normals = [], [], []
+    for i, part in enumerate(parts):
+        for face in part.module.faces:
+            seats.append((i, face.label))
+            centers.append(part.pose.point(face.center))
+            normals.append(part.pose.direction(face.normal))
+    return Faces(tuple(seats), np.array(centers).reshape(-1, 3), np.array(normals).reshape(-1, 3))
+
+
+def mounts_of(parts: Sequence[Part], faces: Faces) -> list[Seat | None]:
+    """The face each block sits on; None of starting blocks and of blocks that sit nowhere.
+
+    Blocks that touch a face come first, then those that were moved off one by no more than the game
+    would still join. A face carries one block, and nothing sits on itself in a circle.
+
+    Args:
+        parts: Blocks without connectors.
+        faces: Their faces.
+    """
+    mounts: list[Seat | None] = [None] * len(parts)
+    taken: set[int] = set()
+    for reach in (_TOUCHING, _NEAR):
+        for i, part in enumerate(parts):
+            if part.module.kind == "start" or mounts[i] is not None or not len(faces.seats):
+                continue
+            for found in _candidates(part, faces, reach):
+                base, label = faces.seats[found]
+                root_face = parts[base].module.root_face
+                if found in taken or label == root_face or _carries(mounts, i, base):
+                    continue
+                mounts[i] = (base, label)
+                taken.add(found)
+                break
+    return mounts
+
+
+def ends_of(link: Part, parts: Sequence[Part], faces: Faces) -> tuple[Seat | None, Seat | None]:
+    """The faces a connector begins and ends on; None where there is none near.
+
+    Where faces lie at the same place the frames that the file gives for its ends decide.
+
+    Args:
+        link: The connector.
+        parts: The blocks.
+        faces: Their faces.
+    """
+    begin, end = link.pose.point(link.start), link.pose.point(link.end)
+    return (
+        _nearest(begin, faces, lambda seat: _same_frame(link, parts, seat)),
+        _nearest(end, faces, lambda seat: _same_rotation(link, parts, seat)),
+    )
+
+
+def _candidates(part: Part, faces: Faces, reach: float) -> list[int]:
+    apart = np.linalg.norm(faces.centers - np.array(part.pose.xyz), axis=1)
+    axis = np.array(part.pose.direction((0.0, 0.0, 1.0)))
+    fitting = np.flatnonzero((apart <= reach) & (faces.normals @ axis >= _ALIGNED))
+    ordered = sorted(fitting.tolist(), key=lambda i: (round(float(apart[i]), 6), i))
+    return [int(i) for i in ordered]
+
+
+def _carries(mounts: list[Seat | None], part: int, base: int) -> bool:
+    """Whether the base already sits, directly or not, on the part."""
+    at: Seat | None = (base, "")
+    while at is not None:
+        if at[0] == part:
+            return True
+        at = mounts[at[0]]
+    return False
+
+
+def _nearest(point: Vector, faces: Faces, fits: Callable[[Seat], bool]) -> Seat | None:
+    if not len(faces.seats):
+        return None
+    apart = np.linalg.norm(faces.centers - np.array(point), axis=1)
+    least = float(apart.min())
+    if least > _NEAR:
+        return None
+    nearest = [faces.seats[i] for i in np.flatnonzero(apart <= least + _TOUCHING)]
+    return next((seat for seat in nearest if fits(seat)), nearest[0])
+
+
+def _same_frame(link: Part, parts: Sequence[Part], seat: Seat) -> bool:
+    part, label = parts[seat[0]], seat[1]
+    face = part.pose @ part.module.face_of_label[label].block_from_face
+    cosine = sum(a * b for a, b in zip(face.wxyz, link.pose.wxyz, strict=True))
+    return abs(cosine) > 1.0 - _ALIKE
+
+
+def _same_rotation(link: Part, parts: Sequence[Part], seat: Seat) -> bool:
+    if link.end_rotation is None:
+        return False
+    part, label = parts[seat[0]], seat[1]
+    theirs = end_rotation(part.pose @ part.module.face_of_label[label].block_from_face)
+    left, right = _half_angles(theirs), _half_angles(link.end_rotation)
+    return abs(sum(a * b for a, b in zip(left, right, strict=True))) > 1.0 - _ALIKE
+
+
+def _half_angles(angles: Vector) -> tuple[float, float, float, float]:
+    """The quaternion of ZYZ angles, so that angles that mean one rotation compare equal."""
+    first, tilt, last = (math.radians(one) / 2 for one in (angles[0] - 270.0, *angles[1:]))
+    cosine, sine = math.cos(tilt), math.sin(tilt)
+    return (
+        cosine * math.cos(first + last),
+        sine * math.sin(last - first),
+        sine * math.cos(last - first),
+        cosine * math.sin(first + last),
+    )

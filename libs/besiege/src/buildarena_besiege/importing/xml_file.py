@@ -1,0 +1,242 @@
+"""A machine file's XML as plain values; everything about it is bounded.
+
+Machine files come from strangers: document types, entities and external references are refused, and
+size, depth, numbers of blocks and entries, and all numbers have bounds.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+import re
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Final
+
+import defusedxml.ElementTree as SafeTree
+from defusedxml import DefusedXmlException
+
+from buildarena_besiege.errors import MachineFileError
+from buildarena_geometry.modules.parameters import LARGEST_NUMBER
+from buildarena_geometry.rotations import NO_ROTATION, ORIGIN, SHORTEST_QUATERNION
+from buildarena_simulation.constants import MAX_PARTS
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from xml.etree.ElementTree import Element
+
+    from buildarena_geometry.rotations import Quaternion, Vector
+
+MAX_BYTES: Final = 8 * 1024 * 1024
+"""Largest file that is read; one of 2,000 blocks has 2 MiB."""
+
+MAX_DEPTH: Final = 12
+"""Deepest nesting; a connector's coordinates lie six deep."""
+
+MAX_ENTRIES: Final = 200
+"""Most entries of one block, or of the machine itself."""
+
+_LARGEST_BLOCK_TYPE: Final = 1_000_000
+_NUMBER: Final = re.compile(
+    r"[+-]?(\d{1,400}(\.\d{0,400})?|\.\d{1,400})([eE][+-]?\d{1,4})?", re.ASCII
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FileEntry:
+    """One entry of a block's or a machine's data.
+
+    Attributes:
+        kind: its type, such as "Boolean".
+        key: its name.
+        text: its text, without blanks around it.
+        items: the texts of its `String` elements.
+        components: the texts of its X, Y and Z elements; empty if it has none.
+    """
+
+    kind: str
+    key: str
+    text: str
+    items: tuple[str, ...] = ()
+    components: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FileBlock:
+    """One block of a file; Besiege's components.
+
+    Attributes:
+        number: which of the file's blocks it is, from 1.
+        type: the game's number of its type.
+        guid: its own id in the game; "" if it has none.
+        position: units.
+        rotation: (w, x, y, z).
+        scale: along its own axes.
+        entries: its data.
+    """
+
+    number: int
+    type: int
+    guid: str
+    position: Vector
+    rotation: Quaternion
+    scale: Vector
+    entries: tuple[FileEntry, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FileMachine:
+    """Everything a machine file says."""
+
+    name: str
+    version: str
+    rotation: Quaternion
+    entries: tuple[FileEntry, ...]
+    blocks: tuple[FileBlock, ...]
+    strays: tuple[str, ...] = field(default=())
+
+
+def parse_file(data: bytes) -> FileMachine:
+    """What a machine file says.
+
+    Raises:
+        MachineFileError: It is no machine file, or breaks a bound.
+    """
+    root = _tree(data)
+    if root.tag != "Machine":
+        raise MachineFileError(f"the file's root is {shown(root.tag)}, not Machine")
+    blocks = [one for part in root.findall("Blocks") for one in part]
+    if not blocks:
+        raise MachineFileError("the file has no blocks")
+    if len(blocks) > MAX_PARTS:
+        raise MachineFileError(f"the file has {len(blocks)} blocks; at most {MAX_PARTS} are read")
+    placed = root.find("Global")
+    known = {"Global", "Data", "Blocks"}
+    return FileMachine(
+        name=root.get("name", "")[:200],
+        version=root.get("bsgVersion", ""),
+        rotation=NO_ROTATION if placed is None else _rotation(placed, "Global"),
+        entries=_entries(root.find("Data"), "the machine's Data"),
+        blocks=tuple(_block(one, number) for number, one in enumerate(blocks, start=1)),
+        strays=tuple(dict.fromkeys(str(one.tag) for one in root if one.tag not in known)),
+    )
+
+
+def number_of(text: str, where: str) -> float:
+    """A finite number within the world.
+
+    Raises:
+        MachineFileError: It is none.
+    """
+    text = text.strip()
+    value = float(text) if _NUMBER.fullmatch(text) else math.nan
+    if not abs(value) <= 2 * LARGEST_NUMBER:
+        raise MachineFileError(
+            f"{where}: {shown(text)} is not a number within ±{2 * LARGEST_NUMBER:.0f}"
+        )
+    return value
+
+
+def shown(text: object) -> str:
+    """Any text as a short literal."""
+    literal = ascii(str(text)[:60])
+    return literal if len(str(text)) <= 60 else f"{literal[:-1]}…'"  # noqa: PLR2004
+
+
+def _tree(data: bytes) -> Element:
+    if len(data) > MAX_BYTES:
+        raise MachineFileError(f"the file has {len(data):,} bytes; at most {MAX_BYTES:,} are read")
+    try:
+        depth = 0
+        root: Element | None = None
+        events = SafeTree.iterparse(
+            io.BytesIO(data), ("start", "end"), forbid_dtd=True, forbid_entities=True
+        )
+        for event, element in events:
+            depth += 1 if event == "start" else -1
+            root = element if root is None else root
+            if depth > MAX_DEPTH:
+                raise MachineFileError(f"the file nests more than {MAX_DEPTH} levels deep")
+    except DefusedXmlException as error:
+        raise MachineFileError(
+            "the file has a document type or entities, which are not read"
+        ) from error
+    except (SafeTree.ParseError, ValueError, LookupError) as error:
+        if isinstance(error, MachineFileError):
+            raise
+        raise MachineFileError(f"not valid XML: {error}") from error
+    if root is None:
+        raise MachineFileError("not valid XML: the file is empty")
+    return root
+
+
+def _block(element: Element, number: int) -> FileBlock:
+    where = f"block {number}"
+    if element.tag != "Block":
+        raise MachineFileError(f"{where}: {shown(element.tag)} is not a Block")
+    written = element.get("id", "")
+    if not re.fullmatch(r"\d{1,7}", written, re.ASCII) or int(written) > _LARGEST_BLOCK_TYPE:
+        raise MachineFileError(f"{where}: its id {shown(written)} is not the number of a type")
+    place = element.find("Transform")
+    if place is None or place.find("Position") is None:
+        raise MachineFileError(f"{where}: it has no Transform with a Position")
+    return FileBlock(
+        number=number,
+        type=int(written),
+        guid=element.get("guid", "")[:64],
+        position=_vector(place, "Position", where, ORIGIN),
+        rotation=_rotation(place, where),
+        scale=_vector(place, "Scale", where, (1.0, 1.0, 1.0)),
+        entries=_entries(element.find("Data"), where),
+    )
+
+
+def _vector(place: Element, tag: str, where: str, default: Vector) -> Vector:
+    found = place.find(tag)
+    if found is None:
+        return default
+    x, y, z = (number_of(found.get(axis, ""), f"{where}: {tag} {axis}") for axis in "xyz")
+    return (x, y, z)
+
+
+def _rotation(place: Element, where: str) -> Quaternion:
+    found = place.find("Rotation")
+    if found is None:
+        return NO_ROTATION
+    w, x, y, z = (number_of(found.get(axis, ""), f"{where}: Rotation {axis}") for axis in "wxyz")
+    length = math.hypot(w, x, y, z)
+    if length < SHORTEST_QUATERNION:
+        raise MachineFileError(f"{where}: its Rotation has no length")
+    return (w / length, x / length, y / length, z / length)
+
+
+def _entries(data: Element | None, where: str) -> tuple[FileEntry, ...]:
+    if data is None:
+        return ()
+    if len(data) > MAX_ENTRIES:
+        raise MachineFileError(f"{where}: {len(data)} entries; at most {MAX_ENTRIES} are read")
+    found = [_entry(one) for one in data]
+    stray = (data.text or "").strip()
+    # The published library writes its own "None" there by accident.
+    if stray not in {"", "None"}:
+        found.append(FileEntry(kind="text", key="", text=stray))
+    return tuple(found)
+
+
+def _entry(element: Element) -> FileEntry:
+    if len(element) > MAX_ENTRIES:
+        raise MachineFileError(f"entry {shown(element.get('key'))}: more than {MAX_ENTRIES} items")
+    by_axis = {str(child.tag): (child.text or "").strip() for child in element}
+    vector = tuple(by_axis[axis] for axis in "XYZ") if {"X", "Y", "Z"} <= by_axis.keys() else ()
+    return FileEntry(
+        kind=str(element.tag),
+        key=element.get("key", ""),
+        text=(element.text or "").strip(),
+        items=tuple(_items(element)),
+        components=vector,
+    )
+
+
+def _items(element: Element) -> Iterator[str]:
+    for child in element:
+        if child.tag == "String":
+            yield (child.text or "").strip()

@@ -1,0 +1,174 @@
+"""The golden machines as machines of ours, and their exports."""
+
+from __future__ import annotations
+
+import gzip
+import json
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from buildarena_benchmark import builtin_tasks
+from buildarena_geometry import KeyPress, Machine, load_catalogue
+from buildarena_geometry.besiege_components import pose_from_besiege
+
+DATA = Path(__file__).parents[1] / "data"
+LEVELS = ("soft", "medium", "hard")
+
+
+@dataclass(frozen=True)
+class Golden:
+    """One golden machine, and what the published library exports of it."""
+
+    name: str
+    entry: dict[str, Any]
+
+    @property
+    def exports(self) -> list[dict[str, Any]]:
+        return self.entry["exports"]
+
+    def machine(self, *, controlled: bool) -> Machine:
+        """The machine; with the keys of its control configuration if it is controlled."""
+        return _machine(self.name, controlled=controlled).copy()
+
+    def played(self, export: dict[str, Any]) -> tuple[Machine, list[KeyPress]]:
+        """What was exported: the machine with its keys, and the control sequence."""
+        control = self.entry["control"]
+        plain = export["category"] == "plain"
+        if control is None or not (
+            export["category"] == "transport" or (plain and control["source"] == "vector")
+        ):
+            return self.machine(controlled=False), []
+        presses = [
+            KeyPress(time_s=one["time"], key=one["key"], hold_for_s=one["hold_for"])
+            for one in control["control_sequence"]
+        ]
+        return self.machine(controlled=True), presses
+
+
+@cache
+def content() -> dict[str, Any]:
+    return json.loads(gzip.decompress((DATA / "besiege" / "machines.json.gz").read_bytes()))
+
+
+@cache
+def goldens() -> tuple[Golden, ...]:
+    return tuple(
+        Golden(name=f"{one['set']}-{one['seed']}", entry=one) for one in content()["machines"]
+    )
+
+
+def golden(name: str) -> Golden:
+    return next(one for one in goldens() if one.name == name)
+
+
+def scenario_of(export: dict[str, Any]):
+    """The scenario of an export's task; None for a plain one."""
+    if export["category"] == "plain":
+        return None
+    return builtin_tasks()[task_of(export)].scenario
+
+
+def task_of(export: dict[str, Any]) -> str:
+    return f"{export['category']}-{LEVELS.index(export['level']) + 1}"
+
+
+def golden_file(name: str) -> bytes:
+    return gzip.decompress((DATA / "besiege" / "bsg" / f"{name}.bsg.gz").read_bytes())
+
+
+def golden_files() -> list[str]:
+    return sorted(path.name[:-7] for path in (DATA / "besiege" / "bsg").glob("*.bsg.gz"))
+
+
+@cache
+def _vectors(which: str) -> list[dict[str, Any]]:
+    return json.loads(gzip.decompress((DATA / "geometry" / f"{which}.json.gz").read_bytes()))
+
+
+@cache
+def _machine(name: str, *, controlled: bool) -> Machine:
+    entry = golden(name).entry
+    vector = _vectors(entry["set"])[entry["index"]]
+    state = vector["steps"][entry["steps_used"] - 1]["state"]
+    keys: dict[str, dict[str, list[str]]] = {}
+    if controlled:
+        for one in entry["control"]["control_config"]:
+            bound = keys.setdefault(one["block_id"], {}).setdefault(one["action"], [])
+            bound += [] if one["key"] in bound else [one["key"]]
+    return Machine.from_document(document_of(state, keys))
+
+
+def document_of(state: dict[str, Any], keys: dict[str, dict[str, list[str]]]) -> dict[str, Any]:
+    """The machine document of a vector's state."""
+    letters = sorted({b["id"].split("_")[0] for b in state["blocks"] if "_" in b["id"]})
+    parts = sorted(state["blocks"], key=lambda b: (b["id"].isdigit(), *_place(b["id"])))
+    parts = [b for b in parts if not dangles(b)]
+    blocks = [_block(b, keys.get(b["id"], {})) for b in parts if "connector" not in b]
+    roots = {b["structure"]: b["id"] for b in blocks if b["module"] == "Starting Block"}
+    return {
+        "version": 1,
+        "blocks": blocks,
+        "joints": [],
+        "connectors": [_connector(b) for b in parts if "connector" in b],
+        "control_sequence": [],
+        "structures": [
+            {"letter": letter, "source": "part", "root": roots[letter]} for letter in letters
+        ],
+        "structures_made": len(letters),
+        "next_id": state["next_id"],
+        "available": {"part": Machine().to_document()} if letters else {},
+        "log": [],
+    }
+
+
+def dangles(b: dict[str, Any]) -> bool:
+    """Whether it is a connector on a removed block, which the published library leaves behind."""
+    link = b.get("connector", {})
+    return "_" not in b["id"] and any(link.get(end, [""])[0] is None for end in ("start", "end"))
+
+
+def _place(part: str) -> tuple[str, int]:
+    letter, _, number = part.rpartition("_")
+    return (letter, int(number))
+
+
+def _common(b: dict[str, Any]) -> dict[str, Any]:
+    module = load_catalogue()[b["name"]]
+    pose = pose_from_besiege(module, tuple(b["virtual"]), tuple(b["quat"]))
+    return {
+        "id": b["id"],
+        "module": b["name"],
+        "position": list(pose.xyz),
+        "quaternion": list(pose.wxyz),
+        "structure": b["id"].split("_")[0] if "_" in b["id"] else "",
+    }
+
+
+def _face(b: dict[str, Any], face: list[Any]) -> list[str]:
+    if face[0] is not None:
+        return [face[0], face[1]]
+    return [f"{b['id'].split('_')[0]}_{face[2]}", face[1]]
+
+
+def _block(b: dict[str, Any], keys: dict[str, list[str]]) -> dict[str, Any]:
+    entry = {**_common(b), "flipped": b["flipped"], "bindings": keys}
+    face = b.get("root_face")
+    lost = face is not None and face[0] is None and "_" not in b["id"]
+    if face is not None and not lost:
+        entry["mount"] = _face(b, face)
+    if lost:
+        entry["lost_mount"] = [face[2], face[1]]
+    return entry
+
+
+def _connector(b: dict[str, Any]) -> dict[str, Any]:
+    link = b["connector"]
+    x, y, z = link["projection_virtual"]
+    return {
+        **_common(b),
+        "start": _face(b, link["start"]),
+        "end": _face(b, link["end"]),
+        "span": [-x, y, z],
+    }
