@@ -21,6 +21,9 @@ def main() -> int:
         parser.error(f"unknown options: {' '.join(unknown)}")
     try:
         faults = read_faults(options.faults) if options.faults else []
+        if options.faults_once is not None and options.faults_once.exists():
+            faults += read_faults(options.faults_once)
+            options.faults_once.unlink()
         if options.random_faults is not None:
             faults += random_faults(options.random_faults)
         terrain = read_level_file(options.level) if options.level else ()
@@ -55,7 +58,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="stand_in_game", description=__doc__)
     add = parser.add_argument
     add("--machines", type=_folder, default=Path(), metavar="DIR", help="the SavedMachines folder")
-    add("--level", type=Path, metavar="FILE", help="a level (.blv); else the flat sandbox")
+    add("--level", type=_optional, metavar="FILE", help="a level (.blv); else the flat sandbox")
     add("--speed", type=_positive, default=1.0, help="game time over the wall clock")
     add("--frame-rate", type=_positive, default=30.0, help="frames a second of the wall clock")
     add("--size", type=_pair("x"), default=(1280, 800), metavar="WxH", help="pixels")
@@ -63,6 +66,7 @@ def _parser() -> argparse.ArgumentParser:
     add("--log-lines", type=int, default=400, help="how many lines the log window keeps")
     add("--horizon", type=_positive, default=36.0, help="seconds of a simulation worked out")
     add("--faults", type=Path, metavar="FILE", help="a JSON list of faults")
+    add("--faults-once", type=Path, metavar="FILE", help="faults of this start; then deleted")
     add("--random-faults", type=int, metavar="SEED", help="some faults, drawn at random")
     add("--report", type=Path, metavar="FILE", help="kept up to date with what the game does")
     add("--seed", type=int, default=0, help="draws everything random")
@@ -70,6 +74,10 @@ def _parser() -> argparse.ArgumentParser:
     add("--ip", default="127.0.0.1", help="headless: where it listens")
     add("--port", type=int, default=6890, help="headless: where it listens; 0 for a free one")
     return parser
+
+
+def _optional(text: str) -> Path | None:
+    return Path(text) if text else None
 
 
 def _folder(text: str) -> Path:

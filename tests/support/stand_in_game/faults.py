@@ -44,7 +44,7 @@ KINDS: Final[Mapping[str, tuple[str, tuple[str, ...]]]] = {
 
 PASSING: Final = tuple(kind for kind in KINDS if kind not in ("freeze", "crash"))
 _COMMON: Final = ("fault", "at", "times")
-_ONLY_AT: Final = {
+ONLY_AT: Final = {
     kind: KINDS[kind][0]
     for kind in (
         "slow_load",
@@ -143,7 +143,7 @@ def random_faults(seed: int) -> list[Fault]:
     found = []
     for _ in range(draw.randint(1, 3)):
         kind = draw.choice(PASSING)
-        points = [_ONLY_AT[kind]] if kind in _ONLY_AT else [p for p in POINTS if p != "copy"]
+        points = [ONLY_AT[kind]] if kind in ONLY_AT else [p for p in POINTS if p != "copy"]
         found.append(Fault(kind=kind, at=draw.choice(points)))
     return found
 
@@ -162,7 +162,7 @@ def _fault(entry: object) -> Fault:
     point, times = entry.get("at", usual), entry.get("times", 1)
     if point not in POINTS:
         raise FaultError(f"{kind}: there is no point {point!r}; choices: {', '.join(POINTS)}")
-    if kind in _ONLY_AT and point != usual:
+    if kind in ONLY_AT and point != usual:
         raise FaultError(f"{kind}: strikes at {usual!r} only, not at {point!r}")
     if times is not None and (not isinstance(times, int) or isinstance(times, bool) or times < 0):
         raise FaultError(f"{kind}: times is a whole number or null (for ever), not {times!r}")

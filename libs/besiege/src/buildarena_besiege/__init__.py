@@ -11,6 +11,7 @@ from buildarena_besiege.importing.machine import ImportedMachine, read_machine_f
 from buildarena_besiege.level import level_file
 from buildarena_besiege.published import looks_published, published_trajectory
 from buildarena_besiege.run import GameRun, plain_machine_file, prepare_run
+from buildarena_besiege.starts import game_start
 from buildarena_besiege.state_log import StateLog
 from buildarena_besiege.trajectories import trajectory_of
 
@@ -23,6 +24,7 @@ __all__ = [
     "MachineFileError",
     "MachineNotPlayableError",
     "StateLog",
+    "game_start",
     "level_file",
     "looks_published",
     "plain_machine_file",

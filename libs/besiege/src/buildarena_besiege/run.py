@@ -30,6 +30,7 @@ from buildarena_simulation.scenario import SpanPlacement
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
+    from buildarena_besiege.keys import Edge
     from buildarena_besiege.machine_file import BlockRecord
     from buildarena_geometry import KeyPress, Machine
     from buildarena_simulation import Scenario
@@ -51,6 +52,9 @@ class GameRun:
         duration_s: Length of the trial by the script's own time, seconds.
         set_ground: Whether "set ground" must be clicked before the start.
         level: The level to be opened (.blv); None for the flat sandbox.
+        key_changes: What the script does to keys: time in seconds, key, whether it goes down.
+        needs_script: Whether a score needs what only the script does or tells: the cargo's growing
+            mass, or which cannons burn.
     """
 
     name: str
@@ -61,6 +65,8 @@ class GameRun:
     duration_s: float
     set_ground: bool
     level: bytes | None
+    key_changes: tuple[tuple[float, str, bool], ...]
+    needs_script: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,12 +78,14 @@ class PreparedMachine:
         records: Its blocks.
         script: Its script.
         tracked: Ids of the blocks the script reports, the cargo apart.
+        edges: When the script presses and lets go of keys.
     """
 
     pose: GlobalPose
     records: tuple[BlockRecord, ...]
     script: str
     tracked: tuple[str, ...] = ()
+    edges: tuple[Edge, ...] = ()
 
 
 def prepare_run(
@@ -117,6 +125,10 @@ def prepare_run(
         duration_s=scenario.duration_s,
         set_ground=not isinstance(scenario.placement, SpanPlacement),
         level=level_file(scenario) if scenario.terrain else None,
+        key_changes=tuple(
+            (edge.update / UPDATES_PER_S, edge.key, edge.down) for edge in prepared.edges
+        ),
+        needs_script=scenario.cargo is not None or scenario.control.mode == "held",
     )
 
 
@@ -182,6 +194,7 @@ def prepared_machine(
         records=tuple(records),
         script=script,
         tracked=tracked,
+        edges=tuple(edges),
     )
 
 

@@ -11,12 +11,18 @@ import numpy as np
 from buildarena_besiege.errors import LogIncompleteError
 from buildarena_besiege.keys import UPDATES_PER_S, cannons
 from buildarena_besiege.log_lines import LINE_VERSION
+from buildarena_besiege.orientation import (
+    centers_of,
+    machine_rotations,
+    placed_quaternions,
+    turned,
+)
 from buildarena_besiege.placement import global_pose
 from buildarena_besiege.script import BLOCKS_PER_LINE, SAMPLE_EVERY
 from buildarena_besiege.tracking import run_digest, tracked_blocks
 from buildarena_geometry.besiege_components import besiege_turn
 from buildarena_geometry.poses import Pose
-from buildarena_geometry.rotations import Quaternion, multiply
+from buildarena_geometry.rotations import Quaternion
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
 from buildarena_simulation.trajectory import (
     Setting,
@@ -57,6 +63,7 @@ class Samples:
         cargo: (T, 3) Besiege's components, units; None without cargo.
         mass: (T,) the cargo's; None without cargo.
         quaternions: (T, N, 4) world_from_block, where the log tells them.
+        of_roots: Whether positions are those of the blocks' roots; otherwise of their centres.
     """
 
     block_ids: tuple[str, ...]
@@ -65,6 +72,7 @@ class Samples:
     cargo: NDArray[np.float64] | None = None
     mass: NDArray[np.float64] | None = None
     quaternions: NDArray[np.float64] | None = None
+    of_roots: bool = True
     settings: Mapping[str, Setting] = field(default_factory=dict)
 
 
@@ -113,7 +121,7 @@ def made_trajectory(
 ) -> Trajectory:
     """The trajectory of samples that are complete.
 
-    Positions are those the game gives for its blocks, in our world frame.
+    The game tells where blocks' roots are; a cargo stands upright as far as is known.
 
     Args:
         samples: What was told.
@@ -129,16 +137,17 @@ def made_trajectory(
     for column, block in enumerate(hot):
         if block in ids:
             heated[:, column] = samples.burning[:, ids.index(block)]
-    quaternions, source = samples.quaternions, "the log"
-    if quaternions is None:
-        quaternions, source = _as_placed(machine, ids, turn, count), "as placed at the start"
-    cargo = samples.cargo
+    pieces = pieces_of(machine, ids, samples.positions)
+    positions, quaternions, source = _poses(samples, machine, turn, pieces)
+    cargo = None if samples.cargo is None else _ours(samples.cargo)
+    if cargo is not None and samples.of_roots and scenario.cargo is not None:
+        cargo = cargo + np.array([0.0, 0.0, scenario.cargo.size[2] / 2])
     return Trajectory(
         time_s=np.arange(count) / SAMPLE_RATE_HZ,
         block_ids=ids,
-        positions=rounded_positions(_ours(samples.positions)),
+        positions=rounded_positions(positions),
         quaternions=rounded_quaternions(quaternions),
-        cargo_position=None if cargo is None else rounded_positions(_ours(cargo)),
+        cargo_position=None if cargo is None else rounded_positions(cargo),
         cargo_quaternion=None
         if cargo is None
         else rounded_quaternions(np.tile(np.array(turn), (count, 1))),
@@ -148,7 +157,7 @@ def made_trajectory(
         else None,
         cannon_ids=hot,
         heated=heated,
-        pieces=pieces_of(machine, ids, samples.positions),
+        pieces=pieces,
         joint_peaks=(),
         breaks=(),
         engine=ENGINE,
@@ -286,15 +295,40 @@ def _names(tracked: tuple[str, ...], scenario: Scenario) -> list[str]:
     return [*(f"block {block}" for block in tracked), *cargo]
 
 
-def _as_placed(
-    machine: Machine, block_ids: tuple[str, ...], turn: Quaternion, count: int
-) -> NDArray[np.float64]:
-    placed = [
-        Pose(quaternion=multiply(turn, machine.blocks[block].world_from_block.wxyz)).wxyz
-        for block in block_ids
-    ]
-    rows = np.array(placed, np.float64).reshape(1, len(block_ids), 4)
-    return np.repeat(rows, count, axis=0)
+def _poses(
+    samples: Samples,
+    machine: Machine,
+    turn: Quaternion,
+    pieces: NDArray[np.int16] | None,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], str]:
+    """(T, N, 3) centres, (T, N, 4) quaternions, and where the latter come from."""
+    ids, told = samples.block_ids, _ours(samples.positions)
+    placed = placed_quaternions(machine, ids, turn)
+    quaternions, source = samples.quaternions, "the log"
+    if quaternions is None:
+        rotations = None if pieces is None else _rotations(machine, ids, turn, told, pieces)
+        if rotations is None:
+            quaternions, source = np.repeat(placed[None], len(told), axis=0), "as placed"
+        else:
+            quaternions, source = turned(rotations, placed), "fitted to the blocks' places"
+    if not samples.of_roots:
+        return told, quaternions, source
+    return centers_of(machine, ids, told, quaternions), quaternions, source
+
+
+def _rotations(
+    machine: Machine,
+    block_ids: tuple[str, ...],
+    turn: Quaternion,
+    roots: NDArray[np.float64],
+    pieces: NDArray[np.int16],
+) -> NDArray[np.float64] | None:
+    """(T, 3, 3) how the machine is turned; None if its tracked blocks do not tell."""
+    pose = Pose(quaternion=turn)
+    built = np.array([pose.point(machine.blocks[one].world_from_block.xyz) for one in block_ids])
+    own = list(machine.blocks).index
+    start = next(i for i in block_ids if machine.blocks[i].module.kind == "start")
+    return machine_rotations(built.reshape(-1, 3), roots, pieces == own(start))
 
 
 def _ours(positions: NDArray[np.float64]) -> NDArray[np.float64]:

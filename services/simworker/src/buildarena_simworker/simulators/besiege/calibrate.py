@@ -14,6 +14,7 @@ from buildarena_simworker.simulators.besiege.desktop import Desktop
 from buildarena_simworker.simulators.besiege.errors import DesktopError, NotSetUpError
 from buildarena_simworker.simulators.besiege.hands import Hands
 from buildarena_simworker.simulators.besiege.play import RunFailedError, play
+from buildarena_simworker.simulators.besiege.time_limits import TimeLimits
 from buildarena_simworker.simulators.besiege.windows import Area, Windows
 
 BEFORE: Final = {
@@ -68,11 +69,12 @@ def ask_positions(
     return Calibration(positions=places, window=(window.width, window.height))
 
 
-def try_out(desktop: Desktop, tell: Tell) -> bool:
+def try_out(desktop: Desktop, limits: TimeLimits, tell: Tell) -> bool:
     """Plays a machine of two blocks for two seconds, from loading to deleting.
 
     Args:
         desktop: The game, driven by the positions to be tried.
+        limits: How long to wait.
         tell: Shows a line for each thing that worked or did not.
 
     Returns:
@@ -97,6 +99,7 @@ def try_out(desktop: Desktop, tell: Tell) -> bool:
             make_run,
             lambda _, log: desktop.trajectory(log, machine, scenario),
             require_held=lambda: None,
+            limits=limits,
         )
     except (RunFailedError, DesktopError) as error:
         tell(f"It does not work yet: {error}")

@@ -33,9 +33,6 @@ from buildarena_simworker.simulators.besiege.traces import Traces
 
 SCENE, LOAD, TOGGLE, KEY, LEVEL, FAIL = 0, 2, 3, 4, 5, 6
 LEVEL_EDITOR: Final = "3"
-ANSWER_S: Final = 60.0
-"""How long the game may take to say that it did something."""
-START_S: Final = 240.0
 PORTS: Final = 200
 """Ports that are tried from the first one on."""
 
@@ -49,6 +46,7 @@ class HeadlessDesktop:
 
     def __init__(self, settings: BesiegeSettings) -> None:
         self._settings = settings
+        self._limits = settings.time_limits
         self._process = GameProcess(settings)
         self._traces = Traces(settings.state)
         self._socket: socket.socket | None = None
@@ -87,13 +85,13 @@ class HeadlessDesktop:
         file = (folder / f"{run.name}.bsg").absolute()
         self._traces.put(file, run.machine_file)
         self._send(LOAD, str(file))
-        self._expect("MachineLoaded", f"load the machine {run.name}", ANSWER_S)
+        self._expect("MachineLoaded", f"load the machine {run.name}", self._limits.answer_s)
 
     def start(self, run: GameRun) -> None:
         """Starts the simulation; keys are pressed by the game's own time."""
         self._edges = sorted(run.key_changes, key=lambda edge: edge[0])
         self._send(TOGGLE, "")
-        self._expect("SimulationStart", "start the simulation", ANSWER_S)
+        self._expect("SimulationStart", "start the simulation", self._limits.answer_s)
         self._running = True
 
     def new_log(self, run: GameRun) -> StateLog:
@@ -129,7 +127,7 @@ class HeadlessDesktop:
         """Ends the simulation."""
         if self._running:
             self._send(FAIL, "")
-            self._expect("SimulationEnd", "stop the simulation", ANSWER_S)
+            self._expect("SimulationEnd", "stop the simulation", self._limits.answer_s)
             self._running = False
 
     def clear(self) -> None:
@@ -172,15 +170,15 @@ class HeadlessDesktop:
             target=_read_lines, args=(process.stdout, self._lines), daemon=True
         )
         self._reader.start()
-        self._socket = _connected(port, process)
-        self._expect("MainMenuLoaded", "start the game", START_S)
+        self._socket = _connected(port, process, self._limits.start_s)
+        self._expect("MainMenuLoaded", "start the game", self._limits.start_s)
         self._send(SCENE, LEVEL_EDITOR)
         self._enter_level()
 
     def _enter_level(self) -> None:
         file = self._process.level_file(self._level) if self._level is not None else None
         self._send(LEVEL, "" if file is None else str(file))
-        self._expect("CustomLevelLoaded", "open the level", ANSWER_S)
+        self._expect("CustomLevelLoaded", "open the level", self._limits.answer_s)
         self._open_level = level_digest(self._level)
         self._running = False
 
@@ -236,8 +234,8 @@ def _free_port(first: int) -> int:
     raise GameGoneError(f"no port is free from {first} on")
 
 
-def _connected(port: int, process: subprocess.Popen[str]) -> socket.socket:
-    ends = time.monotonic() + START_S
+def _connected(port: int, process: subprocess.Popen[str], limit_s: float) -> socket.socket:
+    ends = time.monotonic() + limit_s
     while time.monotonic() < ends:
         try:
             return socket.create_connection(("127.0.0.1", port), timeout=5.0)
@@ -245,4 +243,4 @@ def _connected(port: int, process: subprocess.Popen[str]) -> socket.socket:
             if process.poll() is not None:
                 raise GameGoneError(f"the game ended with code {process.returncode}") from error
             time.sleep(0.1)
-    raise GameGoneError(f"the game did not listen on port {port} within {START_S:.0f} s")
+    raise GameGoneError(f"the game did not listen on port {port} within {limit_s:.0f} s")

@@ -18,14 +18,11 @@ from buildarena_simworker.simulators.besiege.errors import (
     GameGoneError,
     StepFailedError,
 )
+from buildarena_simworker.simulators.besiege.time_limits import TimeLimits
 
 log = structlog.get_logger(__name__)
 
 ATTEMPTS: Final = 3
-BEGIN_S: Final = 15.0
-"""How long the first line may take after the start."""
-STALL_S: Final = 15.0
-"""How long a running game may say nothing new before it counts as frozen."""
 SLOWEST: Final = 10.0
 """A run may take so many times its own duration by the wall clock."""
 POLL_S: Final = 0.1
@@ -74,6 +71,7 @@ def play(
     read: Callable[[GameRun, RunLog], Trajectory],
     *,
     require_held: Callable[[], None],
+    limits: TimeLimits,
 ) -> Played:
     """Plays a run, from a clean game to a clean game, until its log can be trusted.
 
@@ -83,6 +81,7 @@ def play(
             attempt that failed are never taken for another's.
         read: Makes the trajectory of a log; raises `LogIncompleteError` if it cannot be trusted.
         require_held: Raises when the job is somebody else's; the game is cleaned up then, too.
+        limits: How long to wait.
 
     Raises:
         RunFailedError: No attempt came to an end.
@@ -93,7 +92,7 @@ def play(
         run = make_run(attempt)
         desktop.require_able(run)
         try:
-            found, pace = _attempt(desktop, run, require_held)
+            found, pace = _attempt(desktop, run, require_held, limits)
             trajectory = read(run, found)
         except (DesktopError, LogIncompleteError) as error:
             log.warning("run_failed", attempt=attempt, error=str(error))
@@ -109,7 +108,7 @@ def play(
 
 
 def _attempt(
-    desktop: Desktop, run: GameRun, require_held: Callable[[], None]
+    desktop: Desktop, run: GameRun, require_held: Callable[[], None], limits: TimeLimits
 ) -> tuple[RunLog, float]:
     desktop.prepare(run)
     require_held()
@@ -118,7 +117,7 @@ def _attempt(
     desktop.start(run)
     found = desktop.new_log(run)
     started = time.monotonic()
-    _follow(desktop, run, found, require_held)
+    _follow(desktop, run, found, require_held, limits)
     elapsed = time.monotonic() - started
     desktop.stop()
     found.read(desktop.read_log())
@@ -127,7 +126,11 @@ def _attempt(
 
 
 def _follow(
-    desktop: Desktop, run: GameRun, found: RunLog, require_held: Callable[[], None]
+    desktop: Desktop,
+    run: GameRun,
+    found: RunLog,
+    require_held: Callable[[], None],
+    limits: TimeLimits,
 ) -> None:
     """Reads the log until the run is over.
 
@@ -146,13 +149,13 @@ def _follow(
             newest, heard = found.time_s, now
         if not desktop.is_alive():
             raise GameGoneError("the game ended while the machine ran")
-        if not found.begun and now - started > BEGIN_S:
+        if not found.begun and now - started > limits.begin_s:
             raise StepFailedError("start the simulation", "its first line did not appear")
-        if now - heard > STALL_S:
+        if now - heard > limits.stall_s:
             raise StepFailedError(
-                "follow the log", f"nothing new for {STALL_S:.0f} s after {newest:.1f} s"
+                "follow the log", f"nothing new for {limits.stall_s:.0f} s after {newest:.1f} s"
             )
-        if now - started > BEGIN_S + SLOWEST * run.duration_s:
+        if now - started > limits.begin_s + SLOWEST * run.duration_s:
             raise StepFailedError("follow the log", f"the game is too slow: {newest:.1f} s so far")
         time.sleep(POLL_S)
 

@@ -11,6 +11,8 @@ from typing import Annotated, Literal
 from pydantic import Field
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
+from buildarena_simworker.simulators.besiege.time_limits import TimeLimits
+
 LEVEL_FIELD = "{level}"
 """Stands in the game's command for the level file to open; "" for the sandbox."""
 
@@ -60,6 +62,16 @@ class BesiegeSettings(BaseSettings):
         float,
         Field(description="How much shorter than usual the waits between clicks are", gt=0, le=20),
     ] = 1.0
+
+    patience: Annotated[
+        float,
+        Field(description="How many times as long as usual the game may take", gt=0, le=100),
+    ] = 1.0
+
+    @property
+    def time_limits(self) -> TimeLimits:
+        """How long to wait for the game."""
+        return TimeLimits().scaled(self.patience)
 
     @property
     def version(self) -> str | None:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from buildarena_benchmark import score
-from buildarena_besiege import GameRun, MachineNotPlayableError, prepare_run
+from buildarena_besiege import GameRun, MachineNotPlayableError, game_start, prepare_run
 from buildarena_pipeline.catalog.simulators import BESIEGE, ENGINE_SIMULATORS
 from buildarena_pipeline.errors import PermanentError, StartupError
 from buildarena_pipeline.runtime.settings import Settings
@@ -89,6 +89,7 @@ class BesiegeSimulator:
                     run,
                 ),
                 require_held=trial.require_held,
+                limits=self._settings.time_limits,
             )
         except MachineNotPlayableError as error:
             raise MachineRefusedError(str(error)) from error
@@ -116,12 +117,16 @@ class BesiegeSimulator:
 
 
 def annotate(trial: Trial) -> dict[str, Any]:
-    """What each of our engines says of the trial; an engine that fails says nothing."""
+    """What each of our engines says of the trial from the game's start; none if it fails."""
     found: dict[str, Any] = {}
     for engine in ENGINE_SIMULATORS:
         try:
             trajectory = simulate(
-                trial.machine, trial.task.scenario, engine, controls=trial.controls
+                trial.machine,
+                trial.task.scenario,
+                engine,
+                controls=trial.controls,
+                start=game_start(trial.machine, trial.task.scenario),
             )
         except BuildarenaSimulationError:
             continue

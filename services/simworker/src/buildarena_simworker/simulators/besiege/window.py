@@ -24,19 +24,13 @@ from buildarena_simworker.simulators.besiege.hands import SELECT, Hands, differe
 from buildarena_simworker.simulators.besiege.log_sources import LogFile
 from buildarena_simworker.simulators.besiege.process import GameProcess
 from buildarena_simworker.simulators.besiege.settings import BesiegeSettings, level_digest
-from buildarena_simworker.simulators.besiege.steps import take_step, wait_for
+from buildarena_simworker.simulators.besiege.steps import TRIES, take_step, wait_for
 from buildarena_simworker.simulators.besiege.traces import Traces
 from buildarena_simworker.simulators.besiege.windows import Area, Windows
 
 if TYPE_CHECKING:
     from PIL.Image import Image
 
-START_S: Final = 240.0
-"""How long a game may take until its window is there."""
-EFFECT_S: Final = 6.0
-"""How long a click's effect may take."""
-LOAD_S: Final = 30.0
-"""How long a machine may take to load."""
 CHANGED: Final = 0.02
 """Share of a patch that looks different after something was opened or closed there."""
 PATCH: Final = (0.14, 0.10)
@@ -64,6 +58,7 @@ class WindowDesktop:
         windows: Windows,
     ) -> None:
         self._settings = settings
+        self._limits = settings.time_limits
         self._places = calibration.positions
         self._hands = hands
         self._windows = windows
@@ -108,20 +103,7 @@ class WindowDesktop:
         if folder is None or not folder.is_dir():
             raise DesktopError(f"the folder of machine files {folder} does not exist")
         self._traces.put(folder / f"{run.name}.bsg", run.machine_file)
-        self._opened("open the list of machines", "open_folder", "name_box")
-        self._type_name(run.name)
-        panel = self._patch("name_box")
-        self._step(
-            f"load the machine {run.name}",
-            lambda: self._click("open_machine"),
-            lambda: (
-                None
-                if self._patch_differs("name_box", panel)
-                else "the list of machines stayed open, so the game did not find or read its file"
-            ),
-            timeout_s=LOAD_S,
-        )
-        self._saw_machine(run.name)
+        self._by_tries(lambda: self._load_by_name(run.name))
         if run.set_ground:
             self._click("set_ground")
             self._hands.wait(0.5)
@@ -212,11 +194,11 @@ class WindowDesktop:
         self._process.start(level)
         self._panel_shown = False
         title = self._settings.title
-        finding = wait_for(lambda: self._no_window(title), timeout_s=START_S)
+        finding = wait_for(lambda: self._no_window(title), timeout_s=self._limits.start_s)
         if finding is not None:
             raise GameGoneError(
-                f"the game showed no window with {title!r} in its title within {START_S:.0f} s: "
-                f"{finding}"
+                f"the game showed no window with {title!r} in its title within "
+                f"{self._limits.start_s:.0f} s: {finding}"
             )
         self._hands.wait(1.0)
 
@@ -261,6 +243,24 @@ class WindowDesktop:
         self._hands.wait(0.5)
         self._hands.press("escape")
 
+    def _load_by_name(self, name: str) -> None:
+        """Opens the list of machines, types the name, loads; a failure leaves the list closed."""
+        self._opened("open the list of machines", "open_folder", "name_box")
+        self._type_name(name)
+        panel = self._patch("name_box")
+        self._step(
+            f"load the machine {name}",
+            lambda: self._click("open_machine"),
+            lambda: (
+                None
+                if self._patch_differs("name_box", panel)
+                else "the list of machines stayed open, so the game did not find or read its file"
+            ),
+            timeout_s=self._limits.load_s,
+            tries=1,
+        )
+        self._saw_machine(name)
+
     def _type_name(self, name: str) -> None:
         def retype() -> None:
             self._click("name_box")
@@ -278,13 +278,25 @@ class WindowDesktop:
                 self._hands.press("capslock")
             return None if found == name else f"{found!r} stands there instead"
 
-        self._step(f"type the name {name}", retype, read_back, timeout_s=0.0)
+        self._step(f"type the name {name}", retype, read_back, timeout_s=0.0, tries=1)
+
+    def _by_tries(self, act: Callable[[], None]) -> None:
+        """Does something of several steps again from its beginning when one of them fails."""
+        for left in reversed(range(TRIES)):
+            try:
+                act()
+            except StepFailedError:
+                if not left:
+                    raise
+                self.recover()
+            else:
+                return
 
     def _saw_machine(self, name: str) -> None:
         """Notes how much a loaded machine changes the window."""
         finding = wait_for(
             lambda: None if self._changed_since_empty() > 0.0 else "the window shows no machine",
-            timeout_s=EFFECT_S,
+            timeout_s=self._limits.effect_s,
         )
         if finding is not None:
             raise StepFailedError(f"load the machine {name}", finding)
@@ -342,14 +354,16 @@ class WindowDesktop:
         act: Callable[[], None],
         finding: Callable[[], str | None],
         *,
-        timeout_s: float = EFFECT_S,
+        timeout_s: float | None = None,
+        tries: int = TRIES,
     ) -> None:
         def alive() -> str | None:
             if not self.is_alive():
                 raise GameGoneError(f"{name}: the game is gone")
             return finding()
 
-        take_step(name, act, alive, timeout_s=timeout_s, recover=self.recover)
+        limit = self._limits.effect_s if timeout_s is None else timeout_s
+        take_step(name, act, alive, timeout_s=limit, recover=self.recover, tries=tries)
 
     def _click(self, place: str) -> None:
         self._hands.click(*self._point(place))

@@ -1,0 +1,116 @@
+"""How a machine is turned, from where its blocks are, and from their roots to their centres.
+
+The game tells where a block's root is, and not how it is turned. Blocks that hold together move as
+one, so three of them that are not in a line tell the machine's rotation.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from buildarena_geometry.rotations import multiply
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from buildarena_geometry import Machine
+    from buildarena_geometry.rotations import Quaternion
+
+    Floats = NDArray[np.float64]
+
+LEAST_WIDTH: Final = 0.5
+"""Blocks that lie nearer to one line tell no rotation about it, units (root of summed squares)."""
+
+
+def placed_quaternions(machine: Machine, block_ids: tuple[str, ...], turn: Quaternion) -> Floats:
+    """(N, 4) world_from_block of each block where the game puts the machine.
+
+    Args:
+        machine: The machine.
+        block_ids: (N,) the blocks.
+        turn: (w, x, y, z) how the game turns the machine, our components.
+    """
+    rows = [multiply(turn, machine.blocks[one].world_from_block.wxyz) for one in block_ids]
+    return np.array(rows, np.float64).reshape(len(block_ids), 4)
+
+
+def machine_rotations(built: Floats, roots: Floats, joined: NDArray[np.bool_]) -> Floats | None:
+    """(T, 3, 3) how the machine is turned at each sample against how it was put; by least squares.
+
+    A sample of which too little is known keeps the rotation before.
+
+    Args:
+        built: (N, 3) the blocks' roots as the machine was put, units.
+        roots: (T, N, 3) their roots at each sample, units.
+        joined: (T, N) which blocks still hold together.
+
+    Returns:
+        None when the blocks tell no rotation even at the start.
+
+    Source: W. Kabsch, Acta Cryst. A32 (1976) 922.
+    """
+    weights = joined.astype(np.float64)
+    counts = np.maximum(weights.sum(axis=1), 1.0)
+    middles = np.einsum("tn,nk->tk", weights, built) / counts[:, None]
+    centers = np.einsum("tn,tnk->tk", weights, roots) / counts[:, None]
+    before = (built[None] - middles[:, None]) * weights[:, :, None]
+    after = (roots - centers[:, None]) * weights[:, :, None]
+    widths = np.linalg.svd(before, compute_uv=False)
+    known = (np.isfinite(after).all(axis=(1, 2))) & (joined.sum(axis=1) > 2)  # noqa: PLR2004
+    known &= widths[:, 1] > LEAST_WIDTH if widths.shape[1] > 1 else False
+    if not len(known) or not known[0]:
+        return None
+    left, _, right = np.linalg.svd(np.einsum("tni,tnj->tij", after[known], before[known]))
+    mirrored = np.linalg.det(left @ right) < 0.0
+    left[mirrored, :, 2] *= -1.0
+    found = np.tile(np.eye(3), (len(roots), 1, 1))
+    found[known] = left @ right
+    latest = np.maximum.accumulate(np.where(known, np.arange(len(known)), 0))
+    return np.asarray(found[latest])
+
+
+def turned(rotations: Floats, placed: Floats) -> Floats:
+    """(T, N, 4) quaternions of blocks that turn with the machine.
+
+    Args:
+        rotations: (T, 3, 3) of the machine.
+        placed: (N, 4) of each block as it was put.
+    """
+    from scipy.spatial.transform import Rotation
+
+    machine = Rotation.from_matrix(rotations).as_quat(canonical=True)[:, None, [3, 0, 1, 2]]
+    return _product(machine, placed[None])
+
+
+def centers_of(
+    machine: Machine, block_ids: tuple[str, ...], roots: Floats, turns: Floats
+) -> Floats:
+    """(T, N, 3) the blocks' centres, units.
+
+    Args:
+        machine: Gives each block's centre in its own frame.
+        block_ids: (N,) the blocks.
+        roots: (T, N, 3) their roots, units.
+        turns: (T, N, 4) world_from_block.
+    """
+    own = np.array([machine.blocks[one].module.center for one in block_ids], np.float64)
+    vectors = np.concatenate([np.zeros((len(own), 1)), own.reshape(-1, 3)], axis=1)[None]
+    conjugate = turns * np.array([1.0, -1.0, -1.0, -1.0])
+    return np.asarray(roots + _product(_product(turns, vectors), conjugate)[..., 1:])
+
+
+def _product(one: Floats, other: Floats) -> Floats:
+    """Quaternions (w, x, y, z) multiplied, the right one turning first."""
+    a, b, c, d = np.moveaxis(one, -1, 0)
+    e, f, g, h = np.moveaxis(other, -1, 0)
+    return np.stack(
+        [
+            a * e - b * f - c * g - d * h,
+            a * f + b * e + c * h - d * g,
+            a * g - b * h + c * e + d * f,
+            a * h + b * g - c * f + d * e,
+        ],
+        axis=-1,
+    )

@@ -1,0 +1,101 @@
+"""A runner of the game and the stand-in that it plays, in a folder and on a screen of their own."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from player import Player
+
+from buildarena_benchmark import Task, builtin_tasks
+from buildarena_geometry import Machine
+
+SUPPORT = Path(__file__).parent
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rig:
+    """Where a runner and its game keep their files.
+
+    Attributes:
+        folder: Everything is below it.
+        speed: Game time over wall clock.
+        pace: How much shorter than usual the runner's waits are.
+        patience: How many times as long as usual the runner waits for the game.
+    """
+
+    folder: Path
+    speed: float = 8.0
+    pace: float = 5.0
+    patience: float = 0.4
+
+    def __post_init__(self) -> None:
+        self.machines.mkdir(parents=True, exist_ok=True)
+
+    @property
+    def machines(self) -> Path:
+        return self.folder / "SavedMachines"
+
+    @property
+    def faults(self) -> Path:
+        """Faults of the game that is started next; later ones have none."""
+        return self.folder / "faults.json"
+
+    def report(self) -> dict[str, Any]:
+        """What the game says of itself."""
+        return json.loads((self.folder / "report.json").read_text())
+
+    def environment(self) -> dict[str, str]:
+        words = [
+            *(sys.executable, "-m", "stand_in_game", "--machines", str(self.machines)),
+            *("--speed", str(self.speed), "--report", str(self.folder / "report.json")),
+            *("--level={level}", "--faults-once", str(self.faults)),
+        ]
+        return {
+            "BUILDARENA_BESIEGE_GAME": "1.75-23370",
+            "BUILDARENA_BESIEGE_MOD": "1.4",
+            "BUILDARENA_BESIEGE_MACHINES": str(self.machines),
+            "BUILDARENA_BESIEGE_STATE": str(self.folder / "state"),
+            "BUILDARENA_BESIEGE_COMMAND": " ".join(words),
+            "BUILDARENA_BESIEGE_PACE": str(self.pace),
+            "BUILDARENA_BESIEGE_PATIENCE": str(self.patience),
+            "PYTHONPATH": os.pathsep.join([str(SUPPORT), os.environ.get("PYTHONPATH", "")]),
+        }
+
+    def calibrate(self) -> None:
+        """Saves the positions at which the stand-in has its buttons."""
+        from buildarena_simworker.simulators.besiege.calibration import Calibration
+
+        Calibration().save(self.folder / "state" / "calibration.json")
+
+
+def experts_machine(task: str) -> Machine:
+    """What the expert builds, with its key presses."""
+    asked = Player()("builtin/expert", task=task).suspended
+    assert asked is not None
+    document = asked.machine.to_document()
+    if asked.controls is not None:
+        document["control_sequence"] = [
+            {"time_s": press.time_s, "key": press.key, "hold_for_s": press.hold_for_s}
+            for press in asked.controls
+        ]
+    return Machine.from_document(document)
+
+
+def shortened(name: str, duration_s: float, **cargo: float) -> Task:
+    """A built-in task that lasts a few seconds.
+
+    Args:
+        name: Which task.
+        duration_s: How long the trial lasts, seconds.
+        cargo: Changes of its cargo.
+    """
+    task = builtin_tasks()[name]
+    changes: dict[str, Any] = {"duration_s": duration_s}
+    if task.scenario.cargo is not None:
+        changes["cargo"] = task.scenario.cargo.model_copy(update=cargo)
+    return replace(task, scenario=task.scenario.model_copy(update=changes))
