@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -243,7 +243,9 @@ def _simulated(
     start, rebuilt = placed.start(), placed.rebuilt
     cargo = None
     if start.cargo is not None:
-        masses = inputs.masses or (start.cargo.mass,)
+        # The script sets the mass before the first step, so the file's own is never weighed.
+        masses = inputs.masses[1:2] + inputs.masses[1:] or (start.cargo.mass,)
+        start = replace(start, cargo=replace(start.cargo, mass=masses[0]))
         cargo = ScriptedCargo(
             size=_plain(start.cargo.size),
             final_mass=masses[-1],

@@ -67,12 +67,15 @@ class Window:
         self._caps_lock = False
         self._pressed_on = ""
         self._drawn: object = None
+        self._told: object = None
         self._reported_s = 0.0
         self._last_s = time.monotonic()
         self._bind()
 
     def run(self) -> None:
         """Shows the window until it is closed."""
+        # The report says that the game is there: clicks must reach it from then on.
+        self._root.wait_visibility(self._canvas)
         self._root.after(0, self._frame_due)
         try:
             self._root.mainloop()
@@ -96,6 +99,9 @@ class Window:
 
     def strike(self, fault: Fault) -> None:
         """Carries out a fault that is the window's business."""
+        if fault.kind in ("freeze", "crash"):
+            # Whoever watches learns of it now or never.
+            self._tell(time.monotonic())
         self._breakage.strike(fault)
 
     def _bind(self) -> None:
@@ -174,8 +180,6 @@ class Window:
         if quick != self._told or now - self._reported_s >= _REPORT_EVERY_S:
             self._told, self._reported_s = quick, now
             self._report.write(state)
-
-    _told: object = None
 
     def _state(self) -> dict[str, object]:
         game, shown = self._game, self._shown
