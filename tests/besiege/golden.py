@@ -28,6 +28,10 @@ class Golden:
     def exports(self) -> list[dict[str, Any]]:
         return self.entry["exports"]
 
+    @property
+    def state(self) -> dict[str, Any]:
+        return _state(self.name)
+
     def machine(self, *, controlled: bool) -> Machine:
         """The machine; with the keys of its control configuration if it is controlled."""
         return _machine(self.name, controlled=controlled).copy()
@@ -88,16 +92,31 @@ def _vectors(which: str) -> list[dict[str, Any]]:
 
 
 @cache
-def _machine(name: str, *, controlled: bool) -> Machine:
+def _state(name: str) -> dict[str, Any]:
     entry = golden(name).entry
     vector = _vectors(entry["set"])[entry["index"]]
-    state = vector["steps"][entry["steps_used"] - 1]["state"]
+    return vector["steps"][entry["steps_used"] - 1]["state"]
+
+
+@cache
+def _machine(name: str, *, controlled: bool) -> Machine:
+    entry = golden(name).entry
     keys: dict[str, dict[str, list[str]]] = {}
     if controlled:
         for one in entry["control"]["control_config"]:
             bound = keys.setdefault(one["block_id"], {}).setdefault(one["action"], [])
             bound += [] if one["key"] in bound else [one["key"]]
-    return Machine.from_document(document_of(state, keys))
+    return Machine.from_document(document_of(_state(name), keys))
+
+
+def played_document(found: Golden, export: dict[str, Any]) -> dict[str, Any]:
+    """What was exported as a machine document: keys and control sequence included."""
+    machine, presses = found.played(export)
+    document = machine.to_document()
+    document["control_sequence"] = [
+        {"time_s": one.time_s, "key": one.key, "hold_for_s": one.hold_for_s} for one in presses
+    ]
+    return document
 
 
 def document_of(state: dict[str, Any], keys: dict[str, dict[str, list[str]]]) -> dict[str, Any]:

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -19,58 +18,44 @@ if TYPE_CHECKING:
     from rich.progress import Progress
 
     from buildarena_benchmark import Task
+    from buildarena_besiege import ImportedMachine
     from buildarena_geometry import Machine
     from buildarena_simulation import Trajectory
 
 MachineFile = Annotated[
-    Path, typer.Argument(help="A machine document or an action log, JSON; - reads standard input.")
+    Path,
+    typer.Argument(
+        help="A machine document, an action log or the game's .bsg; - reads standard input."
+    ),
 ]
 
 
 def read_machine(file: Path) -> Machine:
-    """The machine of a file.
+    """The machine of a file; what of it was not understood is told on standard error.
 
     Args:
-        file: A machine document; a list of actions ({"op", "params"} or {"name", "arguments"});
-            or an object with such a list under "actions" or "steps" and, for an assembly, the
-            lists of its sub-structures by name under "sub_structures" or "sub_machines".
+        file: A machine file of the game's, a machine document or an action log.
 
     Raises:
-        CommandError: The file cannot be read or is none of these.
-        DocumentError: The document is wrong.
+        CommandError: The file cannot be read.
+        BesiegeError: It is a machine file, and wrong.
+        DocumentError: It is none of these, or the document is wrong.
     """
-    from buildarena_geometry import Machine
+    found = read_imported(file)
+    for remark in found.not_understood:
+        warn(f"{file}: {remark}")
+    return found.machine
+
+
+def read_imported(file: Path) -> ImportedMachine:
+    """The machine of a file with what was not understood; see `read_machine`."""
+    from buildarena_besiege import read_any_machine
 
     try:
-        text = sys.stdin.read() if str(file) == "-" else file.read_text(encoding="utf-8")
-        content = json.loads(text)
-    except (OSError, ValueError, RecursionError) as error:
-        raise CommandError(f"{file}: not valid JSON: {error}") from error
-    if isinstance(content, dict) and "blocks" in content:
-        return Machine.from_document(content)
-    if isinstance(content, list):
-        content = {"actions": content}
-    actions = content.get("actions", content.get("steps")) if isinstance(content, dict) else None
-    if not isinstance(actions, list):
-        raise CommandError(f"{file}: neither a machine document nor an action log")
-    parts = content.get("sub_structures", content.get("sub_machines")) or {}
-    if not isinstance(parts, dict):
-        raise CommandError(f"{file}: sub_structures is an object of action logs by name")
-    built = {name: _built(log, {}, f"{file}, {name}") for name, log in parts.items()}
-    return _built(actions, built, str(file))
-
-
-def _built(actions: Any, available: dict[str, Machine], where: str) -> Machine:
-    """The machine a log builds; refused actions change nothing, as when they were made."""
-    if not isinstance(actions, list) or not all(isinstance(action, dict) for action in actions):
-        raise CommandError(f"{where}: an action log is a list of objects")
-    from buildarena_geometry import Machine
-
-    machine = Machine(available=available) if available else Machine()
-    for action in actions:
-        name = action.get("op", action.get("name"))
-        machine.act(name, action.get("params", action.get("arguments")))
-    return machine
+        data = sys.stdin.buffer.read() if str(file) == "-" else file.read_bytes()
+    except OSError as error:
+        raise CommandError(f"{file}: {error.strerror or error}") from error
+    return read_any_machine(data, where=str(file))
 
 
 def chosen_task(name: str) -> Task:

@@ -1,12 +1,13 @@
 """Machines for the game Besiege: machine files, scripts and levels out, files and logs in."""
 
+from buildarena_besiege.any_file import read_any_machine, read_presses
 from buildarena_besiege.errors import (
     BesiegeError,
     LogIncompleteError,
     MachineFileError,
     MachineNotPlayableError,
 )
-from buildarena_besiege.game_log import GameLog
+from buildarena_besiege.game_log import GameLog, run_ids
 from buildarena_besiege.importing.machine import ImportedMachine, read_machine_file
 from buildarena_besiege.level import level_file
 from buildarena_besiege.published import looks_published, published_trajectory
@@ -30,6 +31,9 @@ __all__ = [
     "plain_machine_file",
     "prepare_run",
     "published_trajectory",
+    "read_any_machine",
     "read_machine_file",
+    "read_presses",
+    "run_ids",
     "trajectory_of",
 ]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from typing import TYPE_CHECKING, Final
+from urllib.parse import unquote
 
 from buildarena_besiege.keys import UPDATES_PER_S
 from buildarena_besiege.log_lines import LONGEST_LINE, Line, line_of
@@ -13,10 +14,25 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 _LINE_ENDS: Final = re.compile(r"\r\n|\r|\n")
+_BEGINNINGS: Final = re.compile(r"ba,([A-Za-z0-9_.~%-]{1,200}),b,")
 _AROUND: Final = " \t\x00\ufeff\xa0"
 _COMPLAINING: Final = re.compile(r"lua|attempt to |stack traceback|\berror\b", re.IGNORECASE)
 _MAX_COMPLAINTS: Final = 50
 _LONGEST_COMPLAINT: Final = 500
+
+
+def run_ids(text: str) -> tuple[str, ...]:
+    """The ids of the runs whose begin lines stand whole in a text, in their order."""
+    marks = dict.fromkeys(found[1] for found in _BEGINNINGS.finditer(text))
+    return tuple(
+        run
+        for run in map(unquote, marks)
+        if any(line_of(row, marked(run)) for row in _begin_lines(text, marked(run)))
+    )
+
+
+def _begin_lines(text: str, prefix: str) -> list[str]:
+    return re.findall(rf"{re.escape(prefix)},b,[0-9,]+", text)[:_MAX_COMPLAINTS]
 
 
 class GameLog:

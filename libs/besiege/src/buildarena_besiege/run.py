@@ -111,7 +111,8 @@ def prepare_run(
         MachineNotPlayableError: The game cannot take the machine.
         ValueError: The name or the run's id cannot be used.
     """
-    _require_names(name, run_id)
+    _require_name(name)
+    _require_run_id(run_id)
     prepared = prepared_machine(
         machine, scenario, run_id=run_id, controls=controls, new_guid=new_guid
     )
@@ -133,19 +134,26 @@ def prepare_run(
 
 
 def plain_machine_file(
-    machine: Machine, *, name: str, new_guid: Callable[[], uuid.UUID] = uuid.uuid4
+    machine: Machine,
+    *,
+    name: str,
+    controls: Sequence[KeyPress] | None = None,
+    new_guid: Callable[[], uuid.UUID] = uuid.uuid4,
 ) -> bytes:
     """The machine file of a machine as it was built, for no trial; its keys play by themselves.
 
     Args:
         machine: The machine.
         name: Stem of the file.
+        controls: The control sequence; the machine's own if left out.
         new_guid: Draws the blocks' guids.
 
     Raises:
         MachineNotPlayableError: The game cannot take the machine.
+        ValueError: The name cannot be used.
     """
-    prepared = prepared_machine(machine, None, new_guid=new_guid)
+    _require_name(name)
+    prepared = prepared_machine(machine, None, controls=controls, new_guid=new_guid)
     return machine_text(name, prepared.pose, prepared.records, prepared.script).encode("utf-8")
 
 
@@ -198,9 +206,24 @@ def prepared_machine(
     )
 
 
+def refusal_of(machine: Machine, scenario: Scenario) -> str | None:
+    """Why the published runner would not play a machine in a scenario; None if it would.
+
+    The game takes such machines; there is nothing to see.
+    """
+    if scenario.control.mode == "agent":
+        if not any(block.module.actions for block in machine.blocks.values()):
+            return "no control file"
+        if not machine.state.keys_in_use():
+            return "no key bound"
+        if not bound_presses(machine.control_sequence, machine):
+            return "no control sequence"
+    return "only a starting block" if machine.part_count == 1 else None
+
+
 def marked(run_id: str) -> str:
     """What every line of a run's log begins with: any id, made safe for a line of fields."""
-    return f"ba,{quote(run_id, safe='')}"
+    return f"ba,{quote(run_id, safe='', errors='replace')}"
 
 
 def _reported(
@@ -222,11 +245,14 @@ def _require_playable(machine: Machine) -> None:
         )
 
 
-def _require_names(name: str, run_id: str) -> None:
+def _require_name(name: str) -> None:
     if not _NAME.fullmatch(name):
         raise ValueError(
             f"{name!r} cannot be typed into the game's load box: use 1 to 100 lower case letters, "
             "digits, - and _"
         )
+
+
+def _require_run_id(run_id: str) -> None:
     if not run_id or len(quote(run_id, safe="", errors="replace")) > _LONGEST_RUN_ID:
         raise ValueError(f"a run's id is a text of 1 to {_LONGEST_RUN_ID} characters")

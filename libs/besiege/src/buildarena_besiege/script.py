@@ -7,6 +7,7 @@ dot; with a colon the table itself would become the first argument.
 
 from __future__ import annotations
 
+import string
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
@@ -27,6 +28,8 @@ END_EVERY: Final = 25
 
 BLOCKS_PER_LINE: Final = 8
 """So that no line is too long for the log window."""
+
+_PLAIN: Final = frozenset((string.ascii_letters + string.digits + "_-.,:% ").encode())
 
 FIRST_BLOCK: Final = "0"
 """How the script names the machine's first block; the mod gives that one no reference key."""
@@ -99,7 +102,7 @@ def script_text(
 def lua_text(text: str) -> str:
     """A Lua string that means the text, whatever it holds."""
     safe = "".join(
-        chr(byte) if chr(byte).isalnum() or byte in b"_-.,:% " else f"\\{byte:03d}"
+        chr(byte) if byte in _PLAIN else f"\\{byte:03d}"
         for byte in text.encode("utf-8", "replace")
     )
     return f'"{safe}"'

@@ -41,6 +41,7 @@ COMMANDS: Final[Mapping[str, Entry]] = {
     "task": Entry("tasks", "app", "Look at tasks, and add your own."),
     "model": Entry("models", "app", "Look at models."),
     "machine": Entry("machine", "app", "Simulate and draw machines on this computer."),
+    "besiege": Entry("besiege", "app", "Play machines in the game Besiege."),
     "key": Entry("keys", "app", "Make, list and revoke API keys."),
     "mcp": Entry("mcp", "mcp", "Let agents that speak the Model Context Protocol build."),
     "worker": Entry("worker", "app", "Run workers by themselves."),

@@ -10,7 +10,7 @@ import typer
 from buildarena_cli.client import Client, RefusedError, at
 from buildarena_cli.commands.job_files import job_files
 from buildarena_cli.commands.job_lists import list_jobs
-from buildarena_cli.commands.machine_files import replay
+from buildarena_cli.commands.job_replay import replay
 from buildarena_cli.errors import DONE, FAILED
 from buildarena_cli.ids import whole_id
 from buildarena_cli.lazy import new_group

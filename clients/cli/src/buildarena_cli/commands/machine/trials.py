@@ -1,4 +1,4 @@
-"""`buildarena machine`: simulate and draw a machine here, without any server."""
+"""`buildarena machine simulate` and `render`: trials here, without any server."""
 
 from __future__ import annotations
 
@@ -7,10 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from buildarena_cli.commands.machine_files import check, export
-from buildarena_cli.commands.machine_robustness import show_robustness
+from buildarena_cli.commands.machine.robustness import show_robustness
 from buildarena_cli.errors import CommandError
-from buildarena_cli.lazy import new_group
 from buildarena_cli.machines import (
     MachineFile,
     chosen_task,
@@ -34,15 +32,10 @@ if TYPE_CHECKING:
     from buildarena_geometry import Machine
     from buildarena_simulation import Trajectory
 
-app = new_group("Simulate and draw machines on this computer.")
-app.command("check")(check)
-app.command("export")(export)
-
 TaskName = Annotated[str, typer.Option("--task", help="A built-in task's name, or a task file.")]
 
 
-@app.command("simulate")
-def simulate_command(  # noqa: PLR0917 - the command line passes options by name
+def simulate(  # noqa: PLR0917 - the command line passes options by name
     file: MachineFile,
     task: TaskName,
     engine: Annotated[str | None, typer.Option(help="pybullet or mujoco.")] = None,
@@ -98,13 +91,12 @@ def simulate_command(  # noqa: PLR0917 - the command line passes options by name
             if video is not None:
                 film(machine, chosen, rollout, video)
         if as_json:
-            print_json(_report(chosen, result, rollout))
+            print_json(score_report(chosen, result, rollout))
         else:
-            _print_score(chosen, result, rollout)
+            print_score(chosen, result, rollout)
 
 
-@app.command("render")
-def render_command(
+def render(
     file: MachineFile,
     task: TaskName,
     trajectory: Annotated[Path, typer.Option(help="A trajectory (.parquet) of this machine.")],
@@ -123,12 +115,13 @@ def render_command(
 
 
 def _simulated(machine: Machine, task: Task, engine: str, seed: int | None) -> Trajectory | None:
-    from buildarena_simulation import MachineNotSimulable, simulate
+    from buildarena_simulation import MachineNotSimulable
+    from buildarena_simulation import simulate as simulate_here
 
     with progress_bar() as bar:
         row = bar.add_task(f"simulating on {engine}", total=1.0)
         try:
-            return simulate(
+            return simulate_here(
                 machine,
                 task.scenario,
                 engine,
@@ -140,7 +133,8 @@ def _simulated(machine: Machine, task: Task, engine: str, seed: int | None) -> T
             return None
 
 
-def _report(task: Task, result: Score, rollout: Trajectory | None) -> dict[str, Any]:
+def score_report(task: Task, result: Score, rollout: Trajectory | None) -> dict[str, Any]:
+    """A trial's score as JSON values."""
     from buildarena_benchmark.flags import is_censored
 
     return {
@@ -163,7 +157,8 @@ def _report(task: Task, result: Score, rollout: Trajectory | None) -> dict[str, 
     }
 
 
-def _print_score(task: Task, result: Score, rollout: Trajectory | None) -> None:
+def print_score(task: Task, result: Score, rollout: Trajectory | None) -> None:
+    """Prints a trial's score as a table."""
     engine = f" on {rollout.engine} {rollout.engine_version}" if rollout else ""
     from buildarena_benchmark.flags import is_censored, meaning
 

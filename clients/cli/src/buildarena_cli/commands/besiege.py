@@ -1,0 +1,91 @@
+"""`buildarena besiege`: levels for the game Besiege, and scores of its logs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from buildarena_cli.errors import CommandError
+from buildarena_cli.lazy import new_group
+from buildarena_cli.machines import chosen_task, read_machine, shown_errors
+from buildarena_cli.options import JsonOption
+from buildarena_cli.terminal.output import print_json, say, warn
+
+if TYPE_CHECKING:
+    from buildarena_benchmark import Task
+    from buildarena_geometry import Machine
+    from buildarena_simulation import Trajectory
+
+app = new_group("Play machines in the game Besiege.")
+
+
+@app.command("level")
+def level(
+    task: Annotated[str, typer.Argument(help="A built-in task's name, or a task file.")],
+    out: Annotated[Path, typer.Option(help="The level file (.blv) to write.")],
+) -> None:
+    """Write the level of a task's terrain, to be opened in the game's level editor."""
+    from buildarena_besiege import level_file
+
+    with shown_errors():
+        if out.suffix != ".blv":
+            raise CommandError(f"{out}: {out.suffix or 'no'} ending; use .blv")
+        chosen = chosen_task(task)
+        if not chosen.scenario.terrain:
+            warn(f"{chosen.name} has no terrain: the level is empty, the sandbox will do")
+        out.write_bytes(level_file(chosen.scenario))
+    say(str(out))
+
+
+@app.command("score")
+def score_log(
+    log: Annotated[Path, typer.Argument(help="A log of the game: ours, or a published run's CSV.")],
+    machine: Annotated[Path, typer.Option(help="The machine that was played.")],
+    task: Annotated[str, typer.Option("--task", help="A built-in task's name, or a task file.")],
+    run: Annotated[
+        str | None, typer.Option("--run", help="The run's id, where the log is of several.")
+    ] = None,
+    *,
+    as_json: JsonOption = False,
+) -> None:
+    """Score a trial that was played in the game, from its log."""
+    from buildarena_benchmark import score
+    from buildarena_cli.commands.machine.trials import print_score, score_report
+
+    with shown_errors():
+        chosen, played = chosen_task(task), read_machine(machine)
+        told = log.read_bytes().decode("utf-8-sig", "replace")
+        trajectory = _trajectory(told, played, chosen, where=str(log), run=run)
+        result = score(chosen, played, trajectory)
+        if as_json:
+            print_json(score_report(chosen, result, trajectory))
+        else:
+            print_score(chosen, result, trajectory)
+
+
+def _trajectory(
+    told: str, machine: Machine, task: Task, *, where: str, run: str | None
+) -> Trajectory:
+    """The trajectory of a log, which is told apart by content."""
+    from buildarena_besiege import (
+        GameLog,
+        looks_published,
+        published_trajectory,
+        run_ids,
+        trajectory_of,
+    )
+
+    runs = run_ids(told)
+    if not runs:
+        if looks_published(told):
+            return published_trajectory(told, machine, task.scenario)
+        raise CommandError(f"{where}: neither a log of ours nor one of the published runner")
+    if run is None and len(runs) > 1:
+        raise CommandError(f"{where}: of {len(runs)} runs; name one by --run: {', '.join(runs)}")
+    if run is not None and run not in runs:
+        raise CommandError(f"{where}: no run {run!r}; there are {', '.join(runs)}")
+    log = GameLog(run or runs[0])
+    log.read(told)
+    return trajectory_of(log, machine, task.scenario, game="unknown", mod="unknown")

@@ -1,0 +1,159 @@
+"""`buildarena machine check`, `export` and `import`: machines as files and pictures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from buildarena_cli.errors import DONE, FAILED, CommandError
+from buildarena_cli.machines import (
+    MachineFile,
+    chosen_task,
+    read_imported,
+    read_machine,
+    shown_errors,
+)
+from buildarena_cli.options import JsonOption
+from buildarena_cli.terminal.output import print_json, say
+
+if TYPE_CHECKING:
+    from buildarena_geometry import Machine
+
+FORMATS = (".glb", ".svg", ".json", ".bsg")
+
+
+def check(
+    file: MachineFile,
+    task: Annotated[
+        str | None, typer.Option("--task", help="Also compare with this task's constraints.")
+    ] = None,
+    *,
+    as_json: JsonOption = False,
+) -> None:
+    """Check whether a machine is sound and what it is made of; exit code 1 when it is not."""
+    from buildarena_benchmark import broken_constraint
+
+    with shown_errors():
+        machine = read_machine(file)
+        chosen = None if task is None else chosen_task(task)
+        broken = None if chosen is None else broken_constraint(chosen, machine)
+        problems = [f"block {block} is attached to nothing" for block in machine.detached]
+        if broken is not None and not (problems and broken[0] == "unjoined_parts"):
+            problems.append(f"{broken[0]}: {broken[1]}")
+        found = {**_facts(machine), "problems": problems}
+        if as_json:
+            print_json(found)
+        else:
+            _print_facts(found)
+        raise typer.Exit(FAILED if problems else DONE)
+
+
+def _facts(machine: Machine) -> dict[str, Any]:
+    low, high = machine.bounds
+    return {
+        "parts": machine.part_count,
+        "mass": machine.mass,
+        "cost": machine.cost,
+        "size": [round(float(length), 3) for length in high - low],
+    }
+
+
+def _print_size(found: dict[str, Any]) -> None:
+    size = " x ".join(f"{length:.2f}" for length in found["size"])
+    say(f"{found['parts']} parts, mass {found['mass']:.2f}, cost {found['cost']}")
+    say(f"{size} units east x north x up")
+
+
+def _print_facts(found: dict[str, Any]) -> None:
+    _print_size(found)
+    for problem in found["problems"]:
+        say(problem)
+    if not found["problems"]:
+        say("The machine is sound.")
+
+
+def export(
+    file: MachineFile,
+    out: Annotated[Path, typer.Option(help=f"File to write: {', '.join(FORMATS)}.")],
+    task: Annotated[
+        str | None, typer.Option("--task", help="For a .bsg: prepare it for this task's trial.")
+    ] = None,
+    controls: Annotated[
+        Path | None,
+        typer.Option(help="For a .bsg: press these keys, a JSON list, in place of its own."),
+    ] = None,
+) -> None:
+    """Write a machine as a 3D model, a drawing, a machine document or the game's file.
+
+    With a task the game's file (.bsg) is one for that task's trial: placed, with cargo, its keys
+    pressed and its motion told in the game's log. Without, it is the machine as it was built.
+    """
+    from buildarena_geometry.export import machine_glb, machine_svg
+
+    with shown_errors():
+        if out.suffix not in FORMATS:
+            raise CommandError(f"{out}: {out.suffix or 'no'} ending; use {', '.join(FORMATS)}")
+        given = {"--task": task, "--controls": controls}
+        for option, value in given.items():
+            if value is not None and out.suffix != ".bsg":
+                raise CommandError(f"{option} is for .bsg files, not for {out}")
+        machine = read_machine(file)
+        if out.suffix == ".glb":
+            out.write_bytes(machine_glb(machine))
+        elif out.suffix == ".svg":
+            out.write_text(machine_svg(machine), encoding="utf-8")
+        elif out.suffix == ".json":
+            from buildarena_pipeline.runtime.machine_documents import machine_bytes
+
+            out.write_bytes(machine_bytes(machine))
+        else:
+            out.write_bytes(_game_file(machine, out.stem, task, controls))
+    say(str(out))
+
+
+def _game_file(machine: Machine, name: str, task: str | None, controls: Path | None) -> bytes:
+    import uuid
+
+    from buildarena_besiege import plain_machine_file, prepare_run, read_presses
+
+    presses = None if controls is None else read_presses(controls.read_bytes(), where=str(controls))
+    if task is None:
+        return plain_machine_file(machine, name=name, controls=presses)
+    scenario = chosen_task(task).scenario
+    run_id = uuid.uuid4().hex
+    run = prepare_run(machine, scenario, name=name, run_id=run_id, controls=presses)
+    return run.machine_file
+
+
+def import_file(
+    file: Annotated[Path, typer.Argument(help="A machine file of the game's (.bsg).")],
+    out: Annotated[
+        Path | None, typer.Option(help="Write the machine document (.json) to this file.")
+    ] = None,
+    *,
+    as_json: JsonOption = False,
+) -> None:
+    """Read a machine file of the game's, and tell what of it was not understood."""
+    with shown_errors():
+        found = read_imported(file)
+        if out is not None:
+            from buildarena_pipeline.runtime.machine_documents import machine_bytes
+
+            out.write_bytes(machine_bytes(found.machine))
+        facts = {
+            "name": found.name,
+            **_facts(found.machine),
+            "not_understood": list(found.not_understood),
+        }
+        if as_json:
+            print_json(facts)
+            return
+        _print_size(facts)
+        for remark in found.not_understood:
+            say(remark)
+        if not found.not_understood:
+            say("Everything was understood.")
+        if out is not None:
+            say(str(out))

@@ -1,0 +1,118 @@
+"""A machine's export in a normalised form, as JSON values: what its file holds, without layout.
+
+The form is that of the golden files: guids are left out, reference keys hold "<guid8>" in their
+place, and the script's text is left out.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+from buildarena_besiege.errors import MachineNotPlayableError
+from buildarena_besiege.machine_file import BSG_VERSION, global_entries
+from buildarena_besiege.names import CARGO_ID
+from buildarena_besiege.run import prepared_machine, refusal_of
+from buildarena_simulation.scenario import SpanPlacement
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from buildarena_besiege.entries import Entry, Value
+    from buildarena_besiege.machine_file import BlockRecord
+    from buildarena_geometry import Machine
+    from buildarena_geometry.rotations import Quaternion
+    from buildarena_simulation import Scenario
+
+LEVELS: Final = {1: "soft", 2: "medium", 3: "hard"}
+"""What the golden files call a task's levels."""
+
+
+def normal_form(
+    machine: Machine,
+    scenario: Scenario | None = None,
+    *,
+    category: str = "plain",
+    level: int | None = None,
+) -> dict[str, Any]:
+    """The normalised export of a machine.
+
+    Args:
+        machine: The machine.
+        scenario: A task's; None for the machine as it was built.
+        category: The task's category.
+        level: The task's level.
+
+    Returns:
+        Fields category, level and refused; where it is not refused, also run, connector_gaps,
+        tracked, machine, global, data and blocks.
+    """
+    head = {
+        "category": category,
+        "level": None if level is None else LEVELS.get(level, str(level)),
+        "refused": None if scenario is None else refusal_of(machine, scenario),
+    }
+    if head["refused"] is not None:
+        return head
+    try:
+        prepared = prepared_machine(machine, scenario, run_id="normal-form")
+    except MachineNotPlayableError as error:
+        return {**head, "refused": str(error)}
+    driven = scenario is not None and scenario.control.mode == "agent"
+    suffix = "_sim_1" if driven else "_sim"
+    cargo = [CARGO_ID] if scenario is not None and scenario.cargo is not None else []
+    return {
+        **head,
+        "run": None
+        if scenario is None
+        else {
+            "machine_name_suffix": suffix,
+            "duration_s": scenario.duration_s,
+            "set_ground": not isinstance(scenario.placement, SpanPlacement),
+        },
+        "connector_gaps": {},
+        "tracked": [*prepared.tracked, *cargo],
+        "machine": {
+            "version": "1",
+            "bsgVersion": BSG_VERSION,
+            "name": "plain" if scenario is None else f"m{suffix}",
+        },
+        "global": {
+            "position": list(prepared.pose.position),
+            "rotation_xyzw": _xyzw(prepared.pose.rotation),
+        },
+        "data": [
+            [kind, key, None if key == "lua_data" else _value(value)]
+            for kind, key, value in global_entries("")
+        ],
+        "blocks": [_block(record) for record in prepared.records],
+    }
+
+
+def _block(record: BlockRecord) -> dict[str, Any]:
+    return {
+        "local_id": record.part,
+        "name": record.module.name,
+        "id": record.module.besiege_id,
+        "position": list(record.position),
+        "rotation_xyzw": _xyzw(record.rotation),
+        "scale": list(record.scale),
+        "data": list(_data(record.all_entries, record.guid[:8])),
+        "stray_text": None,
+    }
+
+
+def _data(entries: Iterable[Entry], guid8: str) -> Iterable[list[Any]]:
+    for kind, key, value in entries:
+        shown = _value(value)
+        if key == "bmt-lua_ref_key":
+            shown = str(value).replace(guid8, "<guid8>")
+        yield [kind, key, sorted(shown) if kind == "StringArray" and value != shown else shown]
+
+
+def _value(value: Value) -> Any:
+    return list(value) if isinstance(value, tuple) else value
+
+
+def _xyzw(rotation: Quaternion) -> list[float]:
+    w, x, y, z = rotation
+    return [x, y, z, w]
