@@ -80,4 +80,6 @@ def test_a_worker_takes_the_commands_place(monkeypatch) -> None:
     ]
     refused = run("worker", "start", "paint")
     assert isinstance(refused.exception, CommandError)
-    assert "choose from construct, simulate.pybullet, simulate.mujoco" in str(refused.exception)
+    assert "choose from construct, simulate.pybullet, simulate.mujoco, simulate.besiege" in str(
+        refused.exception
+    )

@@ -110,7 +110,7 @@ def run_one(rig: Rig, seed: int, trials: dict[str, tuple[Task, Machine, Score]])
         left = [file.name for file in rig.machines.iterdir()] if not _is_clean(rig) else []
         simulator.close()
     if ended in {"right", "fault"} and (left or list(rig.machines.iterdir())):
-        ended = f"left behind: {left or os.listdir(rig.machines)}"
+        ended = f"left behind: {left or [file.name for file in rig.machines.iterdir()]}"
     return Run(
         seed=seed,
         task=name,

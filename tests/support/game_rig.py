@@ -29,8 +29,8 @@ class Rig:
     """
 
     folder: Path
-    speed: float = 8.0
-    pace: float = 5.0
+    speed: float = 12.0
+    pace: float = 8.0
     patience: float = 0.4
 
     def __post_init__(self) -> None:

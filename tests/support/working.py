@@ -15,13 +15,20 @@ from buildarena_store.states import simulate_queue
 from buildarena_worker.wiring import construct_handler
 
 
-def work(context: Context, *, steps: int = 1000, threads: int = 1) -> None:
+def work(
+    context: Context,
+    *,
+    steps: int = 1000,
+    threads: int = 1,
+    queues: tuple[str, ...] | None = None,
+) -> None:
     """Works until nothing waits.
 
     Args:
         context: Where the jobs are.
         steps: Stages at most.
         threads: Stages at once.
+        queues: Only jobs of these queues; others are left to their own workers.
     """
     keeper = LeaseKeeper(context.store.leases, lambda: None)
     keeper.start()
@@ -37,7 +44,14 @@ def work(context: Context, *, steps: int = 1000, threads: int = 1) -> None:
         for queue, made in handlers.items()
     }
     with ThreadPoolExecutor(threads) as pool:
-        while steps > 0 and (waiting := context.store.jobs.page(limit=100, state="queued")):
+        while steps > 0:
+            waiting = [
+                job
+                for job in context.store.jobs.page(limit=100, state="queued")
+                if queues is None or job.queue in queues
+            ]
+            if not waiting:
+                break
             waiting = waiting[:steps]
             steps -= len(waiting)
             list(pool.map(lambda job: runners[job.queue].process_next(job.queue, job.id), waiting))

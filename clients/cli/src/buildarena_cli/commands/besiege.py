@@ -7,11 +7,21 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from buildarena_cli.client import Client
 from buildarena_cli.errors import CommandError
+from buildarena_cli.instead import run_instead
 from buildarena_cli.lazy import new_group
 from buildarena_cli.machines import chosen_task, read_machine, shown_errors
-from buildarena_cli.options import JsonOption
-from buildarena_cli.terminal.output import print_json, say, warn
+from buildarena_cli.options import DEFAULT_URL, JsonOption, UrlOption
+from buildarena_cli.terminal.output import (
+    columns,
+    emphasised,
+    number,
+    print_json,
+    print_table,
+    say,
+    warn,
+)
 
 if TYPE_CHECKING:
     from buildarena_benchmark import Task
@@ -89,3 +99,64 @@ def _trajectory(
     log = GameLog(run or runs[0])
     log.read(told)
     return trajectory_of(log, machine, task.scenario, game="unknown", mod="unknown")
+
+
+@app.command("calibrate")
+def calibrate(
+    *,
+    defaults: Annotated[
+        bool,
+        typer.Option("--defaults", help="Take the published runner's positions, ask nothing."),
+    ] = False,
+    only_try: Annotated[
+        bool, typer.Option("--try", help="Only try the calibration that is there.")
+    ] = False,
+) -> None:
+    """Find out where to click in this machine's game, and try it."""
+    given = [*(["--defaults"] if defaults else []), *(["--try"] if only_try else [])]
+    run_instead([*RUNNER, "calibrate", *given])
+
+
+@app.command("doctor")
+def doctor(*, as_json: JsonOption = False) -> None:
+    """Show what this machine lacks to play the game; the exit code is 1 when anything does."""
+    run_instead([*RUNNER, "doctor", *(["--json"] if as_json else [])])
+
+
+@app.command("agreement")
+def show_agreement(
+    track: Annotated[
+        str | None, typer.Option(help="A track of the game; the first there is if left out.")
+    ] = None,
+    *,
+    url: UrlOption = DEFAULT_URL,
+    as_json: JsonOption = False,
+) -> None:
+    """Show how far our engines say the same as the game, task by task."""
+    client = Client(url)
+    if track is None:
+        known = client.get("/v1/leaderboard")["tracks"]
+        track = next((one for one in known if "/besiege-" in one), None)
+        if track is None:
+            raise CommandError("no job was scored in the game yet, so there is nothing to compare")
+    found = client.get("/v1/leaderboard/agreement", track=track)
+    if as_json:
+        print_json(found)
+        return
+    rows = [
+        (
+            row["task"],
+            f"{row['engine']} ({row['simulation_version']})",
+            str(row["trials"]),
+            f"{row['same_verdict']:.0%} ({row['low']:.0%} to {row['high']:.0%})",
+            number(row["kappa"], 2),
+            "" if row["near"] is None else f"{row['near']:.0%}",
+        )
+        for row in found["rows"]
+    ]
+    heads = ("task", "engine", "trials", "same verdict", "kappa", "indicator within a quarter")
+    print_table(columns(*heads), rows, title=emphasised(str(found["track"])))
+
+
+RUNNER = ("buildarena_simworker.simulators.besiege",)
+"""The program that knows this machine's game."""

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import os
-import sys
 from typing import Annotated
 
 import typer
 
 from buildarena_cli.errors import CommandError
+from buildarena_cli.instead import run_instead
 from buildarena_cli.lazy import new_group
 from buildarena_cli.near import did_you_mean
 from buildarena_cli.terminal.output import say
@@ -33,8 +32,7 @@ def start_worker(
             f"there is no queue {queue!r}; choose from {', '.join(workers)}"
             f"{did_you_mean(queue, workers)}"
         )
-    # The worker takes this process' place, so that signals reach it.
-    os.execv(sys.executable, [sys.executable, "-m", *workers[queue]])  # noqa: S606 - no shell
+    run_instead(workers[queue])
 
 
 def migrate() -> None:
