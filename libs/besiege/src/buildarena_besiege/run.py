@@ -21,7 +21,7 @@ from buildarena_besiege.keys import (
 from buildarena_besiege.level import level_file
 from buildarena_besiege.machine_file import CargoBox, Guids, block_records, machine_text
 from buildarena_besiege.names import CARGO_ID
-from buildarena_besiege.placement import AS_BUILT, GlobalPose, cargo_root, global_pose
+from buildarena_besiege.placement import AS_BUILT, GlobalPose, cargo_root, global_pose, put_down
 from buildarena_besiege.script import FIRST_BLOCK, Reported, Telling, script_text
 from buildarena_besiege.tracking import begin_fields, tracked_blocks
 from buildarena_simulation.constants import MAX_PARTS
@@ -95,6 +95,7 @@ def prepare_run(
     name: str,
     run_id: str,
     controls: Sequence[KeyPress] | None = None,
+    on_ground: bool = False,
     new_guid: Callable[[], uuid.UUID] = uuid.uuid4,
 ) -> GameRun:
     """Prepares a machine for a trial in the game.
@@ -105,6 +106,8 @@ def prepare_run(
         name: Stem of the machine file: lower case letters, digits, "-" and "_".
         run_id: Of this run; stands in every line of the log.
         controls: The control sequence; the machine's own if left out.
+        on_ground: Whether the file itself puts a machine onto the ground that starts there, for a
+            game that has no button for it.
         new_guid: Draws the blocks' guids.
 
     Raises:
@@ -116,7 +119,11 @@ def prepare_run(
     prepared = prepared_machine(
         machine, scenario, run_id=run_id, controls=controls, new_guid=new_guid
     )
-    text = machine_text(name, prepared.pose, prepared.records, prepared.script)
+    starts_on_ground = not isinstance(scenario.placement, SpanPlacement)
+    pose = prepared.pose
+    if on_ground and starts_on_ground:
+        pose = put_down(pose, machine)
+    text = machine_text(name, pose, prepared.records, prepared.script)
     return GameRun(
         name=name,
         run_id=run_id,
@@ -124,7 +131,7 @@ def prepare_run(
         script=prepared.script,
         tracked=prepared.tracked,
         duration_s=scenario.duration_s,
-        set_ground=not isinstance(scenario.placement, SpanPlacement),
+        set_ground=starts_on_ground,
         level=level_file(scenario) if scenario.terrain else None,
         key_changes=tuple(
             (edge.update / UPDATES_PER_S, edge.key, edge.down) for edge in prepared.edges

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 INTERVAL_S: Final = 0.2
 """Time from one line to the next, seconds."""
 
-_BEGIN, _END = "SimulationStart", "SimulationEnd"
+_BEGIN, _PRESS, _END = "SimulationStart", "PressKey", "SimulationEnd"
 _STAT: Final = re.compile(r"GameStat:(.*)$")
 _COMPLAINING: Final = re.compile(r"\b(exception|error|crash)", re.IGNORECASE)
 _VALUES: Final = 8
@@ -59,6 +59,7 @@ class StateLog:
         self._complaints: dict[str, None] = {}
         self._lines: list[str] = []
         self._rows: list[Row] = []
+        self._presses = 0
         self._tail = ""
 
     def read(self, text: str) -> None:
@@ -132,7 +133,7 @@ class StateLog:
                 (len(instants), 0, 4),
             ),
             settings={
-                "effective_key_presses": 0,
+                "effective_key_presses": self._presses,
                 "longest_gap_s": INTERVAL_S,
                 "lag": "not told by the log",
                 "cargo_mass": "not told by the log",
@@ -161,6 +162,9 @@ class StateLog:
             if row is not None:
                 self._rows.append(row)
                 self._lines.append(line)
+        elif _PRESS in line:
+            self._presses += 1
+            self._lines.append(line)
         elif _END in line:
             self.ended = True
             self._lines.append(line)

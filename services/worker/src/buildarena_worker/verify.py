@@ -24,6 +24,7 @@ from buildarena_besiege import (
     GameLog,
     LogIncompleteError,
     MachineNotPlayableError,
+    StateLog,
     prepare_run,
     trajectory_of,
 )
@@ -265,15 +266,15 @@ class Verifier:
             prepare_run(machine, task.scenario, name="again", run_id="again")
             raise LogIncompleteError("the log of the trial was not kept")
         versions = record.versions or {}
-        game = GameLog(str(versions.get("run")))
-        game.read(self._artifacts.get(digest).decode("utf-8", "replace"))
-        return trajectory_of(
-            game,
-            machine,
-            task.scenario,
-            game=str(versions.get("game")),
-            mod=str(versions.get("mod")),
-        )
+        names = {name: str(versions.get(name)) for name in ("game", "mod")}
+        text = self._artifacts.get(digest).decode("utf-8", "replace")
+        if versions.get("desktop") == "headless":
+            states = StateLog(str(versions.get("run")))
+            states.read(text)
+            return states.trajectory(machine, task.scenario, **names)
+        lines = GameLog(str(versions.get("run")))
+        lines.read(text)
+        return trajectory_of(lines, machine, task.scenario, **names)
 
     def _score_checks(
         self, job: Job, machine: Machine | None, records: Sequence[RolloutRecord]

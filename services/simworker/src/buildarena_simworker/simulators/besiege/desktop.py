@@ -41,6 +41,10 @@ class Desktop(Protocol):
     Each call returns when its effect was seen, and raises `DesktopError` when it was not.
     """
 
+    @property
+    def puts_down(self) -> bool:
+        """Whether it can put a machine onto the ground; otherwise its file must."""
+
     def require_able(self, run: GameRun) -> None:
         """Checks that this way of driving the game can do what the run needs.
 

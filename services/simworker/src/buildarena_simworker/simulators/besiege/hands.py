@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import os
 import subprocess
@@ -40,8 +41,10 @@ class Hands:
         self._pace = pace
         _need_no_authority()
         try:
-            import pyautogui
-            import pyperclip
+            # Xlib prints what it misses to standard output, which is for results.
+            with contextlib.redirect_stdout(io.StringIO()):
+                import pyautogui
+                import pyperclip
         except ImportError as error:
             raise NotSetUpError(
                 f"playing the game needs `pip install buildarena-simworker[besiege]` ({error})"

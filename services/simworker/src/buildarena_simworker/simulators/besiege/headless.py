@@ -17,7 +17,7 @@ import threading
 import time
 from typing import IO, Final
 
-from buildarena_besiege import GameRun, StateLog
+from buildarena_besiege import GameRun, StateLog, level_file
 from buildarena_geometry import Machine
 from buildarena_pipeline.errors import PermanentError
 from buildarena_simulation import Scenario, Trajectory
@@ -33,6 +33,8 @@ from buildarena_simworker.simulators.besiege.traces import Traces
 
 SCENE, LOAD, TOGGLE, KEY, LEVEL, FAIL = 0, 2, 3, 4, 5, 6
 LEVEL_EDITOR: Final = "3"
+INTERVAL_S: Final = 0.2
+"""Time between two lines of the game's state."""
 PORTS: Final = 200
 """Ports that are tried from the first one on."""
 
@@ -56,7 +58,14 @@ class HeadlessDesktop:
         self._open_level: str | None = None
         self._running = False
         self._log: StateLog | None = None
+        self._first = ""
+        self._told_s, self._told_at = 0.0, 0.0
         self._edges: list[tuple[float, str, bool]] = []
+
+    @property
+    def puts_down(self) -> bool:
+        """No message of the protocol does it."""
+        return False
 
     def require_able(self, run: GameRun) -> None:
         """Checks that the run needs no script."""
@@ -91,7 +100,8 @@ class HeadlessDesktop:
         """Starts the simulation; keys are pressed by the game's own time."""
         self._edges = sorted(run.key_changes, key=lambda edge: edge[0])
         self._send(TOGGLE, "")
-        self._expect("SimulationStart", "start the simulation", self._limits.answer_s)
+        self._first = self._expect("SimulationStart", "start the simulation", self._limits.answer_s)
+        self._told_s, self._told_at = 0.0, time.monotonic()
         self._running = True
 
     def new_log(self, run: GameRun) -> StateLog:
@@ -107,11 +117,12 @@ class HeadlessDesktop:
 
     def read_log(self) -> str:
         """The lines since the last call; keys whose time has come are pressed or let go."""
-        now = 0.0 if self._log is None else self._log.time_s
+        now = self._game_time()
         while self._running and self._edges and self._edges[0][0] <= now + 1e-9:
             _, key, down = self._edges.pop(0)
             self._send(KEY, f"{key}_{'T' if down else 'F'}")
-        lines = []
+        lines = [self._first]
+        self._first = ""
         while True:
             try:
                 line = self._lines.get_nowait()
@@ -122,6 +133,13 @@ class HeadlessDesktop:
                 break
             lines.append(line)
         return "".join(lines)
+
+    def _game_time(self) -> float:
+        """The newest line's time, and what has passed since, until the next line is due."""
+        told = 0.0 if self._log is None else self._log.time_s
+        if told != self._told_s:
+            self._told_s, self._told_at = told, time.monotonic()
+        return told + min(time.monotonic() - self._told_at, INTERVAL_S)
 
     def stop(self) -> None:
         """Ends the simulation."""
@@ -176,8 +194,8 @@ class HeadlessDesktop:
         self._enter_level()
 
     def _enter_level(self) -> None:
-        file = self._process.level_file(self._level) if self._level is not None else None
-        self._send(LEVEL, "" if file is None else str(file))
+        flat = level_file(Scenario.model_validate({"duration_s": 1.0}))
+        self._send(LEVEL, str(self._process.level_file(self._level or flat)))
         self._expect("CustomLevelLoaded", "open the level", self._limits.answer_s)
         self._open_level = level_digest(self._level)
         self._running = False
@@ -201,7 +219,7 @@ class HeadlessDesktop:
         except OSError as error:
             raise GameGoneError(f"the game does not listen any more: {error}") from error
 
-    def _expect(self, message: str, step: str, timeout_s: float) -> None:
+    def _expect(self, message: str, step: str, timeout_s: float) -> str:
         """Waits for a message; lines before it are dropped: they belong to what came before."""
         ends = time.monotonic() + timeout_s
         while True:
@@ -214,7 +232,7 @@ class HeadlessDesktop:
                 self._lines.put(None)
                 raise GameGoneError(f"{step}: the game ended")
             if "BesiegeAgent" in line and "SendMessage:" in line and message in line:
-                return
+                return line
 
 
 def _read_lines(stream: IO[str], lines: queue.SimpleQueue[str | None]) -> None:

@@ -77,6 +77,7 @@ class BesiegeSimulator:
                 name=name,
                 run_id=f"{trial.token}a{attempt}{uuid.uuid4().hex[:8]}",
                 controls=trial.controls,
+                on_ground=not self._desktop.puts_down,
             )
 
         try:

@@ -26,15 +26,12 @@ from buildarena_simworker.simulators.besiege.process import GameProcess
 from buildarena_simworker.simulators.besiege.settings import BesiegeSettings, level_digest
 from buildarena_simworker.simulators.besiege.steps import TRIES, take_step, wait_for
 from buildarena_simworker.simulators.besiege.traces import Traces
-from buildarena_simworker.simulators.besiege.windows import Area, Windows
+from buildarena_simworker.simulators.besiege.view import View
+from buildarena_simworker.simulators.besiege.windows import Windows
 
 if TYPE_CHECKING:
     from PIL.Image import Image
 
-CHANGED: Final = 0.02
-"""Share of a patch that looks different after something was opened or closed there."""
-PATCH: Final = (0.14, 0.10)
-"""Width and height of a patch, shares of the window."""
 LIKE_EMPTY: Final = 0.35
 """A window is empty again when it differs from an empty one by less than this share of what a
 loaded machine changed."""
@@ -59,7 +56,7 @@ class WindowDesktop:
     ) -> None:
         self._settings = settings
         self._limits = settings.time_limits
-        self._places = calibration.positions
+        self._view = View(settings.title, calibration, hands, windows)
         self._hands = hands
         self._windows = windows
         self._process = GameProcess(settings)
@@ -69,6 +66,11 @@ class WindowDesktop:
         self._level: bytes | None = None
         self._loaded_changed = 0.0
         self._panel_shown = False
+
+    @property
+    def puts_down(self) -> bool:
+        """It has a button for that."""
+        return True
 
     def require_able(self, run: GameRun) -> None:
         """Checks that the run's level is open, or can be opened."""
@@ -95,7 +97,7 @@ class WindowDesktop:
             self._tidy()
         self._level = run.level
         self._to_front()
-        self._empty = self._picture()
+        self._empty = self._view.whole()
 
     def load(self, run: GameRun) -> None:
         """Loads the machine by its name; the name that was typed is read back."""
@@ -247,13 +249,13 @@ class WindowDesktop:
         """Opens the list of machines, types the name, loads; a failure leaves the list closed."""
         self._opened("open the list of machines", "open_folder", "name_box")
         self._type_name(name)
-        panel = self._patch("name_box")
+        panel = self._view.patch("name_box")
         self._step(
             f"load the machine {name}",
             lambda: self._click("open_machine"),
             lambda: (
                 None
-                if self._patch_differs("name_box", panel)
+                if self._view.differs("name_box", panel)
                 else "the list of machines stayed open, so the game did not find or read its file"
             ),
             timeout_s=self._limits.load_s,
@@ -303,7 +305,7 @@ class WindowDesktop:
         self._loaded_changed = self._changed_since_empty()
 
     def _changed_since_empty(self) -> float:
-        return 1.0 if self._empty is None else difference(self._picture(), self._empty)
+        return 1.0 if self._empty is None else difference(self._view.whole(), self._empty)
 
     def _still_there(self) -> str | None:
         changed = self._changed_since_empty()
@@ -328,10 +330,10 @@ class WindowDesktop:
 
     def _opened(self, name: str, click: str | None, seen_at: str) -> None:
         """Opens a panel: with a click, or by Ctrl+L; the patch where it lies changes."""
-        before = self._patch(seen_at)
+        before = self._view.patch(seen_at)
 
         def act() -> None:
-            if self._patch_differs(seen_at, before):
+            if self._view.differs(seen_at, before):
                 return
             if click is None:
                 self._hands.hotkey("ctrl", "l")
@@ -343,7 +345,7 @@ class WindowDesktop:
             act,
             lambda: (
                 None
-                if self._patch_differs(seen_at, before)
+                if self._view.differs(seen_at, before)
                 else "nothing changed in the window where it should appear"
             ),
         )
@@ -366,34 +368,5 @@ class WindowDesktop:
         take_step(name, act, alive, timeout_s=limit, recover=self.recover, tries=tries)
 
     def _click(self, place: str) -> None:
-        self._hands.click(*self._point(place))
+        self._hands.click(*self._view.point(place))
         self._hands.wait(0.1)
-
-    def _point(self, place: str) -> tuple[int, int]:
-        window = self._window()
-        x, y = self._places[place]
-        return (window.left + round(x * window.width), window.top + round(y * window.height))
-
-    def _window(self) -> Area:
-        window = self._windows.find(self._settings.title)
-        if window is None:
-            raise GameGoneError(f"there is no window with {self._settings.title!r} in its title")
-        return window
-
-    def _patch(self, place: str) -> Image:
-        """What the window shows around a place."""
-        window = self._window()
-        width, height = (
-            round(share * side)
-            for share, side in zip(PATCH, (window.width, window.height), strict=True)
-        )
-        x, y = self._point(place)
-        left = min(max(x - width // 2, window.left), window.left + window.width - width)
-        top = min(max(y - height // 2, window.top), window.top + window.height - height)
-        return self._hands.picture(Area(left, top, width, height))
-
-    def _patch_differs(self, place: str, before: Image) -> bool:
-        return difference(self._patch(place), before) > CHANGED
-
-    def _picture(self) -> Image:
-        return self._hands.picture(self._window())

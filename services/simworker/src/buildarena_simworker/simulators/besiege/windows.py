@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -108,7 +110,9 @@ class _X11Windows:
     def __init__(self) -> None:
         from Xlib import display
 
-        self._display = display.Display()
+        # Xlib prints what it misses to standard output, which is for results.
+        with contextlib.redirect_stdout(io.StringIO()):
+            self._display = display.Display()
         self._root = self._display.screen().root
 
     def find(self, title: str) -> Area | None:

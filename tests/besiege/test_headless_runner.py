@@ -1,0 +1,89 @@
+"""A game without a window, driven over TCP."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+
+import pytest
+from game_rig import Rig, experts_machine, shortened
+
+from buildarena_benchmark import builtin_tasks, score
+from buildarena_besiege import game_start
+from buildarena_pipeline.errors import PermanentError
+from buildarena_simulation import simulate
+from buildarena_simworker.simulators.besiege.headless import HeadlessDesktop
+from buildarena_simworker.simulators.besiege.settings import BesiegeSettings
+from buildarena_simworker.simulators.besiege.simulator import BesiegeSimulator
+from buildarena_simworker.simulators.simulator import SimulatorFaultError, Trial
+
+pytestmark = pytest.mark.timeout(120)
+
+
+@pytest.fixture
+def headless(rig: Rig, monkeypatch) -> Iterator[tuple[Rig, BesiegeSimulator]]:
+    own = replace(rig, patience=0.3, speed=2.0)
+    for name, value in own.environment().items():
+        monkeypatch.setenv(name, value)
+    words = own.environment()["BUILDARENA_BESIEGE_COMMAND"].replace(
+        "--level={level}", "--headless --horizon 8"
+    )
+    monkeypatch.setenv("BUILDARENA_BESIEGE_COMMAND", words)
+    monkeypatch.setenv("BUILDARENA_BESIEGE_DESKTOP", "headless")
+    settings = BesiegeSettings()
+    simulator = BesiegeSimulator(settings, HeadlessDesktop(settings), {"desktop": "headless"})
+    yield own, simulator
+    simulator.close()
+
+
+def trial_of(task, machine) -> Trial:
+    return Trial(
+        job_id="job_0001",
+        number=0,
+        token=1,
+        version="1.75-23370-1.4",
+        task=task,
+        machine=machine,
+        controls=None,
+        require_held=lambda: None,
+    )
+
+
+def test_a_car_is_driven_as_by_our_engine(headless) -> None:
+    rig, simulator = headless
+    task, machine = shortened("transport-1", 5.0), experts_machine("transport-1")
+    for _ in range(2):  # the same game plays again
+        done = simulator.run(trial_of(task, machine))
+        start = game_start(machine, task.scenario)
+        right = score(task, machine, simulate(machine, task.scenario, "mujoco", start=start))
+        found = score(task, machine, done.trajectory)
+        assert found.success == right.success
+        assert found.indicator == pytest.approx(right.indicator, rel=0.1)
+        assert not list(rig.machines.iterdir())
+
+
+@pytest.mark.parametrize("name", ["support-1", "transport-2", "lift-1", "lift-2"])
+def test_what_needs_the_script_is_refused_with_the_reason(headless, name) -> None:
+    task, machine = builtin_tasks()[name], experts_machine(name)
+    with pytest.raises(PermanentError, match="runs no script"):
+        headless[1].run(trial_of(task, machine))
+
+
+@pytest.mark.parametrize("fault", ["crash", "freeze"])
+def test_a_fault_once_is_got_over(headless, fault) -> None:
+    rig, simulator = headless
+    rig.faults.write_text(json.dumps([{"fault": fault, "at": "simulating", "after_s": 1.0}]))
+    task, machine = shortened("transport-1", 4.0), experts_machine("transport-1")
+    done = simulator.run(trial_of(task, machine))
+    assert done.versions["faults"]
+    assert score(task, machine, done.trajectory).indicator > 1.0
+
+
+def test_a_game_that_cannot_be_started_is_a_fault_with_a_sentence(headless, monkeypatch) -> None:
+    monkeypatch.setenv("BUILDARENA_BESIEGE_COMMAND", "/nowhere/besiege")
+    settings = BesiegeSettings()
+    simulator = BesiegeSimulator(settings, HeadlessDesktop(settings), {})
+    task, machine = shortened("transport-1", 4.0), experts_machine("transport-1")
+    with pytest.raises(SimulatorFaultError, match="cannot be started"):
+        simulator.run(trial_of(task, machine))

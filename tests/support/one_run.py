@@ -1,0 +1,41 @@
+"""Plays one short trial in the game and prints its score; a program, so that it can be killed."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from pathlib import Path
+
+from buildarena_benchmark import score
+from buildarena_simworker.simulators.besiege.set_up import make_desktop
+from buildarena_simworker.simulators.besiege.settings import BesiegeSettings
+from buildarena_simworker.simulators.besiege.simulator import BesiegeSimulator
+from buildarena_simworker.simulators.simulator import Trial
+from game_rig import Rig, experts_machine, shortened
+
+
+def main() -> None:
+    """Plays the car for a few seconds in the folder that is named."""
+    rig = Rig(folder=Path(sys.argv[1]))
+    os.environ.update(rig.environment())
+    settings = BesiegeSettings()
+    desktop, facts = make_desktop(settings)
+    task, machine = shortened("transport-1", 5.0), experts_machine("transport-1")
+    done = BesiegeSimulator(settings, desktop, facts).run(
+        Trial(
+            job_id="job_killed",
+            number=0,
+            token=1,
+            version=str(settings.version),
+            task=task,
+            machine=machine,
+            controls=None,
+            require_held=lambda: None,
+        )
+    )
+    found = score(task, machine, done.trajectory)
+    sys.stdout.write(json.dumps([found.success, found.indicator]) + "\n")
+
+
+main()
