@@ -69,6 +69,11 @@ class Hands:
             self.wait(0.05)
             gui.mouseUp()
 
+    def move(self, x: int, y: int) -> None:
+        """Moves the mouse."""
+        with _stopped_by_hand(self._gui):
+            self._gui.moveTo(x, y)
+
     def screen_size(self) -> tuple[int, int]:
         """Width and height of the screen, pixels."""
         found = self._gui.size()
