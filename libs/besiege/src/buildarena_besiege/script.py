@@ -102,8 +102,7 @@ def script_text(
 def lua_text(text: str) -> str:
     """A Lua string that means the text, whatever it holds."""
     safe = "".join(
-        chr(byte) if byte in _PLAIN else f"\\{byte:03d}"
-        for byte in text.encode("utf-8", "replace")
+        chr(byte) if byte in _PLAIN else f"\\{byte:03d}" for byte in text.encode("utf-8", "replace")
     )
     return f'"{safe}"'
 
