@@ -10,9 +10,9 @@ import sys
 import pytest
 from tests.besiege.golden import dangles, golden, goldens, played_document, scenario_of, task_of
 
+from buildarena_benchmark import builtin_tasks
 from buildarena_besiege.__main__ import main
 from buildarena_besiege.normal import normal_form
-from buildarena_benchmark import builtin_tasks
 from buildarena_geometry import KeyPress, Machine
 from buildarena_geometry.rotations import multiply
 
