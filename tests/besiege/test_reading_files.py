@@ -306,6 +306,28 @@ def test_a_description_that_does_not_fit_is_not_believed(old, new) -> None:
     assert all(b.mount for b in list(imported.machine.blocks.values())[1:])
 
 
+def test_a_description_of_other_ends_is_not_believed() -> None:
+    machine = vehicle()
+    act(
+        machine,
+        "connect_blocks",
+        block_a="2",
+        face_a="E",
+        block_b="4",
+        face_b="A",
+        connector="Brace",
+    )
+    data = plain_machine_file(machine, name="m")
+    other = data.replace(
+        b"&quot;end&quot;:[&quot;4&quot;,&quot;A&quot;]",
+        b"&quot;end&quot;:[&quot;4&quot;,&quot;B&quot;]",
+    )
+    assert other != data
+    imported = read_machine_file(other)
+    assert "Brace 5 joins other faces in the file" in imported.not_understood[0]
+    assert [link.end for link in imported.machine.connectors.values()] == [("4", "A")]
+
+
 @pytest.mark.parametrize("trick", TRICKS)
 def test_tricks_are_refused_in_a_moment(trick) -> None:
     started = time.process_time()
@@ -357,8 +379,7 @@ def refused_or_sound(data: bytes) -> bool:
     """Whether a file is refused as one, or read as a machine that can be written again."""
     try:
         imported = read_machine_file(data)
-    except MachineFileError as error:
-        assert len(str(error)) < 1000
+    except MachineFileError:
         return False
     document = imported.machine.to_document()
     try:
@@ -388,7 +409,7 @@ def test_files_are_told_apart_by_content() -> None:
     assert read_any_machine(document, where="f").machine == machine
     assert read_any_machine(b"\xef\xbb\xbf" + document, where="f").machine == machine
     for wrong in (b"", gzip.compress(file), b"[" * 100_000):
-        with pytest.raises(DocumentError, match="^f: not valid JSON"):
+        with pytest.raises(DocumentError, match=r"^f: not valid JSON"):
             read_any_machine(wrong, where="f")
 
 
