@@ -214,7 +214,7 @@ def test_lines_of_another_form_do_not_count_even_with_their_sum(body) -> None:
     "text",
     [
         "x" * 5_000_000,
-        "ba,run-1," * 500_000,
+        "ba,run-1," * 150_000,
         "ba,run-1,s,4,1,1," + "1,-,0.0000,0.0000,0.0000," * 100_000,
         "\n" * 3_000_000,
         (LINES[3] + "\n") * 20_000,

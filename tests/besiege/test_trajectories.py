@@ -177,3 +177,11 @@ def test_the_load_of_a_bridge_is_the_cargos_mass_when_it_falls() -> None:
     assert result.success
     assert result.indicator == pytest.approx(chosen.scenario.cargo.mass_at(14.04), abs=0.1)
     assert "span_not_measured" in result.flags
+
+
+def test_a_run_that_reports_nothing_still_tells_its_time() -> None:
+    scenario = SHORT.model_copy(update={"placement": TASKS["support-1"].scenario.placement})
+    game = played(MACHINE, scenario)
+    assert log_of(game).time_s == 2.0
+    found = trajectory(game, scenario=scenario)
+    assert (found.positions.shape, found.cargo_position, found.pieces) == ((51, 0, 3), None, None)

@@ -51,7 +51,7 @@ def header_of(script: str) -> dict[str, Any] | None:
 
 def is_untouched(header: dict[str, Any], file: FileMachine) -> bool:
     """Whether the blocks are where they were when the script was written."""
-    places = ((one.guid, *one.position, *one.rotation) for one in file.blocks)
+    places = ((one.guid, one.position, one.rotation) for one in file.blocks)
     return bool(header.get("digest") == places_digest(places))
 
 
