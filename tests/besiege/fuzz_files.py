@@ -10,7 +10,7 @@ import traceback
 from collections import Counter
 
 from tests.besiege.hostile import mutated
-from tests.besiege.test_reading_files import SAMPLES, refused_or_sound
+from tests.besiege.test_hostile_files import SAMPLES, refused_or_sound
 
 SLOWEST_S = 10.0
 
