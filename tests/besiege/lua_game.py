@@ -1,4 +1,4 @@
-"""A game that runs a script of ours in a real Lua: the mod's functions, and blocks on given paths."""
+"""A game that runs a script of ours in a real Lua: the mod's functions, blocks on given paths."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class LuaGame:
             unpack_returned_tuples=True, register_eval=False, register_builtins=False
         )
         globals_ = runtime.globals()
-        globals_["print"] = lambda text: self.lines.append(text)
+        globals_["print"] = self.lines.append
         globals_["machine"] = runtime.table_from(
             {
                 "new_key_emulator": lambda key: self._emulator(runtime, key),

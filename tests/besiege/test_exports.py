@@ -41,7 +41,7 @@ def test_an_export_is_the_published_one(name, index) -> None:
     left_out = {b["local_id"] for b in theirs["blocks"] if missing(found, b)}
     gaps = set(theirs["connector_gaps"])
     blocks = {block["local_id"]: block for block in ours["blocks"]}
-    assert list(blocks)[0] == theirs["blocks"][0]["local_id"]
+    assert next(iter(blocks)) == theirs["blocks"][0]["local_id"]
     assert ("Ballast" in blocks) == (list(blocks)[-1] == "Ballast")
     assert blocks.keys() == {block["local_id"] for block in theirs["blocks"]} - left_out
     for block in theirs["blocks"]:

@@ -16,7 +16,9 @@ if TYPE_CHECKING:
 _LINE_ENDS: Final = re.compile(r"\r\n|\r|\n")
 _BEGINNINGS: Final = re.compile(r"ba,([A-Za-z0-9_.~%-]{1,200}),b,")
 _AROUND: Final = " \t\x00\ufeff\xa0"
-_COMPLAINING: Final = re.compile(r"lua|attempt to |stack traceback|\berror\b", re.IGNORECASE)
+_COMPLAINING: Final = re.compile(
+    r"lua|attempt to |stack traceback|(?<![a-z])error\b", re.IGNORECASE
+)
 _MAX_COMPLAINTS: Final = 50
 _LONGEST_COMPLAINT: Final = 500
 
@@ -135,8 +137,9 @@ class GameLog:
             line = line_of(text, self._prefix)
             if line is not None:
                 self._lines[text] = line
-            elif not text.startswith(self._prefix):
-                self._note_complaint(text)
+            else:
+                # A half line of ours may have a foreign one glued to it.
+                self._note_complaint(text.removeprefix(self._prefix))
 
     def _note_complaint(self, row: str) -> None:
         if row.startswith("ba,") or len(self._complaints) >= _MAX_COMPLAINTS:

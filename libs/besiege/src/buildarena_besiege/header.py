@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from buildarena_besiege.machine_file import BlockRecord
     from buildarena_geometry import KeyPress, Machine
     from buildarena_geometry.blocks import Connector
+    from buildarena_geometry.rotations import Quaternion, Vector
 
 MARK: Final = "buildarena machine "
 HEADER_VERSION: Final = 1
@@ -39,7 +40,9 @@ def header_lines(
     parts = {part.id: part for part in state.parts}
     content = {
         "version": HEADER_VERSION,
-        "digest": places_digest((record.guid, *_numbers(record)) for record in records),
+        "digest": places_digest(
+            (record.guid, record.position, record.rotation) for record in records
+        ),
         "order": list(parts),
         "parts": {
             record.guid: _part(parts[record.part], record)
@@ -59,24 +62,27 @@ def header_lines(
     ]
 
 
-def places_digest(parts: Iterable[Sequence[str | float]]) -> str:
-    """A digest of blocks and their places.
+def places_digest(parts: Iterable[tuple[str, Vector, Quaternion]]) -> str:
+    """A digest of blocks and their places, which single precision and a sign do not change.
 
     Args:
-        parts: For each, its guid and the numbers of its position and rotation.
+        parts: For each, its guid, its position and its rotation.
     """
     rows = sorted(
-        ",".join(
-            one if isinstance(one, str) else f"{round(one, _DIGITS) + 0.0:.{_DIGITS}f}"
-            for one in part
-        )
-        for part in parts
+        f"{guid.lower()} {_shown(position)} {_shown(_signed(rotation))}"
+        for guid, position, rotation in parts
     )
-    return hashlib.sha256("\n".join(rows).encode()).hexdigest()[:32]
+    return hashlib.sha256("\n".join(rows).encode("utf-8", "replace")).hexdigest()[:32]
 
 
-def _numbers(record: BlockRecord) -> tuple[float, ...]:
-    return (*record.position, *record.rotation)
+def _signed(rotation: Quaternion) -> tuple[float, ...]:
+    """Of a rotation's two quaternions the one whose first component that shows is positive."""
+    first = next((one for one in rotation if round(one, _DIGITS)), 1.0)
+    return tuple(one if first > 0.0 else -one for one in rotation)
+
+
+def _shown(numbers: tuple[float, ...]) -> str:
+    return " ".join(f"{round(one, _DIGITS) + 0.0:.{_DIGITS}f}" for one in numbers)
 
 
 def _part(part: Block | Connector, record: BlockRecord) -> dict[str, Any]:

@@ -46,6 +46,7 @@ _NAME: Final = re.compile(r"ID_(.{1,100})")
 _LINE_ENDS: Final = re.compile(r"\r\n|\r|\n")
 _HALF_LABEL_S: Final = 0.06
 _GRAIN: Final = 0.051
+_JUMPING_SHARE: Final = 0.1
 _PLACE_FIELDS: Final = 5
 _STATE_FIELDS: Final = 3
 _LONGEST_ROW: Final = 300
@@ -200,6 +201,22 @@ def _require_one_run(told: _Told, name: str) -> None:
                 f"At {label / 10:g} s the log has {len(places)} different positions of "
                 f"{_called(name)}; one run prints at most {_SAMPLES_A_LABEL}."
             )
+    if _jumps(told) > _JUMPING_SHARE:
+        raise LogIncompleteError(
+            f"{_called(name).capitalize()} is at different positions at the same times: the log "
+            "is of several runs."
+        )
+
+
+def _jumps(told: _Told) -> float:
+    """The share of time labels within which a block moves more than from label to label."""
+    _, means = _places(told)
+    spreads = np.array(
+        [np.ptp(list(told.places[label]), axis=0).max() for label in sorted(told.places)]
+    )
+    steps = np.abs(np.diff(means, axis=0)).max(axis=1) if len(means) > 1 else np.zeros(0)
+    around = np.maximum(np.append(steps, 0.0), np.append(0.0, steps))
+    return float((spreads > 2 * around + 4 * _GRAIN).mean())
 
 
 def _places(told: _Told) -> tuple[Floats, Floats]:

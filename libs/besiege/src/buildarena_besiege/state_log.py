@@ -33,7 +33,7 @@ INTERVAL_S: Final = 0.2
 
 _BEGIN, _PRESS, _END = "SimulationStart", "PressKey", "SimulationEnd"
 _STAT: Final = re.compile(r"GameStat:(.*)$")
-_COMPLAINING: Final = re.compile(r"\b(exception|error|crash)", re.IGNORECASE)
+_COMPLAINING: Final = re.compile(r"exception|error|crash", re.IGNORECASE)
 _VALUES: Final = 8
 _MAX_COMPLAINTS: Final = 50
 _LONGEST_TAIL: Final = 1_000_000

@@ -6,19 +6,24 @@ Nothing in it is believed unless every word of it fits the blocks of the file.
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from buildarena_besiege.header import HEADER_VERSION, MARK, places_digest
 from buildarena_geometry.documents.log import LoggedState
 from buildarena_geometry.documents.read import read_machine
 from buildarena_geometry.errors import DocumentError
+from buildarena_geometry.rotations import distance
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from buildarena_besiege.importing.blocks import Part
     from buildarena_besiege.importing.xml_file import FileMachine
+    from buildarena_geometry.blocks import Connector
     from buildarena_geometry.modules.module import Catalogue
+
+
+_SAME_PLACE: Final = 1e-3  # units
 
 
 class HeaderError(ValueError):
@@ -46,7 +51,7 @@ def header_of(script: str) -> dict[str, Any] | None:
 
 def is_untouched(header: dict[str, Any], file: FileMachine) -> bool:
     """Whether the blocks are where they were when the script was written."""
-    places = ((one.guid, *one.position, *one.rotation) for one in file.blocks)
+    places = ((one.guid, one.position, one.rotation) for one in file.blocks)
     return bool(header.get("digest") == places_digest(places))
 
 
@@ -86,13 +91,24 @@ def described_machine(
             "log": [],
         }
         document["available"] = _sources(document)
-        return read_machine(document, catalogue=catalogue)
+        logged = read_machine(document, catalogue=catalogue)
     except DocumentError as error:
         raise HeaderError(str(error)) from error
     except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
         if isinstance(error, HeaderError):
             raise
         raise HeaderError(f"{type(error).__name__}: {error}") from error
+    for link in logged.state.connectors.values():
+        _check_ends(link, by_id[link.id][0])
+    return logged
+
+
+def _check_ends(link: Connector, part: Part) -> None:
+    """Refuses a description whose connectors join other places than the file's."""
+    ends = (part.pose.point(part.start), part.pose.point(part.end))
+    told = (link.start_xyz, link.end_xyz)
+    if any(distance(one, other) > _SAME_PLACE for one, other in zip(ends, told, strict=True)):
+        raise HeaderError(f"{link.module.name} {link.id} joins other faces in the file")
 
 
 def presses_of(header: dict[str, Any]) -> list[dict[str, Any]]:

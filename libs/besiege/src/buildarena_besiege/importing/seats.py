@@ -59,19 +59,22 @@ def mounts_of(parts: Sequence[Part], faces: Faces) -> list[Seat | None]:
         faces: Their faces.
     """
     mounts: list[Seat | None] = [None] * len(parts)
-    taken: set[int] = set()
-    for reach in (_TOUCHING, _NEAR):
+    taken: set[Seat] = set()
+    # A block that itself sits nowhere may carry another on the face it once sat by.
+    for reach, roots in ((_TOUCHING, False), (_NEAR, False), (_TOUCHING, True)):
         for i, part in enumerate(parts):
             if part.module.kind == "start" or mounts[i] is not None or not len(faces.seats):
                 continue
-            for found in _candidates(part, faces, reach):
-                base, label = faces.seats[found]
-                root_face = parts[base].module.root_face
-                if found in taken or label == root_face or _carries(mounts, i, base):
-                    continue
-                mounts[i] = (base, label)
-                taken.add(found)
-                break
+            if (i, part.module.root_face) in taken:
+                continue
+            for seat in _candidates(part, faces, reach):
+                base = seat[0]
+                by_root = seat[1] == parts[base].module.root_face
+                open_ = not by_root or (roots and mounts[base] is None)
+                if open_ and seat not in taken and not _carries(mounts, i, base):
+                    mounts[i] = seat
+                    taken.add(seat)
+                    break
     return mounts
 
 
@@ -92,12 +95,12 @@ def ends_of(link: Part, parts: Sequence[Part], faces: Faces) -> tuple[Seat | Non
     )
 
 
-def _candidates(part: Part, faces: Faces, reach: float) -> list[int]:
+def _candidates(part: Part, faces: Faces, reach: float) -> list[Seat]:
     apart = np.linalg.norm(faces.centers - np.array(part.pose.xyz), axis=1)
     axis = np.array(part.pose.direction((0.0, 0.0, 1.0)))
     fitting = np.flatnonzero((apart <= reach) & (faces.normals @ axis >= _ALIGNED))
     ordered = sorted(fitting.tolist(), key=lambda i: (round(float(apart[i]), 6), i))
-    return [int(i) for i in ordered]
+    return [faces.seats[i] for i in ordered]
 
 
 def _carries(mounts: list[Seat | None], part: int, base: int) -> bool:

@@ -1,0 +1,158 @@
+"""The commands `machine export`, `machine import` and `besiege`."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from tests.besiege.golden import golden_file
+from tests.besiege.lua_game import LuaGame
+from tests.besiege.playing import vehicle
+from tests.besiege.published_logs import copies
+from tests.besiege.test_published_logs import DRIVE_ROWS
+from tests.besiege.test_reading_files import assert_alike, contents
+from typer.testing import CliRunner
+
+from buildarena_benchmark import builtin_tasks
+from buildarena_besiege import read_machine_file, run_ids
+from buildarena_besiege.importing.xml_file import parse_file
+from buildarena_cli.main import app
+from buildarena_geometry import Machine
+
+
+def run(*words: object):
+    return CliRunner().invoke(app, [str(word) for word in words])
+
+
+@pytest.fixture
+def machine(tmp_path: Path) -> Path:
+    file = tmp_path / "machine.json"
+    document = vehicle(cannon=True).to_document()
+    document["control_sequence"] = [{"time_s": 1.0, "key": "UpArrow", "hold_for_s": 20.0}]
+    file.write_text(json.dumps(document), encoding="utf-8")
+    return file
+
+
+def test_export_and_import_are_each_others_opposite(machine, tmp_path) -> None:
+    file, back = tmp_path / "my-machine.bsg", tmp_path / "back.json"
+    assert run("machine", "export", machine, "--out", file, "--task", "transport-2").exit_code == 0
+    done = run("machine", "import", file, "--out", back, "--json")
+    told = json.loads(done.stdout)
+    assert (told["name"], told["parts"]) == ("my-machine", 5)
+    assert told["not_understood"] == ["block 6 (Ballast): a cargo is the task's: left out"]
+    ours = Machine.from_document(json.loads(machine.read_text()))
+    assert_alike(contents(Machine.from_document(json.loads(back.read_text()))), contents(ours))
+    assert "a cargo is the task's" in run("machine", "import", file).stdout
+    plain = run("machine", "export", machine, "--out", file)
+    assert plain.exit_code == 0
+    assert "Everything was understood." in run("machine", "import", file).stdout
+
+
+def test_other_keys_may_be_pressed(machine, tmp_path) -> None:
+    controls = tmp_path / "controls.json"
+    controls.write_text('[{"time": 2, "key": "Alpha2", "hold_for": 1.5}]', encoding="utf-8")
+    file = tmp_path / "m.bsg"
+    for task in (("--task", "transport-1"), ()):
+        done = run("machine", "export", machine, "--out", file, "--controls", controls, *task)
+        assert done.exit_code == 0, done.output
+        (press,) = read_machine_file(file.read_bytes()).machine.control_sequence
+        assert (press.key, press.time_s, press.hold_for_s) == ("Alpha2", 2, 1.5)
+    controls.write_text('[{"time": 2, "key": "Z", "hold_for": 1.5}]', encoding="utf-8")
+    done = run("machine", "export", machine, "--out", file, "--controls", controls)
+    assert (done.exit_code, "expected one of UpArrow" in done.stderr) == (1, True)
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (("--out", "x.stl"), ".glb, .svg, .json, .bsg"),
+        (("--out", "x.glb", "--task", "lift-1"), "--task is for .bsg files"),
+        (("--out", "Big Name.bsg"), "lower case letters"),
+        (("--out", "x.bsg", "--task", "lift-9"), "no task 'lift-9'"),
+        (("--out", "x.bsg", "--controls", "none.json"), "none.json"),
+    ],
+)
+def test_wrong_words_are_named(machine, tmp_path, monkeypatch, words, says) -> None:
+    monkeypatch.chdir(tmp_path)
+    done = run("machine", "export", machine, *words)
+    assert (done.exit_code, says in done.stderr) == (1, True), done.stderr
+
+
+def test_machine_files_are_read_wherever_machines_are(tmp_path) -> None:
+    file = tmp_path / "published.bsg"
+    file.write_bytes(golden_file("single_1_plain_none"))
+    done = run("machine", "check", file)
+    assert (done.exit_code, "25 parts" in done.stdout) == (1, True)
+    assert "the Lua script is not ours" in done.stderr
+    assert run("machine", "export", file, "--out", tmp_path / "x.glb").exit_code == 0
+    file.write_bytes(b"<Machine/>")
+    done = run("machine", "check", file)
+    assert (done.exit_code, "no blocks" in done.stderr) == (1, True)
+
+
+def test_a_level_is_written(tmp_path) -> None:
+    out = tmp_path / "gap.blv"
+    assert run("besiege", "level", "support-2", "--out", out).exit_code == 0
+    assert out.read_bytes().count(b'Prefab="7000"') == 2
+    done = run("besiege", "level", "lift-1", "--out", out)
+    assert "has no terrain" in done.stderr
+    assert ".blv" in run("besiege", "level", "lift-1", "--out", tmp_path / "x.bsg").stderr
+
+
+@pytest.fixture
+def played(machine, tmp_path) -> Path:
+    """The log of the machine's exported file, played in a Lua."""
+    file = tmp_path / "m.bsg"
+    run("machine", "export", machine, "--out", file, "--task", "transport-1")
+    parsed = parse_file(file.read_bytes())
+    script = next(one.text for one in parsed.entries if one.key == "lua_data")
+    references: dict[object, int] = {0: 0}
+    for number, block in enumerate(parsed.blocks):
+        key = next(one.text for one in block.entries if one.key == "bmt-lua_ref_key")
+        references.setdefault(key, number)
+    duration_s = builtin_tasks()["transport-1"].scenario.duration_s
+    game = LuaGame(references, path=lambda i, n: (float(i), 1.0, n * 0.004))
+    game.play(script, round(duration_s * 100) + 30)
+    assert game.held("UpArrow") == [[100, 2100]]
+    log = tmp_path / "log.txt"
+    log.write_text("\ufeff" + "\r\n".join(reversed(game.lines)), encoding="utf-8")
+    return log
+
+
+def test_our_logs_are_scored(machine, played) -> None:
+    for file in (machine, played.parent / "m.bsg"):
+        done = run("besiege", "score", played, "--machine", file, "--task", "transport-1", "--json")
+        told = json.loads(done.stdout)
+        assert told["indicator"] == pytest.approx(12.0, abs=0.03)
+        assert told["engine"] == "besiege"
+    assert (
+        "distance"
+        in run("besiege", "score", played, "--machine", machine, "--task", "transport-1").stdout
+    )
+
+
+def test_published_logs_are_scored(machine, tmp_path) -> None:
+    log = tmp_path / "simulation_log.csv"
+    log.write_text(copies(DRIVE_ROWS), encoding="utf-8")
+    done = run("besiege", "score", log, "--machine", machine, "--task", "transport-1", "--json")
+    assert json.loads(done.stdout)["indicator"] == pytest.approx(12.0, abs=0.1)
+
+
+def test_logs_that_cannot_be_scored_are_named(machine, played, tmp_path) -> None:
+    def said(text: str, *words: str) -> str:
+        log = tmp_path / "other.txt"
+        log.write_text(text, encoding="utf-8")
+        done = run("besiege", "score", log, "--machine", machine, "--task", "transport-1", *words)
+        assert done.exit_code == 1
+        return done.stderr
+
+    whole = played.read_text(encoding="utf-8")
+    (run_id,) = run_ids(whole)
+    assert "neither a log of ours nor" in said("hello")
+    assert "no run 'x'; there are " + run_id in said(whole, "--run", "x")
+    assert "The end line is missing" in said(
+        "\n".join(w for w in whole.splitlines() if ",e," not in w)
+    )
+    done = run("besiege", "score", played, "--machine", machine, "--task", "lift-1")
+    assert "another machine or another scenario" in done.stderr

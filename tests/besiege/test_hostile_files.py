@@ -1,0 +1,85 @@
+"""Machine files that were damaged, or made to do harm, are refused or sound."""
+
+from __future__ import annotations
+
+import re
+import time
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from tests.besiege.foreign_files import FOREIGN, TRACKER, block, foreign
+from tests.besiege.golden import golden_file
+from tests.besiege.hostile import TRICKS, mutated
+from tests.besiege.playing import press, vehicle
+
+from buildarena_besiege import MachineFileError, plain_machine_file, read_machine_file
+from buildarena_geometry import DocumentError, Machine
+
+
+@pytest.mark.parametrize("trick", TRICKS)
+def test_tricks_are_refused_in_a_moment(trick) -> None:
+    started = time.process_time()
+    with pytest.raises(MachineFileError) as refused:
+        read_machine_file(TRICKS[trick])
+    assert time.process_time() - started < 5
+    assert "root:" not in str(refused.value)
+    assert len(str(refused.value)) < 300
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        (
+            'x="0" y="0" z="0.5"',
+            'x="nan" y="0" z="0.5"',
+            "block 2: Position x: 'nan' is not a number",
+        ),
+        ('x="0" y="0" z="0.5"', 'x="1e9" y="0" z="0.5"', "'1e9' is not a number within"),
+        ('x="0" y="0" z="0.5"', 'y="0" z="0.5"', "block 2: Position x: '' is not"),
+        ('id="15"', 'id="-3"', "block 2: its id '-3' is not the number of a type"),
+        ('id="0"', 'id="15"', "no starting block"),
+        ('<Rotation x="0" y="0" z="0" w="1"/>', '<Rotation x="0" y="0" z="0" w="0"/>', "no length"),
+        ("Transform", "Transmogrify", "no Transform"),
+    ],
+)
+def test_bad_values_are_named(old, new, says) -> None:
+    text = FOREIGN.format(blocks="", data="", version="1.4").replace(old, new)
+    with pytest.raises(MachineFileError, match=re.escape(says)):
+        read_machine_file(text.encode())
+
+
+def test_a_thousand_blocks_at_one_place_are_no_hang() -> None:
+    many = "".join(block(15, place='x="0" y="0" z="0.5"') for _ in range(1200))
+    started = time.process_time()
+    imported = foreign(many)
+    assert imported.machine.part_count == 1202
+    assert time.process_time() - started < 20
+
+
+SAMPLES = [
+    golden_file("single_5_transport_medium"),
+    plain_machine_file(vehicle(cannon=True), name="m", controls=[press(1.0, "UpArrow", 1.0)]),
+    FOREIGN.format(blocks=block(7) + block(2), data=TRACKER, version="1.3").encode(),
+]
+
+
+def refused_or_sound(data: bytes) -> bool:
+    """Whether a file is refused as one, or read as a machine that can be written again."""
+    try:
+        imported = read_machine_file(data)
+    except MachineFileError:
+        return False
+    document = imported.machine.to_document()
+    try:
+        assert Machine.from_document(document) == imported.machine
+    except DocumentError:
+        assert any("would not be read back" in one for one in imported.not_understood)
+    assert plain_machine_file(imported.machine, name="m")
+    return True
+
+
+@given(st.integers(0, 2**32), st.sampled_from(range(len(SAMPLES))))
+@settings(max_examples=100, deadline=None)
+def test_damaged_files_are_refused_or_sound(seed, which) -> None:
+    refused_or_sound(mutated(SAMPLES[which], seed))

@@ -1,0 +1,232 @@
+"""Scripts do in every Lua what the published ones do, and what the control sequence says."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from tests.besiege.golden import goldens, scenario_of
+from tests.besiege.lua_game import VERSIONS
+from tests.besiege.playing import log_of, played, press, vehicle
+
+from buildarena_benchmark import builtin_tasks
+from buildarena_besiege import MachineNotPlayableError, prepare_run, trajectory_of
+from buildarena_besiege.check_sums import check_sum
+from buildarena_besiege.keys import key_edges
+from buildarena_besiege.script import lua_text
+from buildarena_besiege.tracking import tracked_blocks
+from buildarena_simulation import Scenario
+
+TASKS = builtin_tasks()
+SHORT = TASKS["transport-2"].scenario.model_copy(update={"duration_s": 2.0})
+
+
+def _exports():
+    """Of each machine one drive with its keys, and of some one other trial."""
+    for number, one in enumerate(goldens()):
+        trials = [e for e in one.exports if not e["refused"] and e["category"] != "plain"]
+        for drives in (True, False)[: 2 - (number % 3 > 0)]:
+            fitting = [e for e in trials if (e["category"] == "transport") == drives]
+            for export in fitting[-1:]:
+                name = f"{one.name}-{export['category']}-{export['level']}"
+                yield pytest.param(one, export, id=name)
+
+
+EXPORTS = list(_exports())
+
+
+def in_order_of_time(presses) -> bool:
+    times = [one.time_s for one in presses]
+    return times == sorted(times)
+
+
+@pytest.mark.parametrize(("found", "export"), EXPORTS)
+def test_keys_and_slider_are_those_of_the_published_script(found, export) -> None:
+    machine, presses = found.played(export)
+    game = played(machine, scenario_of(export), controls=presses)
+    theirs = {key: one["held"] for key, one in export["lua"]["keys"].items() if one["held"]}
+    if in_order_of_time(presses):
+        assert {key: game.held(key) for key in game.calls if game.held(key)} == theirs
+    ours = {n: (name, value) for n, name, value in game.slider}
+    assert len(game.slider) == export["lua"]["slider_calls"]
+    for n, _, name, value in export["lua"]["slider"]:
+        assert ours[n] == (name, pytest.approx(value, abs=1e-9))
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+@pytest.mark.parametrize("task", ["transport-3", "support-1", "lift-1", "lift-3"])
+def test_every_lua_prints_the_same(version, task) -> None:
+    scenario = TASKS[task].scenario.model_copy(update={"duration_s": 6.0})
+    machine = vehicle(cannon=True)
+    lines = played(machine, scenario, version=version, updates=660).lines
+    assert lines == played(machine, scenario, version="lua54", updates=660).lines
+    assert lines[0].startswith("ba,run-1,b,")
+    assert [line.split(",")[2:4] for line in lines[-3:]] == [
+        ["e", "600"],
+        ["e", "625"],
+        ["e", "650"],
+    ]
+
+
+def test_lines_hold_their_sums_and_at_most_eight_blocks() -> None:
+    machine = vehicle()
+    for _ in range(12):
+        last = str(machine.state.next_id - 1)
+        face = "E"
+        assert machine.act(
+            "attach_block_to", {"base_block": last, "face": face, "new_block": "Small Wooden Block"}
+        ).ok
+    lines = played(machine, Scenario(duration_s=2.0)).lines
+    samples = [line.split(",") for line in lines if ",s," in line]
+    assert {(one[4], one[5]) for one in samples} == {("1", "2"), ("2", "2")}
+    assert {len(one) for one in samples} == {6 + 8 * 5 + 1}
+    assert all(check_sum(line.rpartition(",")[0]) == int(line.rpartition(",")[2]) for line in lines)
+    assert max(map(len, lines)) < 500
+
+
+def test_positions_have_four_decimals_whatever_their_size() -> None:
+    paths = {
+        0: (1.00004, -0.00006, 199999.99996),
+        1: (float("nan"), float("inf"), -1e12),
+        2: (-0.5, 0.0, -12345.67891),
+    }
+    scenario = Scenario(duration_s=2.0, tracked_blocks=("1", "2", "3"))
+    game = played(vehicle(), scenario, path=lambda i, _: paths.get(i, (0.0, 0.0, 0.0)))
+    fields = next(line for line in game.lines if ",s," in line).split(",")
+    assert fields[8:11] == ["1.0000", "-0.0001", "200000.0000"]
+    assert fields[13:16] == ["nan", "nan", "nan"]
+    assert fields[18:21] == ["-0.5000", "0.0000", "-12345.6789"]
+
+
+KEYS = st.sampled_from(["UpArrow", "Alpha2"])
+PRESSES = st.lists(
+    st.builds(
+        press, st.floats(0, 12), KEYS, st.floats(0.001, 4) | st.sampled_from([0.1, 0.5, 1.0])
+    ),
+    max_size=8,
+)
+
+
+def union(presses, key) -> set[int]:
+    """The updates during which some hold of the key lasts, its ends rounded to a tenth."""
+    down: set[int] = set()
+    for one in presses:
+        if one.key == key:
+            start = round(float(f"{one.time_s:.1f}") * 100)
+            end = round(float(f"{one.time_s + one.hold_for_s:.1f}") * 100)
+            down |= set(range(max(start, 1), end))
+    return down
+
+
+@given(PRESSES)
+@settings(max_examples=60, deadline=None)
+def test_a_key_is_down_while_some_hold_of_it_lasts(presses) -> None:
+    game = played(vehicle(), SHORT, controls=presses, updates=1700)
+    for key in ("UpArrow", "Alpha2"):
+        down = {n for start, end in game.held(key) for n in range(start, end or 1701)}
+        assert down == union(presses, key)
+        changes = [now for _, now in game.calls.get(key, [])]
+        assert changes == [i % 2 == 0 for i in range(len(changes))], "one call for each edge"
+
+
+def test_touching_holds_are_one_and_rounding_is_the_published_one() -> None:
+    edges = key_edges([press(1.0, "UpArrow", 0.5), press(1.5, "UpArrow", 0.25)])
+    assert [(edge.update, edge.down) for edge in edges] == [(100, True), (180, False)]
+    assert [edge.update for edge in key_edges([press(2.25, "UpArrow", 1)])] == [220, 320]
+    assert key_edges([press(1.01, "UpArrow", 0.02)]) == ()
+    assert [edge.update for edge in key_edges([press(0.0, "UpArrow", 0.1)])] == [1, 10]
+
+
+def test_presses_of_unbound_keys_reach_nothing() -> None:
+    assert played(vehicle(), SHORT, controls=[press(0.5, "Keypad7", 1)]).calls == {}
+
+
+@pytest.mark.parametrize("key", ['x") os.exit("', "Alpha10", "", "alpha1\n"])
+def test_unknown_keys_are_refused_with_the_known_ones(key) -> None:
+    with pytest.raises(MachineNotPlayableError, match="the keys are UpArrow, DownArrow"):
+        key_edges([press(0.0, key, 1.0)])
+
+
+@pytest.mark.parametrize("time_s", [float("nan"), float("-inf")])
+def test_times_that_are_no_numbers_are_refused(time_s) -> None:
+    with pytest.raises(MachineNotPlayableError, match="numbers of seconds"):
+        key_edges([press(time_s, "UpArrow", 1.0)])
+    assert key_edges([press(float("inf"), "UpArrow", 1.0)]) == ()
+
+
+def test_held_cannons_get_a_key_of_their_own() -> None:
+    machine = vehicle(cannon=True)
+    later = TASKS["lift-2"].scenario
+    game = played(machine, later.model_copy(update={"duration_s": 4.0}))
+    assert {key: game.held(key) for key in game.calls} == {"Alpha1": [[200, None]]}
+    run = prepare_run(machine, later, name="x", run_id="r")
+    assert b"<String>Alpha5</String><String>Alpha1</String>" in run.machine_file
+    at_once = TASKS["lift-1"].scenario
+    assert played(machine, at_once.model_copy(update={"duration_s": 4.0})).calls == {}
+    assert b"Alpha1" not in prepare_run(machine, at_once, name="x", run_id="r").machine_file
+    assert played(vehicle(), later.model_copy(update={"duration_s": 4.0})).calls == {}
+
+
+def test_the_scenario_says_which_blocks_are_reported() -> None:
+    machine = vehicle(cannon=True)
+    everything = ("1", "2", "3", "4", "5")
+    assert tracked_blocks(machine, TASKS["transport-1"].scenario) == ("1", "2", "3")
+    assert tracked_blocks(machine, TASKS["support-2"].scenario) == ()
+    assert tracked_blocks(machine, TASKS["lift-1"].scenario) == everything
+    assert tracked_blocks(machine, TASKS["lift-3"].scenario) == everything
+    assert tracked_blocks(machine, Scenario(duration_s=1.0, tracked_blocks=("4",))) == ("4",)
+    with pytest.raises(MachineNotPlayableError, match="no block 9"):
+        tracked_blocks(machine, Scenario(duration_s=1.0, tracked_blocks=("9",)))
+
+
+def test_a_run_knows_ground_level_and_duration() -> None:
+    machine = vehicle()
+    run = prepare_run(machine, TASKS["support-1"].scenario, name="a-1_b", run_id="r")
+    assert (run.set_ground, run.duration_s, run.tracked) == (False, 17.0, ())
+    assert run.level is not None
+    run = prepare_run(machine, TASKS["transport-1"].scenario, name="a", run_id="r")
+    assert (run.set_ground, run.duration_s, run.level) == (True, 30.0, None)
+    assert run.script.encode()[:40] in run.machine_file
+
+
+@pytest.mark.parametrize("name", ["", "A", "a b", "a.bsg", "ä", "a" * 101, 'a"'])
+def test_names_that_cannot_be_typed_are_refused(name) -> None:
+    with pytest.raises(ValueError, match="lower case letters"):
+        prepare_run(vehicle(), SHORT, name=name, run_id="r")
+
+
+EVIL = ['"]]os.exit()--', "a\nb", "\\", "ü,1", "'); error('", "]]", "\x00", "ba,run-1,e,1", "%d %s"]
+
+
+@pytest.mark.parametrize("evil", EVIL)
+@pytest.mark.parametrize("version", ["lua51", "lua54"])
+def test_texts_of_users_stay_texts(evil, version) -> None:
+    machine = vehicle()
+    document = machine.to_document()
+    for block in document["blocks"]:
+        block["id"] += evil
+        block["note"] = evil
+        if block["mount"]:
+            block["mount"][0] += evil
+    machine = type(machine).from_document({**document, "next_id": 90})
+    game = played(machine, SHORT, run_id=evil, version=version)
+    trajectory = trajectory_of(log_of(game, evil), machine, SHORT, game="1", mod="2")
+    assert trajectory.block_ids == tuple(machine.blocks)[:3]
+
+
+@given(st.text(max_size=30))
+@settings(max_examples=100, deadline=None)
+def test_any_text_is_a_lua_text(text) -> None:
+    import lupa.lua54
+
+    runtime = lupa.lua54.LuaRuntime(encoding=None)
+    assert runtime.execute(f"return {lua_text(text)}".encode()) == text.encode("utf-8", "replace")
+
+
+def test_machines_the_game_cannot_take_are_refused() -> None:
+    from buildarena_geometry import Machine
+
+    with pytest.raises(MachineNotPlayableError, match="no blocks"):
+        prepare_run(Machine(), SHORT, name="a", run_id="r")
+    with pytest.raises(ValueError, match="1 to 200 characters"):
+        prepare_run(vehicle(), SHORT, name="a", run_id="")

@@ -1,0 +1,187 @@
+"""Logs become trajectories in our world frame; what is missing is said."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from tests.besiege.playing import RUN, log_of, played, press, vehicle
+
+from buildarena_benchmark import builtin_tasks, score
+from buildarena_besiege import GameLog, LogIncompleteError, trajectory_of
+from buildarena_simulation import Scenario, read_trajectory, write_trajectory
+
+TASKS = builtin_tasks()
+MACHINE = vehicle(cannon=True)
+SHORT = Scenario(duration_s=2.0)
+
+
+def still(i: int, n: int) -> tuple[float, float, float]:
+    return (float(i), 5.0 + 0.01 * n, -2.0 * i)
+
+
+def trajectory(game, machine=MACHINE, scenario=SHORT):
+    return trajectory_of(log_of(game), machine, scenario, game="1.75", mod="2")
+
+
+def without(game, gone) -> GameLog:
+    """The log without the samples of some updates."""
+    log = GameLog(RUN)
+    log.read("\n".join(x for x in game.lines if ",s," not in x or int(x.split(",")[3]) not in gone))
+    return log
+
+
+def test_positions_are_east_north_up_at_25_hz() -> None:
+    found = trajectory(played(MACHINE, SHORT, path=still))
+    assert found.block_ids == ("1", "2", "3", "4", "5")
+    assert found.time_s.tolist() == [k / 25 for k in range(51)]
+    expected = np.array(
+        [[[i, -2.0 * i, 5.0 + 0.04 * max(k, 1)] for i in range(5)] for k in range(51)]
+    )
+    assert np.abs(found.positions - expected).max() < 2e-4
+    assert (found.engine, found.engine_version) == ("besiege", "1.75-2")
+    assert (found.bearing, found.breaks, found.joint_peaks) == (None, (), ())
+    assert found.cargo_position is None
+
+
+def test_turns_are_those_at_the_start_and_said_to_be() -> None:
+    found = trajectory(played(MACHINE, SHORT, path=still))
+    placed = [block.world_from_block.wxyz for block in MACHINE.blocks.values()]
+    assert np.abs(found.quaternions - np.array(placed)).max() < 1e-5
+    assert found.settings["quaternions"] == "as placed at the start"
+
+
+def test_the_cargo_has_place_and_mass() -> None:
+    scenario = TASKS["transport-2"].scenario.model_copy(update={"duration_s": 4.0})
+    found = trajectory(played(MACHINE, scenario, path=still), scenario=scenario)
+    assert found.block_ids == ("1", "2", "3")
+    cargo = len(MACHINE.blocks)  # it comes last in the file
+    assert found.cargo_position[25] == pytest.approx([cargo, -2.0 * cargo, 6.0], abs=1e-3)
+    wanted = [scenario.cargo.mass_at(k / 25) for k in range(1, 101)]
+    assert found.cargo_mass[1:] == pytest.approx(wanted, abs=1e-4)
+    assert found.cargo_size == scenario.cargo.size
+    assert found.settings["cannons_not_reported"] == 1
+
+
+def test_cannons_that_burn_are_heated() -> None:
+    found = trajectory(played(MACHINE, SHORT, path=still, burning=lambda _, n: n >= 100))
+    assert found.cannon_ids == ("5",)
+    assert found.heated[:, 0].tolist() == [k >= 25 for k in range(51)]
+
+
+def test_a_block_that_went_away_is_a_piece_of_its_own() -> None:
+    def path(i, n):
+        x, y, z = still(i, n)
+        away = 5.0 if i == 3 and 80 <= n < 120 else 0.9 if i == 2 else 0.0
+        return (x + away * min(n / 80, 1.0), y, z)
+
+    found = trajectory(played(MACHINE, SHORT, path=path))
+    assert (found.pieces[:20] == 0).all()
+    assert found.pieces[50].tolist() == [0, 0, 0, 3, 0], "what broke off stays off"
+
+
+def test_pieces_are_unknown_without_a_starting_block() -> None:
+    scenario = SHORT.model_copy(update={"tracked_blocks": ("2", "5")})
+    assert trajectory(played(MACHINE, scenario, path=still), scenario=scenario).pieces is None
+
+
+@pytest.mark.parametrize("gone", [{100}, {100, 104, 108, 112}, {4, 8, 12}, {192, 196, 200}])
+def test_short_gaps_are_filled_in_a_straight_line(gone) -> None:
+    game = played(MACHINE, SHORT, path=still)
+    found = trajectory_of(without(game, gone), MACHINE, SHORT, game="1", mod="2")
+    whole = trajectory(game)
+    inside = slice(5, 46)
+    assert np.abs(found.positions[inside] - whole.positions[inside]).max() < 1e-3
+    assert found.settings["filled_samples"] == len(gone)
+    assert found.settings["longest_gap_s"] == pytest.approx(
+        0.04 * (len(gone) + (100 in gone or 4 in gone))
+    )
+
+
+@pytest.mark.parametrize(
+    ("gone", "says"),
+    [
+        (range(100, 121, 4), r"Between 0\.96 s and 1\.24 s nothing is told of block 1"),
+        (range(4, 29, 4), r"Between 0\.00 s and 0\.32 s"),
+        (range(176, 201, 4), r"Between 1\.72 s and 2\.00 s"),
+        (range(4, 201, 4), "tells nothing of block 1"),
+    ],
+)
+def test_long_gaps_are_named(gone, says) -> None:
+    game = played(MACHINE, SHORT, path=still)
+    with pytest.raises(LogIncompleteError, match=says):
+        trajectory_of(without(game, set(gone)), MACHINE, SHORT, game="1", mod="2")
+
+
+def test_a_log_without_begin_or_end_is_incomplete() -> None:
+    lines = played(MACHINE, SHORT, path=still).lines
+    log = GameLog(RUN)
+    with pytest.raises(LogIncompleteError, match="begin line of run run-1 is missing"):
+        trajectory_of(log, MACHINE, SHORT, game="1", mod="2")
+    log.read("\n".join(line for line in lines if ",e," not in line))
+    with pytest.raises(LogIncompleteError, match=r"ends at 2\.00 s of 2 s"):
+        trajectory_of(log, MACHINE, SHORT, game="1", mod="2")
+
+
+def test_a_log_of_something_else_is_refused() -> None:
+    log = log_of(played(MACHINE, SHORT, path=still))
+    for machine, scenario in (
+        (vehicle(), SHORT),
+        (MACHINE, SHORT.model_copy(update={"duration_s": 1.0})),
+        (MACHINE, TASKS["lift-1"].scenario),
+    ):
+        with pytest.raises(LogIncompleteError, match="another machine or another scenario"):
+            trajectory_of(log, machine, scenario, game="1", mod="2")
+
+
+def test_a_log_always_makes_the_same_trajectory() -> None:
+    game = played(MACHINE, SHORT, path=still)
+    first, second = trajectory(game), trajectory(game)
+    assert dict(first.settings) == dict(second.settings)
+    assert write_trajectory(first) == write_trajectory(second)
+    again = read_trajectory(write_trajectory(first))
+    assert again.engine == "besiege"
+    assert (again.positions == first.positions).all()
+
+
+def test_positions_that_are_no_numbers_stay_so() -> None:
+    game = played(MACHINE, SHORT, path=lambda i, n: (math.nan, 1.0, 1.0) if n > 50 else still(i, n))
+    assert np.isnan(trajectory(game).positions[20:, 0, 0]).all()
+
+
+def drive(i: int, n: int) -> tuple[float, float, float]:
+    return (float(i), 1.0, max(n - 300, 0) * 0.01)
+
+
+@pytest.mark.parametrize("task", ["transport-1", "lift-1", "lift-2"])
+def test_our_scorers_take_it(task) -> None:
+    chosen = TASKS[task]
+    game = played(MACHINE, chosen.scenario, controls=[press(1.0, "UpArrow", 20)], path=drive)
+    found = trajectory(game, scenario=chosen.scenario)
+    result = score(chosen, MACHINE, found)
+    if task == "transport-1":
+        assert result.indicator == pytest.approx(27.0, abs=0.01)
+        assert "drive_not_measured" in result.flags
+        assert found.settings["effective_key_presses"] == 1
+
+
+def fall(i: int, n: int) -> tuple[float, float, float]:
+    return (0.0, 8.0 - (max(n - 1000, 0) * 0.01), 0.0) if i == 5 else (float(i), 6.0, 0.0)
+
+
+def test_the_load_of_a_bridge_is_the_cargos_mass_when_it_falls() -> None:
+    chosen = TASKS["support-2"]
+    found = trajectory(played(MACHINE, chosen.scenario, path=fall), scenario=chosen.scenario)
+    result = score(chosen, MACHINE, found)
+    assert result.success
+    assert result.indicator == pytest.approx(chosen.scenario.cargo.mass_at(14.04), abs=0.1)
+    assert "span_not_measured" in result.flags
+
+
+def test_a_run_that_reports_nothing_still_tells_its_time() -> None:
+    scenario = SHORT.model_copy(update={"placement": TASKS["support-1"].scenario.placement})
+    game = played(MACHINE, scenario)
+    assert log_of(game).time_s == 2.0
+    found = trajectory(game, scenario=scenario)
+    assert (found.positions.shape, found.cargo_position, found.pieces) == ((51, 0, 3), None, None)
