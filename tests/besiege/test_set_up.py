@@ -7,7 +7,7 @@ import os
 import subprocess
 import sys
 import time
-from pathlib import Path
+from typing import Self
 
 import pytest
 from game_rig import Rig
@@ -17,7 +17,6 @@ from buildarena_simworker.simulators.besiege.calibration import (
     Calibration,
     load_calibration,
 )
-from buildarena_simworker.simulators.besiege.doctor import examine
 from buildarena_simworker.simulators.besiege.errors import NotSetUpError
 from buildarena_simworker.simulators.besiege.log_sources import LogFile
 from buildarena_simworker.simulators.besiege.process import GameProcess
@@ -29,7 +28,7 @@ PROGRAM = [sys.executable, "-m", "buildarena_simworker.simulators.besiege"]
 
 def answer(words: list[str], rig: Rig, screen: dict[str, str] | None, **given: object):
     environment = {**os.environ, **rig.environment(), **(screen or {})}
-    if screen is None:
+    if "DISPLAY" not in (screen or {}):
         environment.pop("DISPLAY", None)
     return subprocess.run(
         [*PROGRAM, *words],
@@ -76,7 +75,7 @@ class GamePlayed:
         self._rig = rig
         self.told = ""
 
-    def __enter__(self) -> GamePlayed:
+    def __enter__(self) -> Self:
         words = self._environment["BUILDARENA_BESIEGE_COMMAND"].replace("{level}", "").split()
         self._game = subprocess.Popen(words, env=self._environment)
         ends = time.monotonic() + 20
@@ -123,13 +122,11 @@ class GamePlayed:
         )
 
 
-def test_a_machine_that_can_play_is_found_able(rig: Rig, screen, tmp_path) -> None:
+def test_a_machine_that_can_play_is_found_able(rig: Rig, screen) -> None:
     done = answer(["doctor", "--json"], rig, screen)
-    findings = {one["name"]: one for one in json.loads(done.stdout)}
-    assert all(one["ok"] for one in findings.values()), findings
-    assert {"versions", "folder of machine files", "display", "calibration", "window"} <= set(
-        findings
-    )
+    found = {one["name"]: one for one in json.loads(done.stdout)}
+    assert all(one["ok"] for one in found.values()), found
+    assert {"versions", "folder of machine files", "display", "calibration", "window"} <= set(found)
 
 
 def test_without_a_screen_the_doctor_says_so_and_goes_on(rig: Rig) -> None:
@@ -157,16 +154,15 @@ def test_a_worker_without_a_screen_does_not_start_and_says_why(rig: Rig) -> None
 @pytest.mark.parametrize(
     ("changes", "named"),
     [
-        ({"machines": Path("/nowhere")}, "folder of machine files"),
-        ({"game": ""}, "versions"),
-        ({"desktop": "headless", "command": ""}, "restart"),
+        ({"MACHINES": "/nowhere"}, "folder of machine files"),
+        ({"GAME": ""}, "versions"),
+        ({"DESKTOP": "headless", "COMMAND": ""}, "restart"),
     ],
 )
 def test_what_is_missing_is_named_with_advice(rig: Rig, changes, named) -> None:
-    given = {"game": "1", "mod": "1", "machines": rig.machines, "state": rig.folder / "state"}
-    findings = {one.name: one for one in examine(BesiegeSettings(**{**given, **changes}))}
-    assert not findings[named].ok
-    assert "BUILDARENA_BESIEGE_" in findings[named].advice
+    found = findings(rig, {f"BUILDARENA_BESIEGE_{name}": to for name, to in changes.items()})
+    assert not found[named]["ok"]
+    assert "BUILDARENA_BESIEGE_" in found[named]["advice"]
 
 
 @pytest.mark.parametrize("kind", ["folder", "manifest", "none"])
@@ -177,9 +173,14 @@ def test_the_mod_is_looked_for_by_name_and_by_manifest(rig: Rig, tmp_path, kind)
         (mods / "Lua Scripting Mod").mkdir()
     elif kind == "manifest":
         (mods / "Other" / "Mod.xml").write_text("<Mod><Name>LuaScripting</Name></Mod>")
-    settings = BesiegeSettings(game="1", mod="1", machines=rig.machines, folder=tmp_path / "game")
-    found = next(one for one in examine(settings) if one.name == "Lua Scripting Mod")
-    assert found.ok == (kind != "none")
+    found = findings(rig, {"BUILDARENA_BESIEGE_FOLDER": str(tmp_path / "game")})
+    assert found["Lua Scripting Mod"]["ok"] == (kind != "none")
+
+
+def findings(rig: Rig, changes: dict[str, str]):
+    """What the doctor finds without a screen, by name."""
+    done = answer(["doctor", "--json"], rig, changes)
+    return {one["name"]: one for one in json.loads(done.stdout)}
 
 
 def test_a_calibration_comes_back_as_it_was(tmp_path) -> None:

@@ -66,7 +66,10 @@ def _calibrate(settings: BesiegeSettings, *, ask: bool, only_try: bool) -> int:
         _say(f"saved {file}, calibration {found.digest}")
     desktop, _ = make_desktop(settings)
     _say("Trying it: hands off mouse and keyboard.")
-    return 0 if try_out(desktop, settings.time_limits, _say) else 1
+    try:
+        return 0 if try_out(desktop, settings.time_limits, _say) else 1
+    finally:
+        desktop.close()
 
 
 def _say(line: str) -> None:

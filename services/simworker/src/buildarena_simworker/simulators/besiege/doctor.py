@@ -128,8 +128,11 @@ def _display() -> None:
     from buildarena_simworker.simulators.besiege.hands import Hands
 
     hands = Hands()
-    hands.screenshot()
-    hands.clear_clipboard()
+    try:
+        hands.screenshot()
+        hands.clear_clipboard()
+    finally:
+        hands.close()
 
 
 def _calibration(settings: BesiegeSettings) -> None:

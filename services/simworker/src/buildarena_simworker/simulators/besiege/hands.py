@@ -5,12 +5,12 @@ from __future__ import annotations
 import contextlib
 import io
 import os
-import subprocess
 import sys
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from buildarena_simworker.simulators.besiege.clipboard import open_clipboard
 from buildarena_simworker.simulators.besiege.errors import DesktopError, NotSetUpError
 
 if TYPE_CHECKING:
@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from buildarena_simworker.simulators.besiege.windows import Area
 
 MODIFIERS: Final = ("ctrl", "shift", "alt", "command", "win")
-CLIPBOARD_S: Final = 2.0
-"""How long another program may take to hand over what it copied."""
 SELECT: Final = "command" if sys.platform == "darwin" else "ctrl"
 """The modifier of "select all" and "copy"."""
 SENTINEL: Final = "nothing was copied"
@@ -44,7 +42,6 @@ class Hands:
             # Xlib prints what it misses to standard output, which is for results.
             with contextlib.redirect_stdout(io.StringIO()):
                 import pyautogui
-                import pyperclip
         except ImportError as error:
             raise NotSetUpError(
                 f"playing the game needs `pip install buildarena-simworker[besiege]` ({error})"
@@ -53,7 +50,7 @@ class Hands:
             raise NotSetUpError(f"there is no screen to play on: {error}") from error
         pyautogui.PAUSE = 0.0
         self._gui: Any = pyautogui
-        self._clip: Any = pyperclip
+        self._clipboard = open_clipboard()
 
     def wait(self, seconds: float) -> None:
         """Waits as long as a game needs at the usual pace."""
@@ -109,12 +106,14 @@ class Hands:
             self._gui.keyUp(key)
         self._gui.mouseUp()
 
+    def close(self) -> None:
+        """Lets go of keys and clipboard."""
+        self.release_all()
+        self._clipboard.close()
+
     def clear_clipboard(self) -> None:
         """Makes the clipboard tell whether something is copied from here on."""
-        try:
-            self._clip.copy(SENTINEL)
-        except self._clip.PyperclipException as error:
-            raise NotSetUpError(f"the clipboard cannot be used: {error}") from error
+        self._clipboard.put(SENTINEL)
 
     def copy_all(self) -> str | None:
         """Selects and copies everything where the keyboard is; None when nothing was copied."""
@@ -123,7 +122,7 @@ class Hands:
         self.wait(0.2)
         self.hotkey(SELECT, "c")
         self.wait(0.2)
-        text = self._pasted()
+        text = self._clipboard.get()
         return None if text is None or text == SENTINEL else text
 
     def picture(self, area: Area) -> Image:
@@ -139,23 +138,6 @@ class Hands:
         data = io.BytesIO()
         ImageGrab.grab().save(data, "PNG")
         return data.getvalue()
-
-    def _pasted(self) -> str | None:
-        if sys.platform in {"win32", "darwin"}:
-            return str(self._clip.paste())
-        # On X11 the owner of the clipboard hands it over itself: a frozen game never does.
-        try:
-            done = subprocess.run(
-                ["xclip", "-selection", "clipboard", "-out"],  # noqa: S607 - where it is differs
-                capture_output=True,
-                timeout=CLIPBOARD_S,
-                check=False,
-            )
-        except subprocess.TimeoutExpired:
-            return None
-        except FileNotFoundError as error:
-            raise NotSetUpError("the clipboard needs the program xclip: install it") from error
-        return done.stdout.decode("utf-8", "replace") if done.returncode == 0 else None
 
 
 def _need_no_authority() -> None:

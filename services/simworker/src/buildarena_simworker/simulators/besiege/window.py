@@ -187,7 +187,7 @@ class WindowDesktop:
 
     def close(self) -> None:
         """Lets go of the keys, and ends the game if it was started here."""
-        self._hands.release_all()
+        self._hands.close()
         self._process.kill()
         self._traces.remove()
 
