@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from pathlib import Path
 
 import numpy as np
@@ -58,7 +59,7 @@ def played(game: Game, seconds: float, frame_s: float = 0.05) -> list[list[str]]
     """The log's fields, oldest line first, after so much game time."""
     game.start()
     while not game.rollout_ready:
-        pass
+        time.sleep(0.01)
     while game.time_s < seconds - 1e-6:
         game.frame(frame_s)
     return [line.split(", ") for line in reversed(game.log.text().split("\n"))]
@@ -216,7 +217,7 @@ def test_frames_bring_all_updates_that_are_due_at_once(tmp_path: Path) -> None:
     game = loaded(machine_file(built(), script=reporting(["1"])), tmp_path, horizon_s=1.0)
     game.start()
     while not game.rollout_ready:
-        pass
+        time.sleep(0.01)
     game.frame(0.039)
     assert game.log.text() == ""
     game.frame(0.101)

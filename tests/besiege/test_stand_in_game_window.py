@@ -106,7 +106,7 @@ def test_the_name_box_keeps_capitals_and_what_was_typed(game: Game, table: Table
     game.press("ctrl", "c")
     game.until("a copy", lambda r: r["counts"]["copies"] == 1)
     assert table.hands.do("copied") == "Tall_2x"
-    table.hands.do("copy", "po st")
+    game.put_on_clipboard("po st")
     game.press("ctrl", "v")
     game.press("backspace")
     game.until("a paste", lambda r: r["name_box"] == "po s")
@@ -162,7 +162,7 @@ def test_the_question_keeps_everything_else_away_until_it_is_answered(game: Game
 
 
 def test_nothing_is_copied_without_focus_or_selection(game: Game, table: Table) -> None:
-    table.hands.do("copy", "what was there")
+    game.put_on_clipboard("what was there")
     game.load("post")
     game.press("ctrl", "l")
     game.start()

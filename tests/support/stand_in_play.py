@@ -61,8 +61,12 @@ class Hands:
         return json.loads(line)
 
     def close(self) -> None:
+        """Ends the process; an xclip it left holds the pipe's other end until the screen goes."""
         self._process.kill()
-        self._process.communicate()
+        self._process.wait()
+        for pipe in (self._process.stdin, self._process.stdout):
+            if pipe is not None:
+                pipe.close()
 
 
 class Game:
@@ -123,6 +127,14 @@ class Game:
         self.until("a rollout", lambda r: r["rollout_ready"])
         self.click("start")
         self.until("simulation", lambda r: r["phase"] == "simulating")
+
+    def put_on_clipboard(self, text: str) -> None:
+        """Copies a text in another program; xclip takes a moment to own the clipboard."""
+        self._hands.do("copy", text)
+        end = time.monotonic() + WAIT_S
+        while self._hands.do("copied") != text:
+            assert time.monotonic() < end, "the clipboard does not take a text"
+            time.sleep(0.01)
 
     def copy_log(self) -> list[str]:
         """What is in the clipboard after the log window was copied."""

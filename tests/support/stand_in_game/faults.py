@@ -70,7 +70,7 @@ class Fault:
     Attributes:
         kind: what.
         at: the point where.
-        left: how often it will still strike; None for ever.
+        left: how often it will still strike; None forever.
         options: what else was told.
     """
 
@@ -165,6 +165,6 @@ def _fault(entry: object) -> Fault:
     if kind in ONLY_AT and point != usual:
         raise FaultError(f"{kind}: strikes at {usual!r} only, not at {point!r}")
     if times is not None and (not isinstance(times, int) or isinstance(times, bool) or times < 0):
-        raise FaultError(f"{kind}: times is a whole number or null (for ever), not {times!r}")
+        raise FaultError(f"{kind}: times is a whole number or null (forever), not {times!r}")
     told = {name: entry[name] for name in options if name in entry}
     return Fault(kind=kind, at=str(point), left=times, options=told)

@@ -13,7 +13,7 @@ _CRASHED: Final = 139
 
 
 def freeze(fault: Fault) -> None:
-    """Does nothing for the fault's seconds, or for ever: no event is answered."""
+    """Does nothing for the fault's seconds, or forever: no event is answered."""
     end = time.monotonic() + fault.number("seconds", 0.0)
     while fault.for_ever or time.monotonic() < end:
         time.sleep(0.05)
