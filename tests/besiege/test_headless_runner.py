@@ -80,7 +80,8 @@ def test_a_fault_once_is_got_over(headless, fault) -> None:
     assert score(task, machine, done.trajectory).indicator > 1.0
 
 
-def test_a_game_that_cannot_be_started_is_a_fault_with_a_sentence(headless, monkeypatch) -> None:
+@pytest.mark.usefixtures("headless")
+def test_a_game_that_cannot_be_started_is_a_fault_with_a_sentence(monkeypatch) -> None:
     monkeypatch.setenv("BUILDARENA_BESIEGE_COMMAND", "/nowhere/besiege")
     settings = BesiegeSettings()
     simulator = BesiegeSimulator(settings, HeadlessDesktop(settings), {})

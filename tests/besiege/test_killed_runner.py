@@ -18,7 +18,7 @@ from buildarena_benchmark import score
 from buildarena_besiege import game_start
 from buildarena_simulation import simulate
 
-pytestmark = pytest.mark.timeout(300)
+pytestmark = pytest.mark.timeout(900)
 KILLS = int(os.environ.get("BESIEGE_KILLS", "3"))
 LONGEST_S = 9.0
 """A run from the game's start to its end takes a little less."""

@@ -207,3 +207,26 @@ def test_no_cargo_mass_makes_an_intact_structure_jitter_or_sink(engine: str, mas
     resting = 1.0 + 0.75
     assert np.ptp(height) < 0.005
     assert height.mean() == pytest.approx(resting - 2 * COLLISION_MARGIN, abs=0.06)
+
+
+def test_a_cargo_falls_as_fast_however_it_grows(engine: str) -> None:
+    machine = Machine()
+    machine.act("start")
+    for final in (5.0, 1000.0):
+        scenario = Scenario.model_validate(
+            {
+                "duration_s": 2,
+                "cargo": {
+                    "size": (2.5, 2.5, 1.5),
+                    "drop_height": 90,
+                    "final_mass": final,
+                    "ramp_start_s": 0,
+                    "ramp_s": 2,
+                },
+            }
+        )
+        rollout = simulate(machine, scenario, engine)
+        assert rollout.cargo_position is not None
+        fallen = rollout.cargo_position[0, 2] - rollout.cargo_position[:, 2]
+        expected = 0.5 * GRAVITY * rollout.time_s**2
+        assert fallen[-1] == pytest.approx(expected[-1], rel=0.03), final

@@ -87,7 +87,7 @@ def test_a_mirrored_car_drives_as_far(engine: str, tasks: dict[str, Task]) -> No
 
 @pytest.mark.parametrize("task", TASKS)
 def test_engines_agree_on_machines_that_nobody_chose(task: str) -> None:
-    result = compared(task, seed=4)
+    result = compared(task, seed=5)
     assert result.same
     assert result.close
 

@@ -117,7 +117,7 @@ def test_seeds_tell_how_often_a_machine_succeeds(run) -> None:
     assert len(set(loads)) > 1
     assert max(loads) < 1.3 * min(loads)
     short = str(DATA / "beam-too-short.json")
-    done = run("simulate", short, "--engine", "mujoco", "--seeds", "2", task_name="support-1")
+    done = run("simulate", short, "--engine", "mujoco", "--seeds", "2", task_name="support-2")
     assert "0 of 2 succeed" in done.output
     assert "failed seeds" in done.output
 

@@ -1,4 +1,4 @@
-"""Plays one short trial in the game and prints its score; a program, so that it can be killed."""
+"""Plays one short trial in the game, prints its score; a program, so that it can be killed."""
 
 from __future__ import annotations
 
@@ -7,12 +7,13 @@ import os
 import sys
 from pathlib import Path
 
+from game_rig import Rig, experts_machine, shortened
+
 from buildarena_benchmark import score
 from buildarena_simworker.simulators.besiege.set_up import make_desktop
 from buildarena_simworker.simulators.besiege.settings import BesiegeSettings
 from buildarena_simworker.simulators.besiege.simulator import BesiegeSimulator
 from buildarena_simworker.simulators.simulator import Trial
-from game_rig import Rig, experts_machine, shortened
 
 
 def main() -> None:

@@ -32,7 +32,7 @@ from buildarena_simulation.trajectory import Trajectory
 if TYPE_CHECKING:
     from buildarena_geometry import Machine
 
-SIMULATION_VERSION: Final = "2"
+SIMULATION_VERSION: Final = "3"
 """Version of the shared model: rises with every change that can move a trajectory."""
 
 _PROGRESS_EVERY = 10

@@ -120,6 +120,9 @@ class MujocoEngine:
         model.body_mass[body] = mass
         model.body_subtreemass[body] = mass
         model.body_inertia[body] = self._inertia_per_mass * mass
+        # A free body by itself takes its inertia from here, computed once and never again.
+        model.dof_M0[:3] = mass
+        model.dof_M0[3:6] = model.body_inertia[body]
         # The solver scales contact softness by these; for a free body they go with 1 / mass.
         model.body_invweight0[body] = self._invweight_times_mass / mass
         model.dof_invweight0[:6] = self._dof_invweight_times_mass / mass
