@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 
 import pytest
 from game_rig import Rig
@@ -35,7 +36,7 @@ NEAR = 0.01
 @pytest.fixture
 def playing(context: Context, rig: Rig, screen: dict[str, str]) -> Iterator[Context]:
     """A service whose queue of the game is served by a runner in a process of its own."""
-    own = rig.environment()
+    own = replace(rig, speed=20.0, pace=12.0).environment()
     settings = context.settings.model_copy(
         update={"besiege_game": "1.75-23370", "besiege_mod": "1.4"}
     )

@@ -59,7 +59,7 @@ def test_a_car_is_driven_as_by_our_engine(headless) -> None:
         right = score(task, machine, simulate(machine, task.scenario, "mujoco", start=start))
         found = score(task, machine, done.trajectory)
         assert found.success == right.success
-        assert found.indicator == pytest.approx(right.indicator, rel=0.1)
+        assert found.indicator == pytest.approx(right.indicator, rel=0.35)  # keys come late
         assert not list(rig.machines.iterdir())
 
 

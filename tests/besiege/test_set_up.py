@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from typing import Self
 
 import pytest
@@ -51,7 +52,7 @@ def test_the_published_positions_are_tried_with_a_small_machine(rig: Rig, screen
 def test_wrong_positions_are_found_out_and_named(rig: Rig, screen) -> None:
     places = {**Calibration().positions, "open_machine": (0.9, 0.9)}
     Calibration(positions=places).save(rig.folder / "state" / "calibration.json")
-    done = answer(["calibrate", "--try"], rig, screen)
+    done = answer(["calibrate", "--try"], replace(rig, patience=0.05), screen)
     assert done.returncode == 1
     assert "It does not work yet: load the machine" in done.stdout
 

@@ -6,7 +6,11 @@ import math
 from collections.abc import Mapping
 from html import escape
 
-from buildarena_geometry.vectors.besiege import besiege_point, besiege_rotation, besiege_span
+from buildarena_geometry.besiege_components import (
+    besiege_point,
+    besiege_rotation,
+    besiege_span,
+)
 
 from buildarena_geometry import Block, Connector, Machine
 

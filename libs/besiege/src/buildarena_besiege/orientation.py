@@ -24,6 +24,10 @@ LEAST_WIDTH: Final = 0.5
 """Blocks that lie nearer to one line tell no rotation about it, units (root of summed squares)."""
 
 
+MOST_MISFIT: Final = 0.25
+"""Blocks that lie farther from where the machine has them are not moving as one, units."""
+
+
 def placed_quaternions(machine: Machine, block_ids: tuple[str, ...], turn: Quaternion) -> Floats:
     """(N, 4) world_from_block of each block where the game puts the machine.
 
@@ -47,7 +51,7 @@ def machine_rotations(built: Floats, roots: Floats, joined: NDArray[np.bool_]) -
         joined: (T, N) which blocks still hold together.
 
     Returns:
-        None when the blocks tell no rotation even at the start.
+        None when the blocks tell no rotation at the start, or lie otherwise than they were put.
 
     Source: W. Kabsch, Acta Cryst. A32 (1976) 922.
     """
@@ -67,6 +71,9 @@ def machine_rotations(built: Floats, roots: Floats, joined: NDArray[np.bool_]) -
     left[mirrored, :, 2] *= -1.0
     found = np.tile(np.eye(3), (len(roots), 1, 1))
     found[known] = left @ right
+    fit = after[0] - before[0] @ found[0].T
+    if np.sqrt((fit**2).sum() / counts[0]) > MOST_MISFIT:
+        return None
     latest = np.maximum.accumulate(np.where(known, np.arange(len(known)), 0))
     return np.asarray(found[latest])
 
