@@ -29,7 +29,7 @@ up: $(STAMP) ## The whole service on this machine until Ctrl-C
 
 test: check ## Lints, types, import rules and all tests
 	@echo "== 5/5 tests, $(WORKERS) at once (left out: make chaos, peer and bench-*)"
-	@$(BIN)/pytest -n $(WORKERS) --dist loadgroup
+	@$(BIN)/pytest -n $(WORKERS) --dist loadgroup -rs
 
 check: $(STAMP) ## Lints, types and import rules alone
 	@echo "== 1/5 format"

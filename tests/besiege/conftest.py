@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 from game_rig import Rig
+from stand_in_play import Table, laid_table
 from virtual_screen import missing_packages, virtual_screen
 
 
@@ -23,3 +24,10 @@ def rig(tmp_path: Path) -> Rig:
     rig = Rig(folder=tmp_path / "rig")
     rig.calibrate()
     return rig
+
+
+@pytest.fixture(scope="module")
+def table() -> Iterator[Table]:
+    """A screen with a player at it."""
+    with laid_table() as table:
+        yield table

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import pytest
-from game_rig import Rig, experts_machine, shortened
+from game_rig import Rig, experts_machine, shortened, trial_of
 
 from buildarena_benchmark import builtin_tasks, score
 from buildarena_besiege import game_start
@@ -16,7 +16,7 @@ from buildarena_simulation import simulate
 from buildarena_simworker.simulators.besiege.headless import HeadlessDesktop
 from buildarena_simworker.simulators.besiege.settings import BesiegeSettings
 from buildarena_simworker.simulators.besiege.simulator import BesiegeSimulator
-from buildarena_simworker.simulators.simulator import SimulatorFaultError, Trial
+from buildarena_simworker.simulators.simulator import SimulatorFaultError
 
 pytestmark = pytest.mark.timeout(120)
 
@@ -35,19 +35,6 @@ def headless(rig: Rig, monkeypatch) -> Iterator[tuple[Rig, BesiegeSimulator]]:
     simulator = BesiegeSimulator(settings, HeadlessDesktop(settings), {"desktop": "headless"})
     yield own, simulator
     simulator.close()
-
-
-def trial_of(task, machine) -> Trial:
-    return Trial(
-        job_id="job_0001",
-        number=0,
-        token=1,
-        version="1.75-23370-1.4",
-        task=task,
-        machine=machine,
-        controls=None,
-        require_held=lambda: None,
-    )
 
 
 def test_a_car_is_driven_as_by_our_engine(headless) -> None:

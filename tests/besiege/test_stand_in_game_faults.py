@@ -5,25 +5,18 @@ from __future__ import annotations
 import json
 import time
 from collections import Counter
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from stand_in_game.faults import KINDS, POINTS, Fault, FaultError, random_faults, read_faults
 from stand_in_game.log_window import LogWindow
 from stand_in_machines import machine_file, reporting
-from stand_in_play import Game, Table, laid_table
+from stand_in_play import Game, Table
 from virtual_screen import missing_packages
 
 from buildarena_geometry import Machine
 
 on_screen = pytest.mark.skipif(missing_packages() != "", reason=missing_packages())
-
-
-@pytest.fixture(scope="module")
-def table() -> Iterator[Table]:
-    with laid_table() as table:
-        yield table
 
 
 @pytest.fixture

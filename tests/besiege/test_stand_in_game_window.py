@@ -9,18 +9,12 @@ from pathlib import Path
 import pytest
 from PIL import Image, ImageChops
 from stand_in_machines import machine_file, reporting
-from stand_in_play import SIZE, Game, Table, laid_table, start_game
+from stand_in_play import SIZE, Game, Table, start_game
 from virtual_screen import missing_packages
 
 from buildarena_geometry import Machine
 
 pytestmark = pytest.mark.skipif(missing_packages() != "", reason=missing_packages())
-
-
-@pytest.fixture(scope="module")
-def table() -> Iterator[Table]:
-    with laid_table() as table:
-        yield table
 
 
 @pytest.fixture

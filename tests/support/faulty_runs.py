@@ -16,7 +16,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from game_rig import Rig, experts_machine, shortened
+from game_rig import Rig, experts_machine, shortened, trial_of
 from stand_in_game.faults import KINDS, ONLY_AT, POINTS
 
 from buildarena_benchmark import Score, Task, score
@@ -75,7 +75,7 @@ def run_one(rig: Rig, seed: int, trials: dict[str, tuple[Task, Machine, Score]])
     from buildarena_simworker.simulators.besiege.set_up import make_desktop
     from buildarena_simworker.simulators.besiege.settings import BesiegeSettings
     from buildarena_simworker.simulators.besiege.simulator import BesiegeSimulator
-    from buildarena_simworker.simulators.simulator import SimulatorFaultError, Trial
+    from buildarena_simworker.simulators.simulator import SimulatorFaultError
 
     name = sorted(trials)[seed % len(trials)]
     task, machine, right = trials[name]
@@ -84,16 +84,7 @@ def run_one(rig: Rig, seed: int, trials: dict[str, tuple[Task, Machine, Score]])
     settings = BesiegeSettings()
     desktop, facts = make_desktop(settings)
     simulator = BesiegeSimulator(settings, desktop, facts)
-    trial = Trial(
-        job_id=f"job_{seed:010d}",
-        number=0,
-        token=1,
-        version=str(settings.version),
-        task=task,
-        machine=machine,
-        controls=None,
-        require_held=lambda: None,
-    )
+    trial = trial_of(task, machine, job_id=f"job_{seed:010d}")
     started = time.monotonic()
     try:
         done = simulator.run(trial)

@@ -13,8 +13,11 @@ from player import Player
 
 from buildarena_benchmark import Task, builtin_tasks
 from buildarena_geometry import Machine
+from buildarena_simworker.simulators.simulator import Trial
 
 SUPPORT = Path(__file__).parent
+GAME, MOD = "1.75-23370", "1.4"
+VERSION = f"{GAME}-{MOD}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,8 +59,8 @@ class Rig:
             *("--level={level}", "--faults-once", str(self.faults)),
         ]
         return {
-            "BUILDARENA_BESIEGE_GAME": "1.75-23370",
-            "BUILDARENA_BESIEGE_MOD": "1.4",
+            "BUILDARENA_BESIEGE_GAME": GAME,
+            "BUILDARENA_BESIEGE_MOD": MOD,
             "BUILDARENA_BESIEGE_MACHINES": str(self.machines),
             "BUILDARENA_BESIEGE_STATE": str(self.folder / "state"),
             "BUILDARENA_BESIEGE_COMMAND": " ".join(words),
@@ -99,3 +102,17 @@ def shortened(name: str, duration_s: float, **cargo: float) -> Task:
     if task.scenario.cargo is not None:
         changes["cargo"] = task.scenario.cargo.model_copy(update=cargo)
     return replace(task, scenario=task.scenario.model_copy(update=changes))
+
+
+def trial_of(task: Task, machine: Machine, *, job_id: str = "job_0001") -> Trial:
+    """One run of a machine, as the simulate stage asks a simulator for it."""
+    return Trial(
+        job_id=job_id,
+        number=0,
+        token=1,
+        version=VERSION,
+        task=task,
+        machine=machine,
+        controls=None,
+        require_held=lambda: None,
+    )

@@ -7,13 +7,12 @@ import os
 import sys
 from pathlib import Path
 
-from game_rig import Rig, experts_machine, shortened
+from game_rig import Rig, experts_machine, shortened, trial_of
 
 from buildarena_benchmark import score
 from buildarena_simworker.simulators.besiege.set_up import make_desktop
 from buildarena_simworker.simulators.besiege.settings import BesiegeSettings
 from buildarena_simworker.simulators.besiege.simulator import BesiegeSimulator
-from buildarena_simworker.simulators.simulator import Trial
 
 
 def main() -> None:
@@ -24,16 +23,7 @@ def main() -> None:
     desktop, facts = make_desktop(settings)
     task, machine = shortened("transport-1", 5.0), experts_machine("transport-1")
     done = BesiegeSimulator(settings, desktop, facts).run(
-        Trial(
-            job_id="job_killed",
-            number=0,
-            token=1,
-            version=str(settings.version),
-            task=task,
-            machine=machine,
-            controls=None,
-            require_held=lambda: None,
-        )
+        trial_of(task, machine, job_id="job_killed")
     )
     found = score(task, machine, done.trajectory)
     sys.stdout.write(json.dumps([found.success, found.indicator]) + "\n")

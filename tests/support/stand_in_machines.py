@@ -6,13 +6,12 @@ import math
 from collections.abc import Mapping
 from html import escape
 
+from buildarena_geometry import Block, Connector, Machine
 from buildarena_geometry.besiege_components import (
     besiege_point,
     besiege_rotation,
     besiege_span,
 )
-
-from buildarena_geometry import Block, Connector, Machine
 
 _ENTRIES = {
     "spinning_forward": "bmt-forward",
