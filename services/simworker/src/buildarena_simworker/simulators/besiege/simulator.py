@@ -67,7 +67,7 @@ class BesiegeSimulator:
                 f"{BESIEGE}-{self._settings.version}: submit it again",
                 reason="game_version",
             )
-        name = f"ba{trial.job_id.rpartition('-')[2][:10].lower()}n{trial.number}"
+        name = _file_name(trial)
 
         def make_run(attempt: int) -> GameRun:
             return prepare_run(
@@ -133,6 +133,12 @@ def besiege_simulator(settings: Settings) -> BesiegeSimulator:
     except NotSetUpError as error:
         raise StartupError(str(error)) from error
     return BesiegeSimulator(own, desktop, facts)
+
+
+def _file_name(trial: Trial) -> str:
+    """A name that any keyboard types with single keys: letters and digits."""
+    plain = "".join(filter(str.isalnum, trial.job_id.rpartition("_")[2].lower()))
+    return f"ba{plain[:10]}n{trial.number}"
 
 
 def _course(played: Played) -> dict[str, Any]:
