@@ -27,7 +27,7 @@ from buildarena_store import Job
 from buildarena_worker.wiring import verifier
 
 ALL = os.environ.get("BESIEGE_TASKS") == "all"
-pytestmark = pytest.mark.timeout(900 if ALL else 200)
+pytestmark = pytest.mark.timeout(1200 if ALL else 400)
 TASKS = tuple(builtin_tasks()) if ALL else ("support-1", "transport-2", "lift-2")
 NEAR = 0.01
 """What a log's four decimals and 25 samples a second leave open, as a share of an indicator."""
@@ -80,7 +80,7 @@ def test_each_category_is_played_scored_verified_and_compared(playing: Context, 
 
 
 def _ended(context: Context, rig: Rig) -> list[Job]:
-    ends = time.monotonic() + (800 if ALL else 150)
+    ends = time.monotonic() + (1100 if ALL else 350)
     while time.monotonic() < ends:
         work(context, queues=("construct",))
         jobs = context.store.jobs.page(limit=100)
