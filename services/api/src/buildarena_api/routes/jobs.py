@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from hashlib import sha256
 from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query, Response
@@ -27,13 +28,15 @@ from buildarena_pipeline.catalog.models import ModelRegistry
 from buildarena_pipeline.catalog.specs import JobSpec
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.notify import notify_waiting
+from buildarena_pipeline.turns import Transcripts
+from buildarena_store import Job
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
 
+KEPT_TYPES = ("application/json", "application/vnd.apache.parquet", "image/png", "text/plain")
 ARTIFACT_TYPES = {
     "machine": "application/json",
     "transcript": "application/json",
-    "trajectory": "application/vnd.apache.parquet",
 }
 
 
@@ -159,7 +162,7 @@ def list_artifacts(job_id: str, context: ContextDep) -> list[JobFileView]:
 @router.get(
     "/{job_id}/artifacts/{name}",
     responses={
-        200: {"content": {kind: {} for kind in sorted({*ARTIFACT_TYPES.values()})}},
+        200: {"content": {kind: {} for kind in KEPT_TYPES}},
         **problem_responses(404, 503),
     },
     response_class=Response,
@@ -189,25 +192,38 @@ def get_artifact_by_name(job_id: str, name: str, context: ContextDep) -> Respons
 )
 def get_artifact(
     job_id: str,
-    artifact: Literal["machine", "transcript", "trajectory"],
+    artifact: Literal["machine", "transcript"],
     context: ContextDep,
-    number: Annotated[int, Query(ge=0, le=1000, description="Which rollout's trajectory")] = 0,
     style: Annotated[
         Literal["json", "markdown"], Query(description="markdown: a transcript for people")
     ] = "json",
 ) -> Response:
-    """The machine document, the transcript or a trajectory of a job."""
+    """The machine document or the transcript of a job.
+
+    The transcript of a session that is under way goes as far as that has come.
+    """
     job = context.store.jobs.get(job_id)
-    name = f"trajectory-{number}" if artifact == "trajectory" else artifact
-    digest = context.store.jobs.artifacts(job_id).get(name)
+    if artifact == "transcript":
+        return _transcript(context, job, style)
+    digest = context.store.jobs.artifacts(job_id).get(artifact)
     if digest is None:
-        raise ProblemError(404, f"job {job_id} has no {name} yet")
-    data = context.artifacts.get(digest)
-    if artifact == "transcript" and style == "markdown":
+        raise ProblemError(404, f"job {job_id} has no {artifact} yet")
+    return Response(
+        context.artifacts.get(digest),
+        media_type=ARTIFACT_TYPES[artifact],
+        headers={"ETag": f'"{digest}"'},
+    )
+
+
+def _transcript(context: Context, job: Job, style: str) -> Response:
+    data = Transcripts(context.store, context.artifacts).read(job)
+    if data is None:
+        raise ProblemError(404, f"job {job.id} has no transcript yet")
+    if style == "markdown":
         title = f"{job.task} by {job.model}, seed {job.seed}"
         return Response(as_markdown(data, title), media_type="text/markdown; charset=utf-8")
     return Response(
         data,
-        media_type=ARTIFACT_TYPES[artifact],
-        headers={"ETag": f'"{digest}"'},
+        media_type=ARTIFACT_TYPES["transcript"],
+        headers={"ETag": f'"{sha256(data).hexdigest()}"'},
     )
