@@ -35,6 +35,7 @@ from buildarena_api.routes import (
     keys,
     leaderboard,
     metrics,
+    pictures,
     replays,
     sessions,
     sweeps,
@@ -58,6 +59,7 @@ ORDINARY = (
     sessions,
     replays,  # before jobs, whose artifacts have paths like theirs
     trials,
+    pictures,
     jobs,
     sweeps,
     leaderboard,
@@ -119,6 +121,7 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
     app.state.registry = registry
     app.state.boards = BoardCache(context.store.results.boards, context.tasks)
     app.state.scenes = KeptAnswers(trials.KEPT_SCENES)
+    app.state.pictures = KeptAnswers(pictures.KEPT_PICTURES)
     app.state.replays = Replays(context)
     app.state.submissions = Submissions(context, registry)
     app.state.external = ExternalSessions(context)
