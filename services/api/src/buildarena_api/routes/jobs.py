@@ -30,6 +30,7 @@ from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.notify import notify_waiting
 from buildarena_pipeline.turns import Transcripts
 from buildarena_store import Job
+from buildarena_store.jobs.pages import JobFilter, Order, Sort, sort_value
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
 
@@ -62,24 +63,58 @@ def list_jobs(
     outcome: Annotated[AnyOutcome | None, Query()] = None,
     reason: Annotated[str | None, Query(description="Class of the failure")] = None,
     flag: Annotated[str | None, Query(description="Only jobs with this flag")] = None,
+    indicator_min: Annotated[
+        float | None, Query(allow_inf_nan=False, description="Only with at least this indicator")
+    ] = None,
+    indicator_max: Annotated[
+        float | None, Query(allow_inf_nan=False, description="Only with at most this indicator")
+    ] = None,
+    text: Annotated[
+        str | None,
+        Query(
+            min_length=1,
+            max_length=100,
+            description="Only jobs in whose id, task, model, reason or detail it stands, in any "
+            "case",
+        ),
+    ] = None,
     id_prefix: IdPrefix = None,
-    cursor: Annotated[str | None, Query(max_length=500)] = None,
+    sort: Annotated[
+        Sort, Query(description="Jobs without such a figure come last, in both directions")
+    ] = "created",
+    order: Annotated[
+        Literal["asc", "desc"], Query(description="desc: the newest, or greatest, first")
+    ] = "desc",
+    cursor: Annotated[str | None, Query(max_length=1000)] = None,
     limit: Annotated[int, Query(ge=1, le=1000)] = 100,
 ) -> JobPage:
-    """Lists jobs, newest first. A value that no job can have is refused with the choices."""
+    """Lists jobs, newest first by default.
+
+    A value that no job can have is refused with the choices. A cursor is good for the order that
+    it was made in.
+    """
     if sweep is not None:
         context.store.sweeps.get(sweep)
+    in_order = Order(by=sort, descending=order == "desc")
     found = context.store.jobs.page(
         limit=limit,
-        after=None if cursor is None else cursors.decode(cursor),
-        sweep_id=sweep,
-        task=task,
-        model=model,
-        state=state,
-        outcome=outcome,
-        reason=reason,
-        flag=flag,
-        id_prefix=id_prefix,
+        after=None if cursor is None else cursors.decode_in(cursor, in_order),
+        order=in_order,
+        wanted=JobFilter(
+            sweep_id=sweep,
+            flag=flag,
+            id_prefix=id_prefix,
+            indicator_min=indicator_min,
+            indicator_max=indicator_max,
+            text=text,
+            equals={
+                "task": task,
+                "model": model,
+                "state": state,
+                "outcome": outcome,
+                "reason": reason,
+            },
+        ),
     )
     if not found:
         _require_known(
@@ -88,8 +123,12 @@ def list_jobs(
     more = len(found) == limit
     return JobPage(
         jobs=[JobView.of(job) for job in found],
-        next_cursor=cursors.encode(found[-1].created_at, found[-1].id) if more else None,
+        next_cursor=_cursor(in_order, found[-1]) if more else None,
     )
+
+
+def _cursor(order: Order, job: Job) -> str:
+    return cursors.encode_in(order, sort_value(job, order.by), job.id)
 
 
 def _require_known(
