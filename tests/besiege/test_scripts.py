@@ -12,8 +12,8 @@ from tests.besiege.playing import log_of, played, press, vehicle
 from buildarena_benchmark import builtin_tasks
 from buildarena_besiege import MachineNotPlayableError, prepare_run, trajectory_of
 from buildarena_besiege.check_sums import check_sum
+from buildarena_besiege.exporting.script import lua_text
 from buildarena_besiege.keys import key_edges
-from buildarena_besiege.script import lua_text
 from buildarena_besiege.tracking import tracked_blocks
 from buildarena_simulation import Scenario
 

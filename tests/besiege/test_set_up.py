@@ -13,14 +13,14 @@ from typing import Self
 import pytest
 from game_rig import Rig
 
-from buildarena_simworker.simulators.besiege.calibration import (
+from buildarena_simworker.simulators.besiege.errors import NotSetUpError
+from buildarena_simworker.simulators.besiege.log_sources import LogFile
+from buildarena_simworker.simulators.besiege.process import GameProcess
+from buildarena_simworker.simulators.besiege.screen.calibration import (
     POSITIONS,
     Calibration,
     load_calibration,
 )
-from buildarena_simworker.simulators.besiege.errors import NotSetUpError
-from buildarena_simworker.simulators.besiege.log_sources import LogFile
-from buildarena_simworker.simulators.besiege.process import GameProcess
 from buildarena_simworker.simulators.besiege.settings import BesiegeSettings
 from buildarena_simworker.simulators.besiege.traces import Traces
 
@@ -113,8 +113,8 @@ class GamePlayed:
 
     def _point_at_the_middle(self) -> None:
         program = (
-            "from buildarena_simworker.simulators.besiege.hands import Hands;"
-            "from buildarena_simworker.simulators.besiege.windows import open_windows;"
+            "from buildarena_simworker.simulators.besiege.screen.hands import Hands;"
+            "from buildarena_simworker.simulators.besiege.screen.windows import open_windows;"
             "h = Hands(); a = open_windows().find('besiege');"
             "h.move(a.left + a.width // 2, a.top + a.height // 2)"
         )

@@ -12,7 +12,7 @@ from tests.besiege.playing import RUN, log_of, played, press, vehicle
 
 from buildarena_benchmark import builtin_tasks, score
 from buildarena_besiege import GameLog, LogIncompleteError, trajectory_of
-from buildarena_besiege.trajectories import Samples, made_trajectory
+from buildarena_besiege.logs.trajectories import Samples, made_trajectory
 from buildarena_geometry import Machine
 from buildarena_simulation import Scenario, read_trajectory, simulate, write_trajectory
 

@@ -71,7 +71,7 @@ class Rig:
 
     def calibrate(self) -> None:
         """Saves the positions at which the stand-in has its buttons."""
-        from buildarena_simworker.simulators.besiege.calibration import Calibration
+        from buildarena_simworker.simulators.besiege.screen.calibration import Calibration
 
         Calibration().save(self.folder / "state" / "calibration.json")
 

@@ -7,14 +7,14 @@ from buildarena_besiege.errors import (
     MachineFileError,
     MachineNotPlayableError,
 )
-from buildarena_besiege.game_log import GameLog, run_ids
+from buildarena_besiege.exporting.level import level_file
 from buildarena_besiege.importing.machine import ImportedMachine, read_machine_file
-from buildarena_besiege.level import level_file
-from buildarena_besiege.published import looks_published, published_trajectory
+from buildarena_besiege.logs.game_log import GameLog, run_ids
+from buildarena_besiege.logs.published import looks_published, published_trajectory
+from buildarena_besiege.logs.state_log import StateLog
+from buildarena_besiege.logs.trajectories import trajectory_of
 from buildarena_besiege.run import GameRun, plain_machine_file, prepare_run
 from buildarena_besiege.starts import game_start
-from buildarena_besiege.state_log import StateLog
-from buildarena_besiege.trajectories import trajectory_of
 
 __all__ = [
     "BesiegeError",

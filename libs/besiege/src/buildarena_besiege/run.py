@@ -9,7 +9,10 @@ from typing import TYPE_CHECKING, Final
 from urllib.parse import quote
 
 from buildarena_besiege.errors import MachineNotPlayableError
-from buildarena_besiege.header import header_lines
+from buildarena_besiege.exporting.header import header_lines
+from buildarena_besiege.exporting.level import level_file
+from buildarena_besiege.exporting.machine_file import CargoBox, Guids, block_records, machine_text
+from buildarena_besiege.exporting.script import FIRST_BLOCK, Reported, Telling, script_text
 from buildarena_besiege.keys import (
     UPDATES_PER_S,
     bindings_of,
@@ -18,11 +21,8 @@ from buildarena_besiege.keys import (
     held_edges,
     key_edges,
 )
-from buildarena_besiege.level import level_file
-from buildarena_besiege.machine_file import CargoBox, Guids, block_records, machine_text
 from buildarena_besiege.names import CARGO_ID
 from buildarena_besiege.placement import AS_BUILT, GlobalPose, cargo_root, global_pose, put_down
-from buildarena_besiege.script import FIRST_BLOCK, Reported, Telling, script_text
 from buildarena_besiege.tracking import begin_fields, tracked_blocks
 from buildarena_simulation.constants import MAX_PARTS
 from buildarena_simulation.scenario import SpanPlacement
@@ -30,8 +30,8 @@ from buildarena_simulation.scenario import SpanPlacement
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
+    from buildarena_besiege.exporting.machine_file import BlockRecord
     from buildarena_besiege.keys import Edge
-    from buildarena_besiege.machine_file import BlockRecord
     from buildarena_geometry import KeyPress, Machine
     from buildarena_simulation import Scenario
 

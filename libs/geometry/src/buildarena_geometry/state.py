@@ -37,6 +37,16 @@ class SubStructure:
     root: str
 
 
+def sub_structure_letter(count: int) -> str:
+    """The letter of the sub-structure before which so many were added: A to Z, then AA, AB."""
+    letters = ""
+    count += 1
+    while count:
+        count, digit = divmod(count - 1, 26)
+        letters = chr(ord("A") + digit) + letters
+    return letters
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MachineState:
     """A machine at one moment; its mappings are never changed once they are in a state.

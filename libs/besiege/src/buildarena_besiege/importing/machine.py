@@ -23,6 +23,7 @@ from buildarena_geometry.documents.read import read_machine
 from buildarena_geometry.errors import DocumentError
 from buildarena_geometry.keys import KEYS
 from buildarena_geometry.rotations import NO_ROTATION, subtract
+from buildarena_geometry.state import sub_structure_letter
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -294,15 +295,5 @@ def _letters(mounts: Sequence[Seat | None], starts: int) -> list[str]:
         at = i
         while (mount := mounts[at]) is not None:
             at = mount[0]
-        found.append(_letter(at if at < starts else 0))
+        found.append(sub_structure_letter(at if at < starts else 0))
     return found
-
-
-def _letter(count: int) -> str:
-    """A to Z, then AA, AB and so on, as an assembly's sub-structures are called."""
-    letters = ""
-    count += 1
-    while count:
-        count, digit = divmod(count - 1, 26)
-        letters = chr(ord("A") + digit) + letters
-    return letters

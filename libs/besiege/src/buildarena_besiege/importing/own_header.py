@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any, Final
 
-from buildarena_besiege.header import HEADER_VERSION, MARK, places_digest
+from buildarena_besiege.exporting.header import HEADER_VERSION, MARK, places_digest
 from buildarena_geometry.documents.log import LoggedState
 from buildarena_geometry.documents.read import read_machine
 from buildarena_geometry.errors import DocumentError

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from buildarena_besiege.entries import end_rotation
+from buildarena_besiege.exporting.entries import end_rotation
 from buildarena_geometry.blocks import JOINT_REACH
 
 if TYPE_CHECKING:

@@ -13,7 +13,13 @@ from buildarena_geometry.modules.parameters import Name, RefusalError, Triple, s
 from buildarena_geometry.outcomes import Cause
 from buildarena_geometry.poses import Pose
 from buildarena_geometry.rotations import ORIGIN
-from buildarena_geometry.state import MachineState, SubStructure, follow, moved_connector
+from buildarena_geometry.state import (
+    MachineState,
+    SubStructure,
+    follow,
+    moved_connector,
+    sub_structure_letter,
+)
 
 
 def add_machine(
@@ -40,7 +46,7 @@ def add_machine(
             Cause.NO_SUCH_MACHINE,
             f"Machine {shown(machine_id)} {problem}. Machines: {named(state.available)}.",
         )
-    letter = _letter(state.structures_made)
+    letter = sub_structure_letter(state.structures_made)
     root = next(iter(source.blocks.values()))
     motion = turn_about(root.center_xyz, turned(init_rotation)).shifted(init_shift)
     blocks = [_copy_block(block, letter, motion) for block in source.blocks.values()]
@@ -153,16 +159,6 @@ def _moved(
     members = after.members(letter)
     lines = (words.block_lines_with_faces if turned else words.block_lines)(after, members)
     return "\n".join([sentence, *lines, *words.losses(before, after)])
-
-
-def _letter(count: int) -> str:
-    """A, B, … Z, AA, AB and so on."""
-    letters = ""
-    count += 1
-    while count:
-        count, digit = divmod(count - 1, 26)
-        letters = chr(ord("A") + digit) + letters
-    return letters
 
 
 def _renamed(face: FaceRef | None, letter: str) -> FaceRef | None:

@@ -7,9 +7,9 @@ import json
 import sys
 from dataclasses import asdict
 
-from buildarena_simworker.simulators.besiege.calibration import Calibration, load_calibration
 from buildarena_simworker.simulators.besiege.doctor import examine
 from buildarena_simworker.simulators.besiege.errors import DesktopError, NotSetUpError
+from buildarena_simworker.simulators.besiege.screen.calibration import Calibration, load_calibration
 from buildarena_simworker.simulators.besiege.set_up import make_desktop
 from buildarena_simworker.simulators.besiege.settings import BesiegeSettings
 
@@ -50,8 +50,8 @@ def _doctor(settings: BesiegeSettings, *, as_json: bool) -> int:
 
 def _calibrate(settings: BesiegeSettings, *, ask: bool, only_try: bool) -> int:
     from buildarena_simworker.simulators.besiege.calibrate import ask_positions, try_out
-    from buildarena_simworker.simulators.besiege.hands import Hands
-    from buildarena_simworker.simulators.besiege.windows import open_windows
+    from buildarena_simworker.simulators.besiege.screen.hands import Hands
+    from buildarena_simworker.simulators.besiege.screen.windows import open_windows
 
     file = settings.calibration_file
     if not only_try:

@@ -9,13 +9,13 @@ from typing import Final
 from buildarena_besiege import GameRun, prepare_run
 from buildarena_geometry import Machine
 from buildarena_simulation import Scenario
-from buildarena_simworker.simulators.besiege.calibration import POSITIONS, Calibration
 from buildarena_simworker.simulators.besiege.desktop import Desktop
 from buildarena_simworker.simulators.besiege.errors import DesktopError, NotSetUpError
-from buildarena_simworker.simulators.besiege.hands import Hands
 from buildarena_simworker.simulators.besiege.play import RunFailedError, play
+from buildarena_simworker.simulators.besiege.screen.calibration import POSITIONS, Calibration
+from buildarena_simworker.simulators.besiege.screen.hands import Hands
+from buildarena_simworker.simulators.besiege.screen.windows import Area, Windows
 from buildarena_simworker.simulators.besiege.time_limits import TimeLimits
-from buildarena_simworker.simulators.besiege.windows import Area, Windows
 
 BEFORE: Final = {
     "name_box": "Open the list of machine files in the game.",

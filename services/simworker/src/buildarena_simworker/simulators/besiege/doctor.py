@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from buildarena_simworker.simulators.besiege.calibration import load_calibration
 from buildarena_simworker.simulators.besiege.errors import NotSetUpError
+from buildarena_simworker.simulators.besiege.screen.calibration import load_calibration
 from buildarena_simworker.simulators.besiege.settings import BesiegeSettings
 
 MOD_FOLDERS = ("Besiege_Data/Mods", "Mods", "../../workshop/content/346010", "Contents/Mods")
@@ -125,7 +125,7 @@ def _tried(name: str, detail: str, check: Callable[[], None]) -> Finding:
 
 
 def _display() -> None:
-    from buildarena_simworker.simulators.besiege.hands import Hands
+    from buildarena_simworker.simulators.besiege.screen.hands import Hands
 
     hands = Hands()
     try:
@@ -136,7 +136,7 @@ def _display() -> None:
 
 
 def _calibration(settings: BesiegeSettings) -> None:
-    from buildarena_simworker.simulators.besiege.windows import open_windows
+    from buildarena_simworker.simulators.besiege.screen.windows import open_windows
 
     calibration = load_calibration(settings.calibration_file)
     _display()
@@ -150,7 +150,7 @@ def _calibration(settings: BesiegeSettings) -> None:
 
 
 def _window(settings: BesiegeSettings) -> None:
-    from buildarena_simworker.simulators.besiege.windows import open_windows
+    from buildarena_simworker.simulators.besiege.screen.windows import open_windows
 
     _display()
     if open_windows().find(settings.title) is None and not settings.command:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from buildarena_simworker.simulators.besiege.calibration import load_calibration
 from buildarena_simworker.simulators.besiege.desktop import Desktop
 from buildarena_simworker.simulators.besiege.errors import NotSetUpError
+from buildarena_simworker.simulators.besiege.screen.calibration import load_calibration
 from buildarena_simworker.simulators.besiege.settings import BesiegeSettings
 
 
@@ -27,9 +27,9 @@ def make_desktop(settings: BesiegeSettings) -> tuple[Desktop, Mapping[str, Any]]
         from buildarena_simworker.simulators.besiege.headless import HeadlessDesktop
 
         return HeadlessDesktop(settings), {"desktop": "headless"}
-    from buildarena_simworker.simulators.besiege.hands import Hands
-    from buildarena_simworker.simulators.besiege.window import WindowDesktop
-    from buildarena_simworker.simulators.besiege.windows import open_windows
+    from buildarena_simworker.simulators.besiege.screen.hands import Hands
+    from buildarena_simworker.simulators.besiege.screen.window import WindowDesktop
+    from buildarena_simworker.simulators.besiege.screen.windows import open_windows
 
     calibration = load_calibration(settings.calibration_file)
     hands = Hands(settings.pace)

@@ -20,15 +20,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from buildarena_besiege.errors import LogIncompleteError
-from buildarena_besiege.names import CARGO_ID
-from buildarena_besiege.resampling import (
+from buildarena_besiege.logs.resampling import (
     latest,
     require_no_gap,
     resampled,
     sample_instants,
     stacked,
 )
-from buildarena_besiege.trajectories import LONGEST_GAP_S, Samples, made_trajectory
+from buildarena_besiege.logs.trajectories import LONGEST_GAP_S, Samples, made_trajectory
+from buildarena_besiege.names import CARGO_ID
 from buildarena_simulation.control import effective_presses
 
 if TYPE_CHECKING:

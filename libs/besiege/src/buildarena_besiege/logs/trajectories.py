@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from buildarena_besiege.errors import LogIncompleteError
+from buildarena_besiege.exporting.script import BLOCKS_PER_LINE, SAMPLE_EVERY
 from buildarena_besiege.keys import UPDATES_PER_S, cannons
-from buildarena_besiege.log_lines import LINE_VERSION
-from buildarena_besiege.orientation import (
+from buildarena_besiege.logs.log_lines import LINE_VERSION
+from buildarena_besiege.logs.orientation import (
     centers_of,
     machine_rotations,
     placed_quaternions,
     turned,
 )
 from buildarena_besiege.placement import global_pose
-from buildarena_besiege.script import BLOCKS_PER_LINE, SAMPLE_EVERY
 from buildarena_besiege.tracking import run_digest, tracked_blocks
 from buildarena_geometry.besiege_components import besiege_turn
 from buildarena_geometry.poses import Pose
@@ -36,8 +36,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from buildarena_besiege.game_log import GameLog
-    from buildarena_besiege.log_lines import Line
+    from buildarena_besiege.logs.game_log import GameLog
+    from buildarena_besiege.logs.log_lines import Line
     from buildarena_geometry import Machine
     from buildarena_simulation import Scenario
 

@@ -10,13 +10,13 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from buildarena_simworker.simulators.besiege.clipboard import open_clipboard
 from buildarena_simworker.simulators.besiege.errors import DesktopError, NotSetUpError
+from buildarena_simworker.simulators.besiege.screen.clipboard import open_clipboard
 
 if TYPE_CHECKING:
     from PIL.Image import Image
 
-    from buildarena_simworker.simulators.besiege.windows import Area
+    from buildarena_simworker.simulators.besiege.screen.windows import Area
 
 MODIFIERS: Final = ("ctrl", "shift", "alt", "command", "win")
 SELECT: Final = "command" if sys.platform == "darwin" else "ctrl"

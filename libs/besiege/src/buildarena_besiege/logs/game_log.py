@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 from urllib.parse import unquote
 
 from buildarena_besiege.keys import UPDATES_PER_S
-from buildarena_besiege.log_lines import LONGEST_LINE, Line, line_of
+from buildarena_besiege.logs.log_lines import LONGEST_LINE, Line, line_of
 from buildarena_besiege.run import marked
 
 if TYPE_CHECKING:

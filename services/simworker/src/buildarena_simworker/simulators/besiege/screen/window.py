@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Final
 
-from buildarena_besiege import GameLog, GameRun, trajectory_of
+from buildarena_benchmark import builtin_tasks
+from buildarena_besiege import GameLog, GameRun, level_file, trajectory_of
 from buildarena_geometry import Machine
 from buildarena_simulation import Scenario, Trajectory
-from buildarena_simworker.simulators.besiege.calibration import Calibration
 from buildarena_simworker.simulators.besiege.desktop import RunLog
 from buildarena_simworker.simulators.besiege.errors import (
     DesktopError,
@@ -20,14 +20,15 @@ from buildarena_simworker.simulators.besiege.errors import (
     LevelClosedError,
     StepFailedError,
 )
-from buildarena_simworker.simulators.besiege.hands import SELECT, Hands, difference
 from buildarena_simworker.simulators.besiege.log_sources import LogFile
 from buildarena_simworker.simulators.besiege.process import GameProcess
+from buildarena_simworker.simulators.besiege.screen.calibration import Calibration
+from buildarena_simworker.simulators.besiege.screen.hands import SELECT, Hands, difference
+from buildarena_simworker.simulators.besiege.screen.steps import TRIES, take_step, wait_for
+from buildarena_simworker.simulators.besiege.screen.view import View
+from buildarena_simworker.simulators.besiege.screen.windows import Windows
 from buildarena_simworker.simulators.besiege.settings import BesiegeSettings, level_digest
-from buildarena_simworker.simulators.besiege.steps import TRIES, take_step, wait_for
 from buildarena_simworker.simulators.besiege.traces import Traces
-from buildarena_simworker.simulators.besiege.view import View
-from buildarena_simworker.simulators.besiege.windows import Windows
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -215,9 +216,6 @@ class WindowDesktop:
         """Digest of the level that the owner says is open."""
         if not self._settings.level:
             return level_digest(None)
-        from buildarena_benchmark import builtin_tasks
-        from buildarena_besiege import level_file
-
         task = builtin_tasks().get(self._settings.level)
         if task is None:
             known = ", ".join(builtin_tasks())

@@ -16,7 +16,7 @@ from buildarena_geometry.blocks import Block
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from buildarena_besiege.machine_file import BlockRecord
+    from buildarena_besiege.exporting.machine_file import BlockRecord
     from buildarena_geometry import KeyPress, Machine
     from buildarena_geometry.blocks import Connector
     from buildarena_geometry.rotations import Quaternion, Vector

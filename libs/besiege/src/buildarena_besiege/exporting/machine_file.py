@@ -8,8 +8,14 @@ import uuid
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-from buildarena_besiege.entries import Entry, Value, block_entries, connector_entries, typed
 from buildarena_besiege.errors import MachineNotPlayableError
+from buildarena_besiege.exporting.entries import (
+    Entry,
+    Value,
+    block_entries,
+    connector_entries,
+    typed,
+)
 from buildarena_besiege.names import CARGO, CARGO_ID, type_name
 from buildarena_besiege.placement import UPRIGHT_CARGO, GlobalPose
 from buildarena_geometry.besiege_components import besiege_point, besiege_rotation

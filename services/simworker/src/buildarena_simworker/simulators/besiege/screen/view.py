@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from buildarena_simworker.simulators.besiege.calibration import Calibration
 from buildarena_simworker.simulators.besiege.errors import GameGoneError
-from buildarena_simworker.simulators.besiege.hands import Hands, difference
-from buildarena_simworker.simulators.besiege.windows import Area, Windows
+from buildarena_simworker.simulators.besiege.screen.calibration import Calibration
+from buildarena_simworker.simulators.besiege.screen.hands import Hands, difference
+from buildarena_simworker.simulators.besiege.screen.windows import Area, Windows
 
 if TYPE_CHECKING:
     from PIL.Image import Image

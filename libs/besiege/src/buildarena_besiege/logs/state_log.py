@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from buildarena_besiege.errors import LogIncompleteError
-from buildarena_besiege.machine_file import parts_in_file_order
+from buildarena_besiege.exporting.machine_file import parts_in_file_order
+from buildarena_besiege.logs.resampling import resampled, sample_instants, stacked
+from buildarena_besiege.logs.trajectories import Samples, made_trajectory
 from buildarena_besiege.names import CARGO_ID
-from buildarena_besiege.resampling import resampled, sample_instants, stacked
 from buildarena_besiege.tracking import tracked_blocks
-from buildarena_besiege.trajectories import Samples, made_trajectory
 from buildarena_geometry.besiege_components import pose_from_besiege
 from buildarena_geometry.rotations import NO_ROTATION, ORIGIN, SHORTEST_QUATERNION
 

@@ -1,0 +1,1 @@
+"""What the game is given: machine files, the scripts in them, and levels."""
