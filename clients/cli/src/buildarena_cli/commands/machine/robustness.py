@@ -43,7 +43,7 @@ def show_robustness(
 
 
 def _report(task: Task, engine: str, found: Robustness) -> dict[str, Any]:
-    from buildarena_benchmark.statistics import wilson_interval
+    from buildarena_benchmark.statistics import exact_interval
 
     trials = len(found.scores)
     return {
@@ -53,7 +53,7 @@ def _report(task: Task, engine: str, found: Robustness) -> dict[str, Any]:
         "trials": trials,
         "successes": found.successes,
         "robustness": found.share,
-        "robustness_interval": list(wilson_interval(found.successes, trials)),
+        "robustness_interval": list(exact_interval(found.successes, trials)),
         "indicator_name": task.indicator.name,
         "indicator_unit": task.indicator.unit,
         "results": [
