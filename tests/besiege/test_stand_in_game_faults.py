@@ -273,5 +273,7 @@ def test_a_scrolled_log_is_copied_without_its_newest_lines(table: Table, folder:
     with table.game(folder, faults=[{"fault": "log_scrolled", "lines": 30}]) as game:
         first = run_for(game, 2.0)
         second = game.copy_log()
-    assert int(first[-1].split(",")[0]) == int(second[-1].split(",")[0]) == 4
-    assert int(second[0].split(",")[0]) - int(first[0].split(",")[0]) >= 120
+    newest, oldest = (int(first[place].split(",")[0]) for place in (0, -1))
+    assert int(second[0].split(",")[0]) - newest >= 120
+    # The window drops old lines by itself, should the game have run on for long.
+    assert oldest <= int(second[-1].split(",")[0])
