@@ -54,8 +54,8 @@ def elsewhere(context, tmp_path) -> Callable[[], Context]:
 
 
 @pytest.fixture
-def archive(context, submissions, tmp_path) -> tuple[str, Path]:
-    """An archive of a finished sweep."""
+def played(context, submissions, tmp_path) -> tuple[str, Path]:
+    """A finished sweep and its archive."""
     sweep_id = submissions.submit_sweep(SPEC).sweep.id
     work(context)
     target = tmp_path / "sweep.zip"
@@ -63,8 +63,26 @@ def archive(context, submissions, tmp_path) -> tuple[str, Path]:
     return sweep_id, target
 
 
-def test_a_sweep_arrives_whole_and_can_be_verified_there(context, archive, elsewhere) -> None:
-    sweep_id, file = archive
+@pytest.fixture(scope="module")
+def kept() -> list[tuple[str, bytes]]:
+    """The archive of the first sweep that was played."""
+    return []
+
+
+@pytest.fixture
+def archive(request, kept, tmp_path) -> tuple[str, Path]:
+    """The archive of a finished sweep, which need not be here any more."""
+    if not kept:
+        sweep_id, file = request.getfixturevalue("played")
+        kept.append((sweep_id, file.read_bytes()))
+    sweep_id, content = kept[0]
+    file = tmp_path / "sweep.zip"
+    file.write_bytes(content)
+    return sweep_id, file
+
+
+def test_a_sweep_arrives_whole_and_can_be_verified_there(context, played, elsewhere) -> None:
+    sweep_id, file = played
     before = context.store.jobs.page(limit=10, sweep_id=sweep_id)
     journals = {job.id: context.store.journal.read(job.id) for job in before}
     other = elsewhere()
@@ -83,8 +101,8 @@ def test_a_sweep_arrives_whole_and_can_be_verified_there(context, archive, elsew
     assert report["ok"], report
 
 
-def test_taking_in_twice_changes_nothing(context, archive) -> None:
-    sweep_id, file = archive
+def test_taking_in_twice_changes_nothing(context, played) -> None:
+    sweep_id, file = played
     before = context.store.jobs.page(limit=10)
     assert read_archive(context, file, owner="other").added == 0
     assert context.store.jobs.page(limit=10) == before
@@ -362,8 +380,8 @@ def test_a_forged_score_never_counts(archive, elsewhere) -> None:
     assert other.store.jobs.get(forged.id).verified_at is None
 
 
-def test_a_sweep_that_is_here_keeps_its_jobs(archive, context) -> None:
-    sweep_id, file = archive
+def test_a_sweep_that_is_here_keeps_its_jobs(played, context) -> None:
+    sweep_id, file = played
     with context.store.database.transaction() as connection:
         connection.execute(text("DELETE FROM sweep_jobs WHERE job_id = (SELECT min(id) FROM jobs)"))
     with pytest.raises(ArchiveError, match=f"{sweep_id} is here, with other jobs"):
