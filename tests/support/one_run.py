@@ -7,6 +7,7 @@ import os
 import sys
 from pathlib import Path
 
+import structlog
 from game_rig import Rig, experts_machine, shortened, trial_of
 
 from buildarena_benchmark import score
@@ -17,6 +18,8 @@ from buildarena_simworker.simulators.besiege.simulator import BesiegeSimulator
 
 def main() -> None:
     """Plays the car for a few seconds in the folder that is named."""
+    # What the runner had to do again goes to its log: standard output is the score's.
+    structlog.configure(logger_factory=structlog.PrintLoggerFactory(sys.stderr))
     rig = Rig(folder=Path(sys.argv[1]))
     for name, value in rig.environment().items():
         os.environ.setdefault(name, value)
