@@ -97,7 +97,8 @@ def reachable(database: Database) -> bool:
 def test_nothing_is_lost_or_done_twice(folder, play) -> None:
     rng = random.Random(SEED)
     cheap, dear = JOBS - JOBS // 4, JOBS // 4
-    # On a busy machine strikes may leave a job no time to make progress: giving up is another rule's test.
+    # On a busy machine strikes may leave a job no time to make progress; giving up is another
+    # rule's test.
     with running_stack(folder, lease_s=LEASE_S, max_faults=1000) as stack:
         environment, logs = stack.environment, stack.logs
         database = Database(environment["BUILDARENA_DATABASE_URL"])
