@@ -13,15 +13,33 @@ import httpx
 import pytest
 from live_api import LOOPBACK, live_api
 from pydantic import ValidationError
+from starlette.testclient import TestClient
 from tenants import operator
 
+from buildarena_api.app import create_app
 from buildarena_api.http.limits import is_too_deep
+from buildarena_pipeline.catalog.models import load_registry
+from buildarena_pipeline.runtime.context import open_context
 from buildarena_pipeline.runtime.settings import Settings
 
 CONTRACT = json.loads((Path(__file__).parents[1] / "data" / "openapi.json").read_text())
 METHODS = ("GET", "POST", "PUT", "PATCH", "DELETE", "OPTIONS", "TRACE", "PROPFIND")
 JOB = json.dumps({"task": "support-1", "model": "builtin/idle"}).encode()
 OPEN = json.dumps({"task": "support-1", "agent": "me"}).encode()
+
+
+@pytest.fixture(scope="module")
+def api(database_url, broker_url, tmp_path_factory):
+    """One API for all requests that change nothing."""
+    data = tmp_path_factory.mktemp("data")
+    context = open_context(
+        Settings(database_url=database_url, broker_url=broker_url, data=data, lease_s=2.0)
+    )
+    with TestClient(
+        create_app(context, load_registry()), base_url=LOOPBACK, raise_server_exceptions=False
+    ) as client:
+        yield client
+    context.close()
 
 
 @pytest.fixture
