@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Sequence
-from itertools import cycle
+from collections.abc import Awaitable, Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from pydantic_ai.direct import model_request
@@ -45,8 +47,11 @@ from buildarena_worker.providers.failures import RETRIED_STATUS, Failure, Provid
 from buildarena_worker.session.messages import Message, Reply, Request, Tool, ToolCall
 
 POOLS = 16
-"""Connection pools per model over httpx: it looks at all connections of a pool for each request,
-so that many small pools carry hundreds of open requests at less cost than one large one."""
+"""Connection pools per model over httpx at most: it looks at all connections of a pool for each
+request, so that many small pools carry hundreds of open requests at less cost than one large one.
+"""
+SMALL_POOL = 8
+"""Open requests of each pool from which another one is worth the 0.1 s that it takes to make."""
 FINISH = {"tool_call": "stop", None: "stop"}
 FAILURES: tuple[tuple[type[Exception], Failure], ...] = (
     (ModelContextWindowExceededError, Failure.CONTEXT_OVERFLOW),
@@ -60,17 +65,27 @@ Connected = tuple[Model, Callable[[], Awaitable[Any]]]
 """A model with connections of its own, and how to close them."""
 
 
+@dataclass(slots=True)
+class _Pool:
+    """A model with connections of its own, and the requests that are open on them."""
+
+    connected: Connected
+    open: int = 0
+
+
 class LibrarySender:
     """Sends through pydantic-ai and the provider's library.
 
     Args:
-        models: One model several times.
+        connect: Makes the model, each time with connections of its own.
         takes_parallel_tool_calls: Whether the provider lets parallel tool calls be turned off.
     """
 
-    def __init__(self, models: Sequence[Connected], *, takes_parallel_tool_calls: bool) -> None:
-        self._models = cycle([model for model, _ in models])
-        self._closers = [close for _, close in models]
+    def __init__(
+        self, connect: Callable[[], Connected], *, takes_parallel_tool_calls: bool
+    ) -> None:
+        self._connect = connect
+        self._pools = [_Pool(connect())]
         self._takes_parallel_tool_calls = takes_parallel_tool_calls
 
     async def send(self, request: Request) -> Answered:
@@ -82,12 +97,13 @@ class LibrarySender:
         received = Received()
         RECEIVED.set(received)
         try:
-            response = await model_request(
-                next(self._models),
-                to_wire(request.messages),
-                model_settings=self._settings(request),
-                model_request_parameters=request_parameters(request.tools),
-            )
+            with self._model() as model:
+                response = await model_request(
+                    model,
+                    to_wire(request.messages),
+                    model_settings=self._settings(request),
+                    model_request_parameters=request_parameters(request.tools),
+                )
             return from_wire(response)
         except Exception as error:
             received.require_usable()
@@ -95,8 +111,22 @@ class LibrarySender:
 
     async def close(self) -> None:
         """Closes the connections."""
-        for close in self._closers:
+        for pool in self._pools:
+            _, close = pool.connected
             await close()
+
+    @contextmanager
+    def _model(self) -> Iterator[Model]:
+        """The model with the fewest open requests."""
+        pool = min(self._pools, key=lambda one: one.open)
+        if pool.open >= SMALL_POOL and len(self._pools) < POOLS:
+            pool = _Pool(self._connect())
+            self._pools.append(pool)
+        pool.open += 1
+        try:
+            yield pool.connected[0]
+        finally:
+            pool.open -= 1
 
     def _settings(self, request: Request) -> ModelSettings:
         decoding = request.model_config["decoding"]
@@ -114,14 +144,14 @@ class LibrarySender:
 
 def anthropic_sender(entry: ModelEntry, provider: ProviderEntry, key: str) -> LibrarySender:
     """The sender of a model behind Anthropic's API."""
-    models = [_anthropic(entry, provider, key) for _ in range(POOLS)]
-    return LibrarySender(models, takes_parallel_tool_calls=True)
+    connect = partial(_anthropic, entry, provider, key)
+    return LibrarySender(connect, takes_parallel_tool_calls=True)
 
 
 def google_sender(entry: ModelEntry, provider: ProviderEntry, key: str) -> LibrarySender:
     """The sender of a model behind Google's API."""
-    models = [_google(entry, provider, key) for _ in range(POOLS)]
-    return LibrarySender(models, takes_parallel_tool_calls=False)
+    connect = partial(_google, entry, provider, key)
+    return LibrarySender(connect, takes_parallel_tool_calls=False)
 
 
 def _anthropic(entry: ModelEntry, provider: ProviderEntry, key: str) -> Connected:
