@@ -12,6 +12,8 @@ export default tseslint.config(
     languageOptions: { parserOptions: { projectService: true } },
     rules: {
       ...hooks.configs.recommended.rules,
+      // The compiler is not used, and virtual lists are never memoised.
+      "react-hooks/incompatible-library": "off",
       "@typescript-eslint/restrict-template-expressions": ["error", { allowNumber: true }],
       "@typescript-eslint/no-confusing-void-expression": "off",
       "max-lines": ["error", 400],
@@ -23,6 +25,6 @@ export default tseslint.config(
   },
   {
     files: ["public/*.js", "scripts/*.mjs"],
-    languageOptions: { globals: { localStorage: "readonly", matchMedia: "readonly", document: "readonly", process: "readonly", console: "readonly" } },
+    languageOptions: { globals: { localStorage: "readonly", matchMedia: "readonly", document: "readonly", process: "readonly", console: "readonly", URL: "readonly" } },
   },
 );

@@ -86,7 +86,7 @@ export function useEvents(
             handler.current(events);
           });
         } catch {
-          if (ending.signal.aborted) return;
+          // Whatever broke it: the loop looks whether anybody still listens.
         }
         setState("broken");
         await new Promise((resolve) => setTimeout(resolve, wait));

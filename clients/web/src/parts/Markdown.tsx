@@ -11,6 +11,9 @@ export function Markdown({ text }: { text: string }) {
         remarkPlugins={[remarkGfm]}
         rehypePlugins={[rehypeSanitize]}
         components={{
+          // The page has its own headings of the first ranks.
+          h1: ({ children }) => <h3>{children}</h3>,
+          h2: ({ children }) => <h4>{children}</h4>,
           img: ({ alt }) => <span>[picture: {alt}]</span>,
           a: ({ href, children }) => (
             <a href={href} rel="noopener noreferrer nofollow" target="_blank">

@@ -17,7 +17,7 @@ export function ProblemNote({ error, retry }: { error: unknown; retry?: () => vo
             {issues.map((issue) => (
               <List.Item key={`${issue.field} ${issue.message}`}>
                 <code>{issue.field}</code>: {issue.message}
-                {(issue.choices ?? []).length > 0 && <> (choose from {(issue.choices ?? []).join(", ")})</>}
+                {issue.choices.length > 0 && <> (choose from {issue.choices.join(", ")})</>}
               </List.Item>
             ))}
           </List>

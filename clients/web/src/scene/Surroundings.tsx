@@ -8,8 +8,8 @@ export interface Scenario {
   placement: { kind: string; gap?: number; lowest_center?: number };
 }
 
-const GROUND = 400;
-const LINES = 200;
+const GROUND = 160;
+const LINES = 80;
 
 /** The ground and the fixed boxes of a scenario. */
 export function Surroundings({ scenario, floor = 0 }: { scenario: Scenario | null; floor?: number }) {

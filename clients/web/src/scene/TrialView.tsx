@@ -1,10 +1,11 @@
 import { ActionIcon, Alert, Group, SegmentedControl, Slider, Stack, Switch, Text } from "@mantine/core";
 import { IconPlayerPause, IconPlayerPlay, IconPlayerSkipBack } from "@tabler/icons-react";
 import { useCallback, useEffect, useMemo, useRef, useState } from "react";
+import { Box3, Matrix4, Vector3 } from "three";
 import { duration } from "../format";
 import { Curves } from "./Curves";
 import { boundsOf, readMachine, type MachineDocument, type Part } from "./machine";
-import { poseAt } from "./playing";
+import { cargoAt, poseAt } from "./playing";
 import { Stage } from "./Stage";
 import { Surroundings, type Scenario } from "./Surroundings";
 import { curvesOf, type Trial } from "./trial";
@@ -22,7 +23,12 @@ export default function TrialView({ document, trial, scenario }: { document: Mac
   const clock = useClock(end);
   const bounds = useMemo(() => {
     const start = poseAt(trial, 0);
-    return boundsOf({ ...machine, parts: machine.parts.map((part) => ({ ...part, pose: start(part, part.pose.clone()) })) });
+    const whole = boundsOf({ ...machine, parts: machine.parts.map((part) => ({ ...part, pose: start(part, part.pose.clone()) })) });
+    if (trial.cargo !== null) {
+      const size = new Vector3(...trial.cargo.size);
+      whole.union(new Box3().setFromCenterAndSize(new Vector3().setFromMatrixPosition(cargoAt(trial, 0, new Matrix4())), size));
+    }
+    return whole;
   }, [machine, trial]);
   const curves = useMemo(() => curvesOf(trial), [trial]);
   const worst = useMemo(() => worstLoads(trial), [trial]);

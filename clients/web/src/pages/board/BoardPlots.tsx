@@ -64,7 +64,7 @@ function Failures({ board, models }: { board: Board; models: string[] }) {
 }
 
 function Dimensions({ board, models }: { board: Board; models: string[] }) {
-  const rows = (board.overall ?? [])
+  const rows = board.overall
     .filter((row) => models.includes(row.model))
     .flatMap((row) => Object.entries(row.dimensions).map(([name, score]) => ({ model: row.model, name: words(name), score })));
   const names = new Set(rows.map((row) => row.name)).size;
@@ -88,7 +88,7 @@ function Dimensions({ board, models }: { board: Board; models: string[] }) {
 }
 
 function Costs({ board, models }: { board: Board; models: string[] }) {
-  const rows = (board.overall ?? [])
+  const rows = board.overall
     .filter((row) => models.includes(row.model) && row.success_rate_mean !== null)
     .map((row) => ({ model: row.model, tokens: row.output_tokens_mean ?? 0, cost: row.cost_usd_mean ?? 0, success: 100 * (row.success_rate_mean ?? 0), pareto: row.pareto }));
   const priced = rows.some((row) => row.cost > 0);

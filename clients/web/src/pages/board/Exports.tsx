@@ -16,7 +16,7 @@ const FORMATS: Readonly<Record<string, { label: string; ending: string }>> = {
 /** The address of exactly what the board shows, as data. */
 export function exportPath(track: string, search: BoardSearch, format: string): string {
   const words = new URLSearchParams();
-  for (const [name, value] of Object.entries({ ...boardQuery(search), track })) {
+  for (const [name, value] of Object.entries<string | string[]>({ ...boardQuery(search), track })) {
     for (const one of Array.isArray(value) ? value : [value]) words.append(name, one);
   }
   if (format === "json") return `/v1/leaderboard?${words.toString()}`;

@@ -13,7 +13,7 @@ const FIGURES: readonly { value: Figure; label: string }[] = [
 
 /** Models in the order of the overall ranking, then those that it does not have. */
 export function modelsInOrder(board: Board, baselines: boolean): string[] {
-  const ranked = (board.overall ?? []).map((row) => row.model);
+  const ranked = board.overall.map((row) => row.model);
   const others = board.tasks.flatMap((task) => task.rows.map((row) => row.model));
   const hidden = new Set(
     baselines ? [] : board.tasks.flatMap((task) => task.rows.filter((row) => row.baseline).map((row) => row.model)),
@@ -135,7 +135,8 @@ function Cell({ task, model, figure, models }: { task: TaskBoard; model: string;
 }
 
 function Ghosts({ board, figure }: { board: Board; figure: Figure }) {
-  const names = [...new Set(board.tasks.flatMap((task) => task.published.map((row) => row.model)))];
+  const ranked = board.published.map((row) => row.model);
+  const names = [...new Set([...ranked, ...board.tasks.flatMap((task) => task.published.map((row) => row.model))])];
   return names.map((name) => (
     <tr key={name} className="ghost">
       <th scope="row" style={{ textAlign: "left" }}>

@@ -9,10 +9,11 @@ type Entry = Pick<OverallView, "rank" | "rank_low" | "rank_high" | "mean_rank" |
 
 /** Models ranked over all tasks of the board, with the intervals of their places. */
 export function Overall({ board, search }: { board: Board; search: BoardSearch }) {
-  const overall = (board.overall ?? []).filter((row) => search.baselines !== "no" || !row.baseline);
-  const published = search.paper === "yes" ? (board.published ?? []) : [];
+  const overall = board.overall.filter((row) => search.baselines !== "no" || !row.baseline);
+  const published = search.paper === "yes" ? board.published : [];
   const most = Math.max(1, ...[...overall, ...published].map((row) => row.rank_high ?? 1));
   const ties = sharedRanks(overall);
+  const paperTies = sharedRanks(published);
   return (
     <Table.ScrollContainer minWidth={720} type="native">
       <Table verticalSpacing={7} className="sticky-first" highlightOnHover>
@@ -37,12 +38,12 @@ export function Overall({ board, search }: { board: Board; search: BoardSearch }
               <Table.Td>
                 <Group gap={6} wrap="nowrap">
                   {row.model}
-                  <Badge variant="outline" color="gray" size="sm" tt="none">
+                  <Badge variant="outline" color="gray" size="sm" tt="none" styles={{ root: { color: "inherit" } }}>
                     paper
                   </Badge>
                 </Group>
               </Table.Td>
-              <Place row={row} most={most} tied={false} />
+              <Place row={row} most={most} tied={paperTies.has(row.rank)} />
               <Table.Td className="figures">{number(row.mean_rank, 2)}</Table.Td>
               <Table.Td colSpan={4} className="dimmed">
                 ranked by the paper’s own trials, among its models only
@@ -108,13 +109,13 @@ function OverallRow({ row, most, tied }: { row: OverallView; most: number; tied:
             <b>{row.model}</b>
           </Link>
           {row.baseline && (
-            <Badge variant="light" color="gray" size="sm" tt="none">
+            <Badge variant="outline" color="gray" size="sm" tt="none" styles={{ root: { color: "inherit" } }}>
               baseline
             </Badge>
           )}
           {row.pareto && (
             <Tooltip label="No other model is both better and cheaper">
-              <Badge variant="outline" size="sm" tt="none">
+              <Badge variant="outline" size="sm" tt="none" styles={{ root: { color: "inherit" } }}>
                 Pareto
               </Badge>
             </Tooltip>

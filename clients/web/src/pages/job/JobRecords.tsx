@@ -21,6 +21,8 @@ export function JobRecords({ job }: { job: JobDetail }) {
       </Section>
       {job.manifest !== null && (
         <Section title="Manifest">
+          <details>
+            <summary style={{ cursor: "pointer" }}>Versions of everything that can change this result</summary>
           <Table fz="sm">
             <Table.Tbody>
               {flattened(job.manifest).map(([name, value]) => (
@@ -33,6 +35,7 @@ export function JobRecords({ job }: { job: JobDetail }) {
               ))}
             </Table.Tbody>
           </Table>
+          </details>
         </Section>
       )}
     </SimpleGrid>

@@ -22,7 +22,7 @@ export default function ModelPage() {
 }
 
 function Profile({ board: found, name }: { board: Board; name: string }) {
-  const overall = (found.overall ?? []).find((row) => row.model === name);
+  const overall = found.overall.find((row) => row.model === name);
   const tasks = found.tasks
     .map((task) => ({ ...task, rows: task.rows.filter((row) => row.model === name) }))
     .filter((task) => task.rows.length > 0);

@@ -4,6 +4,7 @@ import { Link } from "@tanstack/react-router";
 import { tasks, type TaskView } from "../../api/queries";
 import { words } from "../../format";
 import { Answered } from "../../parts/States";
+import { goalOf } from "./goal";
 
 /** All tasks, by category. */
 export default function TasksPage() {
@@ -55,7 +56,7 @@ function TaskCard({ task }: { task: TaskView }) {
         {task.name} · {task.version}
       </Text>
       <Text size="sm" mt="xs" lineClamp={4}>
-        {task.statement}
+        {goalOf(task.statement)}
       </Text>
       <Text size="xs" mt="xs" className="dimmed">
         ranked by {words(task.indicator)}, {task.unit}
