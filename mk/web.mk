@@ -21,7 +21,7 @@ $(WEB_STAMP): $(WEB_PARTS) $(WEB_SOURCES)
 test-web: $(WEB_STAMP) ## Types, lint, logic and pages of the dashboard, in a real browser
 	@bash mk/node.sh npm --prefix $(WEB) run --silent check
 	@bash mk/node.sh npm --prefix $(WEB) test
-	@$(BIN)/pytest tests/web -rs
+	@BUILDARENA_TEST_WEB=1 $(BIN)/pytest tests/web -rs
 
 # People who look at a service want its pages; without them it runs all the same.
 up: | web-if-it-can-be

@@ -19,6 +19,8 @@ export default function Plot({
     const drawn = ObservablePlot.plot({ ...options(Math.max(NARROW, width)), width: Math.max(NARROW, width) });
     drawn.setAttribute("role", "img");
     drawn.setAttribute("aria-label", label);
+    // The whole has a label; groups without a role may have none.
+    for (const part of drawn.querySelectorAll("g[aria-label]")) part.removeAttribute("aria-label");
     place.current.replaceChildren(drawn);
     return () => {
       drawn.remove();

@@ -109,7 +109,8 @@ def _detach(settings: Settings, *, keys: bool) -> None:
     except OSError as error:
         raise unwritable(data, error) from error
     say(
-        f"dashboard and API {run.url}  ·  docs {run.url}/docs  ·  pid {run.pid}  ·  logs {data / 'logs'}"
+        f"dashboard and API {run.url}  ·  docs {run.url}/docs  ·  pid {run.pid}"
+        f"  ·  logs {data / 'logs'}"
     )
     say("`buildarena down` stops it.")
 
