@@ -152,6 +152,13 @@ def test_a_worker_without_a_screen_does_not_start_and_says_why(rig: Rig) -> None
     assert "there is no screen to play on" in done.stderr
 
 
+def test_without_the_extra_the_doctor_says_what_to_install(rig: Rig, tmp_path) -> None:
+    (tmp_path / "pyautogui.py").write_text("raise ImportError('No module named pyautogui')")
+    path = f"{tmp_path}{os.pathsep}{rig.environment()['PYTHONPATH']}"
+    done = answer(["doctor"], rig, {"PYTHONPATH": path})
+    assert "pip install buildarena-simworker[besiege]" in done.stdout
+
+
 @pytest.mark.parametrize(
     ("changes", "named"),
     [

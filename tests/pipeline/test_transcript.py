@@ -1,7 +1,7 @@
 from __future__ import annotations
 
-from buildarena_pipeline.agents.sessions import _transcript
 from buildarena_pipeline.transcript import ActionResult, ModelTurn, Transcript
+from buildarena_pipeline.turns import turn_of_call
 from buildarena_store import ExternalCall
 
 ACTION = ActionResult(
@@ -41,7 +41,7 @@ def test_an_external_agents_transcript_has_blanks_and_no_costs() -> None:
         reason="block_presence",
         feedback="No.",
     )
-    transcript = _transcript([call])
+    transcript = Transcript([turn_of_call(0, call)])
     assert transcript.to_json(spaced=True).decode() == (
         '{"version": "1", "turns": [{"index": 0, "stage": "external", "sub_structure": "main", '
         '"role": "agent", "text": "", "actions": [{"name": "start", "arguments": {"n": [1, "ü"]}, '

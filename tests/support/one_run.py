@@ -18,7 +18,8 @@ from buildarena_simworker.simulators.besiege.simulator import BesiegeSimulator
 def main() -> None:
     """Plays the car for a few seconds in the folder that is named."""
     rig = Rig(folder=Path(sys.argv[1]))
-    os.environ.update(rig.environment())
+    for name, value in rig.environment().items():
+        os.environ.setdefault(name, value)
     settings = BesiegeSettings()
     desktop, facts = make_desktop(settings)
     task, machine = shortened("transport-1", 5.0), experts_machine("transport-1")

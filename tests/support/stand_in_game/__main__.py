@@ -36,6 +36,7 @@ def main() -> int:
         log_lines=options.log_lines,
         horizon_s=options.horizon,
         seed=options.seed,
+        log_file=options.log_file,
     )
     game = Game(settings, Faults(faults), scripted=not options.headless)
     return _show(game, options)
@@ -69,6 +70,7 @@ def _parser() -> argparse.ArgumentParser:
     add("--faults-once", type=Path, metavar="FILE", help="faults of this start; then deleted")
     add("--random-faults", type=int, metavar="SEED", help="some faults, drawn at random")
     add("--report", type=Path, metavar="FILE", help="kept up to date with what the game does")
+    add("--log-file", type=Path, metavar="FILE", help="write the log there as well")
     add("--seed", type=int, default=0, help="draws everything random")
     add("--headless", action="store_true", help="no window: the protocol of BesiegeField")
     add("--ip", default="127.0.0.1", help="headless: where it listens")

@@ -33,6 +33,7 @@ class Settings:
         horizon_s: how much of a simulation is worked out.
         load_s: how long a machine takes to load, wall clock.
         seed: draws everything random.
+        log_file: where the log is written as well.
     """
 
     terrain: tuple[TerrainBox, ...] = ()
@@ -41,6 +42,7 @@ class Settings:
     horizon_s: float = 36.0
     load_s: float = 0.3
     seed: int = 0
+    log_file: Path | None = None
 
 
 class Rollout:
@@ -83,7 +85,7 @@ class Game:
         self._scripted = scripted
         self.terrain = settings.terrain
         self._draw = random.Random(settings.seed)
-        self.log = LogWindow(settings.log_lines, settings.seed)
+        self.log = LogWindow(settings.log_lines, settings.seed, settings.log_file)
         self.machine_name: str | None = None
         self.placed: Placed | None = None
         self.grounded = False

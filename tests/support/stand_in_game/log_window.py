@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 from collections import deque
 from collections.abc import Sequence
+from pathlib import Path
 
 from stand_in_game.faults import Fault
 
@@ -15,9 +16,11 @@ class LogWindow:
     Args:
         limit: how many lines it keeps.
         seed: draws which lines faults strike.
+        file: where every line is written as well, as by a mod that keeps a log.
     """
 
-    def __init__(self, limit: int, seed: int) -> None:
+    def __init__(self, limit: int, seed: int, file: Path | None = None) -> None:
+        self._file = file
         self._lines: deque[str] = deque(maxlen=limit)
         self._draw = random.Random(seed)
         self.version = 0
@@ -28,6 +31,9 @@ class LogWindow:
             for shown in self._through(line, faults):
                 self._lines.appendleft(shown)
                 self.version += 1
+        if self._file is not None and printed:
+            with self._file.open("a", encoding="utf-8") as log:
+                log.writelines(f"{line}\n" for line in printed)
 
     def clear(self) -> None:
         """Empties it, as a new simulation does."""

@@ -20,11 +20,11 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-LEAST_WIDTH: Final = 0.5
+MIN_WIDTH: Final = 0.5
 """Blocks that lie nearer to one line tell no rotation about it, units (root of summed squares)."""
 
 
-MOST_MISFIT: Final = 0.25
+MAX_MISFIT: Final = 0.25
 """Blocks that lie farther from where the machine has them are not moving as one, units."""
 
 
@@ -63,7 +63,7 @@ def machine_rotations(built: Floats, roots: Floats, joined: NDArray[np.bool_]) -
     after = (roots - centers[:, None]) * weights[:, :, None]
     widths = np.linalg.svd(before, compute_uv=False)
     known = (np.isfinite(after).all(axis=(1, 2))) & (joined.sum(axis=1) > 2)  # noqa: PLR2004
-    known &= widths[:, 1] > LEAST_WIDTH if widths.shape[1] > 1 else False
+    known &= widths[:, 1] > MIN_WIDTH if widths.shape[1] > 1 else False
     if not len(known) or not known[0]:
         return None
     left, _, right = np.linalg.svd(np.einsum("tni,tnj->tij", after[known], before[known]))
@@ -72,7 +72,7 @@ def machine_rotations(built: Floats, roots: Floats, joined: NDArray[np.bool_]) -
     found = np.tile(np.eye(3), (len(roots), 1, 1))
     found[known] = left @ right
     fit = after[0] - before[0] @ found[0].T
-    if np.sqrt((fit**2).sum() / counts[0]) > MOST_MISFIT:
+    if np.sqrt((fit**2).sum() / counts[0]) > MAX_MISFIT:
         return None
     latest = np.maximum.accumulate(np.where(known, np.arange(len(known)), 0))
     return np.asarray(found[latest])

@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 SAMPLE_EVERY: Final = 4
 """Updates from one sample to the next: 25 samples a second."""
 
+BEGIN_EVERY: Final = 50
+"""Updates from one repetition of the begin line to the next: the window loses its oldest lines."""
+
 END_EVERY: Final = 25
 """Updates from one repetition of the end line to the next."""
 
@@ -137,6 +140,7 @@ def _told(telling: Telling) -> str:
         [
             f"local prefix = {lua_text(telling.prefix)}",
             f"local begin = {lua_text(telling.begin)}",
+            f"local begin_every = {BEGIN_EVERY}",
             f"local last = {telling.last_update}",
             f"local per_line = {BLOCKS_PER_LINE}",
             f"local sample_every, end_every = {SAMPLE_EVERY}, {END_EVERY}",
@@ -239,7 +243,7 @@ local function sample()
 end
 
 local function report()
-  if updates == 1 then
+  if updates == 1 or (updates % begin_every == 0 and updates <= last) then
     tell(",b," .. begin)
   end
   if updates % sample_every == 0 and updates <= last then

@@ -9,8 +9,16 @@ from buildarena_geometry.keys import KEYS
 from buildarena_geometry.machine import Machine, replay
 from buildarena_geometry.modules.catalogue import load_catalogue
 from buildarena_geometry.modules.module import Box, Catalogue, Cylinder, Face, Landmark, Module
-from buildarena_geometry.outcomes import Accepted, Cause, Outcome, RefusalClass, Refused
+from buildarena_geometry.outcomes import (
+    Accepted,
+    AttemptedBlock,
+    Cause,
+    Outcome,
+    RefusalClass,
+    Refused,
+)
 from buildarena_geometry.poses import Pose
+from buildarena_geometry.steps import Difference, Step, step
 from buildarena_geometry.tools import GROUPS, ToolDefinition, tool_definitions
 
 __version__ = "0.1.0"
@@ -23,6 +31,7 @@ __all__ = [
     "Accepted",
     "ActionLog",
     "ActionRecord",
+    "AttemptedBlock",
     "Block",
     "Box",
     "Catalogue",
@@ -30,6 +39,7 @@ __all__ = [
     "Cause",
     "Connector",
     "Cylinder",
+    "Difference",
     "DocumentError",
     "Face",
     "GeometryError",
@@ -43,9 +53,11 @@ __all__ = [
     "RefusalClass",
     "Refused",
     "SequenceError",
+    "Step",
     "ToolDefinition",
     "__version__",
     "load_catalogue",
     "replay",
+    "step",
     "tool_definitions",
 ]

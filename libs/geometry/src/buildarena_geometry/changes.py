@@ -5,9 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
+from buildarena_geometry.outcomes import AttemptedBlock
 
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+    from buildarena_geometry.blocks import Block
     from buildarena_geometry.state import MachineState
 
 
@@ -30,3 +33,16 @@ class Change:
     removed: tuple[str, ...] = ()
     touched: tuple[str, ...] = ()
     attempt: str = ""
+
+
+def attempted(blocks: Iterable[Block]) -> tuple[AttemptedBlock, ...]:
+    """Blocks as a refusal names them: where they would have been."""
+    return tuple(
+        AttemptedBlock(
+            id=block.id,
+            module=block.module.name,
+            position=block.world_from_block.xyz,
+            quaternion=block.world_from_block.wxyz,
+        )
+        for block in blocks
+    )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Self
 
-from buildarena_geometry.changes import Change
+from buildarena_geometry.changes import Change, attempted
 from buildarena_geometry.collision import CollisionWorld
 from buildarena_geometry.documents.log import ActionLog, ActionRecord, LoggedState
 from buildarena_geometry.documents.read import read_machine
@@ -20,7 +20,7 @@ from buildarena_geometry.state import MachineState
 from buildarena_geometry.tools import ACTIONS, action_named
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Mapping, Sequence
 
     import numpy as np
     from numpy.typing import NDArray
@@ -77,7 +77,12 @@ class Machine:
         try:
             outcome: Outcome = self._carry_out(self._propose(name, arguments))
         except RefusalError as refusal:
-            outcome = Refused(cause=refusal.cause, text=refusal.text, overlaps=refusal.overlaps)
+            outcome = Refused(
+                cause=refusal.cause,
+                text=refusal.text,
+                overlaps=refusal.overlaps,
+                attempted=refusal.attempted,
+            )
         self._record(name, arguments, outcome)
         return outcome
 
@@ -284,13 +289,14 @@ def replay(log: ActionLog) -> Machine:
     return machine
 
 
-def _require_reach(blocks: Iterable[Block]) -> None:
+def _require_reach(blocks: Sequence[Block]) -> None:
     """Refuses blocks so far out that coordinates lose the digits overlaps are judged by."""
     for block in blocks:
         if max(map(abs, block.world_from_block.xyz)) > LARGEST_NUMBER:
             raise RefusalError(
                 Cause.OUT_OF_RANGE,
                 f"Block {block.id} would lie farther out than {LARGEST_NUMBER:.0f}.",
+                attempted=attempted(blocks),
             )
 
 
@@ -301,7 +307,8 @@ def _overlap(change: Change, pairs: list[tuple[str, str]]) -> RefusalError:
     else:
         named = "; ".join(f"{mine} and {other}" for mine, other in pairs)
         text = f"{change.attempt} would make blocks overlap: {named}."
-    return RefusalError(Cause.OVERLAP, text, tuple(pairs))
+    tried = attempted(change.after.blocks[found] for found in change.placed)
+    return RefusalError(Cause.OVERLAP, text, tuple(pairs), tried)
 
 
 def _blocks(state: MachineState, ids: list[str]) -> str:

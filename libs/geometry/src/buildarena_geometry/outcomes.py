@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Literal
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from buildarena_geometry.rotations import Quaternion, Vector
+
 
 class RefusalClass(StrEnum):
     """Why an action was refused, as results are counted by.
@@ -119,6 +121,23 @@ class Accepted:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class AttemptedBlock:
+    """A block where a refused action would have put it.
+
+    Attributes:
+        id: the id it has, or would have got.
+        module: name of its module.
+        position: (3,) its root point, world frame, units.
+        quaternion: (4,) how it would be turned, (w, x, y, z).
+    """
+
+    id: str
+    module: str
+    position: Vector
+    quaternion: Quaternion
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Refused:
     """An action that was not carried out; the machine is what it was.
 
@@ -126,11 +145,13 @@ class Refused:
         cause: what exactly was wrong.
         text: what a model reads: what was wrong and what would be allowed.
         overlaps: the pairs of block ids that would overlap; a new block has its id to be.
+        attempted: the blocks where they would have been; empty when that is not known.
     """
 
     cause: Cause
     text: str
     overlaps: tuple[tuple[str, str], ...] = ()
+    attempted: tuple[AttemptedBlock, ...] = ()
 
     @property
     def ok(self) -> Literal[False]:

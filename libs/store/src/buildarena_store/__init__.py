@@ -30,6 +30,7 @@ from buildarena_store.jobs.journal import Journal, JournalEntry, Usage
 from buildarena_store.jobs.leases import Lease, Leases
 from buildarena_store.jobs.results import JobScore, Results
 from buildarena_store.jobs.rollouts import RolloutRecord, RolloutRequest, Rollouts
+from buildarena_store.jobs.turns import TurnRecord, TurnResult, Turns
 from buildarena_store.jobs.verifications import Verification, Verifications
 from buildarena_store.states import (
     JobState,
@@ -99,6 +100,9 @@ __all__ = [
     "Sweeps",
     "Tasks",
     "TransitionError",
+    "TurnRecord",
+    "TurnResult",
+    "Turns",
     "UnknownIdError",
     "Usage",
     "Verification",

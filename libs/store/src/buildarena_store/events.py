@@ -12,6 +12,7 @@ from sqlalchemy.dialects.postgresql import JSONB
 
 from buildarena_store.database import Database
 from buildarena_store.rows import bound_texts, columns_of, value_of
+from buildarena_store.states import TURN
 from buildarena_store.tables import events, sweep_jobs
 
 now = func.clock_timestamp()
@@ -69,6 +70,8 @@ class Events:
     ) -> list[Event]:
         """Events of a job, or of a sweep and its jobs, or of everything, in order.
 
+        A sweep's have no turns: those of all its jobs are too many for one who watches it.
+
         Args:
             last_id: Only events with greater ids.
             job_id: Only this job's.
@@ -80,7 +83,10 @@ class Events:
             query = query.where(events.c.job_id == job_id)
         if sweep_id is not None:
             members = select(sweep_jobs.c.job_id).where(sweep_jobs.c.sweep_id == sweep_id)
-            query = query.where(or_(events.c.sweep_id == sweep_id, events.c.job_id.in_(members)))
+            query = query.where(
+                or_(events.c.sweep_id == sweep_id, events.c.job_id.in_(members)),
+                events.c.kind != TURN,
+            )
         query = query.order_by(events.c.id).limit(limit)
         with self._database.transaction() as connection:
             return [value_of(Event, row) for row in connection.execute(query)]

@@ -18,6 +18,7 @@ __all__ = [
     "EXTERNAL_QUEUE",
     "JOB_TRANSITIONS",
     "SWEEP_TRANSITIONS",
+    "TURN",
     "VERIFY_QUEUE",
     "AttemptResult",
     "JobState",
@@ -37,6 +38,9 @@ EXTERNAL_PROVIDER: Final = "external"
 """Provider in the configuration of external agents: nobody counts their requests and tokens."""
 EXTERNAL_QUEUE: Final = "external"
 """Where jobs of external agents are while they build: no worker serves it."""
+
+TURN: Final = "turn"
+"""Kind of the events that say that a session took a reply: of a job's stream, not of a sweep's."""
 
 
 def simulate_queue(simulator: str) -> str:

@@ -15,6 +15,7 @@ from buildarena_store.jobs.journal import Journal
 from buildarena_store.jobs.leases import Leases
 from buildarena_store.jobs.results import Results
 from buildarena_store.jobs.rollouts import Rollouts
+from buildarena_store.jobs.turns import Turns
 from buildarena_store.jobs.verifications import Verifications
 from buildarena_store.sweeps.lifecycle import SweepLifecycle
 from buildarena_store.sweeps.sweeps import Sweeps
@@ -33,6 +34,7 @@ class Store:
     rollouts: Rollouts
     results: Results
     external_calls: ExternalCalls
+    turns: Turns
     verifications: Verifications
     sweeps: Sweeps
     lifecycle: SweepLifecycle
@@ -61,6 +63,7 @@ def open_store(database: Database, *, lease_s: float, max_faults: int) -> Store:
         rollouts=Rollouts(database),
         results=Results(database, leases),
         external_calls=ExternalCalls(database),
+        turns=Turns(database),
         verifications=Verifications(database),
         sweeps=Sweeps(database),
         lifecycle=SweepLifecycle(database),

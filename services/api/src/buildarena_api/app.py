@@ -13,6 +13,7 @@ from buildarena_api.dashboard.files import read_pages
 from buildarena_api.dashboard.serving import Dashboard
 from buildarena_api.events.hub import EventHub
 from buildarena_api.http.access import caller_of
+from buildarena_api.http.answers import KeptAnswers
 from buildarena_api.http.concurrency import limited, usual_limits
 from buildarena_api.http.key_checks import KeyChecks
 from buildarena_api.http.limits import BodyLimitMiddleware
@@ -25,6 +26,7 @@ from buildarena_api.http.own_pool import OwnPool
 from buildarena_api.http.problems import add_problem_handlers, problem_responses
 from buildarena_api.http.rate_limits import RateLimits
 from buildarena_api.leaderboard.cache import BoardCache
+from buildarena_api.replays.making import Replays
 from buildarena_api.routes import (
     archives,
     catalogue,
@@ -35,9 +37,12 @@ from buildarena_api.routes import (
     keys,
     leaderboard,
     metrics,
+    pictures,
+    replays,
     sessions,
     sweeps,
     tasks,
+    trials,
     verifications,
 )
 from buildarena_pipeline import __version__
@@ -51,7 +56,20 @@ WATCHERS = 3
 """Threads and connections for key checks and event streams."""
 EXPORTERS = 6
 """Threads and connections for exports and archives: as many as may go on at once."""
-ORDINARY = (verifications, sessions, jobs, sweeps, leaderboard, tasks, catalogue, keys, metrics)
+ORDINARY = (
+    verifications,
+    sessions,
+    replays,  # before jobs, whose artifacts have paths like theirs
+    trials,
+    pictures,
+    jobs,
+    sweeps,
+    leaderboard,
+    tasks,
+    catalogue,
+    keys,
+    metrics,
+)
 LIMITED_THEMSELVES = (events, exports, archives)
 """Routes whose requests take long, and don't count among a caller's ordinary ones."""
 DESCRIPTION = """Find out whether language models can engineer: submit task x model x seed jobs,
@@ -104,6 +122,9 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
     app.state.concurrency = usual_limits()
     app.state.registry = registry
     app.state.boards = BoardCache(context.store.results.boards, context.tasks)
+    app.state.scenes = KeptAnswers(trials.KEPT_SCENES)
+    app.state.pictures = KeptAnswers(pictures.KEPT_PICTURES)
+    app.state.replays = Replays(context)
     app.state.submissions = Submissions(context, registry)
     app.state.external = ExternalSessions(context)
     app.state.rate_limits = rate_limits

@@ -131,7 +131,7 @@ class JobFileView(_Answer):
 
 
 class JobPage(_Answer):
-    """Some jobs, newest first."""
+    """Some jobs, in the order that was asked for."""
 
     jobs: list[JobView]
     next_cursor: str | None = Field(description="Give it as `cursor` to get the next page")

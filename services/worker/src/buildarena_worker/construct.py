@@ -44,6 +44,7 @@ from buildarena_worker.session.results import (
     Suspended,
 )
 from buildarena_worker.session.session import Session
+from buildarena_worker.session.turn_keeper import TurnKeeper
 from buildarena_worker.workflow import Workflows
 from buildarena_worker.workflow.rounds import run_session
 
@@ -97,6 +98,7 @@ class ConstructHandler:
             model_config=job.model_config,
             pack=pack_of(job, self._packs),
             host=self._host(active),
+            on_turn=TurnKeeper(self._store.turns, lease),
         )
         workflow = self._workflows.find(str(job.track_config["workflow"]))
         with self._gate.acquired():

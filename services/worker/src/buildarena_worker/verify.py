@@ -20,14 +20,7 @@ import structlog
 from sqlalchemy.exc import OperationalError
 
 from buildarena_benchmark import Task, broken_constraint, failed_score, score
-from buildarena_besiege import (
-    GameLog,
-    LogIncompleteError,
-    MachineNotPlayableError,
-    StateLog,
-    prepare_run,
-    trajectory_of,
-)
+from buildarena_besiege import LogIncompleteError, MachineNotPlayableError, prepare_run
 from buildarena_geometry import KeyPress, Machine
 from buildarena_pipeline.agents.workbench import Workbench
 from buildarena_pipeline.catalog.prompt_packs import PromptPacks
@@ -59,6 +52,7 @@ from buildarena_store import (
     Usage,
     Verifications,
 )
+from buildarena_worker.game_trials import annotations_again, logged_trajectory
 from buildarena_worker.jobs import loop_of, pack_of
 from buildarena_worker.session.host import ReplayHost
 from buildarena_worker.session.results import (
@@ -232,6 +226,10 @@ class Verifier:
         try:
             if record.engine == BESIEGE:
                 trajectory = self._played(job, record, machine, task)
+                checks += [
+                    _compare(f"{name}: what {engine} says", kept, _plain(found))
+                    for engine, kept, found in annotations_again(record, task, machine, controls)
+                ]
             else:
                 simulated_by = (record.versions or {}).get("simulation")
                 version = f"{name}: simulation version"
@@ -265,16 +263,8 @@ class Verifier:
         if digest is None:
             prepare_run(machine, task.scenario, name="again", run_id="again")
             raise LogIncompleteError("the log of the trial was not kept")
-        versions = record.versions or {}
-        names = {name: str(versions.get(name)) for name in ("game", "mod")}
         text = self._artifacts.get(digest).decode("utf-8", "replace")
-        if versions.get("desktop") == "headless":
-            states = StateLog(str(versions.get("run")))
-            states.read(text)
-            return states.trajectory(machine, task.scenario, **names)
-        lines = GameLog(str(versions.get("run")))
-        lines.read(text)
-        return trajectory_of(lines, machine, task.scenario, **names)
+        return logged_trajectory(text, record.versions or {}, machine, task)
 
     def _score_checks(
         self, job: Job, machine: Machine | None, records: Sequence[RolloutRecord]

@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from itertools import combinations
 
-import numpy as np
-
-from buildarena_benchmark.leaderboard import Cell, counted_trials
-from buildarena_benchmark.statistics import agreement, detectable_difference, token_bins
+from buildarena_benchmark.leaderboard import Cell, cost_bins, counted_trials
+from buildarena_benchmark.statistics import agreement, detectable_difference
 from buildarena_cli.report.document import Block, Grid, Heading, Paragraph, Plot
 from buildarena_cli.report.material import Material, paper_rows, percent
 from buildarena_cli.report.plots import cost_plot, rounds_plot
@@ -47,18 +45,14 @@ def cost(material: Material, cells: Mapping[str, Sequence[Cell]]) -> list[Block]
         Heading(text="Cost"),
         Grid(caption="Means of scored jobs", columns=columns, rows=rows, text_columns=2),
     ]
-    by_category = _normalised(material)
+    categories = {name: task.category for name, task in material.tasks.items()}
+    by_category = cost_bins(material.trials, reading=material.reading, categories=categories)
     if by_category:
         blocks.append(
             Plot(
                 name="cost",
                 text="Performance, normalised to the best job, by output tokens",
-                figure=cost_plot(
-                    {
-                        category: token_bins(tokens, performance)
-                        for category, (tokens, performance) in by_category.items()
-                    }
-                ),
+                figure=cost_plot(by_category),
             )
         )
     return blocks
@@ -154,23 +148,3 @@ def _after(runs: Sequence[Sequence[tuple[bool, float]]], rounds: int) -> tuple[f
     succeeded = [any(success for success, _ in run[:rounds]) for run in runs]
     best = [max((value for _, value in run[:rounds]), default=0.0) for run in runs]
     return sum(succeeded) / len(runs), sum(best) / len(runs)
-
-
-def _normalised(material: Material) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Output tokens and performance, relative to the best job of the task, by category."""
-    tasks = material.tasks
-    best: dict[str, float] = {}
-    trials = counted_trials(material.trials, reading=material.reading)
-    for trial in trials:
-        best[trial.task] = max(best.get(trial.task, 0.0), trial.indicator)
-    found: dict[str, list[tuple[float, float]]] = {}
-    for trial in trials:
-        if trial.output_tokens:
-            category = tasks[trial.task].category if trial.task in tasks else trial.task
-            top = best[trial.task]
-            relative = trial.indicator / top if top > 0 else 0.0
-            found.setdefault(category, []).append((float(trial.output_tokens), relative))
-    return {
-        category: (np.array([t for t, _ in pairs]), np.array([p for _, p in pairs]))
-        for category, pairs in found.items()
-    }

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Final
 
 from buildarena_benchmark.flags import Reading, is_disqualified, is_left_out, meaning
-from buildarena_benchmark.leaderboard import Board, BoardQuery, Cell, TrackBoard
+from buildarena_benchmark.leaderboard import Board, BoardQuery, Cell, TrackBoard, failure_rows
 from buildarena_benchmark.statistics import MIN_SUCCESSES
 from buildarena_cli.report.custom_tasks import custom_tasks
 from buildarena_cli.report.document import Block, Grid, Heading, Paragraph, Plot
@@ -202,17 +203,10 @@ def _dimensions(board: Board) -> list[Block]:
 
 
 def _failures(material: Material, cells: Mapping[str, Sequence[Cell]]) -> list[Block]:
-    outcomes: dict[str, Counter[str]] = {}
-    refusals: dict[str, Counter[str]] = {}
-    actions: dict[str, list[int]] = {}
-    for trial in material.trials:
-        row = outcomes.setdefault(trial.model, Counter())
-        named = trial.outcome if not trial.reason else f"{trial.outcome}: {trial.reason}"
-        row[named] += 1
-        refusals.setdefault(trial.model, Counter()).update(trial.refusals)
-        made = actions.setdefault(trial.model, [0, 0])
-        made[0] += trial.actions
-        made[1] += trial.refused_actions
+    # A row of a report is one name, whatever limits its jobs had.
+    found = failure_rows(replace(trial, configuration="") for trial in material.trials)
+    outcomes = {row.model: row.outcomes for row in found}
+    refusals = {row.model: row.refusals for row in found}
     if not outcomes:
         return []
     blocks: list[Block] = [
@@ -236,8 +230,13 @@ def _failures(material: Material, cells: Mapping[str, Sequence[Cell]]) -> list[B
                 caption="Refused actions of all actions",
                 columns=("model", "actions", "refused", "invalid-action rate"),
                 rows=[
-                    (model, f"{n:,}", f"{bad:,}", percent(bad / n if n else None))
-                    for model, (n, bad) in actions.items()
+                    (
+                        row.model,
+                        f"{row.actions:,}",
+                        f"{row.refused_actions:,}",
+                        percent(row.refused_actions / row.actions if row.actions else None),
+                    )
+                    for row in found
                 ],
             ),
             Plot(

@@ -11,7 +11,7 @@ from buildarena_geometry.actions.lookups import (
 )
 from buildarena_geometry.actions.motions import turned
 from buildarena_geometry.blocks import Block, Connector
-from buildarena_geometry.changes import Change
+from buildarena_geometry.changes import Change, attempted
 from buildarena_geometry.feedback import state as words
 from buildarena_geometry.feedback.words import listing
 from buildarena_geometry.modules.parameters import BlockId, Name, Note, RefusalError, Triple, shown
@@ -79,12 +79,6 @@ def attach_block_to(
             Cause.NO_SUCH_FACE,
             f"{words.heading(base)} has no face {shown(face)}. Its free faces: {free}.",
         )
-    if state.is_occupied(base, face):
-        raise RefusalError(
-            Cause.FACE_OCCUPIED,
-            f"Face {words.face_name(base, face)} of {words.title(base)} is taken. "
-            f"Its free faces: {words.free_faces(state, base)}.",
-        )
     block = _new_block(
         state,
         Block(
@@ -96,6 +90,13 @@ def attach_block_to(
         ),
         note,
     )
+    if state.is_occupied(base, face):
+        raise RefusalError(
+            Cause.FACE_OCCUPIED,
+            f"Face {words.face_name(base, face)} of {words.title(base)} is taken. "
+            f"Its free faces: {words.free_faces(state, base)}.",
+            attempted=attempted([block]),
+        )
     after = replace(
         state,
         blocks={**state.blocks, block.id: block},

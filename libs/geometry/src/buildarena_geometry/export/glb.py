@@ -14,6 +14,7 @@ import numpy as np
 from buildarena_geometry.export.meshes import COLOURS, CONNECTOR_RADIUS, normal, polygons
 from buildarena_geometry.modules.module import Cylinder
 from buildarena_geometry.poses import Pose
+from buildarena_geometry.rotations import ORIGIN
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -41,6 +42,17 @@ def machine_glb(machine: Machine) -> bytes:
         scene.add_node(block.id, scene.module_mesh(block.module), block.world_from_block)
     for link in machine.connectors.values():
         scene.add_node(link.id, scene.add_mesh(link.module, [_rod(link)]), Pose())
+    return scene.packed()
+
+
+def module_glb(module: Module) -> bytes:
+    """A module as a GLB file, its root point at the origin; a connector as a rod of length 1."""
+    scene = _Scene()
+    if module.body:
+        scene.add_node(module.name, scene.module_mesh(module), Pose())
+    else:
+        rod = Cylinder(radius=CONNECTOR_RADIUS, base=ORIGIN, top=(0.0, 0.0, 1.0))
+        scene.add_node(module.name, scene.add_mesh(module, [rod]), Pose())
     return scene.packed()
 
 

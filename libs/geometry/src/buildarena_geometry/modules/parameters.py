@@ -14,7 +14,7 @@ from typing import Annotated, Any, TypeGuard
 
 from buildarena_geometry.json_values import LARGEST_INTEGER, is_storable
 from buildarena_geometry.keys import KEYS
-from buildarena_geometry.outcomes import Cause
+from buildarena_geometry.outcomes import AttemptedBlock, Cause
 from buildarena_geometry.rotations import Vector
 
 LARGEST_NUMBER = (
@@ -28,12 +28,19 @@ JsonSchema = dict[str, Any]
 class RefusalError(Exception):
     """Stops an action from inside; the dispatcher turns it into a `Refused`."""
 
-    def __init__(self, cause: Cause, text: str, overlaps: tuple[tuple[str, str], ...] = ()) -> None:
-        """Takes what was wrong and what a model shall read about it."""
+    def __init__(
+        self,
+        cause: Cause,
+        text: str,
+        overlaps: tuple[tuple[str, str], ...] = (),
+        attempted: tuple[AttemptedBlock, ...] = (),
+    ) -> None:
+        """Takes what was wrong and what a model shall read about it; see `Refused`."""
         super().__init__(text)
         self.cause = cause
         self.text = text
         self.overlaps = overlaps
+        self.attempted = attempted
 
 
 @dataclass(frozen=True, slots=True)

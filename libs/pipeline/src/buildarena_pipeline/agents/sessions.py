@@ -23,7 +23,8 @@ from buildarena_pipeline.errors import PipelineError, SubmissionError
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.machine_documents import machine_bytes
 from buildarena_pipeline.runtime.scoring import failure_score, task_of
-from buildarena_pipeline.transcript import ActionResult, Transcript, Turn
+from buildarena_pipeline.transcript import Transcript
+from buildarena_pipeline.turns import turn_of_call
 from buildarena_store import (
     ExternalCall,
     Job,
@@ -189,7 +190,7 @@ class ExternalSessions:
             if chosen is None:
                 raise NothingToSubmitError(_what_to_do(bench.machines))
             _, machine = chosen
-            transcript = _transcript(calls)
+            transcript = Transcript([turn_of_call(i, call) for i, call in enumerate(calls)])
             kept = context.artifacts.put(machine_bytes(machine), JSON)
             made = {
                 "machine": kept,
@@ -282,29 +283,4 @@ def _what_to_do(machines: Collection[str]) -> str:
 def _unknown(field: str, value: str, choices: Sequence[str]) -> ValidationIssue:
     return ValidationIssue(
         path=field, message=f"there is no {field} {value!r}", choices=tuple(choices)
-    )
-
-
-def _transcript(calls: Sequence[ExternalCall]) -> Transcript:
-    """What an external agent did; what it thought in between is not known."""
-    return Transcript(
-        [
-            Turn(
-                index=index,
-                stage="external",
-                sub_structure=call.machine,
-                role="agent",
-                text="",
-                actions=(
-                    ActionResult(
-                        name=call.tool,
-                        arguments=call.arguments,
-                        ok=call.ok,
-                        reason=call.reason,
-                        feedback=call.feedback,
-                    ),
-                ),
-            )
-            for index, call in enumerate(calls)
-        ]
     )

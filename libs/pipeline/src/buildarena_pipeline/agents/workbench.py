@@ -38,7 +38,7 @@ class Workbench:
     def call(self, machine: str, tool: str, arguments: Any) -> ExternalCall:
         """Carries out an action and returns its result; no argument makes it raise."""
         tool, arguments = clean(tool), clean(arguments)
-        outcome = self._machine(machine).act(tool, arguments)
+        outcome = self.machine(machine).act(tool, arguments)
         self.size += _size(tool) + _size(arguments) + len(outcome.text.encode())
         return ExternalCall(
             machine=machine,
@@ -57,7 +57,8 @@ class Workbench:
             return next(iter(self.machines.items()))
         return None
 
-    def _machine(self, name: str) -> Machine:
+    def machine(self, name: str) -> Machine:
+        """The machine with a name, empty when there was none."""
         if name not in self.machines:
             available = dict(self.machines) if name == ASSEMBLY else {}
             self.machines[name] = Machine(available=available) if available else Machine()

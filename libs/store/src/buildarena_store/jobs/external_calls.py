@@ -15,7 +15,7 @@ from buildarena_store.jobs.job import JOB_COLUMNS, Job
 from buildarena_store.jobs.leases import Lease
 from buildarena_store.jobs.transitions import transition
 from buildarena_store.rows import columns_of, value_of
-from buildarena_store.states import EXTERNAL_QUEUE, JobState, Outcome
+from buildarena_store.states import EXTERNAL_QUEUE, TURN, JobState, Outcome
 from buildarena_store.tables import external_calls, jobs
 
 IDLE_FOR = timedelta(hours=24)
@@ -116,13 +116,24 @@ class ExternalCalls:
                 feedback=call.feedback,
             )
         )
+        events.record_jobs(connection, [lease.job.id], TURN, {"index": sequence})
 
-    def read(self, job_id: str, *, connection: Connection) -> list[ExternalCall]:
-        """All calls of a session, in order."""
+    def read(
+        self, job_id: str, *, connection: Connection, first: int = 0, count: int | None = None
+    ) -> list[ExternalCall]:
+        """Calls of a session, in order.
+
+        Args:
+            job_id: The session.
+            connection: A transaction.
+            first: Place of the first of them.
+            count: How many at most; all by default.
+        """
         query = (
             select(*columns_of(ExternalCall, external_calls))
-            .where(external_calls.c.job_id == job_id)
+            .where(external_calls.c.job_id == job_id, external_calls.c.sequence >= first)
             .order_by(external_calls.c.sequence)
+            .limit(count)
         )
         return [value_of(ExternalCall, row) for row in connection.execute(query)]
 

@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from datetime import datetime
 from typing import Any
 
-from sqlalchemy import ColumnElement, Connection, and_, any_, func, or_, select, update
+from sqlalchemy import ColumnElement, Connection, any_, func, select, update
 from sqlalchemy.dialects.postgresql import insert
 
 from buildarena_store import events
 from buildarena_store.database import Database
 from buildarena_store.errors import UnknownIdError
-from buildarena_store.ids import begins_with
 from buildarena_store.jobs.attempts import Attempt, Ending, end_attempts
 from buildarena_store.jobs.job import JOB_COLUMNS, Job, JobFile, NewJob
+from buildarena_store.jobs.pages import JobFilter, Order, SortValue, page_query
 from buildarena_store.jobs.transitions import REOPENED, transition
 from buildarena_store.rows import bound_texts, columns_of, rows_of, value_of
 from buildarena_store.states import CONSTRUCT_QUEUE, AttemptResult, JobState, Outcome, Stage
-from buildarena_store.tables import artifacts, attempts, job_artifacts, jobs, sweep_jobs
+from buildarena_store.tables import artifacts, attempts, job_artifacts, jobs
 
 
 class Jobs:
@@ -77,43 +76,24 @@ class Jobs:
         self,
         *,
         limit: int,
-        after: tuple[datetime, str] | None = None,
+        after: tuple[SortValue, str] | None = None,
+        order: Order | None = None,
+        wanted: JobFilter | None = None,
         sweep_id: str | None = None,
-        flag: str | None = None,
-        id_prefix: str | None = None,
         **equals: str | int | None,
     ) -> list[Job]:
-        """The newest jobs first, with keyset paging.
+        """A page of jobs, the newest first by default, with keyset paging.
 
         Args:
             limit: Rows at most.
-            after: ``(created_at, id)`` of the last row of the page before.
-            sweep_id: Only this sweep's jobs.
-            flag: Only jobs with this flag.
-            id_prefix: Only jobs whose id begins like this.
-            equals: Column values to match; None means any.
+            after: What the last row of the page before is sorted by, and its id.
+            order: In which order.
+            wanted: Which jobs.
+            sweep_id: Only this sweep's jobs, in the place of ``wanted``.
+            equals: Column values to match, in the place of ``wanted``; None means any.
         """
-        query = select(*JOB_COLUMNS)
-        if sweep_id is not None:
-            query = query.join(sweep_jobs, sweep_jobs.c.job_id == jobs.c.id).where(
-                sweep_jobs.c.sweep_id == sweep_id
-            )
-        for name, value in equals.items():
-            if value is not None:
-                query = query.where(jobs.c[name] == value)
-        if flag is not None:
-            query = query.where(jobs.c.flags.contains([flag]))
-        if id_prefix is not None:
-            query = query.where(begins_with(jobs.c.id, id_prefix))
-        if after is not None:
-            created_at, id_ = after
-            query = query.where(
-                or_(
-                    jobs.c.created_at < created_at,
-                    and_(jobs.c.created_at == created_at, jobs.c.id > id_),
-                )
-            )
-        query = query.order_by(jobs.c.created_at.desc(), jobs.c.id).limit(limit)
+        chosen = wanted or JobFilter(sweep_id=sweep_id, equals=equals)
+        query = page_query(chosen, order or Order(), after, limit)
         with self._database.statement() as connection:
             return [value_of(Job, row) for row in connection.execute(query)]
 

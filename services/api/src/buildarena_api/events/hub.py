@@ -7,7 +7,6 @@ and each event's text.
 from __future__ import annotations
 
 import asyncio
-import json
 from collections.abc import AsyncIterator
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -15,10 +14,12 @@ from datetime import datetime, timedelta
 
 import structlog
 from sqlalchemy.exc import SQLAlchemyError
-from sse_starlette import ServerSentEvent
 
+from buildarena_api.events.texts import event_texts
 from buildarena_api.http.own_pool import OwnPool
+from buildarena_pipeline.turns import Transcripts
 from buildarena_store import Event
+from buildarena_store.states import TURN
 
 log = structlog.get_logger(__name__)
 
@@ -29,6 +30,8 @@ SETTLED_AFTER = timedelta(seconds=5)
 """Ids are given out before their transactions end, so an event may appear behind later ones:
 reading goes back this far."""
 PAGE = 1000
+JOB_PAGE = 50
+"""Events of a job that are read at once: those that are turns may be long."""
 BACKLOG = 10_000
 """Events kept for a slow listener; one that falls further behind is cut off and may come again."""
 
@@ -74,6 +77,8 @@ class Channel:
 
     def wants(self, event: Event) -> bool:
         """Whether an event is of what it is about."""
+        if event.kind == TURN and self.is_sweep:
+            return False
         return event.job_id in self.job_ids or (self.is_sweep and event.sweep_id == self.id)
 
 
@@ -87,6 +92,7 @@ class EventHub:
     def __init__(self, pool: OwnPool) -> None:
         self._pool = pool
         self._store = pool.context.store
+        self._transcripts = Transcripts(self._store, pool.context.artifacts)
         self._channels: dict[str, Channel] = {}
         self._opening: dict[str, asyncio.Task[Channel]] = {}
         self._task: asyncio.Task[None] | None = None
@@ -182,8 +188,10 @@ class EventHub:
         about = {"sweep_id" if channel.is_sweep else "job_id": channel.id}
 
         def read() -> Piece:
-            found = self._store.events.after(last_id, limit=PAGE, **about)
-            return Piece(tuple(event.id for event in found), b"".join(map(_text, found)))
+            limit = PAGE if channel.is_sweep else JOB_PAGE
+            found = self._store.events.after(last_id, limit=limit, **about)
+            texts = event_texts(self._transcripts, found)
+            return Piece(tuple(event.id for event in found), b"".join(texts))
 
         return await self._pool.run(read)
 
@@ -212,13 +220,11 @@ class EventHub:
             try:
                 await self._end_streams_of_bad_keys()
                 events = await self._new_events()
+                fresh = [event for event in events if event.id not in self._seen]
+                await self._pass_on(fresh)
             except SQLAlchemyError as error:
                 log.warning("events_unreadable", error=str(error).splitlines()[0])
                 continue
-            for event in events:
-                if event.id not in self._seen:
-                    self._seen.add(event.id)
-                    self._pass_on(event)
             self._settle(events)
         self._floor = None
         self._seen.clear()
@@ -248,13 +254,18 @@ class EventHub:
             if one.key_id in bad:
                 one.end()
 
-    def _pass_on(self, event: Event) -> None:
-        piece: Piece | None = None
-        for channel in self._channels.values():
-            if channel.wants(event):
-                piece = piece or Piece((event.id,), _text(event))
-                for listener in channel.listeners:
-                    listener.put(piece)
+    async def _pass_on(self, events: list[Event]) -> None:
+        channels = list(self._channels.values())
+        wanted = [event for event in events if any(one.wants(event) for one in channels)]
+        texts = await self._pool.run(event_texts, self._transcripts, wanted) if wanted else []
+        self._seen.update(event.id for event in events)
+        for event, text in zip(wanted, texts, strict=True):
+            piece = Piece((event.id,), text)
+            # Who came while the texts were made has read from the database what was there.
+            for channel in self._channels.values():
+                if channel.wants(event):
+                    for listener in channel.listeners:
+                        listener.put(piece)
 
     def _settle(self, events: list[Event]) -> None:
         """Forgets events that are too old for another to appear before them."""
@@ -265,14 +276,3 @@ class EventHub:
         if settled:
             self._floor = max(settled)
             self._seen = {id_ for id_ in self._seen if id_ > max(settled)}
-
-
-def _text(event: Event) -> bytes:
-    """An event as it is sent to all who listen."""
-    data = {
-        "job": event.job_id,
-        "sweep": event.sweep_id,
-        "at": event.at.isoformat(),
-        **event.data,
-    }
-    return ServerSentEvent(json.dumps(data), event=event.kind, id=str(event.id)).encode()

@@ -118,6 +118,7 @@ class ConcurrencyLimits:
     streams: ConcurrencyLimit
     archives: ConcurrencyLimit
     exports: ConcurrencyLimit
+    trajectories: ConcurrencyLimit
 
 
 def usual_limits() -> ConcurrencyLimits:
@@ -128,6 +129,8 @@ def usual_limits() -> ConcurrencyLimits:
         streams=ConcurrencyLimit("event streams", per_caller=32, total=512, retry_s=5),
         archives=ConcurrencyLimit("archive transfers", per_caller=1, total=2, retry_s=5),
         exports=ConcurrencyLimit("exports", per_caller=2, total=4),
+        # One may have 64 MB in memory until it is sent.
+        trajectories=ConcurrencyLimit("trajectories", per_caller=4, total=12, wait_s=30.0),
     )
 
 

@@ -64,6 +64,12 @@ class BoardCache:
             kind: Names the rendering: one kind is always rendered alike.
             render: Makes the body; called only when there is no true answer in memory.
         """
+        return self.answer_from(track, query, kind, lambda board: render(board.board(query)))
+
+    def answer_from(
+        self, track: str, query: BoardQuery, kind: str, render: Callable[[TrackBoard], bytes]
+    ) -> Answer:
+        """The same from all trials of a track; they do not change while it is made."""
         with self._lock:
             self._refresh()
             generation = self._generations.get(track, 0)
@@ -72,7 +78,7 @@ class BoardCache:
             if kept is not None and kept[0] == generation:
                 self._answers.move_to_end(key)
                 return kept[1]
-            body = render(self._track(track).board(query))
+            body = render(self._track(track))
             answer = Answer.of(body)
             self._answers[key] = (generation, answer)
             self._answers.move_to_end(key)

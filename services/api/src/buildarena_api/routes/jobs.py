@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from hashlib import sha256
 from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query, Response
@@ -27,13 +28,16 @@ from buildarena_pipeline.catalog.models import ModelRegistry
 from buildarena_pipeline.catalog.specs import JobSpec
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.notify import notify_waiting
+from buildarena_pipeline.turns import Transcripts
+from buildarena_store import Job
+from buildarena_store.jobs.pages import JobFilter, Order, Sort, sort_value
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
 
+KEPT_TYPES = ("application/json", "application/vnd.apache.parquet", "image/png", "text/plain")
 ARTIFACT_TYPES = {
     "machine": "application/json",
     "transcript": "application/json",
-    "trajectory": "application/vnd.apache.parquet",
 }
 
 
@@ -59,24 +63,58 @@ def list_jobs(
     outcome: Annotated[AnyOutcome | None, Query()] = None,
     reason: Annotated[str | None, Query(description="Class of the failure")] = None,
     flag: Annotated[str | None, Query(description="Only jobs with this flag")] = None,
+    indicator_min: Annotated[
+        float | None, Query(allow_inf_nan=False, description="Only with at least this indicator")
+    ] = None,
+    indicator_max: Annotated[
+        float | None, Query(allow_inf_nan=False, description="Only with at most this indicator")
+    ] = None,
+    text: Annotated[
+        str | None,
+        Query(
+            min_length=1,
+            max_length=100,
+            description="Only jobs in whose id, task, model, reason or detail it stands, in any "
+            "case",
+        ),
+    ] = None,
     id_prefix: IdPrefix = None,
-    cursor: Annotated[str | None, Query(max_length=500)] = None,
+    sort: Annotated[
+        Sort, Query(description="Jobs without such a figure come last, in both directions")
+    ] = "created",
+    order: Annotated[
+        Literal["asc", "desc"], Query(description="desc: the newest, or greatest, first")
+    ] = "desc",
+    cursor: Annotated[str | None, Query(max_length=1000)] = None,
     limit: Annotated[int, Query(ge=1, le=1000)] = 100,
 ) -> JobPage:
-    """Lists jobs, newest first. A value that no job can have is refused with the choices."""
+    """Lists jobs, newest first by default.
+
+    A value that no job can have is refused with the choices. A cursor is good for the order that
+    it was made in.
+    """
     if sweep is not None:
         context.store.sweeps.get(sweep)
+    in_order = Order(by=sort, descending=order == "desc")
     found = context.store.jobs.page(
         limit=limit,
-        after=None if cursor is None else cursors.decode(cursor),
-        sweep_id=sweep,
-        task=task,
-        model=model,
-        state=state,
-        outcome=outcome,
-        reason=reason,
-        flag=flag,
-        id_prefix=id_prefix,
+        after=None if cursor is None else cursors.decode_in(cursor, in_order),
+        order=in_order,
+        wanted=JobFilter(
+            sweep_id=sweep,
+            flag=flag,
+            id_prefix=id_prefix,
+            indicator_min=indicator_min,
+            indicator_max=indicator_max,
+            text=text,
+            equals={
+                "task": task,
+                "model": model,
+                "state": state,
+                "outcome": outcome,
+                "reason": reason,
+            },
+        ),
     )
     if not found:
         _require_known(
@@ -85,8 +123,12 @@ def list_jobs(
     more = len(found) == limit
     return JobPage(
         jobs=[JobView.of(job) for job in found],
-        next_cursor=cursors.encode(found[-1].created_at, found[-1].id) if more else None,
+        next_cursor=_cursor(in_order, found[-1]) if more else None,
     )
+
+
+def _cursor(order: Order, job: Job) -> str:
+    return cursors.encode_in(order, sort_value(job, order.by), job.id)
 
 
 def _require_known(
@@ -159,7 +201,7 @@ def list_artifacts(job_id: str, context: ContextDep) -> list[JobFileView]:
 @router.get(
     "/{job_id}/artifacts/{name}",
     responses={
-        200: {"content": {kind: {} for kind in sorted({*ARTIFACT_TYPES.values()})}},
+        200: {"content": {kind: {} for kind in KEPT_TYPES}},
         **problem_responses(404, 503),
     },
     response_class=Response,
@@ -189,25 +231,38 @@ def get_artifact_by_name(job_id: str, name: str, context: ContextDep) -> Respons
 )
 def get_artifact(
     job_id: str,
-    artifact: Literal["machine", "transcript", "trajectory"],
+    artifact: Literal["machine", "transcript"],
     context: ContextDep,
-    number: Annotated[int, Query(ge=0, le=1000, description="Which rollout's trajectory")] = 0,
     style: Annotated[
         Literal["json", "markdown"], Query(description="markdown: a transcript for people")
     ] = "json",
 ) -> Response:
-    """The machine document, the transcript or a trajectory of a job."""
+    """The machine document or the transcript of a job.
+
+    The transcript of a session that is under way goes as far as that has come.
+    """
     job = context.store.jobs.get(job_id)
-    name = f"trajectory-{number}" if artifact == "trajectory" else artifact
-    digest = context.store.jobs.artifacts(job_id).get(name)
+    if artifact == "transcript":
+        return _transcript(context, job, style)
+    digest = context.store.jobs.artifacts(job_id).get(artifact)
     if digest is None:
-        raise ProblemError(404, f"job {job_id} has no {name} yet")
-    data = context.artifacts.get(digest)
-    if artifact == "transcript" and style == "markdown":
+        raise ProblemError(404, f"job {job_id} has no {artifact} yet")
+    return Response(
+        context.artifacts.get(digest),
+        media_type=ARTIFACT_TYPES[artifact],
+        headers={"ETag": f'"{digest}"'},
+    )
+
+
+def _transcript(context: Context, job: Job, style: str) -> Response:
+    data = Transcripts(context.store, context.artifacts).read(job)
+    if data is None:
+        raise ProblemError(404, f"job {job.id} has no transcript yet")
+    if style == "markdown":
         title = f"{job.task} by {job.model}, seed {job.seed}"
         return Response(as_markdown(data, title), media_type="text/markdown; charset=utf-8")
     return Response(
         data,
-        media_type=ARTIFACT_TYPES[artifact],
-        headers={"ETag": f'"{digest}"'},
+        media_type=ARTIFACT_TYPES["transcript"],
+        headers={"ETag": f'"{sha256(data).hexdigest()}"'},
     )

@@ -13,11 +13,18 @@ from buildarena_api.http.access import CallerDep
 from buildarena_api.http.etags import conditional
 from buildarena_api.http.problems import problem_responses
 from buildarena_api.leaderboard.agreement import AgreementTable, agreement_rows
+from buildarena_api.leaderboard.figures import Figures, figures_view
 from buildarena_api.leaderboard.filters import BoardsDep, SelectionDep, unknown
 from buildarena_api.leaderboard.views import Board, ChangePage, ChangeView, board_view
 from buildarena_api.routes.verifications import request_verifications
 from buildarena_benchmark.flags import Reading
-from buildarena_benchmark.leaderboard import SCORED, BoardQuery, TaskComparison, compare_models
+from buildarena_benchmark.leaderboard import (
+    SCORED,
+    BoardQuery,
+    TaskComparison,
+    TrackBoard,
+    compare_models,
+)
 
 router = APIRouter(prefix="/v1", tags=["leaderboard"])
 MAX_DISTINCT = 20
@@ -126,6 +133,26 @@ def leaderboard(
             .encode()
         ),
     )
+    return conditional(request, answer, "application/json")
+
+
+@router.get("/leaderboard/figures", response_model=Figures, responses=problem_responses(422, 503))
+def figures(boards: BoardsDep, selection: SelectionDep, request: Request) -> Any:
+    """What the figures of a board are drawn from; reports are drawn from the same."""
+    track, reading = selection.track, selection.query.reading
+    if track is None:
+        return Figures(track=None, reading=reading, dimensions=[], failures=[], cost=[], front=[])
+    tasks, query = boards.tasks(), selection.query
+
+    def render(kept: TrackBoard) -> bytes:
+        board, trials = kept.board(query), list(kept.trials(query))
+        return (
+            figures_view(track, board, trials, reading=reading, tasks=tasks)
+            .model_dump_json()
+            .encode()
+        )
+
+    answer = boards.answer_from(track, query, "figures", render)
     return conditional(request, answer, "application/json")
 
 

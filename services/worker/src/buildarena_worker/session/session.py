@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from buildarena_benchmark import Task, broken_constraint
@@ -13,6 +13,8 @@ from buildarena_store import JournalEntry
 from buildarena_worker.session.host import SessionHost
 from buildarena_worker.session.messages import Message, Reply, Request, Tool
 from buildarena_worker.session.results import ConstructionFailedError
+
+OnTurn = Callable[[ModelTurn, JournalEntry], None]
 
 MAX_CONVERSATION = 2_000_000
 """Characters of all messages together, some 500,000 tokens: with 40 sessions in a process, their
@@ -28,6 +30,7 @@ class Session:
         model_config: The job's model configuration.
         pack: The sentences to use.
         host: Where answers come from.
+        on_turn: Hears of every turn, those of kept answers included.
 
     Attributes:
         additions: What follows the task's statement: an example, results of rounds.
@@ -43,6 +46,7 @@ class Session:
         model_config: Mapping[str, Any],
         pack: PromptPack,
         host: SessionHost,
+        on_turn: OnTurn | None = None,
     ) -> None:
         self.task = task
         self.seed = seed
@@ -53,6 +57,7 @@ class Session:
         self.machine: Machine | None = None
         self.plan = ""
         self._model_config = model_config
+        self._on_turn = on_turn
 
     @property
     def statement(self) -> str:
@@ -96,22 +101,23 @@ class Session:
         actions: Sequence[ActionResult] = (),
     ) -> None:
         """Adds a turn to the transcript."""
-        self.transcript.turns.append(
-            ModelTurn(
-                index=len(self.transcript.turns),
-                stage=phase,
-                sub_structure=sub_structure,
-                role=role,
-                text=reply.text,
-                actions=tuple(actions),
-                finish=reply.finish,
-                input_tokens=entry.usage.input_tokens,
-                output_tokens=entry.usage.output_tokens,
-                cost_usd=f"{entry.usage.cost_usd:.6f}",
-                latency_s=entry.latency_s,
-                tries=entry.tries,
-            )
+        turn = ModelTurn(
+            index=len(self.transcript.turns),
+            stage=phase,
+            sub_structure=sub_structure,
+            role=role,
+            text=reply.text,
+            actions=tuple(actions),
+            finish=reply.finish,
+            input_tokens=entry.usage.input_tokens,
+            output_tokens=entry.usage.output_tokens,
+            cost_usd=f"{entry.usage.cost_usd:.6f}",
+            latency_s=entry.latency_s,
+            tries=entry.tries,
         )
+        self.transcript.turns.append(turn)
+        if self._on_turn is not None:
+            self._on_turn(turn, entry)
 
     def breaks_rules(self, machine: Machine) -> bool:
         """Whether a machine breaks one of the task's constraints."""

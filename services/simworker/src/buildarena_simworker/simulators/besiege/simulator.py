@@ -6,12 +6,11 @@ import uuid
 from collections.abc import Mapping
 from typing import Any, Final
 
-from buildarena_benchmark import score
-from buildarena_besiege import GameRun, MachineNotPlayableError, game_start, prepare_run
-from buildarena_pipeline.catalog.simulators import BESIEGE, ENGINE_SIMULATORS
+from buildarena_besiege import GameRun, MachineNotPlayableError, prepare_run
+from buildarena_pipeline.catalog.simulators import BESIEGE
 from buildarena_pipeline.errors import PermanentError, StartupError
+from buildarena_pipeline.runtime.annotations import annotate
 from buildarena_pipeline.runtime.settings import Settings
-from buildarena_simulation import BuildarenaSimulationError, simulate
 from buildarena_simworker.simulators.besiege.desktop import Desktop
 from buildarena_simworker.simulators.besiege.errors import LevelClosedError, NotSetUpError
 from buildarena_simworker.simulators.besiege.placing import require_placed
@@ -68,7 +67,7 @@ class BesiegeSimulator:
                 f"{BESIEGE}-{self._settings.version}: submit it again",
                 reason="game_version",
             )
-        name = f"ba{trial.job_id.rpartition('-')[2][:10].lower()}n{trial.number}"
+        name = _file_name(trial)
 
         def make_run(attempt: int) -> GameRun:
             return prepare_run(
@@ -109,37 +108,12 @@ class BesiegeSimulator:
             trajectory=played.trajectory,
             versions={**self.versions, **_course(played)},
             files=_files(played, trial.number),
-            annotations=annotate(trial),
+            annotations=annotate(trial.task, trial.machine, trial.controls),
         )
 
     def close(self) -> None:
         """Leaves no key held and no game that was started here."""
         self._desktop.close()
-
-
-def annotate(trial: Trial) -> dict[str, Any]:
-    """What each of our engines says of the trial from the game's start; none if it fails."""
-    found: dict[str, Any] = {}
-    for engine in ENGINE_SIMULATORS:
-        try:
-            trajectory = simulate(
-                trial.machine,
-                trial.task.scenario,
-                engine,
-                controls=trial.controls,
-                start=game_start(trial.machine, trial.task.scenario),
-            )
-        except BuildarenaSimulationError:
-            continue
-        said = score(trial.task, trial.machine, trajectory)
-        found[engine] = {
-            "success": said.success,
-            "indicator": said.indicator,
-            "flags": list(said.flags),
-            "simulation": trajectory.simulation_version,
-            "engine_version": trajectory.engine_version,
-        }
-    return found
 
 
 def besiege_simulator(settings: Settings) -> BesiegeSimulator:
@@ -159,6 +133,12 @@ def besiege_simulator(settings: Settings) -> BesiegeSimulator:
     except NotSetUpError as error:
         raise StartupError(str(error)) from error
     return BesiegeSimulator(own, desktop, facts)
+
+
+def _file_name(trial: Trial) -> str:
+    """A name that any keyboard types with single keys: letters and digits."""
+    plain = "".join(filter(str.isalnum, trial.job_id.rpartition("_")[2].lower()))
+    return f"ba{plain[:10]}n{trial.number}"
 
 
 def _course(played: Played) -> dict[str, Any]:

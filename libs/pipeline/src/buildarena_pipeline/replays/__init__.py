@@ -1,0 +1,1 @@
+"""How machines came about: the kept actions done again, chapter by chapter."""

@@ -1,0 +1,137 @@
+"""What a replay is made of, and how much of it is told."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Final, Literal
+
+from buildarena_geometry import AttemptedBlock, Difference, Machine, Refused, step
+
+MAX_PARTS_TOLD: Final = 100_000
+"""Parts in all steps together: a session that moves large assemblies about could fill gigabytes."""
+MAX_WORK: Final = 5_000_000
+"""Parts of the machine, summed over its steps: what doing them again may take."""
+
+Kind = Literal["machine", "sub_structure", "assembly"]
+Turn = Mapping[str, Any]
+"""A turn as transcripts keep it."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReplayStep:
+    """One action, as it was asked for and as the geometry library carries it out.
+
+    Attributes:
+        turn: Place of its turn in the transcript; None for what the session did by itself.
+        action: Name of the tool.
+        arguments: What it was given.
+        accepted: Whether it was carried out.
+        reason: Refusal class; None if it was accepted.
+        text: Why it was refused; None if it was accepted.
+        difference: What it changed.
+        attempted: The blocks where a refused action would have put them, if that is known.
+    """
+
+    turn: int | None
+    action: str
+    arguments: Any
+    accepted: bool
+    reason: str | None = None
+    text: str | None = None
+    difference: Difference = field(default_factory=Difference)
+    attempted: tuple[AttemptedBlock, ...] = ()
+
+
+@dataclass(slots=True, kw_only=True)
+class Chapter:
+    """How one machine came about: a sub-structure, the assembly, or the only one.
+
+    Attributes:
+        name: The sub-structure's name; that of what it is for the others.
+        kind: What it is.
+        machine: The machine after the last step.
+        steps: In order.
+    """
+
+    name: str
+    kind: Kind
+    machine: Machine
+    steps: list[ReplayStep] = field(default_factory=list)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Replay:
+    """How a job's machine came about.
+
+    Attributes:
+        chapters: In the order in which they began; the last step of the one that is simulated
+            leads to the job's machine.
+        machine: The machine at the end; None when nothing was built.
+        complete: Whether every step is there.
+    """
+
+    chapters: list[Chapter]
+    machine: Machine | None
+    complete: bool
+
+
+class Recorder:
+    """Does actions again and tells them, as long as that is not too much.
+
+    Attributes:
+        complete: Whether everything so far was told.
+    """
+
+    def __init__(self) -> None:
+        self.complete = True
+        self._told = 0
+        self._work = 0
+
+    def record(self, chapter: Chapter, turn: int | None, name: str, arguments: Any) -> bool:
+        """Has the chapter's machine carry out an action.
+
+        Returns:
+            Whether it was accepted.
+        """
+        self._work += chapter.machine.part_count + sum(
+            one.part_count for one in chapter.machine.available.values()
+        )
+        if not self.complete or self._work > MAX_WORK:
+            self.complete = False
+            return True
+        done = step(chapter.machine, name, arguments)
+        outcome, changed = done.outcome, done.difference
+        tried = outcome.attempted if isinstance(outcome, Refused) else ()
+        self._told += sum(
+            map(len, (changed.added, changed.moved, changed.rebound, changed.removed, tried))
+        )
+        if self._told > MAX_PARTS_TOLD:
+            self.complete = False
+            return True
+        refused = outcome if isinstance(outcome, Refused) else None
+        chapter.steps.append(
+            ReplayStep(
+                turn=turn,
+                action=name,
+                arguments=arguments,
+                accepted=refused is None,
+                reason=None if refused is None else refused.reason.value,
+                text=None if refused is None else refused.text,
+                difference=changed,
+                attempted=tried,
+            )
+        )
+        return refused is None
+
+
+def refused_step(turn: int, action: Mapping[str, Any]) -> ReplayStep:
+    """The step of an action that was refused before it reached the machine."""
+    return ReplayStep(
+        turn=turn,
+        action=str(action["name"]),
+        arguments=action["arguments"],
+        accepted=False,
+        reason=action["reason"] or "refused",
+        text=action["feedback"],
+    )

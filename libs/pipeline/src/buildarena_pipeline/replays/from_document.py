@@ -1,0 +1,135 @@
+"""The replay of a kept machine: its own log, with the turns of the transcript beside it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from difflib import SequenceMatcher
+from itertools import groupby
+from typing import Any, Final
+
+from buildarena_geometry import Machine
+from buildarena_geometry.documents.log import LoggedState
+from buildarena_pipeline.agents.workbench import ASSEMBLY
+from buildarena_pipeline.replays.chapters import (
+    Chapter,
+    Recorder,
+    Replay,
+    Turn,
+    refused_step,
+)
+from buildarena_pipeline.replays.from_turns import ASSEMBLE, BUILD, OBJECTION, REFINE, place
+
+CONTROL: Final = "control"
+LOOKING: Final = ("get_", "review_")
+"""How actions begin that change nothing."""
+PROGRAMMED: Final = frozenset({"add_control_key", "add_control_sequence"})
+"""What the session does with a controller's program, which is text and no action."""
+
+Told = tuple[int, Mapping[str, Any]]
+"""An action of the transcript with its turn."""
+
+
+def replay_of_document(document: object, turns: Sequence[Turn]) -> Replay:
+    """How a machine came about, from the log that is part of it.
+
+    Args:
+        document: The machine document.
+        turns: The job's transcript.
+
+    Raises:
+        DocumentError: It is no machine document.
+    """
+    kept = Machine.from_document(document).logged
+    recorder = Recorder()
+    chapters: dict[str, Chapter] = {}
+    for name, one in kept.available.items():
+        chapter = Chapter(name=name, kind="sub_structure", machine=Machine())
+        chapters[name] = _played(recorder, chapter, one, _of_part(turns, name))
+    if kept.available:
+        made = {name: chapter.machine for name, chapter in chapters.items()}
+        last = Chapter(name=ASSEMBLY, kind="assembly", machine=Machine(available=made))
+        _played(recorder, last, kept, _of_assembly(turns))
+    else:
+        built = [turn for turn in turns if turn["stage"] == BUILD]
+        part = built[-1].get("sub_structure") if built else None
+        last = Chapter(name=part or "machine", kind="machine", machine=Machine())
+        _played(recorder, last, kept, _of_part(turns, part))
+    _name_controller(last, turns)
+    return Replay(
+        chapters=[*chapters.values(), last], machine=last.machine, complete=recorder.complete
+    )
+
+
+def _played(
+    recorder: Recorder, chapter: Chapter, kept: LoggedState, told: Sequence[Told]
+) -> Chapter:
+    """A machine's log done again, each action with the turn that asked for it."""
+    wanted = [
+        _key(action["name"], action["arguments"], None if action["ok"] else action["reason"])
+        for _, action in told
+    ]
+    records = kept.records
+    done = [_key(record.name, record.arguments, record.reason) for record in records]
+    for tag, start, end, first, last in SequenceMatcher(None, wanted, done).get_opcodes():
+        if tag == "equal":
+            for (turn, _), record in zip(told[start:end], records[first:last], strict=True):
+                recorder.record(chapter, turn, record.name, record.arguments)
+            continue
+        chapter.steps += [
+            refused_step(turn, action)
+            for turn, action in told[start:end]
+            if not action["ok"] and action["name"] != OBJECTION
+        ]
+        for record in records[first:last]:
+            recorder.record(chapter, None, record.name, record.arguments)
+    # What the session looked up for the next phase's opening words is no step of the machine's.
+    chapter.steps = [
+        step
+        for step in chapter.steps
+        if step.turn is not None or not step.accepted or not step.action.startswith(LOOKING)
+    ]
+    return chapter
+
+
+def _of_part(turns: Sequence[Turn], name: str | None) -> list[Told]:
+    """The actions of a part's last dialogue of building, and of those that corrected it."""
+    found: list[Told] = []
+    for (phase, part), dialogue in groupby(turns, key=place):
+        if part != name:
+            continue
+        if phase == BUILD:
+            found = _actions(list(dialogue))
+        elif phase == REFINE:
+            found += _actions(list(dialogue))
+    return found
+
+
+def _of_assembly(turns: Sequence[Turn]) -> list[Told]:
+    found: list[Told] = []
+    for (phase, _), dialogue in groupby(turns, key=place):
+        if phase == ASSEMBLE:
+            found = _actions(list(dialogue))
+    return found
+
+
+def _actions(turns: Sequence[Turn]) -> list[Told]:
+    return [(turn["index"], action) for turn in turns for action in turn["actions"]]
+
+
+def _key(name: str, arguments: object, reason: object) -> str:
+    given = {} if arguments is None else arguments
+    return json.dumps([name, given, reason], sort_keys=True)
+
+
+def _name_controller(chapter: Chapter, turns: Sequence[Turn]) -> None:
+    """Gives the key presses of a program the turn in which the controller wrote it."""
+    said = [turn["index"] for turn in turns if turn["stage"] == CONTROL]
+    if said:
+        chapter.steps = [
+            replace(step, turn=said[-1])
+            if step.turn is None and step.action in PROGRAMMED
+            else step
+            for step in chapter.steps
+        ]

@@ -1,0 +1,43 @@
+"""What our engines say of a trial in the game; never part of its score."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from buildarena_benchmark import Task, score
+from buildarena_besiege import game_start
+from buildarena_geometry import KeyPress, Machine
+from buildarena_pipeline.catalog.simulators import ENGINE_SIMULATORS
+from buildarena_simulation import BuildarenaSimulationError, simulate
+
+
+def annotate(
+    task: Task, machine: Machine, controls: Sequence[KeyPress] | None
+) -> dict[str, dict[str, Any]]:
+    """What each engine says of a trial from the game's start; an engine that fails says nothing.
+
+    Args:
+        task: What the machine was put through.
+        machine: The machine.
+        controls: Key presses; None for the machine's own.
+
+    Returns:
+        By engine: success, indicator, flags, and the versions of model and engine.
+    """
+    found: dict[str, dict[str, Any]] = {}
+    for engine in ENGINE_SIMULATORS:
+        try:
+            start = game_start(machine, task.scenario)
+            trajectory = simulate(machine, task.scenario, engine, controls=controls, start=start)
+        except BuildarenaSimulationError:
+            continue
+        said = score(task, machine, trajectory)
+        found[engine] = {
+            "success": said.success,
+            "indicator": said.indicator,
+            "flags": list(said.flags),
+            "simulation": trajectory.simulation_version,
+            "engine_version": trajectory.engine_version,
+        }
+    return found

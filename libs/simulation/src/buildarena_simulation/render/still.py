@@ -1,0 +1,67 @@
+"""One picture of a machine as it stands at the start of its trial."""
+
+import io
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from buildarena_simulation.engines.base import quaternion_of
+from buildarena_simulation.machine import structure_of
+from buildarena_simulation.placement import start_of
+from buildarena_simulation.render.camera import Camera
+from buildarena_simulation.render.drawing import draw
+from buildarena_simulation.render.scene import Scene
+from buildarena_simulation.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from buildarena_geometry import Machine
+    from buildarena_simulation.scenario import Scenario
+
+SIZE: Final = (480, 320)
+"""Width and height of a picture, pixels."""
+
+
+def still_png(machine: "Machine", scenario: "Scenario") -> bytes:
+    """A picture of a machine, without cargo, where its trial puts it.
+
+    Args:
+        machine: The machine.
+        scenario: What it is put through.
+
+    Returns:
+        A PNG file; the same machine and scenario give the same picture.
+
+    Raises:
+        MachineNotSimulable: It has no blocks, or too many.
+    """
+    scene = Scene(machine, scenario, _standing(machine, scenario))
+    camera = Camera.looking_at(
+        scene.focus(0), distance=2.2 * scene.reach(), size=SIZE, azimuth_deg=scene.azimuth_deg
+    )
+    out = io.BytesIO()
+    draw(scene.at(0), camera, size=SIZE, caption="").save(out, format="PNG", optimize=True)
+    return out.getvalue()
+
+
+def _standing(machine: "Machine", scenario: "Scenario") -> Trajectory:
+    """The trajectory of no time at all."""
+    structure = structure_of(machine)
+    start = start_of(structure, scenario)
+    return Trajectory(
+        time_s=np.zeros(1),
+        block_ids=structure.block_ids,
+        positions=(structure.shown @ start.rotation.T + start.position)[None].astype(np.float32),
+        quaternions=quaternion_of(start.rotation @ structure.rotations)[None].astype(np.float32),
+        cargo_position=None,
+        cargo_quaternion=None,
+        cargo_mass=None,
+        cargo_size=None,
+        cannon_ids=(),
+        heated=np.zeros((1, 0), dtype=bool),
+        joint_peaks=(),
+        breaks=(),
+        engine="",
+        engine_version="",
+        simulation_version="",
+        settings={},
+    )

@@ -1,0 +1,1 @@
+"""How jobs' machines came about, as the API answers it."""

@@ -1,0 +1,141 @@
+"""Routes of trials: their trajectories, and all that is needed to draw them."""
+
+from __future__ import annotations
+
+import json
+from threading import Lock
+from typing import Annotated, Any, Final
+
+from fastapi import APIRouter, Depends, Query, Request, Response
+
+from buildarena_api.dependencies import ContextDep
+from buildarena_api.http.answers import KeptAnswers
+from buildarena_api.http.concurrency import limited
+from buildarena_api.http.etags import conditional
+from buildarena_api.http.negotiation import prefers
+from buildarena_api.http.problems import ProblemError, problem_responses
+from buildarena_api.scenes import SceneView, scene_view
+from buildarena_geometry import DocumentError, Machine
+from buildarena_pipeline.runtime.context import Context
+from buildarena_simulation import TrajectoryFormatError
+from buildarena_simulation.arrow import MEDIA_TYPE as ARROW
+from buildarena_simulation.arrow import arrow_stream, unpacked_bytes
+from buildarena_store import Job
+
+router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
+
+PARQUET: Final = "application/vnd.apache.parquet"
+MAX_ARROW_BYTES: Final = 64 << 20
+"""Larger trajectories are given only as the file that is kept: they fill a page's memory."""
+KEPT_SCENES: Final = 16 << 20
+"""Bytes of scenes in memory; one of a hundred blocks has 15 kB."""
+Number = Annotated[int, Query(ge=0, le=1000, description="Which rollout's")]
+_unpacking = Lock()
+
+
+async def _scenes(request: Request) -> KeptAnswers:
+    scenes: KeptAnswers = request.app.state.scenes
+    return scenes
+
+
+@router.get(
+    "/{job_id}/trajectory",
+    dependencies=[limited("trajectories", until="request")],
+    responses={
+        200: {"content": {PARQUET: {}, ARROW: {}}, "description": "As Parquet, or Arrow IPC"},
+        **problem_responses(404, 413, 422, 503),
+    },
+    response_class=Response,
+)
+def get_trajectory(
+    job_id: str, context: ContextDep, request: Request, number: Number = 0
+) -> Response:
+    """A trajectory of a job, as the Parquet file that is kept, or as an Arrow IPC stream.
+
+    `Accept: application/vnd.apache.arrow.stream` asks for the stream: one record batch with
+    `time_s`, and lists of fixed size, block after block: `positions` (the shown centres, units),
+    `quaternions` (w, x, y, z), `cargo_position`, `cargo_quaternion`, `cargo_mass`, `heated`,
+    `pieces` and the `bearing` forces. Block and cannon ids, joint peaks and breaks are JSON in the
+    schema's metadata under `buildarena.trajectory`.
+    """
+    digest = _trajectory_hash(context, context.store.jobs.get(job_id), number)
+    as_arrow = prefers(request.headers.get("accept", ""), ARROW, over=PARQUET)
+    media_type = ARROW if as_arrow else PARQUET
+    headers = {"ETag": f'"{digest}{"-arrow" if as_arrow else ""}"', "Vary": "Accept"}
+    if headers["ETag"] in request.headers.get("if-none-match", ""):
+        return Response(status_code=304, headers=headers)
+    data = context.artifacts.get(digest)
+    return Response(
+        _arrow(data, job_id) if as_arrow else data, media_type=media_type, headers=headers
+    )
+
+
+@router.get("/{job_id}/scene", response_model=SceneView, responses=problem_responses(404, 422, 503))
+def show_scene(
+    job_id: str,
+    context: ContextDep,
+    scenes: Annotated[KeptAnswers, Depends(_scenes)],
+    request: Request,
+    number: Number = 0,
+) -> Any:
+    """All that is needed to draw a trial: the scenario, the machine's parts and their bodies.
+
+    With a trajectory's poses it makes a film: a block's root point lies at
+    `position - rotation * center`, and its bodies are given in the block's own frame.
+    """
+    job = context.store.jobs.get(job_id)
+    answer = scenes.get_or_make(
+        f"{_machine_hash(context, job, number)} {job.task} {job.task_version}",
+        lambda: _scene(context, job, number),
+    )
+    return conditional(request, answer, "application/json")
+
+
+def _trajectory_hash(context: Context, job: Job, number: int) -> str:
+    digest = context.store.jobs.artifacts(job.id).get(f"trajectory-{number}")
+    if digest is None:
+        raise ProblemError(404, f"job {job.id} has no trajectory-{number} yet")
+    return digest
+
+
+def _machine_hash(context: Context, job: Job, number: int) -> str | None:
+    """The machine of a rollout; before the first, the one that was built so far."""
+    for record in context.store.rollouts.read(job.id):
+        if record.number == number:
+            return record.machine_hash
+    if number:
+        raise ProblemError(404, f"job {job.id} has no rollout {number} yet")
+    return context.store.jobs.artifacts(job.id).get("machine")
+
+
+def _arrow(data: bytes, job_id: str) -> bytes:
+    try:
+        size = unpacked_bytes(data)
+        if size > MAX_ARROW_BYTES:
+            raise ProblemError(
+                413,
+                f"the trajectory of job {job_id} has {size:,} bytes unpacked, more than the "
+                f"{MAX_ARROW_BYTES:,} that are sent as Arrow: ask for {PARQUET}",
+            )
+        # One at a time: unpacked it is several times in memory.
+        with _unpacking:
+            return arrow_stream(data)
+    except TrajectoryFormatError as error:
+        raise ProblemError(
+            404, f"job {job_id} has no trajectory that can be read: {error}"
+        ) from error
+
+
+def _scene(context: Context, job: Job, number: int) -> bytes:
+    task = context.tasks.exact(job.task, job.task_version)
+    if task is None:
+        raise ProblemError(404, f"task {job.task} is no longer at version {job.task_version}")
+    digest = _machine_hash(context, job, number)
+    machine = None
+    if digest is not None:
+        try:
+            machine = Machine.from_document(json.loads(context.artifacts.get(digest)))
+        except DocumentError as error:
+            detail = f"job {job.id} has a machine that this version does not read: {error}"
+            raise ProblemError(404, detail) from error
+    return scene_view(task.scenario, machine).model_dump_json().encode()

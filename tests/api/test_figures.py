@@ -1,0 +1,96 @@
+"""Figures of a board as data: the page and the report never differ."""
+
+from __future__ import annotations
+
+import pytest
+from sqlalchemy import text
+
+from buildarena_benchmark.flags import Reading
+from buildarena_benchmark.leaderboard import EndedJob, cost_bins, failure_rows
+from buildarena_store import JobScore, JournalEntry, Usage
+
+
+def end_next(context, outcome: str, indicator: float, tokens: int, **more: object) -> None:
+    lease = context.store.leases.claim("construct", owner="w")
+    entry = JournalEntry(
+        sequence=0, stage="plan", role="planner", request_hash="h", reply={},
+        usage=Usage(requests=1, output_tokens=tokens, cost_usd=1), latency_s=0.1,
+    )  # fmt: skip
+    context.store.journal.append(lease, entry)
+    score = JobScore(outcome=outcome, success=outcome == "success", indicator=indicator, **more)
+    with context.store.database.transaction() as connection:
+        counts = {"actions": 10, "refused_actions": 3, "refusals": {"overlap": 3}}
+        context.store.results.finish(lease, score, connection=connection, **counts)
+
+
+@pytest.fixture
+def played(api, context) -> None:
+    spec = {"tasks": ["support-1"], "models": ["builtin/idle", "builtin/random"], "seeds": [0, 1]}
+    assert api.post("/v1/sweeps", json=spec).status_code == 202
+    end_next(context, "success", 100.0, 50)
+    end_next(context, "construction_failed", 0.0, 10, reason="objection")
+    end_next(context, "success", 50.0, 1000, flags=("unstable",))
+    end_next(context, "unsuccessful", 25.0, 400)
+
+
+def test_figures_without_jobs_are_empty(api) -> None:
+    found = api.get("/v1/leaderboard/figures").json()
+    assert found["track"] is None
+    assert found["failures"] == found["cost"] == found["front"] == found["dimensions"] == []
+
+
+@pytest.mark.usefixtures("played")
+@pytest.mark.parametrize("reading", [*Reading])
+def test_figures_are_those_of_the_report(api, context, reading) -> None:
+    answer = api.get("/v1/leaderboard/figures", params={"reading": reading})
+    found = answer.json()
+    feed = context.store.results.boards.feed(None)
+    trials: list[EndedJob] = list(feed.put)
+    wanted = {
+        row.model: (dict(row.outcomes), dict(row.refusals), row.actions, row.refused_actions)
+        for row in failure_rows(trials)
+    }
+    assert wanted == {
+        row["model"]: (row["outcomes"], row["refusals"], row["actions"], row["refused_actions"])
+        for row in found["failures"]
+    }
+    assert sum(sum(row["outcomes"].values()) for row in found["failures"]) == 4
+    assert any("construction_failed: objection" in row["outcomes"] for row in found["failures"])
+    (cost,) = found["cost"]
+    categories = {"support-1": cost["category"]}
+    bins = cost_bins(trials, reading=reading, categories=categories)[cost["category"]]
+    assert [one["trials"] for one in cost["bins"]] == [one.trials for one in bins]
+    assert [one["mean"] for one in cost["bins"]] == [one.mean for one in bins]
+    board = api.get("/v1/leaderboard", params={"reading": reading}).json()
+    for name in ("mean_rank", "cost_usd_mean", "success_rate_mean", "pareto"):
+        assert [row[name] for row in found["front"]] == [row[name] for row in board["overall"]]
+    ranked = [row for row in board["overall"] if row["dimensions"]]
+    assert [row["dimensions"] for row in found["dimensions"]] == [
+        row["dimensions"] for row in ranked
+    ]
+    assert any(row["pareto"] for row in found["front"])
+    known = {"If-None-Match": answer.headers["etag"]}
+    again = api.get("/v1/leaderboard/figures", params={"reading": reading}, headers=known)
+    assert again.status_code == 304
+
+
+@pytest.mark.usefixtures("played")
+def test_figures_follow_what_changed_and_what_is_chosen(api, context) -> None:
+    def models() -> list[str]:
+        given = {"model": "builtin/idle"}
+        rows = api.get("/v1/leaderboard/figures", params=given).json()["failures"]
+        return [row["model"] for row in rows]
+
+    assert models() == ["builtin/idle"]
+    with context.store.database.transaction() as connection:
+        connection.execute(
+            text("UPDATE jobs SET outcome = 'cancelled' WHERE model = 'builtin/idle'")
+        )
+    rows = api.get("/v1/leaderboard/figures").json()["failures"]
+    idle = next(row for row in rows if row["model"] == "builtin/idle")
+    assert next(iter(idle["outcomes"])).startswith("cancelled")
+
+
+@pytest.mark.parametrize("bad", [{"track": "x"}, {"task": "x"}, {"reading": "mine"}])
+def test_unknown_choices_are_refused(api, bad) -> None:
+    assert api.get("/v1/leaderboard/figures", params=bad).status_code == 422

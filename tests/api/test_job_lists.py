@@ -1,0 +1,188 @@
+"""Lists of jobs: sorted, filtered, and paged without losing or doubling any."""
+
+from __future__ import annotations
+
+import base64
+import json
+
+import pytest
+
+from buildarena_store import JobScore, JournalEntry, Usage
+
+SORTS = ["created", "finished", "indicator", "cost", "task", "model", "seed"]
+
+
+@pytest.fixture
+def jobs(api, context) -> list[dict]:
+    """Twelve jobs, some of which cost alike, score alike or never ended; one is an agent's."""
+    spec = {
+        "tasks": ["support-1", "lift-1"],
+        "models": ["builtin/idle", "builtin/random"],
+        "seeds": [0, 1, 2],
+    }
+    assert api.post("/v1/sweeps", json=spec).status_code == 202
+    for number in range(8):
+        lease = context.store.leases.claim("construct", owner="w")
+        usage = Usage(requests=1, cost_usd=[0, 1, 1, 2][number % 4])
+        entry = JournalEntry(
+            sequence=0, stage="plan", role="planner", request_hash="h", reply={}, usage=usage,
+            latency_s=0.1,
+        )  # fmt: skip
+        context.store.journal.append(lease, entry)
+        score = JobScore(
+            outcome="success", success=True, indicator=[0.1, 0.1, 7.5, -2.0][number % 4],
+            detail=f"number {number} of 100%_sure",
+        )  # fmt: skip
+        with context.store.database.transaction() as connection:
+            context.store.results.finish(lease, score, connection=connection)
+    opened = {"task": "lift-1", "agent": "me", "seed": 5, "simulator": "mujoco"}
+    assert api.post("/v1/sessions", json=opened).status_code == 201
+    return api.get("/v1/jobs", params={"limit": 1000}).json()["jobs"]
+
+
+def pages(api, limit: int, **params: object) -> list[dict]:
+    found: list[dict] = []
+    cursor = None
+    while True:
+        given = {"limit": limit, **params, **({"cursor": cursor} if cursor else {})}
+        answer = api.get("/v1/jobs", params=given)
+        assert answer.status_code == 200, answer.text
+        page = answer.json()
+        found += page["jobs"]
+        cursor = page["next_cursor"]
+        if cursor is None:
+            return found
+        assert len(page["jobs"]) == limit
+
+
+def value(job: dict, sort: str) -> object:
+    if sort == "cost":
+        return job["usage"]["cost_usd"]
+    return job[{"created": "created_at", "finished": "finished_at"}.get(sort, sort)]
+
+
+def test_every_order_is_kept_over_pages_of_every_size(api, jobs) -> None:
+    assert len(jobs) == 13
+    for sort in SORTS:
+        for order in ("asc", "desc"):
+            whole = pages(api, 1000, sort=sort, order=order)
+            assert {job["id"] for job in whole} == {job["id"] for job in jobs}
+            values = [value(job, sort) for job in whole]
+            known = [one for one in values if one is not None]
+            assert values == known + [None] * (len(values) - len(known)), "what is missing is last"
+            assert known == sorted(known, reverse=order == "desc")
+            for limit in (1, 3, 5):
+                ids = [job["id"] for job in pages(api, limit, sort=sort, order=order)]
+                assert ids == [job["id"] for job in whole], (sort, order, limit)
+
+
+@pytest.mark.usefixtures("jobs")
+def test_an_agents_cost_is_unknown_and_not_nothing(api) -> None:
+    cheapest = pages(api, 1000, sort="cost", order="asc")
+    assert cheapest[-1]["model"] == "agent/me"
+
+
+@pytest.mark.usefixtures("jobs")
+def test_indicators_are_filtered_by_range(api) -> None:
+    def found(**params: object) -> list[float]:
+        return sorted(job["indicator"] for job in pages(api, 3, sort="indicator", **params))
+
+    assert found(indicator_min=0.1) == [0.1] * 4 + [7.5] * 2
+    assert found(indicator_max=0.1) == [-2.0] * 2 + [0.1] * 4
+    assert found(indicator_min=0.1, indicator_max=0.1) == [0.1] * 4
+    assert found(indicator_min=8) == []
+    assert found(indicator_min=1, indicator_max=0) == []
+
+
+@pytest.mark.parametrize("bad", ["nan", "inf", "-inf", "x", ""])
+def test_ranges_are_numbers(api, bad) -> None:
+    assert api.get("/v1/jobs", params={"indicator_min": bad}).status_code == 422
+
+
+@pytest.mark.parametrize(
+    ("text", "count"),
+    [
+        ("SUPPORT", 6),
+        ("lift-1", 7),
+        ("agent/", 1),
+        ("number 3", 1),
+        ("100%", 8),
+        ("100%_s", 8),
+        ("%", 8),
+        ("_", 13),
+        ("l_ft", 0),
+        ("n%r", 0),
+        ("\\", 0),
+        ("' OR 1=1 --", 0),
+    ],
+)
+@pytest.mark.usefixtures("jobs")
+def test_texts_are_found_as_they_are_written(api, text, count) -> None:
+    assert len(pages(api, 4, text=text)) == count
+
+
+@pytest.mark.parametrize("text", ["", "x" * 101])
+def test_texts_are_bounded(api, text) -> None:
+    assert api.get("/v1/jobs", params={"text": text}).status_code == 422
+
+
+def test_filters_go_together(api, jobs) -> None:
+    given = {"task": "lift-1", "text": "idle", "state": "done", "indicator_min": 0}
+    wanted = [
+        job
+        for job in jobs
+        if job["task"] == "lift-1"
+        and "idle" in job["model"]
+        and job["state"] == "done"
+        and job["indicator"] >= 0
+    ]
+    found = pages(api, 1, sort="seed", order="asc", **given)
+    assert sorted(job["id"] for job in found) == sorted(job["id"] for job in wanted)
+
+
+@pytest.mark.usefixtures("jobs")
+def test_a_cursor_of_another_order_is_refused(api) -> None:
+    cursor = api.get("/v1/jobs", params={"limit": 2, "sort": "cost"}).json()["next_cursor"]
+    for other in ({"sort": "seed"}, {"sort": "cost", "order": "asc"}, {}):
+        answer = api.get("/v1/jobs", params={**other, "cursor": cursor})
+        assert answer.status_code == 422
+        assert "another order" in answer.json()["detail"]
+
+
+@pytest.mark.parametrize(
+    ("sort", "wrong"),
+    [
+        ("created", None),
+        ("created", "2024-01-01T00:00:00"),
+        ("created", 5),
+        ("cost", "NaN"),
+        ("cost", "x"),
+        ("cost", [1]),
+        ("indicator", "1"),
+        ("indicator", True),
+        ("seed", 2**70),
+        ("seed", 1.5),
+        ("seed", True),
+        ("task", None),
+        ("task", 5),
+        ("task", "a\0b"),
+        ("model", {"a": 1}),
+    ],
+)
+def test_forged_cursors_are_refused(api, sort, wrong) -> None:
+    text = json.dumps([sort, True, wrong, "job_1"])
+    cursor = base64.urlsafe_b64encode(text.encode()).decode()
+    answer = api.get("/v1/jobs", params={"sort": sort, "cursor": cursor})
+    assert answer.status_code == 422
+    assert answer.json()["errors"][0]["field"] == "cursor"
+
+
+@pytest.mark.parametrize("text", ["[]", "5", "{}", '["created", true]', "[" * 500, "null", "NaN"])
+def test_cursors_of_any_shape_are_refused(api, text) -> None:
+    cursor = base64.urlsafe_b64encode(text.encode()).decode()
+    assert api.get("/v1/jobs", params={"cursor": cursor}).status_code == 422
+
+
+def test_an_unknown_order_names_the_choices(api) -> None:
+    problem = api.get("/v1/jobs", params={"sort": "luck"}).json()
+    assert problem["errors"][0]["choices"] == SORTS
