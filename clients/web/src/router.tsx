@@ -1,6 +1,7 @@
 import { createRootRoute, createRoute, createRouter, lazyRouteComponent } from "@tanstack/react-router";
 import { readSearch } from "./pages/board/search";
-import { readJobsSearch } from "./pages/job/search";
+import { readCompareSearch } from "./pages/compare/search";
+import { readJobSearch, readJobsSearch } from "./pages/job/search";
 import { Missing, RootError, Shell } from "./parts/Shell";
 
 const root = createRootRoute({ component: Shell, notFoundComponent: Missing, errorComponent: RootError });
@@ -30,11 +31,14 @@ const jobs = createRoute({
 const job = createRoute({
   getParentRoute: () => root,
   path: "/jobs/$id",
-  validateSearch: (raw: Record<string, unknown>): { turn?: number; view?: "trial" } => ({
-    turn: typeof raw.turn === "number" && raw.turn >= 0 ? Math.floor(raw.turn) : undefined,
-    view: raw.view === "trial" ? "trial" : undefined,
-  }),
+  validateSearch: readJobSearch,
   component: lazyRouteComponent(() => import("./pages/job/JobPage")),
+});
+const compare = createRoute({
+  getParentRoute: () => root,
+  path: "/compare",
+  validateSearch: readCompareSearch,
+  component: lazyRouteComponent(() => import("./pages/compare/ComparePage")),
 });
 const tasks = createRoute({
   getParentRoute: () => root,
@@ -53,7 +57,7 @@ const model = createRoute({
 });
 
 export const router = createRouter({
-  routeTree: root.addChildren([board, sweeps, sweep, jobs, job, tasks, task, model]),
+  routeTree: root.addChildren([board, sweeps, sweep, jobs, job, compare, tasks, task, model]),
   defaultPreload: "intent",
   scrollRestoration: true,
 });

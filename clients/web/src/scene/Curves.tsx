@@ -1,6 +1,7 @@
 import { SimpleGrid, Text } from "@mantine/core";
 import { number } from "../format";
-import { instantAt, type Curve } from "./trial";
+import type { Curve } from "./curves";
+import { instantAt } from "./trial";
 
 const WIDTH = 400;
 const HEIGHT = 70;

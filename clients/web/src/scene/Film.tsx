@@ -1,7 +1,10 @@
 import { useFrame, useThree } from "@react-three/fiber";
-import { useEffect, useMemo, useRef, type RefObject } from "react";
+import { useCallback, useEffect, useMemo, useRef } from "react";
 import { Matrix4, Vector3, type Mesh } from "three";
-import type { Machine, Part } from "./machine";
+import type { Clock } from "./clock";
+import { Breaks, LoadedJoints } from "./Joints";
+import { loadColour, loadsOfBlocks } from "./loads";
+import type { Machine, Part, Rod } from "./machine";
 import { Parts, type PoseNow } from "./Parts";
 import { cargoAt, poseAt } from "./playing";
 import type { Trial } from "./trial";
@@ -15,20 +18,18 @@ interface Orbit {
 export function Film({
   machine,
   trial,
-  time,
-  shown,
-  playing,
+  clock,
   follow,
-  colour,
+  loads,
 }: {
   machine: Machine;
   trial: Trial;
-  time: RefObject<number>;
-  shown: number;
-  playing: boolean;
+  clock: Clock;
   follow: boolean;
-  colour: (part: Part) => string | null;
+  /** What each joint bears; null to draw the parts in their own colours. */
+  loads: Float32Array | null;
 }) {
+  const { time, shown, playing } = clock;
   const { invalidate, camera } = useThree();
   const controls = useThree((state) => state.controls) as Orbit | null;
   const cargo = useRef<Mesh>(null);
@@ -60,10 +61,16 @@ export function Film({
     }
     if (playing) invalidate();
   }, -1);
+  const blocks = useMemo(() => (loads === null ? null : loadsOfBlocks(trial, loads)), [trial, loads]);
+  const joints = useMemo(() => new Map(trial.peaks.map((peak, index) => [peak.joint, index])), [trial]);
+  const colour = useCallback((part: Part) => (blocks === null ? null : loadColour(blocks.get(part.id) ?? 0)), [blocks]);
+  const rodColour = useCallback((rod: Rod) => (loads === null ? null : loadColour(loads[joints.get(rod.joint) ?? -1] ?? 0)), [loads, joints]);
   const pose = useMemo<PoseNow>(() => (part, into) => poses.current(part, into), []);
   return (
     <>
-      <Parts machine={machine} pose={pose} moving colour={colour} />
+      <Parts machine={machine} pose={pose} moving colour={colour} rodColour={rodColour} />
+      {loads !== null && <LoadedJoints machine={machine} trial={trial} pose={pose} loads={loads} />}
+      <Breaks machine={machine} trial={trial} pose={pose} now={shown} />
       {trial.cargo !== null && (
         <mesh ref={cargo} matrixAutoUpdate={false} frustumCulled={false}>
           <boxGeometry args={[...trial.cargo.size]} />

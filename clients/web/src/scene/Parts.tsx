@@ -2,7 +2,7 @@ import { useFrame, useThree } from "@react-three/fiber";
 import { useEffect, useMemo, useRef } from "react";
 import { Color, Matrix4, Quaternion, Vector3, type InstancedMesh } from "three";
 import { moduleGeometry } from "./geometry";
-import type { Machine, Part } from "./machine";
+import type { Machine, Part, Rod } from "./machine";
 import { KIND_COLOURS, moduleShape } from "./modules";
 
 const ROD_RADIUS = 0.06;
@@ -12,7 +12,7 @@ const Y = new Vector3(0, 1, 0);
 /** Where a part is now; the pose at the origin of its frame. */
 export type PoseNow = (part: Part, into: Matrix4) => Matrix4;
 
-export const asBuilt: PoseNow = (part, into) => into.copy(part.pose);
+export const asPlaced: PoseNow = (part, into) => into.copy(part.pose);
 
 interface PartsProps {
   machine: Machine;
@@ -20,7 +20,8 @@ interface PartsProps {
   /** Whether poses change from frame to frame. */
   moving?: boolean;
   colour?: (part: Part) => string | null;
-  chosen?: string | null;
+  rodColour?: (rod: Rod) => string | null;
+  chosen?: ReadonlySet<string>;
   onChoose?: (id: string) => void;
 }
 
@@ -36,7 +37,7 @@ export function Parts(props: PartsProps) {
       {groups.map(([module, parts]) => (
         <Blocks key={module} module={module} parts={parts} {...props} />
       ))}
-      <Rods machine={props.machine} pose={props.pose} moving={props.moving} />
+      <Rods {...props} />
     </>
   );
 }
@@ -45,6 +46,7 @@ function Blocks({ module, parts, pose, moving, colour, chosen, onChoose }: Parts
   const mesh = useRef<InstancedMesh>(null);
   const invalidate = useThree((state) => state.invalidate);
   const geometry = moduleGeometry(module);
+  const ids = useMemo(() => parts.map((part) => part.id), [parts]);
   const place = (): void => {
     const into = new Matrix4();
     parts.forEach((part, index) => mesh.current?.setMatrixAt(index, pose(part, into)));
@@ -58,7 +60,7 @@ function Blocks({ module, parts, pose, moving, colour, chosen, onChoose }: Parts
   useEffect(() => {
     const usual = KIND_COLOURS[moduleShape(module).kind] ?? "#999999";
     parts.forEach((part, index) => {
-      mesh.current?.setColorAt(index, part.id === chosen ? CHOSEN : new Color(colour?.(part) ?? usual));
+      mesh.current?.setColorAt(index, chosen?.has(part.id) ? CHOSEN : new Color(colour?.(part) ?? usual));
     });
     if (mesh.current?.instanceColor) mesh.current.instanceColor.needsUpdate = true;
     invalidate();
@@ -68,9 +70,11 @@ function Blocks({ module, parts, pose, moving, colour, chosen, onChoose }: Parts
   });
   return (
     <instancedMesh
+      key={parts.length}
       ref={mesh}
       args={[geometry, undefined, parts.length]}
       frustumCulled={false}
+      userData={{ blocks: ids }}
       onClick={(event) => {
         event.stopPropagation();
         const part = event.instanceId === undefined ? undefined : parts[event.instanceId];
@@ -82,29 +86,53 @@ function Blocks({ module, parts, pose, moving, colour, chosen, onChoose }: Parts
   );
 }
 
-function Rods({ machine, pose, moving }: { machine: Machine; pose: PoseNow; moving?: boolean }) {
+function Rods({ machine, pose, moving, rodColour, chosen, onChoose }: PartsProps) {
   const mesh = useRef<InstancedMesh>(null);
+  const invalidate = useThree((state) => state.invalidate);
   const parts = useMemo(() => new Map(machine.parts.map((part) => [part.id, part])), [machine]);
+  const ids = useMemo(() => machine.rods.map((rod) => rod.id), [machine]);
   const place = (): void => {
     const block = new Matrix4();
+    const at = (id: string | null, local: Vector3): Vector3 => {
+      const part = id === null ? undefined : parts.get(id);
+      return part === undefined ? local.clone() : local.clone().applyMatrix4(pose(part, block));
+    };
     machine.rods.forEach((rod, index) => {
-      const [from, to] = [parts.get(rod.startBlock), parts.get(rod.endBlock)];
-      if (from === undefined || to === undefined) return;
-      const start = rod.startLocal.clone().applyMatrix4(pose(from, block));
-      const end = rod.endLocal.clone().applyMatrix4(pose(to, block));
-      mesh.current?.setMatrixAt(index, between(start, end));
+      mesh.current?.setMatrixAt(index, between(at(rod.startBlock, rod.startLocal), at(rod.endBlock, rod.endLocal)));
     });
     if (mesh.current !== null) mesh.current.instanceMatrix.needsUpdate = true;
   };
-  useEffect(place);
+  useEffect(() => {
+    place();
+    mesh.current?.computeBoundingSphere();
+    invalidate();
+  });
+  useEffect(() => {
+    machine.rods.forEach((rod, index) => {
+      mesh.current?.setColorAt(index, chosen?.has(rod.id) ? CHOSEN : new Color(rodColour?.(rod) ?? KIND_COLOURS.connector));
+    });
+    if (mesh.current?.instanceColor) mesh.current.instanceColor.needsUpdate = true;
+    invalidate();
+  }, [machine, chosen, rodColour, invalidate]);
   useFrame(() => {
     if (moving) place();
   });
   if (machine.rods.length === 0) return null;
   return (
-    <instancedMesh ref={mesh} args={[undefined, undefined, machine.rods.length]} frustumCulled={false}>
+    <instancedMesh
+      key={machine.rods.length}
+      ref={mesh}
+      args={[undefined, undefined, machine.rods.length]}
+      frustumCulled={false}
+      userData={{ rods: ids }}
+      onClick={(event) => {
+        event.stopPropagation();
+        const rod = event.instanceId === undefined ? undefined : machine.rods[event.instanceId];
+        if (rod !== undefined) onChoose?.(rod.id);
+      }}
+    >
       <cylinderGeometry args={[ROD_RADIUS, ROD_RADIUS, 1, 8]} />
-      <meshStandardMaterial color={KIND_COLOURS.connector} />
+      <meshStandardMaterial />
     </instancedMesh>
   );
 }

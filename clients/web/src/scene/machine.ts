@@ -1,30 +1,10 @@
 import { Box3, Matrix4, Quaternion, Vector3 } from "three";
-import { moduleShape, type Solid, type Vector } from "./modules";
+import type { Schema } from "../api/client";
+import { learnShapes, moduleShape, type Solid, type Vector } from "./modules";
 
-/** A machine document, as far as a page draws it. */
-export interface MachineDocument {
-  blocks: {
-    id: string;
-    module: string;
-    position: Vector;
-    quaternion: readonly [number, number, number, number];
-    mount: readonly [string, string] | null;
-    bindings: Record<string, string[]>;
-    flipped: boolean;
-    note: string;
-    structure: string;
-  }[];
-  connectors: {
-    id: string;
-    module: string;
-    start: readonly [string, string];
-    end: readonly [string, string];
-    position: Vector;
-    quaternion: readonly [number, number, number, number];
-    span: Vector;
-  }[];
-  control_sequence: { time_s: number; key: string; hold_for_s: number }[];
-}
+export type MachineScene = Schema<"MachineScene">;
+export type PlacedView = Schema<"PlacedView">;
+export type PartView = Schema<"PartView">;
 
 export interface Part {
   id: string;
@@ -37,8 +17,11 @@ export interface Part {
 export interface Rod {
   id: string;
   module: string;
-  startBlock: string;
-  endBlock: string;
+  /** What trajectories call it. */
+  joint: string;
+  /** The blocks that it sits on; null for an end that is given in the world's frame. */
+  startBlock: string | null;
+  endBlock: string | null;
   /** Ends in the frames of the blocks they sit on. */
   startLocal: Vector3;
   endLocal: Vector3;
@@ -55,36 +38,44 @@ function vector(values: Vector): Vector3 {
   return new Vector3(values[0], values[1], values[2]);
 }
 
-/** A pose as a matrix; documents have quaternions as (w, x, y, z). */
+/** A pose as a matrix; the service has quaternions as (w, x, y, z). */
 export function poseOf(position: Vector, wxyz: readonly [number, number, number, number]): Matrix4 {
   const [w, x, y, z] = wxyz;
   return new Matrix4().compose(vector(position), new Quaternion(x, y, z, w), ONE);
 }
 
-/** The parts of a machine, ready to be drawn. */
-export function readMachine(document: MachineDocument): Machine {
-  const parts = document.blocks.map((block) => ({
-    id: block.id,
-    module: block.module,
-    kind: moduleShape(block.module).kind,
-    pose: poseOf(block.position, block.quaternion),
-  }));
-  const poses = new Map(parts.map((part) => [part.id, part.pose]));
-  const local = (block: string, point: Vector3): Vector3 =>
-    point.clone().applyMatrix4((poses.get(block) ?? new Matrix4()).clone().invert());
-  const rods = document.connectors.map((connector) => {
-    const start = vector(connector.position);
-    const end = vector(connector.span).applyMatrix4(poseOf(connector.position, connector.quaternion));
-    return {
-      id: connector.id,
-      module: connector.module,
-      startBlock: connector.start[0],
-      endBlock: connector.end[0],
-      startLocal: local(connector.start[0], start),
-      endLocal: local(connector.end[0], end),
-    };
-  });
-  return { parts, rods };
+export function partOf({ id, module, position, quaternion }: Omit<PlacedView, "start">): Part {
+  return { id, module, kind: moduleShape(module).kind, pose: poseOf(position, quaternion) };
+}
+
+/** The parts of a trial's machine, ready to be drawn. */
+export function readScene(scene: MachineScene): Machine {
+  learnShapes(scene.modules);
+  return {
+    parts: scene.blocks.map(partOf),
+    rods: scene.connectors.map(({ id, module, joint, start, end }) => ({
+      id,
+      module,
+      joint,
+      startBlock: start.block,
+      endBlock: end.block,
+      startLocal: vector(start.point),
+      endLocal: vector(end.point),
+    })),
+  };
+}
+
+/** The machine of a step of a replay. */
+export function machineOf(parts: Iterable<PartView>): Machine {
+  const machine: { parts: Part[]; rods: Rod[] } = { parts: [], rods: [] };
+  for (const part of parts) {
+    if (part.start === null || part.end === null) machine.parts.push(partOf(part));
+    else {
+      const { id, module, start, end } = part;
+      machine.rods.push({ id, module, joint: `${module} ${id}`, startBlock: null, endBlock: null, startLocal: vector(start), endLocal: vector(end) });
+    }
+  }
+  return machine;
 }
 
 function solidBox(solid: Solid): Box3 {

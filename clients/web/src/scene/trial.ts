@@ -1,5 +1,4 @@
-import { decompress } from "fzstd";
-import { parquetMetadata, parquetReadObjects } from "hyparquet";
+import { Table, tableFromIPC } from "apache-arrow";
 
 export interface JointPeak {
   joint: string;
@@ -16,7 +15,7 @@ export interface Break {
   ratio: number;
 }
 
-/** A rollout: T instants, N tracked blocks. */
+/** A rollout: T instants, N tracked blocks, J joints. */
 export interface Trial {
   times: Float64Array;
   blockIds: readonly string[];
@@ -26,6 +25,8 @@ export interface Trial {
   quaternions: Float32Array;
   cargo: { size: readonly [number, number, number]; positions: Float32Array; quaternions: Float32Array; mass: Float64Array } | null;
   peaks: readonly JointPeak[];
+  /** T x J shares of strength, in the order of the peaks; null in older trajectories. */
+  loads: Float32Array | null;
   breaks: readonly Break[];
   engine: string;
   engineVersion: string;
@@ -40,56 +41,54 @@ interface Facts {
   engine_version: string;
 }
 
-interface SampleRow {
-  time_s: number;
-  positions: number[];
-  quaternions: number[];
-  cargo_position?: number[];
-  cargo_quaternion?: number[];
-  cargo_mass?: number;
-}
-
+export const ARROW = "application/vnd.apache.arrow.stream";
 const FACTS = "buildarena.trajectory";
-const WANTED = ["time_s", "positions", "quaternions", "cargo_position", "cargo_quaternion", "cargo_mass"];
 
-function flat(rows: readonly number[][]): Float32Array {
-  const width = rows[0]?.length ?? 0;
-  const values = new Float32Array(rows.length * width);
-  rows.forEach((row, index) => {
-    values.set(row, index * width);
-  });
-  return values;
+/** A column of fixed-size lists as one flat array; null where the trajectory has none. */
+function flat(table: Table, name: string): Float32Array | null {
+  const data = table.getChild(name)?.data ?? [];
+  const parts = data.map((chunk) => chunk.children[0]?.values as Float32Array);
+  if (parts.length <= 1) return parts[0] ?? null;
+  const whole = new Float32Array(parts.reduce((sum, part) => sum + part.length, 0));
+  let at = 0;
+  for (const part of parts) {
+    whole.set(part, at);
+    at += part.length;
+  }
+  return whole;
 }
 
-/** Reads a trajectory as the service keeps it. */
-export async function readTrial(file: ArrayBuffer): Promise<Trial> {
-  const metadata = parquetMetadata(file);
-  const text = metadata.key_value_metadata?.find((entry) => entry.key === FACTS)?.value;
+function series(table: Table, name: string): Float64Array | null {
+  const column = table.getChild(name);
+  return column === null ? null : Float64Array.from(column as Iterable<number>);
+}
+
+const NONE = new Float32Array();
+
+/** Reads a trajectory as the service sends it, an Arrow stream. */
+export function readTrial(file: ArrayBuffer): Trial {
+  const table = tableFromIPC(new Uint8Array(file));
+  const text = table.schema.metadata.get(FACTS);
   if (text === undefined) throw new Error("this file is no trajectory");
   const facts = JSON.parse(text) as Facts;
-  const present = new Set(metadata.schema.map((element) => element.name));
-  const rows = (await parquetReadObjects({
-    file,
-    metadata,
-    columns: WANTED.filter((name) => present.has(name)),
-    compressors: { ZSTD: (input, length) => decompress(input, new Uint8Array(length)) },
-  })) as unknown as SampleRow[];
+  const times = series(table, "time_s") ?? new Float64Array();
   const size = facts.cargo_size;
   return {
-    times: Float64Array.from(rows, (row) => row.time_s),
+    times,
     blockIds: facts.block_ids,
-    positions: flat(rows.map((row) => row.positions)),
-    quaternions: flat(rows.map((row) => row.quaternions)),
+    positions: flat(table, "positions") ?? NONE,
+    quaternions: flat(table, "quaternions") ?? NONE,
     cargo:
       size === null
         ? null
         : {
             size,
-            positions: flat(rows.map((row) => row.cargo_position ?? [0, 0, 0])),
-            quaternions: flat(rows.map((row) => row.cargo_quaternion ?? [1, 0, 0, 0])),
-            mass: Float64Array.from(rows, (row) => row.cargo_mass ?? 0),
+            positions: flat(table, "cargo_position") ?? NONE,
+            quaternions: flat(table, "cargo_quaternion") ?? NONE,
+            mass: series(table, "cargo_mass") ?? new Float64Array(times.length),
           },
     peaks: facts.joint_peaks,
+    loads: flat(table, "joint_loads"),
     breaks: facts.breaks,
     engine: facts.engine,
     engineVersion: facts.engine_version,
@@ -111,37 +110,4 @@ export function instantAt(times: Float64Array, time: number): { index: number; s
   const from = times[low] ?? 0;
   const to = times[high] ?? from;
   return { index: low, share: to > from ? (time - from) / (to - from) : 0 };
-}
-
-export interface Curve {
-  name: string;
-  unit: string;
-  values: Float64Array;
-}
-
-function distances(positions: Float32Array, stride: number, count: number): Float64Array {
-  const [x, y] = [positions[0] ?? 0, positions[1] ?? 0];
-  return Float64Array.from({ length: count }, (_, i) =>
-    Math.hypot((positions[i * stride] ?? 0) - x, (positions[i * stride + 1] ?? 0) - y),
-  );
-}
-
-/** What a trial is judged by, over time: heights, distances, the load. */
-export function curvesOf(trial: Trial): Curve[] {
-  const count = trial.times.length;
-  const stride = trial.blockIds.length * 3;
-  const height = Float64Array.from({ length: count }, (_, i) => {
-    let sum = 0;
-    for (let block = 0; block < trial.blockIds.length; block += 1) sum += trial.positions[i * stride + block * 3 + 2] ?? 0;
-    return sum / Math.max(1, trial.blockIds.length);
-  });
-  const curves: Curve[] = [
-    { name: "Mean height of the machine", unit: "units", values: height },
-    { name: "Distance of the starting block", unit: "units", values: distances(trial.positions, stride, count) },
-  ];
-  if (trial.cargo !== null) {
-    curves.push({ name: "Distance of the cargo", unit: "units", values: distances(trial.cargo.positions, 3, count) });
-    curves.push({ name: "Mass of the cargo", unit: "mass units", values: trial.cargo.mass });
-  }
-  return curves;
 }

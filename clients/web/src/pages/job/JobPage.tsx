@@ -1,41 +1,38 @@
-import { SimpleGrid, Stack, Tabs } from "@mantine/core";
-import { useQuery, useQueryClient } from "@tanstack/react-query";
+import { Badge, Button, Group, Stack, Tabs } from "@mantine/core";
+import { IconDownload } from "@tabler/icons-react";
+import { useQuery } from "@tanstack/react-query";
 import { getRouteApi, useNavigate } from "@tanstack/react-router";
-import { lazy, Suspense, useCallback } from "react";
-import { bytesOf } from "../../api/client";
-import { useEvents } from "../../api/events";
-import { artifact, job as jobQuery, task as taskQuery, type JobDetail } from "../../api/queries";
+import { useState } from "react";
+import { download } from "../../api/client";
+import type { StreamState } from "../../api/events";
+import { job as jobQuery, type JobDetail } from "../../api/queries";
+import { ProblemNote } from "../../parts/Problem";
 import { Section } from "../../parts/Section";
-import { Answered, Empty, Loading } from "../../parts/States";
-import type { MachineDocument } from "../../scene/machine";
-import type { Scenario } from "../../scene/Surroundings";
+import { Answered, Empty } from "../../parts/States";
+import { BuildPart } from "./BuildPart";
 import { JobFacts, JobHead } from "./JobFacts";
 import { JobRecords } from "./JobRecords";
-import type { Transcript } from "./transcript";
+import { useLive } from "./live";
+import { replay as replayQuery, rolloutsOf, transcript as transcriptQuery } from "./queries";
+import { TrialPart } from "./TrialPart";
+import { useBuild } from "./build";
 import { TranscriptView } from "./TranscriptView";
 
-const MachineView = lazy(() => import("../../scene/MachineView"));
-const TrialView = lazy(() => import("../../scene/TrialView"));
 const route = getRouteApi("/jobs/$id");
 
 /** How a machine came about, how its trial went, and what was made of it. */
 export default function JobPage() {
   const { id } = route.useParams();
   const query = useQuery(jobQuery(id));
-  const queries = useQueryClient();
-  const open = query.data !== undefined && query.data.state !== "done";
-  const onEvents = useCallback(() => void queries.invalidateQueries({ queryKey: jobQuery(id).queryKey }), [queries, id]);
-  useEvents(open ? `/v1/jobs/${encodeURIComponent(id)}/events` : null, onEvents);
+  const state = useLive(query.data, id);
   return (
     <Answered query={query} rows={12}>
       {(job) => (
         <Stack gap="lg">
           <JobHead job={job} />
+          <Live state={state} />
           <JobFacts job={job} />
-          <SimpleGrid cols={{ base: 1, md: 2 }} spacing="md">
-            <TranscriptPart job={job} />
-            <MachinePart job={job} />
-          </SimpleGrid>
+          <Room job={job} />
           <JobRecords job={job} />
         </Stack>
       )}
@@ -43,88 +40,90 @@ export default function JobPage() {
   );
 }
 
-function TranscriptPart({ job }: { job: JobDetail }) {
-  const hash = job.artifacts.transcript;
-  const query = useQuery(artifact<Transcript>(job.id, "transcript", hash));
+const LIVE: Readonly<Record<StreamState, readonly [string, string]>> = {
+  live: ["teal", "● live: turns appear as they are taken"],
+  connecting: ["gray", "○ connecting"],
+  broken: ["yellow", "○ the service does not answer: connecting again"],
+};
+
+function Live({ state }: { state: StreamState | "ended" }) {
+  if (state === "ended") return null;
+  const [colour, text] = LIVE[state];
   return (
-    <Section title="Transcript">
-      {hash === undefined ? (
-        <Empty title={job.state === "done" ? "This job has no transcript" : "The transcript comes when the session ends"} />
-      ) : (
-        <Answered query={query}>{(found) => <TranscriptView turns={found.turns} />}</Answered>
-      )}
-    </Section>
+    <Badge color={colour} variant="outline" tt="none" role="status" data-live={state} styles={{ root: { color: "inherit" } }}>
+      {text}
+    </Badge>
   );
 }
 
-function MachinePart({ job }: { job: JobDetail }) {
-  const { view } = route.useSearch();
+/** Transcript and machine, in step. */
+function Room({ job }: { job: JobDetail }) {
+  const search = route.useSearch();
   const navigate = useNavigate({ from: "/jobs/$id" });
-  const hash = job.artifacts.machine;
-  const machine = useQuery(artifact<MachineDocument>(job.id, "machine", hash));
-  const trials = Object.keys(job.artifacts).filter((name) => name.startsWith("trajectory-")).sort();
-  if (hash === undefined) {
-    return (
-      <Section title="Machine">
-        <Empty title={job.state === "done" ? "No machine was finished" : "The machine comes when it is built"}>{job.detail}</Empty>
-      </Section>
-    );
-  }
+  const transcript = useQuery(transcriptQuery(job.id));
+  const replay = useQuery(replayQuery(job.id));
+  const build = useBuild(replay.data ?? null, transcript.data?.turns, search, (change) => {
+    void navigate({ search: (before) => ({ ...before, ...change }), replace: true, resetScroll: false });
+  });
+  const trials = rolloutsOf(job.artifacts);
+  const ended = job.state === "done";
   return (
-    <Section title="Machine">
-      <Answered query={machine}>
-        {(document) => (
-          <Tabs
-            value={view ?? "built"}
-            keepMounted={false}
-            onChange={(value) => {
-              void navigate({ search: (before) => ({ ...before, view: value === "trial" ? ("trial" as const) : undefined }), replace: true, resetScroll: false });
-            }}
-          >
-            <Tabs.List mb="sm">
-              <Tabs.Tab value="built">As built</Tabs.Tab>
-              <Tabs.Tab value="trial" disabled={trials.length === 0}>
-                The trial
-              </Tabs.Tab>
-            </Tabs.List>
-            <Tabs.Panel value="built">
-              <Suspense fallback={<Loading rows={10} />}>
-                <MachineView document={document} />
-              </Suspense>
-            </Tabs.Panel>
-            <Tabs.Panel value="trial">
-              <TrialPart job={job} document={document} name={trials.at(-1) ?? ""} />
-            </Tabs.Panel>
-          </Tabs>
-        )}
-      </Answered>
-    </Section>
+    <div className="job-room">
+      <Section title="Machine" aside={job.artifacts.machine === undefined ? null : <GlbButton job={job} />}>
+        <Tabs
+          value={search.view ?? "built"}
+          keepMounted={false}
+          onChange={(value) => {
+            void navigate({ search: (before) => ({ ...before, view: value === "trial" ? ("trial" as const) : undefined }), replace: true, resetScroll: false });
+          }}
+        >
+          <Tabs.List mb="sm">
+            <Tabs.Tab value="built">How it was built</Tabs.Tab>
+            <Tabs.Tab value="trial" disabled={trials.length === 0}>
+              The trial
+            </Tabs.Tab>
+          </Tabs.List>
+          <Tabs.Panel value="built">
+            <Answered query={replay} rows={10}>
+              {(found) =>
+                found === null || build.steps.length === 0 ? (
+                  <Empty title={ended ? "Nothing was built" : "Nothing is built yet"}>{job.detail ?? (ended ? "No action reached a machine." : "The first action shows here as soon as it is taken.")}</Empty>
+                ) : (
+                  <BuildPart build={build} />
+                )
+              }
+            </Answered>
+          </Tabs.Panel>
+          <Tabs.Panel value="trial">
+            <TrialPart job={job} numbers={trials} />
+          </Tabs.Panel>
+        </Tabs>
+      </Section>
+      <Section title="Transcript">
+        <Answered query={transcript}>
+          {(found) => (found === null || found.turns.length === 0 ? <Empty title={ended ? "This job has no transcript" : "No turn was taken yet"} /> : <TranscriptView turns={found.turns} build={build} />)}
+        </Answered>
+      </Section>
+    </div>
   );
 }
 
-function TrialPart({ job, document, name }: { job: JobDetail; document: MachineDocument; name: string }) {
-  const hash = job.artifacts[name];
-  const trial = useQuery({
-    queryKey: ["trial", hash],
-    enabled: hash !== undefined,
-    staleTime: Infinity,
-    queryFn: async () => {
-      const [{ readTrial }, file] = await Promise.all([
-        import("../../scene/trial"),
-        bytesOf(`/v1/jobs/${encodeURIComponent(job.id)}/artifacts/${encodeURIComponent(name)}`),
-      ]);
-      return readTrial(file);
-    },
-  });
-  const task = useQuery(taskQuery(job.task, job.task_version));
-  const scenario = task.data?.document.scenario as Scenario | undefined;
+function GlbButton({ job }: { job: JobDetail }) {
+  const [error, setError] = useState<unknown>(null);
   return (
-    <Answered query={trial} rows={10}>
-      {(found) => (
-        <Suspense fallback={<Loading rows={10} />}>
-          <TrialView document={document} trial={found} scenario={scenario ?? null} />
-        </Suspense>
-      )}
-    </Answered>
+    <Group gap="xs">
+      {error !== null && <ProblemNote error={error} />}
+      <Button
+        size="compact-sm"
+        variant="default"
+        leftSection={<IconDownload size={14} aria-hidden />}
+        onClick={() => {
+          setError(null);
+          download(`/v1/jobs/${encodeURIComponent(job.id)}/machine.glb`, `${job.id}.glb`).catch(setError);
+        }}
+      >
+        GLB
+      </Button>
+    </Group>
   );
 }

@@ -1,14 +1,15 @@
-import { Badge, Code, Group, Select, Stack, Switch, Text, TextInput } from "@mantine/core";
+import { Anchor, Badge, Code, Group, Select, Stack, Switch, Text, TextInput } from "@mantine/core";
 import { useVirtualizer } from "@tanstack/react-virtual";
-import { memo, useMemo, useRef, useState } from "react";
+import { memo, useEffect, useMemo, useRef, useState } from "react";
 import { count, dollars, duration, words } from "../../format";
+import type { Build } from "./build";
 import { callLine, chosenTurns, ROLE_COLOURS, type Turn, type TurnAction } from "./transcript";
 
 const ESTIMATE_PX = 140;
 const HEIGHT_PX = 760;
 
 /** A session's turns, virtualised: only those in sight are drawn. */
-export function TranscriptView({ turns }: { turns: readonly Turn[] }) {
+export function TranscriptView({ turns, build }: { turns: readonly Turn[]; build: Build }) {
   const [role, setRole] = useState<string | null>(null);
   const [refusedOnly, setRefusedOnly] = useState(false);
   const [text, setText] = useState("");
@@ -22,7 +23,13 @@ export function TranscriptView({ turns }: { turns: readonly Turn[] }) {
     overscan: 4,
     gap: 10,
   });
+  useInStep(build, shown, frame, (place) => { list.scrollToIndex(place, { align: "center" }); });
   const roles = [...new Set(turns.map((turn) => turn.role))];
+  const latest = useRef(build.go);
+  useEffect(() => {
+    latest.current = build.go;
+  });
+  const go = useMemo(() => (step: number) => { latest.current(step); }, []);
   return (
     <Stack gap="xs">
       <Group gap="sm" align="end">
@@ -59,7 +66,7 @@ export function TranscriptView({ turns }: { turns: readonly Turn[] }) {
                 data-index={item.index}
                 style={{ position: "absolute", top: 0, left: 0, right: 0, transform: `translateY(${item.start}px)` }}
               >
-                {turn !== undefined && <TurnCard turn={turn} />}
+                {turn !== undefined && <TurnCard turn={turn} marked={markedIn(build.markedAction, turn.index)} stepOf={build.stepOf} go={go} />}
               </div>
             );
           })}
@@ -69,10 +76,45 @@ export function TranscriptView({ turns }: { turns: readonly Turn[] }) {
   );
 }
 
-const TurnCard = memo(function TurnCard({ turn }: { turn: Turn }) {
+/** The action of this turn that is marked: its place; -1 for the turn alone; null for none. */
+function markedIn(marked: string | null, turn: number): number | null {
+  const [of, place] = (marked ?? "").split(":");
+  if (of === "" || Number(of) !== turn) return null;
+  return place === "" || place === undefined ? -1 : Number(place);
+}
+
+const NEAR_PX = 200;
+
+/** Brings the turn of the step into sight; one that comes in live only to who reads the end. */
+function useInStep(build: Build, shown: readonly Turn[], frame: React.RefObject<HTMLDivElement | null>, show: (place: number) => void): void {
+  const { markedAction, following } = build;
+  const begun = useRef(false);
+  useEffect(() => {
+    const first = !begun.current;
+    begun.current = true;
+    const box = frame.current;
+    if (box === null || markedAction === null) return;
+    if (following && build.part === undefined) {
+      const nearEnd = box.scrollHeight - box.scrollTop - box.clientHeight < NEAR_PX;
+      if (first || !nearEnd) return;
+    }
+    const place = shown.findIndex((turn) => markedIn(markedAction, turn.index) !== null);
+    if (place >= 0) show(place);
+    // eslint-disable-next-line react-hooks/exhaustive-deps -- filters and folds shall not scroll
+  }, [markedAction, following]);
+}
+
+interface TurnProps {
+  turn: Turn;
+  marked: number | null;
+  stepOf: ReadonlyMap<string, number>;
+  go: (step: number) => void;
+}
+
+const TurnCard = memo(function TurnCard({ turn, marked, stepOf, go }: TurnProps) {
   const colour = ROLE_COLOURS[turn.role] ?? "gray";
   return (
-    <article className="turn" style={{ "--turn-colour": `var(--mantine-color-${colour}-6)` } as React.CSSProperties} aria-label={`Turn ${turn.index}, ${turn.role}`}>
+    <article className="turn" style={{ "--turn-colour": `var(--mantine-color-${colour}-6)` } as React.CSSProperties} aria-label={`Turn ${turn.index}, ${turn.role}`} data-turn={turn.index} data-chosen={marked === null ? undefined : true}>
       <Group justify="space-between" gap="xs" mb={4}>
         <Group gap={6}>
           <Text size="xs" className="figures dimmed">
@@ -99,24 +141,31 @@ const TurnCard = memo(function TurnCard({ turn }: { turn: Turn }) {
       </Group>
       {turn.text !== "" && <div className="turn-text">{turn.text}</div>}
       {turn.actions.map((action, index) => (
-        <ActionFold key={index} action={action} />
+        <ActionFold key={index} action={action} chosen={marked === index} step={stepOf.get(`${turn.index}:${index}`)} go={go} />
       ))}
     </article>
   );
 });
 
-function ActionFold({ action }: { action: TurnAction }) {
+function ActionFold({ action, chosen, step, go }: { action: TurnAction; chosen: boolean; step: number | undefined; go: (step: number) => void }) {
   return (
-    <details style={{ marginTop: 6 }} open={!action.ok}>
-      <summary style={{ cursor: "pointer" }}>
-        <Badge size="sm" mr={6} variant="outline" color={action.ok ? "teal" : "red"} tt="none" styles={{ root: { color: "inherit" } }}>
-          {action.ok ? "✓ accepted" : `✗ ${words(action.reason ?? "refused")}`}
-        </Badge>
-        <Code style={{ overflowWrap: "anywhere" }}>{callLine(action)}</Code>
-      </summary>
-      <pre className="feedback" style={{ padding: "6px 10px" }}>
-        {action.feedback}
-      </pre>
-    </details>
+    <div className="action-line" data-chosen={chosen ? true : undefined} aria-current={chosen ? "step" : undefined} style={{ marginTop: 6, display: "flex", gap: 8, alignItems: "start" }}>
+      <details style={{ flex: 1, minWidth: 0 }} open={!action.ok}>
+        <summary style={{ cursor: "pointer" }}>
+          <Badge size="sm" mr={6} variant="outline" color={action.ok ? "teal" : "red"} tt="none" styles={{ root: { color: "inherit" } }}>
+            {action.ok ? "✓ accepted" : `✗ ${words(action.reason ?? "refused")}`}
+          </Badge>
+          <Code style={{ overflowWrap: "anywhere" }}>{callLine(action)}</Code>
+        </summary>
+        <pre className="feedback" style={{ padding: "6px 10px" }}>
+          {action.feedback}
+        </pre>
+      </details>
+      {step !== undefined && (
+        <Anchor component="button" type="button" size="xs" style={{ whiteSpace: "nowrap" }} onClick={() => { go(step); }}>
+          step {step + 1}
+        </Anchor>
+      )}
+    </div>
   );
 }

@@ -13,3 +13,20 @@ export function readJobsSearch(raw: Record<string, unknown>): JobsSearch {
   });
   return Object.fromEntries(found) as JobsSearch;
 }
+
+/** What the address of a job says: how far it is built, which part is chosen, or that the trial is shown. */
+export interface JobSearch {
+  step?: number;
+  part?: string;
+  view?: "trial";
+}
+
+export function readJobSearch(raw: Record<string, unknown>): JobSearch {
+  const step = typeof raw.step === "number" ? Math.floor(raw.step) : NaN;
+  const part = typeof raw.part === "number" ? String(raw.part) : raw.part;
+  return {
+    step: step >= 0 && Number.isSafeInteger(step) ? step : undefined,
+    part: typeof part === "string" && part.length < 100 ? part : undefined,
+    view: raw.view === "trial" ? "trial" : undefined,
+  };
+}
