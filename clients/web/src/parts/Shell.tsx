@@ -21,6 +21,7 @@ const PLACES = [
   { to: "/sweeps", label: "Sweeps" },
   { to: "/jobs", label: "Jobs" },
   { to: "/tasks", label: "Tasks" },
+  { to: "/compare", label: "Compare" },
 ] as const;
 
 /** The frame of every page: where one is, where one can go, light or dark, the key. */

@@ -1,7 +1,7 @@
 import { Badge, Button, Group, Stack, Tabs } from "@mantine/core";
 import { IconDownload } from "@tabler/icons-react";
 import { useQuery } from "@tanstack/react-query";
-import { getRouteApi, useNavigate } from "@tanstack/react-router";
+import { getRouteApi, Link, useNavigate } from "@tanstack/react-router";
 import { useState } from "react";
 import { download } from "../../api/client";
 import type { StreamState } from "../../api/events";
@@ -113,6 +113,9 @@ function GlbButton({ job }: { job: JobDetail }) {
   return (
     <Group gap="xs">
       {error !== null && <ProblemNote error={error} />}
+      <Link to="/compare" search={{ a: job.id }}>
+        Compare
+      </Link>
       <Button
         size="compact-sm"
         variant="default"
