@@ -41,9 +41,9 @@ export function Stage({ bounds, height, label, subject = "", lock, children }: S
         dpr={[1, 2]}
         camera={{ up: [0, 0, 1], fov: FIELD_DEG }}
         gl={{ antialias: true }}
-        onCreated={({ gl, scene }) => {
+        onCreated={({ gl, scene, camera }) => {
           // Whoever measures the page reads poses where they are drawn from.
-          Object.assign(gl.domElement, { scene });
+          Object.assign(gl.domElement, { scene, camera });
         }}
       >
         <hemisphereLight args={["#ffffff", "#8a7f70", 1.6]} />
