@@ -1,4 +1,4 @@
-.PHONY: web test-web
+.PHONY: web test-web bench-web
 
 WEB := clients/web
 WEB_OUT := services/api/src/buildarena_api/pages
@@ -22,6 +22,9 @@ test-web: $(WEB_STAMP) ## Types, lint, logic and pages of the dashboard, in a re
 	@bash mk/node.sh npm --prefix $(WEB) run --silent check
 	@bash mk/node.sh npm --prefix $(WEB) test
 	@BUILDARENA_TEST_WEB=1 $(BIN)/pytest tests/web -rs
+
+bench-web: $(WEB_STAMP) ## Measures the dashboard's pages in a browser that draws in software
+	@$(BIN)/python tests/benchmarks/web/bench_web.py
 
 # People who look at a service want its pages; without them it runs all the same.
 up: | web-if-it-can-be

@@ -20,7 +20,7 @@ WEIGHTS = {
     "flip_spin": 1,
     "change_control_key": 1,
 }
-CALLS = 22
+CALLS = 15
 
 Steps = list[dict[str, Any]]
 

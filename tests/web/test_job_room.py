@@ -9,11 +9,12 @@ from pathlib import Path
 
 import httpx
 import psutil
-import pytest
 from running import finished, running_stack
+from tests.web import test_pages
 from tests.web.random_machines import built_session
 from tests.web.test_pages import CHROMIUM, LONGEST_S, NODE, WEB
-from tests.web.test_pages import pytestmark as pytestmark
+
+pytestmark = test_pages.pytestmark
 
 MACHINES, A_SESSION = 50, 10
 SWEEP = {

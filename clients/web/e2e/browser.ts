@@ -11,7 +11,7 @@ export function launched(): Promise<Browser> {
 
 /** Opens a page of the service and waits until it has read what it shows. */
 export async function opened(browser: Browser, path: string, width = 1280): Promise<Page> {
-  const page = await browser.newPage({ viewport: { width, height: 900 } });
+  const page = await (await browser.newContext({ viewport: { width, height: 900 } })).newPage();
   await page.goto(URL_OF_SERVICE + path);
   await page.locator("h1").waitFor();
   await page.waitForFunction(() => document.querySelector("[aria-busy=true]") === null);

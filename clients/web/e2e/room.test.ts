@@ -88,9 +88,11 @@ async function walked(page: Page, expected: Expected): Promise<string[]> {
 
 describe.skipIf(sessions.length === 0)("random machines", () => {
   it.each(sessions.map((one, index) => [index, one] as const))("of session %d stand where the geometry library says, step by step", async (_, expected) => {
-    const page = await opened(browser, `/jobs/${expected.job}?step=0`, 900);
+    const page = await opened(browser, `/jobs/${expected.job}?step=0`, 390);
     await page.locator("canvas").waitFor();
     await page.waitForFunction(() => "scene" in (document.querySelector("canvas") ?? {}));
+    // What is drawn is small: poses are read, and software draws slowly.
+    await page.locator(".stage-3d").evaluate((stage) => { stage.style.height = "60px"; });
     expect(await page.locator("[data-steps]").getAttribute("data-steps")).toBe(String(expected.steps.length));
     expect(await walked(page, expected)).toEqual([]);
     await page.close();
@@ -124,23 +126,25 @@ describe.skipIf(PIDS.length === 0)("a session under way", () => {
     await page.locator("[data-live=live]").waitFor();
     await page.evaluate(() => Object.assign(window, { kept: true }));
     const waits: number[] = [];
-    const total = 40;
+    const total = 36;
+    const before = 31;
     for (let turn = 0; turn < total; turn += 1) {
       const began = performance.now();
       await act(session, turn === 0 ? "start" : "attach_block_to", turn === 0 ? {} : ATTACH(1 + Math.floor(turn / 3), turn));
       await page.waitForFunction((count) => document.querySelector("[data-steps]")?.getAttribute("data-steps") === String(count), turn + 1, { timeout: 40_000 });
-      if (turn !== 34) waits.push(performance.now() - began);
-      if (turn === 33) for (const pid of PIDS) process.kill(Number(pid), "SIGKILL");
+      if (turn < before) waits.push(performance.now() - began);
+      if (turn === before - 1) for (const pid of PIDS) process.kill(Number(pid), "SIGKILL");
     }
-    const first = waits.slice(0, 33).sort((a, b) => a - b);
-    console.log(JSON.stringify({ live_turns: first.length, median_ms: Math.round(first[16] ?? 0), worst_ms: Math.round(first.at(-1) ?? 0) }));
-    expect(first[16]).toBeLessThan(1500);
+    waits.sort((a, b) => a - b);
+    const median = waits[before >> 1] ?? Infinity;
+    console.log(JSON.stringify({ live_turns: waits.length, median_ms: Math.round(median), worst_ms: Math.round(waits.at(-1) ?? 0) }));
+    expect(median).toBeLessThan(1500);
     expect(await page.getByText(`${total} turns`, { exact: true }).count()).toBe(1);
     expect(await page.evaluate(() => "kept" in window)).toBe(true);
     const seen = new Set<string>();
     const box = page.getByRole("region", { name: "Transcript, scrolls" });
-    for (let top = 0; top < 40; top += 1) {
-      await box.evaluate((element, at) => { element.scrollTop = at * 250; }, top);
+    for (let top = 0; top < 20; top += 1) {
+      await box.evaluate((element, at) => { element.scrollTop = at * 400; }, top);
       await page.waitForTimeout(30);
       const now = await page.locator("[data-turn]").evaluateAll((found) => found.map((one) => one.getAttribute("data-turn") ?? ""));
       expect(new Set(now).size).toBe(now.length);

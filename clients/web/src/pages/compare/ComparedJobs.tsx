@@ -35,7 +35,7 @@ function Both({ jobs }: { jobs: readonly [JobDetail, JobDetail] }) {
         aside={<SegmentedControl size="xs" aria-label="Which facts" value={differing} onChange={setDiffering} data={[{ value: "all", label: "All" }, { value: "differing", label: "Only what differs" }]} />}
       >
         <div style={{ overflowX: "auto" }} tabIndex={0} role="region" aria-label="Facts of both jobs, scrolls">
-          <Table miw={520}>
+          <Table miw={300} style={{ overflowWrap: "anywhere" }}>
             <Table.Thead>
               <Table.Tr>
                 <Table.Th>Fact</Table.Th>

@@ -47,7 +47,7 @@ function Rows({ a, b }: { a: readonly Done[]; b: readonly Done[] }) {
         {same} of {rows.length} actions are the same; {a.length} in A, {b.length} in B.
       </Text>
       <div ref={frame} style={{ maxHeight: 520, overflow: "auto" }} tabIndex={0} role="region" aria-label="Actions of both, scrolls">
-        <div style={{ height: list.getTotalSize(), position: "relative", minWidth: 520 }}>
+        <div style={{ height: list.getTotalSize(), position: "relative", minWidth: 300 }}>
           {list.getVirtualItems().map((item) => {
             const row = rows[item.index];
             return (

@@ -51,7 +51,7 @@ export function JobFacts({ job }: { job: JobDetail }) {
         <Fact name={words(task.data?.indicator ?? "indicator")} value={`${job.censored ? "≥ " : ""}${number(job.indicator)}`} note={unit} strong />
         <Fact name="Actions" value={count(job.actions)} note={`${count(job.refused_actions)} refused`} />
         <Fact name="Model requests" value={count(job.usage.requests)} note="" />
-        <Fact name="Tokens" value={`${compact(job.usage.input_tokens)} in`} note={`${compact(job.usage.output_tokens)} out`} />
+        <Fact name="Tokens" value={job.usage.input_tokens === null ? "–" : `${compact(job.usage.input_tokens)} in`} note={job.usage.output_tokens === null ? "" : `${compact(job.usage.output_tokens)} out`} />
         <Fact name="Cost" value={dollars(job.usage.cost_usd)} note="" />
         <Fact name="Took" value={duration(secondsBetween(job.started_at, job.finished_at))} note={`${job.attempts.length} attempts`} />
       </SimpleGrid>
