@@ -1,4 +1,5 @@
 import { SimpleGrid, Text } from "@mantine/core";
+import { useMemo } from "react";
 import { number } from "../format";
 import type { Curve } from "./curves";
 import { instantAt } from "./trial";
@@ -23,10 +24,17 @@ export function Curves({
 }) {
   const end = times.at(-1) ?? 1;
   const { index } = instantAt(times, now);
+  const drawn = useMemo(
+    () =>
+      curves.map((curve) => {
+        const [low, high] = [Math.min(...curve.values), Math.max(...curve.values)];
+        return { curve, low, high, path: outline(curve.values, times, low, high) };
+      }),
+    [curves, times],
+  );
   return (
     <SimpleGrid cols={{ base: 1, sm: 2 }}>
-      {curves.map((curve) => {
-        const [low, high] = [Math.min(...curve.values), Math.max(...curve.values)];
+      {drawn.map(({ curve, low, high, path }) => {
         return (
           <figure key={curve.name} style={{ margin: 0 }}>
             <Text size="xs" component="figcaption">
@@ -51,7 +59,7 @@ export function Curves({
               {breaks.map((time, item) => (
                 <line key={item} x1={(WIDTH * time) / end} x2={(WIDTH * time) / end} y1={0} y2={HEIGHT} stroke="var(--mantine-color-red-6)" strokeDasharray="3 3" />
               ))}
-              <path d={outline(curve.values, times, low, high)} fill="none" stroke="var(--mantine-primary-color-filled)" strokeWidth={2} vectorEffect="non-scaling-stroke" />
+              <path d={path} fill="none" stroke="var(--mantine-primary-color-filled)" strokeWidth={2} vectorEffect="non-scaling-stroke" />
               <line x1={(WIDTH * now) / end} x2={(WIDTH * now) / end} y1={0} y2={HEIGHT} stroke="currentColor" vectorEffect="non-scaling-stroke" />
             </svg>
           </figure>

@@ -33,7 +33,7 @@ export function Film({
   const { invalidate, camera } = useThree();
   const controls = useThree((state) => state.controls) as Orbit | null;
   const cargo = useRef<Mesh>(null);
-  const poses = useRef<PoseNow>(poseAt(trial, 0));
+  const poses = useRef(new Map<string, Matrix4>());
   const followed = useRef<Vector3 | null>(null);
   const first = machine.parts.find((part) => part.id === trial.blockIds[0]);
   useEffect(() => {
@@ -44,20 +44,24 @@ export function Film({
   }, [follow]);
   // Before the parts are placed, so that all of a frame is of one instant.
   useFrame(() => {
-    poses.current = poseAt(trial, time.current);
+    const now = poseAt(trial, time.current);
+    for (const part of machine.parts) {
+      const known = poses.current.get(part.id) ?? new Matrix4();
+      poses.current.set(part.id, now(part, known));
+    }
     if (cargo.current !== null) {
       cargo.current.matrix.copy(cargoAt(trial, time.current, new Matrix4()));
       cargo.current.matrixWorldNeedsUpdate = true;
     }
     if (follow && first !== undefined && controls !== null) {
-      const now = new Vector3().setFromMatrixPosition(poses.current(first, new Matrix4()));
+      const here = new Vector3().setFromMatrixPosition(poses.current.get(first.id) ?? first.pose);
       if (followed.current !== null) {
-        const moved = now.clone().sub(followed.current);
+        const moved = here.clone().sub(followed.current);
         camera.position.add(moved);
         controls.target.add(moved);
         controls.update();
       }
-      followed.current = now;
+      followed.current = here;
     }
     if (playing) invalidate();
   }, -1);
@@ -65,7 +69,7 @@ export function Film({
   const joints = useMemo(() => new Map(trial.peaks.map((peak, index) => [peak.joint, index])), [trial]);
   const colour = useCallback((part: Part) => (blocks === null ? null : loadColour(blocks.get(part.id) ?? 0)), [blocks]);
   const rodColour = useCallback((rod: Rod) => (loads === null ? null : loadColour(loads[joints.get(rod.joint) ?? -1] ?? 0)), [loads, joints]);
-  const pose = useMemo<PoseNow>(() => (part, into) => poses.current(part, into), []);
+  const pose = useMemo<PoseNow>(() => (part, into) => into.copy(poses.current.get(part.id) ?? part.pose), []);
   return (
     <>
       <Parts machine={machine} pose={pose} moving colour={colour} rodColour={rodColour} />

@@ -36,7 +36,7 @@ export function LoadedJoints({ machine, trial, pose, loads }: { machine: Machine
   return (
     // Drawn over the blocks: joints lie inside them.
     <instancedMesh ref={mesh} args={[undefined, undefined, joints.length]} frustumCulled={false} renderOrder={2}>
-      <sphereGeometry args={[1, 12, 8]} />
+      <sphereGeometry args={[1, 10, 6]} />
       <meshBasicMaterial depthTest={false} transparent opacity={0.9} />
     </instancedMesh>
   );

@@ -8,15 +8,23 @@ import type { CameraLock } from "./lock";
 // The world's z points up.
 Object3D.DEFAULT_UP.set(0, 0, 1);
 
-function canDraw(): boolean {
+type Drawing = "none" | "software" | "hardware";
+
+/** Who draws: without a graphics card, smooth edges cost more than they are worth. */
+function whoDraws(): Drawing {
   try {
-    return document.createElement("canvas").getContext("webgl2") !== null;
+    const context = document.createElement("canvas").getContext("webgl2");
+    if (context === null) return "none";
+    const names = context.getExtension("WEBGL_debug_renderer_info");
+    const name = names === null ? "" : String(context.getParameter(names.UNMASKED_RENDERER_WEBGL));
+    context.getExtension("WEBGL_lose_context")?.loseContext();
+    return /swiftshader|llvmpipe|software/i.test(name) ? "software" : "hardware";
   } catch {
-    return false;
+    return "none";
   }
 }
 
-let drawing: boolean | null = null;
+let drawing: Drawing | null = null;
 
 interface StageProps {
   bounds: Box3;
@@ -30,17 +38,17 @@ interface StageProps {
 
 /** A view of something of this size: light, and a camera that mouse, touch and keys turn. */
 export function Stage({ bounds, height, label, subject = "", lock, children }: StageProps) {
-  drawing ??= canDraw();
-  if (!drawing) {
+  drawing ??= whoDraws();
+  if (drawing === "none") {
     return <Text size="sm">This browser draws no 3D (WebGL 2 is off).</Text>;
   }
   return (
     <div className="stage-3d" style={{ height }} role="img" aria-label={label}>
       <Canvas
         frameloop="demand"
-        dpr={[1, 2]}
+        dpr={drawing === "software" ? 1 : [1, 2]}
         camera={{ up: [0, 0, 1], fov: FIELD_DEG }}
-        gl={{ antialias: true }}
+        gl={{ antialias: drawing === "hardware" }}
         onCreated={({ gl, scene, camera }) => {
           // Whoever measures the page reads poses where they are drawn from.
           Object.assign(gl.domElement, { scene, camera });

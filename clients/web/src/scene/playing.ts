@@ -24,10 +24,19 @@ function blended(positions: Float32Array, quaternions: Float32Array, item: numbe
   return [place, facing];
 }
 
+const known = new WeakMap<Trial, Map<string, number>>();
+
+/** The place of each block in the trial's arrays. */
+function placesIn(trial: Trial): Map<string, number> {
+  const places = known.get(trial) ?? new Map(trial.blockIds.map((id, item) => [id, item]));
+  known.set(trial, places);
+  return places;
+}
+
 /** Where parts are at a time. The trajectory has the shown points; a pose has the block's root. */
 export function poseAt(trial: Trial, time: number): PoseNow {
   const { index, share } = instantAt(trial.times, time);
-  const places = new Map(trial.blockIds.map((id, item) => [id, item]));
+  const places = placesIn(trial);
   return (part, into) => {
     const item = places.get(part.id);
     if (item === undefined) return into.copy(part.pose);

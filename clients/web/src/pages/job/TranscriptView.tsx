@@ -1,4 +1,4 @@
-import { Anchor, Badge, Code, Group, Select, Stack, Switch, Text, TextInput } from "@mantine/core";
+import { Group, Select, Stack, Switch, Text, TextInput } from "@mantine/core";
 import { useVirtualizer } from "@tanstack/react-virtual";
 import { memo, useEffect, useMemo, useRef, useState } from "react";
 import { count, dollars, duration, words } from "../../format";
@@ -115,30 +115,20 @@ const TurnCard = memo(function TurnCard({ turn, marked, stepOf, go }: TurnProps)
   const colour = ROLE_COLOURS[turn.role] ?? "gray";
   return (
     <article className="turn" style={{ "--turn-colour": `var(--mantine-color-${colour}-6)` } as React.CSSProperties} aria-label={`Turn ${turn.index}, ${turn.role}`} data-turn={turn.index} data-chosen={marked === null ? undefined : true}>
-      <Group justify="space-between" gap="xs" mb={4}>
-        <Group gap={6}>
-          <Text size="xs" className="figures dimmed">
-            {turn.index}
-          </Text>
-          <Text size="sm" fw={650}>
-            {turn.role}
-          </Text>
-          <Text size="xs" className="dimmed">
-            {turn.stage}
-            {turn.sub_structure === null ? "" : ` · ${turn.sub_structure}`}
-          </Text>
-          {turn.finish !== undefined && turn.finish !== "stop" && turn.finish !== "tool_calls" && (
-            <Badge size="xs" color="yellow" variant="outline" tt="none" styles={{ root: { color: "inherit" } }}>
-              {turn.finish}
-            </Badge>
-          )}
-        </Group>
+      <header className="turn-head">
+        <span className="figures dimmed">{turn.index}</span>
+        <b>{turn.role}</b>
+        <span className="dimmed">
+          {turn.stage}
+          {turn.sub_structure === null ? "" : ` · ${turn.sub_structure}`}
+        </span>
+        {turn.finish !== undefined && turn.finish !== "stop" && turn.finish !== "tool_calls" && <span className="tag">{turn.finish}</span>}
         {turn.input_tokens !== undefined && (
-          <Text size="xs" className="figures dimmed">
+          <span className="figures dimmed turn-usage">
             {count(turn.input_tokens)} in · {count(turn.output_tokens)} out · {dollars(Number(turn.cost_usd ?? 0))} · {duration(turn.latency_s)}
-          </Text>
+          </span>
         )}
-      </Group>
+      </header>
       {turn.text !== "" && <div className="turn-text">{turn.text}</div>}
       {turn.actions.map((action, index) => (
         <ActionFold key={index} action={action} chosen={marked === index} step={stepOf.get(`${turn.index}:${index}`)} go={go} />
@@ -152,19 +142,17 @@ function ActionFold({ action, chosen, step, go }: { action: TurnAction; chosen: 
     <div className="action-line" data-chosen={chosen ? true : undefined} aria-current={chosen ? "step" : undefined} style={{ marginTop: 6, display: "flex", gap: 8, alignItems: "start" }}>
       <details style={{ flex: 1, minWidth: 0 }} open={!action.ok}>
         <summary style={{ cursor: "pointer" }}>
-          <Badge size="sm" mr={6} variant="outline" color={action.ok ? "teal" : "red"} tt="none" styles={{ root: { color: "inherit" } }}>
-            {action.ok ? "✓ accepted" : `✗ ${words(action.reason ?? "refused")}`}
-          </Badge>
-          <Code style={{ overflowWrap: "anywhere" }}>{callLine(action)}</Code>
+          <span className={action.ok ? "tag tag-good" : "tag tag-bad"}>{action.ok ? "✓ accepted" : `✗ ${words(action.reason ?? "refused")}`}</span>
+          <code className="call">{callLine(action)}</code>
         </summary>
         <pre className="feedback" style={{ padding: "6px 10px" }}>
           {action.feedback}
         </pre>
       </details>
       {step !== undefined && (
-        <Anchor component="button" type="button" size="xs" style={{ whiteSpace: "nowrap" }} onClick={() => { go(step); }}>
+        <button type="button" className="step-link" onClick={() => { go(step); }}>
           step {step + 1}
-        </Anchor>
+        </button>
       )}
     </div>
   );
