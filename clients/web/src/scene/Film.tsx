@@ -78,7 +78,7 @@ export function Film({
       {trial.cargo !== null && (
         <mesh ref={cargo} matrixAutoUpdate={false} frustumCulled={false}>
           <boxGeometry args={[...trial.cargo.size]} />
-          <meshStandardMaterial color="#859966" roughness={0.8} transparent opacity={0.85} />
+          <meshLambertMaterial color="#859966" transparent opacity={0.85} />
         </mesh>
       )}
     </>

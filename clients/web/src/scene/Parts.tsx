@@ -81,7 +81,7 @@ function Blocks({ module, parts, pose, moving, colour, chosen, onChoose }: Parts
         if (part !== undefined) onChoose?.(part.id);
       }}
     >
-      <meshStandardMaterial roughness={0.75} />
+      <meshLambertMaterial />
     </instancedMesh>
   );
 }
@@ -132,7 +132,7 @@ function Rods({ machine, pose, moving, rodColour, chosen, onChoose }: PartsProps
       }}
     >
       <cylinderGeometry args={[ROD_RADIUS, ROD_RADIUS, 1, 8]} />
-      <meshStandardMaterial />
+      <meshLambertMaterial />
     </instancedMesh>
   );
 }

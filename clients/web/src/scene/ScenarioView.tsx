@@ -25,12 +25,12 @@ export default function ScenarioView({ scenario }: { scenario: Scenario }) {
         {scenario.cargo !== null && (
           <mesh position={[0, 0, height]}>
             <boxGeometry args={[...scenario.cargo.size]} />
-            <meshStandardMaterial color="#859966" transparent opacity={0.85} />
+            <meshLambertMaterial color="#859966" transparent opacity={0.85} />
           </mesh>
         )}
         <mesh position={[0, 0, scenario.placement.lowest_center ?? 0.5]}>
           <boxGeometry args={[1, 1, 1]} />
-          <meshStandardMaterial color="#cc5c45" transparent opacity={0.6} />
+          <meshLambertMaterial color="#cc5c45" transparent opacity={0.6} />
         </mesh>
       </Stage>
       <Text size="sm">{described(scenario)}</Text>

@@ -18,13 +18,13 @@ export function Surroundings({ scenario, floor = 0 }: { scenario: Scenario | nul
     <>
       <mesh position={[0, 0, floor - 0.02]}>
         <planeGeometry args={[GROUND, GROUND]} />
-        <meshStandardMaterial color="#b9b5a8" roughness={1} transparent opacity={0.55} />
+        <meshLambertMaterial color="#b9b5a8" transparent opacity={0.55} />
       </mesh>
       <gridHelper args={[GROUND, LINES, "#6f6b60", "#8f8b80"]} rotation={[Math.PI / 2, 0, 0]} position={[0, 0, floor]} />
       {terrain.map((box, index) => (
         <mesh key={index} position={[...box.center]} rotation={[((box.slope_deg ?? 0) * Math.PI) / 180, 0, 0]}>
           <boxGeometry args={[...box.size]} />
-          <meshStandardMaterial color="#9aa38b" roughness={1} />
+          <meshLambertMaterial color="#9aa38b" />
         </mesh>
       ))}
     </>

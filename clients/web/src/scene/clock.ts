@@ -1,6 +1,6 @@
 import { useEffect, useRef, useState, type RefObject } from "react";
 
-const TELL_EVERY_MS = 80;
+const TELL_EVERY_MS = 120;
 export const SPEEDS = ["0.1", "0.25", "1", "4"] as const;
 
 export interface Clock {
