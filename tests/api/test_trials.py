@@ -56,6 +56,9 @@ def test_arrow_says_what_parquet_says_and_the_scene_draws_it(api, context, monke
         np.testing.assert_array_equal(
             column.flatten().to_numpy(zero_copy_only=False), wanted.reshape(-1)
         )
+    loads = table.column("joint_loads").combine_chunks()
+    assert loads.type.list_size == len(trajectory.joint_peaks)
+    np.testing.assert_array_equal(loads.flatten().to_numpy(), trajectory.joint_loads.reshape(-1))
     np.testing.assert_array_equal(table.column("time_s").to_numpy(), trajectory.time_s)
     np.testing.assert_array_equal(table.column("cargo_mass").to_numpy(), trajectory.cargo_mass)
     facts = json.loads(table.schema.metadata[b"buildarena.trajectory"])

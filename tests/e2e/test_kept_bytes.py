@@ -13,6 +13,8 @@ from buildarena_api.routes import health
 from buildarena_pipeline.catalog.models import load_registry
 from buildarena_pipeline.catalog.specs import JobSpec
 from buildarena_pipeline.runtime.context import Context
+from buildarena_simulation import Trajectory, schema_of, write_trajectory
+from buildarena_simworker import simulate
 from buildarena_worker.wiring import verifier
 
 SPEC = JobSpec(task="lift-1", model="builtin/expert", simulator="mujoco")
@@ -126,3 +128,19 @@ def test_an_agent_can_submit_again_when_the_store_works(context, folder) -> None
         assert refused.headers["Retry-After"]
         mend_store(folder)
         assert api.post(f"/v1/sessions/{session}/submit").status_code == 202
+
+
+def test_a_trajectory_of_an_older_schema_is_verified_as_it_is(
+    context, submissions, monkeypatch
+) -> None:
+    def older(trajectory: Trajectory) -> bytes:
+        return write_trajectory(trajectory, schema=2)
+
+    monkeypatch.setattr(simulate, "write_trajectory", older)
+    job, _ = submissions.submit_job(SPEC)
+    work(context)
+    kept = context.artifacts.get(context.store.jobs.artifacts(job.id)["trajectory-0"])
+    assert schema_of(kept) == 2
+    checks = verifier(context).verify(job.id)["checks"]
+    assert [check["name"] for check in checks if not check["ok"]] == []
+    assert "rollout 0: trajectory" in {check["name"] for check in checks}

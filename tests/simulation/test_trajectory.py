@@ -4,7 +4,19 @@ import dataclasses
 
 import numpy as np
 import pytest
-from tests.simulation.designs import beam, car, deck, one_shot_bridge, replayed, rocket
+from tests.simulation.designs import (
+    NORTH,
+    SOUTH,
+    UP,
+    WINCH,
+    Draft,
+    beam,
+    car,
+    deck,
+    one_shot_bridge,
+    replayed,
+    rocket,
+)
 
 from buildarena_benchmark import Task
 from buildarena_simulation import (
@@ -14,6 +26,7 @@ from buildarena_simulation import (
     TrajectoryFormatError,
     engine_version,
     read_trajectory,
+    schema_of,
     simulate,
     write_trajectory,
 )
@@ -57,6 +70,62 @@ def test_a_trajectory_tells_what_bears_the_machine_and_what_it_bears(
     assert wheels is not None
     assert wheels.wheels[settled].sum(axis=1) == pytest.approx(replayed(car()).mass, rel=0.02)
     assert len(wheels.wheel_ids) == 4
+
+
+def test_a_trajectory_tells_what_each_joint_bears_over_time(
+    engine: str, tasks: dict[str, Task]
+) -> None:
+    trajectory = simulate(replayed(beam(7)), tasks["support-1"].scenario, engine)
+    loads = trajectory.joint_loads
+    assert loads is not None
+    assert loads.dtype == np.float32
+    assert loads.shape == (len(trajectory.time_s), len(trajectory.joint_peaks))
+    assert loads[5 : round(25 * trajectory.breaks[0].time_s)].any(axis=1).all()
+    assert np.array_equal(loads * 512, np.round(loads * 512))
+    for column, peak in enumerate(trajectory.joint_peaks):
+        assert peak.ratio <= loads[:, column].max() + 1e-5
+        assert loads[:, column].max() <= peak.ratio + 1 / 512 + 1e-5
+    names = [peak.joint for peak in trajectory.joint_peaks]
+    for event in trajectory.breaks:
+        row = int(np.searchsorted(trajectory.time_s, event.time_s - 1e-9))
+        series = loads[:, names.index(event.joint)]
+        assert series[row] == pytest.approx(event.ratio, abs=0.003)
+        assert series[row] > 1.0
+        assert not series[row + 1 :].any()
+        assert (series[:row] <= 1.0).all()
+    # A load that grows: the joint that breaks first is nearer to it shortly before than early on.
+    first = loads[:, names.index(trajectory.breaks[0].joint)]
+    broken = round(trajectory.breaks[0].time_s * 25)
+    assert 0 < first[broken // 2] < first[broken - 2]
+
+
+def test_ropes_bear_their_share_too(engine: str, tasks: dict[str, Task]) -> None:
+    draft = Draft()
+    middle = draft.start()
+    row = [*draft.row(middle, NORTH, 3), *draft.row(middle, SOUTH, 3)]
+    draft.connect(row[2], row[5], UP, connector=WINCH)
+    trajectory = simulate(replayed(draft.actions), tasks["support-1"].scenario, engine)
+    loads = trajectory.joint_loads
+    assert loads is not None
+    peaks = trajectory.joint_peaks
+    assert peaks[-1].kind == "rope"
+    assert loads.shape[1] == len(peaks)
+    assert loads[:, -1].max() == pytest.approx(peaks[-1].ratio, abs=0.003)
+
+
+def test_older_files_are_read_and_can_be_written(tasks: dict[str, Task]) -> None:
+    scenario = tasks["support-1"].scenario.model_copy(update={"duration_s": 1.0})
+    trajectory = simulate(replayed(beam(7)), scenario, "mujoco")
+    old = write_trajectory(trajectory, schema=2)
+    assert (schema_of(old), schema_of(write_trajectory(trajectory))) == (2, 3)
+    again = read_trajectory(old)
+    assert again.joint_loads is None
+    assert _equal(dataclasses.replace(trajectory, joint_loads=None), again)
+    assert write_trajectory(again, schema=2) == old
+    with pytest.raises(ValueError, match="schema 1 are not written, only of 2 and 3"):
+        write_trajectory(trajectory, schema=1)
+    with pytest.raises(ValueError, match="joint_loads has shape"):
+        dataclasses.replace(trajectory, joint_loads=np.zeros((3, 2), dtype=np.float32))
 
 
 def test_a_break_makes_pieces(tasks: dict[str, Task]) -> None:

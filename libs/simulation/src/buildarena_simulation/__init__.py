@@ -11,7 +11,7 @@ from buildarena_simulation.errors import (
     TrajectoryFormatError,
     UnknownEngineError,
 )
-from buildarena_simulation.parquet import read_trajectory, write_trajectory
+from buildarena_simulation.parquet import read_trajectory, schema_of, write_trajectory
 from buildarena_simulation.rollout import SIMULATION_VERSION, simulate
 from buildarena_simulation.scenario import Scenario
 from buildarena_simulation.trajectory import Bearing, Break, JointPeak, Trajectory
@@ -31,6 +31,7 @@ __all__ = [
     "UnknownEngineError",
     "engine_version",
     "read_trajectory",
+    "schema_of",
     "simulate",
     "write_trajectory",
 ]

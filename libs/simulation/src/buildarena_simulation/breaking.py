@@ -45,6 +45,8 @@ class BreakingModel:
         self._enter(clusters)
         self._interval_s, self._unseen_s, self._calm = interval_s, 0.0, False
         self._peaks = np.zeros((3, len(structure.members)))
+        self._loads_now = np.zeros(len(structure.members) + len(structure.ropes))
+        self._loads_since: FloatArray | None = None
         self._rope_holds = np.ones(len(structure.ropes), dtype=bool)
         self._rope_peaks = np.zeros(len(structure.ropes))
         self.motion = motion
@@ -82,6 +84,7 @@ class BreakingModel:
         self._calm = bool(loads.ratio.max(initial=0.0) < _CALM) and not engine.struck
         for peak, seen in zip(self._peaks, (loads.force, loads.moment, loads.ratio), strict=True):
             np.maximum(peak, seen, out=peak)
+        self._follow_loads(loads.ratio, tensions)
         self._break_ropes(engine, tensions, time_s, cargo_mass)
         if not len(loads.ratio):
             return
@@ -106,6 +109,19 @@ class BreakingModel:
         mates = member[np.isin(face, face[member == worst])]
         tied = mates[ratio[mates] >= ratio[worst] * (1.0 - 1e-6)]
         return [worst, *(int(mate) for mate in np.unique(tied) if mate != worst)]
+
+    def taken_loads(self) -> FloatArray:
+        """The largest share of its strength that each joint and rope bore since the last call.
+
+        Where all evaluations since were left out, what it was found to bear last.
+        """
+        seen, self._loads_since = self._loads_since, None
+        return self._loads_now if seen is None else seen
+
+    def _follow_loads(self, ratio: FloatArray, tensions: FloatArray) -> None:
+        ropes = tensions / GRAVITY / self._structure.ropes.limit
+        now = self._loads_now = np.concatenate([ratio, ropes])
+        self._loads_since = now if self._loads_since is None else np.maximum(self._loads_since, now)
 
     def peaks(self) -> tuple[JointPeak, ...]:
         """The largest load of every joint and rope so far."""

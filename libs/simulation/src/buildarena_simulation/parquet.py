@@ -2,7 +2,7 @@
 
 Columns `positions` and `quaternions` hold all tracked blocks of an instant, block after block; what
 is not a series (ids, joint peaks, breaks, settings) is JSON in the schema's metadata under the key
-`buildarena.trajectory`. `SCHEMA_VERSION` rises with every change that older readers cannot follow.
+`buildarena.trajectory`. `SCHEMA_VERSION` rises with everything that is added or changed.
 """
 
 import io
@@ -19,17 +19,31 @@ from buildarena_simulation.trajectory import Bearing, Break, JointPeak, Trajecto
 if TYPE_CHECKING:
     import pyarrow as pa
 
-SCHEMA_VERSION: Final = 2
-_READABLE: Final = (1, 2)
-"""Schema 1 has no pieces and no bearing forces."""
+SCHEMA_VERSION: Final = 3
+_READABLE: Final = (1, 2, 3)
+"""Schema 1 has no pieces and no bearing forces, schema 2 no loads over time."""
+_WRITABLE: Final = (2, 3)
+_LOADS_FROM: Final = 3
 
 _BEARING: Final = ("ground", "terrain", "cargo", "wheels")
 _KEY: Final = b"buildarena.trajectory"
 _COMPRESSION_LEVEL: Final = 6
 
 
-def write_trajectory(trajectory: Trajectory) -> bytes:
-    """The bytes of a trajectory's file; equal trajectories give equal bytes."""
+def write_trajectory(trajectory: Trajectory, *, schema: int = SCHEMA_VERSION) -> bytes:
+    """The bytes of a trajectory's file; equal trajectories give equal bytes.
+
+    Args:
+        trajectory: What is written.
+        schema: 2 to write it as versions before this one did, without loads over time: so can a
+            file of theirs be compared byte by byte.
+
+    Raises:
+        ValueError: Files of this schema are no longer written.
+    """
+    if schema not in _WRITABLE:
+        choices = " and ".join(str(version) for version in _WRITABLE)
+        raise ValueError(f"files of schema {schema} are not written, only of {choices}")
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -51,8 +65,10 @@ def write_trajectory(trajectory: Trajectory) -> bytes:
     if bearing is not None:
         for name in _BEARING:
             columns[f"bearing_{name}"] = _rows(getattr(bearing, name).reshape(count, -1))
+    if trajectory.joint_loads is not None and schema >= _LOADS_FROM:
+        columns["joint_loads"] = _rows(trajectory.joint_loads)
     facts = {
-        "schema_version": SCHEMA_VERSION,
+        "schema_version": schema,
         "block_ids": trajectory.block_ids,
         "cannon_ids": trajectory.cannon_ids,
         "cargo_size": trajectory.cargo_size,
@@ -74,6 +90,7 @@ def write_trajectory(trajectory: Trajectory) -> bytes:
             ("quaternions", "quaternions.list.element"),
             ("cargo_position", "cargo_position.list.element"),
             ("cargo_quaternion", "cargo_quaternion.list.element"),
+            ("joint_loads", "joint_loads.list.element"),
             *((f"bearing_{name}", f"bearing_{name}.list.element") for name in _BEARING),
         )
         if name in columns
@@ -97,16 +114,9 @@ def read_trajectory(data: bytes) -> Trajectory:
     Raises:
         TrajectoryFormatError: The bytes are not a trajectory of a schema this version reads.
     """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    try:
-        table = pq.read_table(io.BytesIO(data))
-        facts = json.loads(table.schema.metadata[_KEY])
-    except (pa.ArrowException, KeyError, TypeError, ValueError) as error:
-        raise TrajectoryFormatError(f"these bytes are not a trajectory: {error}") from error
+    table, facts = _opened(data)
     if facts.pop("schema_version") not in _READABLE:
-        known = " and ".join(str(version) for version in _READABLE)
+        known = ", ".join(str(version) for version in _READABLE)
         raise TrajectoryFormatError(f"only trajectories of schemas {known} can be read")
     columns = {name: table.column(name).combine_chunks() for name in table.column_names}
     time_s = columns["time_s"].to_numpy()
@@ -125,10 +135,33 @@ def read_trajectory(data: bytes) -> Trajectory:
         cargo_mass=columns["cargo_mass"].to_numpy() if "cargo_mass" in columns else None,
         joint_peaks=tuple(JointPeak(**peak) for peak in facts["joint_peaks"]),
         breaks=tuple(Break(**event) for event in facts["breaks"]),
+        joint_loads=_matrix(columns["joint_loads"], count) if "joint_loads" in columns else None,
         pieces=_matrix(columns["pieces"], count) if "pieces" in columns else None,
         bearing=_bearing(columns, count, facts.pop("wheel_ids", None)),
     )
     return Trajectory(**facts)
+
+
+def schema_of(data: bytes) -> int:
+    """The schema that a trajectory's file has.
+
+    Raises:
+        TrajectoryFormatError: The bytes are not a trajectory.
+    """
+    return int(_opened(data)[1]["schema_version"])
+
+
+def _opened(data: bytes) -> "tuple[pa.Table, dict[str, Any]]":
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        table = pq.read_table(io.BytesIO(data))
+        facts = json.loads(table.schema.metadata[_KEY])
+        int(facts["schema_version"])
+    except (pa.ArrowException, KeyError, TypeError, ValueError) as error:
+        raise TrajectoryFormatError(f"these bytes are not a trajectory: {error}") from error
+    return table, facts
 
 
 def _bearing(

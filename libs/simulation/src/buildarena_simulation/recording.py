@@ -18,6 +18,7 @@ from buildarena_simulation.structure.vectors import turned
 from buildarena_simulation.trajectory import (
     Setting,
     Trajectory,
+    rounded_loads,
     rounded_positions,
     rounded_quaternions,
 )
@@ -50,6 +51,7 @@ class Recorder:
         self._time_s = np.zeros(count)
         self._seen: list[tuple[Clusters, Motion]] = []
         self._bearing: list[FloatArray] = []
+        self._loads: list[FloatArray] = []
         self._heated = np.zeros((count, cannons), dtype=bool)
         self._cargo_size = scenario.cargo.size if scenario.cargo else None
         self._cargo_position = np.zeros((count, 3))
@@ -67,12 +69,14 @@ class Recorder:
         cargo_mass: float | None,
         *,
         bearing: FloatArray,
+        loads: FloatArray,
     ) -> None:
         """Keeps one instant, and finds which cannons are heated from here on."""
         row = self._row
         self._time_s[row] = time_s
         self._seen.append((clusters, motion))
         self._bearing.append(bearing)
+        self._loads.append(loads)
         if len(self.heated_now):
             self.heated_now = self._heated_in(clusters, motion)
         self._heated[row] = self.heated_now
@@ -150,6 +154,7 @@ class Recorder:
                 np.array(self._bearing), tuple(structure.block_ids[i] for i in structure.wheels)
             ),
             joint_peaks=breaking.peaks(),
+            joint_loads=rounded_loads(np.array(self._loads)),
             breaks=tuple(breaking.breaks),
             engine=engine,
             engine_version=engine_version,

@@ -240,4 +240,5 @@ class _Trial:
             self._engine.cargo() if cargo else None,
             cargo.mass_at(time_s) if cargo else None,
             bearing=self.breaking.bearing.now,
+            loads=self.breaking.taken_loads(),
         )

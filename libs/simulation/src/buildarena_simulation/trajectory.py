@@ -1,4 +1,4 @@
-"""What a trial leaves behind: poses at 25 Hz, cargo, heating, joint peaks and breaks."""
+"""What a trial leaves behind: poses at 25 Hz, cargo, heating, joint loads and breaks."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
@@ -14,6 +14,9 @@ POSE_GRAIN: Final = 2.0**-14
 
 QUATERNION_GRAIN: Final = 2.0**-18
 """Components of quaternions are multiples of this (4e-6)."""
+
+LOAD_GRAIN: Final = 2.0**-9
+"""Shares of strength in series are multiples of this (0.2 %)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,7 +95,7 @@ class Bearing:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Trajectory:
-    """The rollout of one trial: T instants, N tracked blocks, C cannons.
+    """The rollout of one trial: T instants, N tracked blocks, C cannons, J joints.
 
     Positions are the points shown to models as the blocks' positions; with a block's quaternion
     (world_from_block) they give its pose: the block's root lies at
@@ -114,6 +117,9 @@ class Trajectory:
             piece. None where no simulator of ours ran.
         bearing: What bears the machine and what it bears; None where no simulator of ours ran.
         joint_peaks: One per joint.
+        joint_loads: (T, J) float32, the largest share of its strength that each joint bore since
+            the instant before, in the order of `joint_peaks`: above 1 where it broke, 0 from then
+            on. None where no simulator of ours ran, and in files of schemas 1 and 2.
         breaks: In order of time.
         engine: Name of the engine.
         engine_version: Version of the engine's library.
@@ -139,6 +145,7 @@ class Trajectory:
     settings: Mapping[str, Setting]
     pieces: NDArray[np.int16] | None = None
     bearing: Bearing | None = None
+    joint_loads: NDArray[np.float32] | None = None
 
     def __post_init__(self) -> None:
         """Checks that the arrays fit together, and closes them."""
@@ -151,6 +158,7 @@ class Trajectory:
             "cargo_mass": (count,),
             "heated": (count, len(self.cannon_ids)),
             "pieces": (count, blocks),
+            "joint_loads": (count, len(self.joint_peaks)),
         }
         for name, shape in wanted.items():
             array = getattr(self, name)
@@ -170,3 +178,8 @@ def rounded_positions(positions: NDArray[np.float64]) -> NDArray[np.float32]:
 def rounded_quaternions(quaternions: NDArray[np.float64]) -> NDArray[np.float32]:
     """Quaternions as they are stored."""
     return (np.round(quaternions / QUATERNION_GRAIN) * QUATERNION_GRAIN).astype(np.float32)
+
+
+def rounded_loads(loads: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Shares of strength as they are stored: upwards, so that one that breaks a joint tells so."""
+    return (np.ceil(loads / LOAD_GRAIN) * LOAD_GRAIN).astype(np.float32)

@@ -9,6 +9,8 @@ from fastapi import Depends, FastAPI
 from fastapi_offline import FastAPIOffline
 from starlette.routing import Route
 
+from buildarena_api.dashboard.files import read_pages
+from buildarena_api.dashboard.serving import Dashboard
 from buildarena_api.events.hub import EventHub
 from buildarena_api.http.access import caller_of
 from buildarena_api.http.answers import KeptAnswers
@@ -128,6 +130,8 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
     app.state.rate_limits = rate_limits
     add_problem_handlers(app)
     _add_routes(app)
+    # Behind every route, so that no page can stand in the place of one.
+    app.router.default = Dashboard(read_pages(), app.router.default)
     _add_middleware(app)
     return app
 

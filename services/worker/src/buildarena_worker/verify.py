@@ -34,7 +34,9 @@ from buildarena_simulation import (
     SIMULATION_VERSION,
     MachineNotSimulable,
     Trajectory,
+    TrajectoryFormatError,
     read_trajectory,
+    schema_of,
     simulate,
     write_trajectory,
 )
@@ -245,12 +247,21 @@ class Verifier:
         except LogIncompleteError as error:
             return [*checks, Check(name=f"{name}: log", ok=False, kept="", found=str(error))]
         else:
-            again, digest = score(task, machine, trajectory), _hash(write_trajectory(trajectory))
+            again = score(task, machine, trajectory)
+            digest = _hash(self._written_as(record.trajectory_hash, trajectory))
         checks.append(_compare(f"{name}: trajectory", record.trajectory_hash, digest))
         for field in SCORED:
             kept = _plain(getattr(record, field))
             checks.append(_compare(f"{name}: {field}", kept, _plain(getattr(again, field))))
         return checks
+
+    def _written_as(self, kept: str | None, trajectory: Trajectory) -> bytes:
+        """A trajectory's file in the schema of the kept one, which an older version may have."""
+        with suppress(ArtifactStoreError, TrajectoryFormatError, ValueError):
+            if kept is not None:
+                schema = schema_of(self._artifacts.get(kept))
+                return write_trajectory(trajectory, schema=schema)
+        return write_trajectory(trajectory)
 
     def _played(self, job: Job, record: RolloutRecord, machine: Machine, task: Task) -> Trajectory:
         """What the kept log of a trial in the game tells; the game itself plays nothing again.

@@ -56,7 +56,7 @@ def up(
         signal.signal(number, lambda *_: stopping.set())
     _tell_simulators()
     with Stack(settings, tell=_tell) as stack:
-        say(f"API {stack.url}  ·  docs {stack.url}/docs  ·  logs {stack.logs}")
+        say(f"dashboard and API {stack.url}  ·  docs {stack.url}/docs  ·  logs {stack.logs}")
         say("Ctrl-C stops it.")
         while not stopping.wait(0.5):
             stack.require_running()
@@ -108,7 +108,10 @@ def _detach(settings: Settings, *, keys: bool) -> None:
         run = start(data, ["--port", str(settings.port), *(["--keys"] if keys else [])])
     except OSError as error:
         raise unwritable(data, error) from error
-    say(f"API {run.url}  ·  docs {run.url}/docs  ·  pid {run.pid}  ·  logs {data / 'logs'}")
+    say(
+        f"dashboard and API {run.url}  ·  docs {run.url}/docs  ·  pid {run.pid}"
+        f"  ·  logs {data / 'logs'}"
+    )
     say("`buildarena down` stops it.")
 
 

@@ -55,8 +55,10 @@ def get_trajectory(
     `Accept: application/vnd.apache.arrow.stream` asks for the stream: one record batch with
     `time_s`, and lists of fixed size, block after block: `positions` (the shown centres, units),
     `quaternions` (w, x, y, z), `cargo_position`, `cargo_quaternion`, `cargo_mass`, `heated`,
-    `pieces` and the `bearing` forces. Block and cannon ids, joint peaks and breaks are JSON in the
-    schema's metadata under `buildarena.trajectory`.
+    `pieces`, the `bearing` forces, and `joint_loads`: the largest share of its strength that each
+    joint bore since the instant before, in the order of the joint peaks (not in trajectories of
+    before schema 3). Block and cannon ids, joint peaks and breaks are JSON in the schema's metadata
+    under `buildarena.trajectory`.
     """
     digest = _trajectory_hash(context, context.store.jobs.get(job_id), number)
     as_arrow = prefers(request.headers.get("accept", ""), ARROW, over=PARQUET)

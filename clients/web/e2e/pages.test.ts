@@ -1,0 +1,123 @@
+import { AxeBuilder } from "@axe-core/playwright";
+import { chromium, type Browser, type BrowserContext, type Page } from "playwright-core";
+import { afterAll, beforeAll, describe, expect, it } from "vitest";
+
+const URL_OF_SERVICE = process.env.BUILDARENA_WEB_URL ?? "";
+const CHROMIUM = process.env.BUILDARENA_CHROMIUM ?? "/usr/bin/chromium";
+// A machine without a graphics card draws 3D all the same.
+const ARGUMENTS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"];
+
+let browser: Browser;
+let sweep = "";
+let built = "";
+
+async function json(path: string): Promise<Record<string, { id: string }[]>> {
+  return (await (await fetch(URL_OF_SERVICE + path)).json()) as Record<string, { id: string }[]>;
+}
+
+beforeAll(async () => {
+  browser = await chromium.launch({ executablePath: CHROMIUM, args: ARGUMENTS });
+  sweep = (await json("/v1/sweeps")).sweeps?.[0]?.id ?? "";
+  built = (await json("/v1/jobs?model=builtin/expert&outcome=success")).jobs?.[0]?.id ?? "";
+});
+afterAll(() => browser.close());
+
+interface Opened {
+  page: Page;
+  faults: string[];
+  context: BrowserContext;
+}
+
+async function open(path: string, width = 1280, scheme: "light" | "dark" = "light"): Promise<Opened> {
+  const context = await browser.newContext({ viewport: { width, height: 900 }, colorScheme: scheme });
+  const page = await context.newPage();
+  const faults: string[] = [];
+  page.on("pageerror", (error) => faults.push(String(error)));
+  page.on("console", (message) => {
+    if (message.type() === "error") faults.push(message.text());
+  });
+  await page.goto(URL_OF_SERVICE + path);
+  await page.locator("h1").waitFor();
+  await page.waitForFunction(() => document.querySelector("[aria-busy=true]") === null);
+  return { page, faults, context };
+}
+
+const PAGES: readonly (readonly [string, () => string])[] = [
+  ["leaderboard", () => "/?paper=yes"],
+  ["sweeps", () => "/sweeps"],
+  ["sweep", () => `/sweeps/${sweep}`],
+  ["jobs", () => "/jobs"],
+  ["job", () => `/jobs/${built}`],
+  ["trial", () => `/jobs/${built}?view=trial`],
+  ["tasks", () => "/tasks"],
+  ["task", () => "/tasks/support-1"],
+  ["model", () => "/models/builtin/expert"],
+];
+
+describe.each(PAGES)("the page of the %s", (_, path) => {
+  it.each([
+    [1280, "light"],
+    [390, "dark"],
+  ] as const)("at %d px, %s, has no serious fault", async (width, scheme) => {
+    const { page, faults, context } = await open(path(), width, scheme);
+    const { violations } = await new AxeBuilder({ page }).analyze();
+    const serious = violations.filter((one) => one.impact === "serious" || one.impact === "critical");
+    expect(serious.map((one) => `${one.id}: ${one.nodes.map((node) => node.html.slice(0, 160)).slice(0, 3).join(" | ")}`)).toEqual([]);
+    expect(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth)).toBe(true);
+    expect(faults).toEqual([]);
+    await context.close();
+  });
+});
+
+describe("the leaderboard", () => {
+  it("keeps its switches in the address, and reads them from it", async () => {
+    const { page, context } = await open("/");
+    await page.getByRole("switch", { name: "Baselines" }).click({ force: true });
+    await page.waitForURL(/baselines=no/);
+    await page.reload();
+    await page.locator("h1").waitFor();
+    expect(await page.getByRole("switch", { name: "Baselines" }).isChecked()).toBe(false);
+    await context.close();
+  });
+
+  it("opens the jobs behind a cell", async () => {
+    const { page, context } = await open("/");
+    await page.locator("a.heat-cell").first().click();
+    await page.waitForURL(/\/jobs\?.*task=/);
+    await page.getByRole("region", { name: /jobs, scrolls/ }).waitFor();
+    await context.close();
+  });
+});
+
+describe("a job", () => {
+  it("draws its machine and plays its trial", async () => {
+    const { page, context } = await open(`/jobs/${built}?view=trial`);
+    const canvas = page.locator("canvas");
+    await canvas.waitFor();
+    const before = await page.getByText(/^\d+\.\d \/ \d+ s$/).textContent();
+    await page.getByRole("button", { name: "Play" }).click();
+    await expect.poll(() => page.getByText(/^\d+\.\d \/ \d+ s$/).textContent(), { timeout: 20_000 }).not.toBe(before);
+    await context.close();
+  });
+
+  it("that nobody has is told in words", async () => {
+    const context = await browser.newContext();
+    const page = await context.newPage();
+    await page.goto(`${URL_OF_SERVICE}/jobs/job_none`);
+    await expect.poll(() => page.getByRole("alert").textContent()).toContain("There is no such thing");
+    await context.close();
+  });
+});
+
+it("loads at most 350 kB of script on the first page, and no 3D", async () => {
+  const context = await browser.newContext();
+  const page = await context.newPage();
+  const sizes: number[] = [];
+  page.on("response", (response) => {
+    if (response.url().endsWith(".js")) sizes.push(Number(response.headers()["content-length"] ?? 0));
+  });
+  await page.goto(URL_OF_SERVICE);
+  await page.locator("figure, .plot svg").first().waitFor();
+  expect(sizes.reduce((sum, size) => sum + size, 0)).toBeLessThan(350_000);
+  await context.close();
+});

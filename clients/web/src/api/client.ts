@@ -1,0 +1,66 @@
+import createClient, { type Middleware } from "openapi-fetch";
+import type { components, paths } from "./contract";
+import { authorization } from "./key";
+import { ApiError, refusal } from "./problem";
+
+export type Schema<Name extends keyof components["schemas"]> = components["schemas"][Name];
+
+const withKey: Middleware = {
+  onRequest({ request }) {
+    for (const [name, value] of Object.entries(authorization())) request.headers.set(name, value);
+    return request;
+  },
+};
+
+export const client = createClient<paths>({
+  baseUrl: "/",
+  querySerializer: { array: { style: "form", explode: true } },
+});
+client.use(withKey);
+
+/** The data of an answer, or its problem as an error. */
+export async function taken<Data>(
+  asked: Promise<{ data?: Data; error?: unknown; response: Response }>,
+): Promise<Data> {
+  let answer;
+  try {
+    answer = await asked;
+  } catch {
+    throw new ApiError(0, null, "no answer came: is it running, and is the network there?");
+  }
+  if (!answer.response.ok || answer.data === undefined) {
+    throw refusal(answer.response.status, answer.error);
+  }
+  return answer.data;
+}
+
+/** Bytes that the contract does not describe, such as artifacts. */
+export async function bytesOf(path: string, accept = "*/*"): Promise<ArrayBuffer> {
+  let response: Response;
+  try {
+    response = await fetch(path, { headers: { ...authorization(), Accept: accept } });
+  } catch {
+    throw new ApiError(0, null, "no answer came: is it running, and is the network there?");
+  }
+  if (!response.ok) {
+    throw refusal(response.status, await response.json().catch(() => null));
+  }
+  return response.arrayBuffer();
+}
+
+export async function jsonOf<Data>(path: string): Promise<Data> {
+  const bytes = await bytesOf(path, "application/json");
+  return JSON.parse(new TextDecoder().decode(bytes)) as Data;
+}
+
+/** Saves what the API answers with; a link could not carry the key. */
+export async function download(path: string, name: string): Promise<void> {
+  const url = URL.createObjectURL(new Blob([await bytesOf(path)]));
+  const link = document.createElement("a");
+  link.href = url;
+  link.download = name;
+  link.click();
+  setTimeout(() => {
+    URL.revokeObjectURL(url);
+  }, 10_000);
+}

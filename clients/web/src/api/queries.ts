@@ -1,0 +1,113 @@
+import { keepPreviousData, queryOptions } from "@tanstack/react-query";
+import type { BoardSearch } from "../pages/board/search";
+import { client, jsonOf, taken, type Schema } from "./client";
+import type { paths } from "./contract";
+
+export type Board = Schema<"Board">;
+export type Row = Schema<"Row">;
+export type TaskBoard = Schema<"TaskBoard">;
+export type OverallView = Schema<"OverallView">;
+export type SweepView = Schema<"SweepView">;
+export type JobView = Schema<"JobView">;
+export type JobDetail = Schema<"JobDetail">;
+export type TaskView = Schema<"TaskView">;
+export type TaskDetail = Schema<"TaskDetail">;
+export type JobFilters = NonNullable<paths["/v1/jobs"]["get"]["parameters"]["query"]>;
+
+const LIVE_MS = 5_000;
+
+export function boardQuery(search: BoardSearch): Record<string, string | string[]> {
+  const query: Record<string, string | string[]> = {};
+  if (search.track !== undefined) query.track = search.track;
+  if (search.task !== undefined && search.task.length > 0) query.task = search.task;
+  if (search.reading !== undefined) query.reading = search.reading;
+  if (search.since !== undefined) query.since = `${search.since}T00:00:00Z`;
+  if (search.until !== undefined) query.until = `${search.until}T00:00:00Z`;
+  return query;
+}
+
+export const board = (search: BoardSearch) =>
+  queryOptions({
+    queryKey: ["board", boardQuery(search)],
+    queryFn: () => taken(client.GET("/v1/leaderboard", { params: { query: boardQuery(search) } })),
+    placeholderData: keepPreviousData,
+    refetchInterval: 4 * LIVE_MS,
+  });
+
+export const sweeps = (cursor?: string) =>
+  queryOptions({
+    queryKey: ["sweeps", cursor ?? ""],
+    queryFn: () => taken(client.GET("/v1/sweeps", { params: { query: { limit: 50, cursor } } })),
+    placeholderData: keepPreviousData,
+    refetchInterval: LIVE_MS,
+  });
+
+export const sweep = (id: string) =>
+  queryOptions({
+    queryKey: ["sweep", id],
+    queryFn: () => taken(client.GET("/v1/sweeps/{sweep_id}", { params: { path: { sweep_id: id } } })),
+  });
+
+/** Every job of a sweep, page after page; events keep it true from then on. */
+export const sweepJobs = (id: string) =>
+  queryOptions({
+    queryKey: ["sweep-jobs", id],
+    staleTime: Infinity,
+    queryFn: async () => {
+      const found: JobView[] = [];
+      let cursor: string | undefined;
+      do {
+        const query = { sweep: id, limit: 1000, cursor };
+        const page = await taken(client.GET("/v1/jobs", { params: { query } }));
+        found.push(...page.jobs);
+        cursor = page.next_cursor ?? undefined;
+      } while (cursor !== undefined);
+      return found;
+    },
+  });
+
+export const jobPage = (filters: JobFilters) => client.GET("/v1/jobs", { params: { query: filters } });
+
+export const job = (id: string) =>
+  queryOptions({
+    queryKey: ["job", id],
+    queryFn: () => taken(client.GET("/v1/jobs/{job_id}", { params: { path: { job_id: id } } })),
+  });
+
+export const jobFiles = (id: string) =>
+  queryOptions({
+    queryKey: ["job-files", id],
+    queryFn: () =>
+      taken(client.GET("/v1/jobs/{job_id}/artifacts", { params: { path: { job_id: id } } })),
+  });
+
+/** An artifact's content never changes under its hash, so it is read once. */
+export const artifact = <Data>(id: string, name: string, hash: string | undefined) =>
+  queryOptions({
+    queryKey: ["artifact", hash],
+    enabled: hash !== undefined,
+    staleTime: Infinity,
+    queryFn: () => jsonOf<Data>(`/v1/jobs/${encodeURIComponent(id)}/artifacts/${encodeURIComponent(name)}`),
+  });
+
+export const tasks = () =>
+  queryOptions({
+    queryKey: ["tasks"],
+    staleTime: 60_000,
+    queryFn: () => taken(client.GET("/v1/tasks", {})),
+  });
+
+export const task = (name: string, version?: string) =>
+  queryOptions({
+    queryKey: ["task", name, version ?? ""],
+    staleTime: 60_000,
+    queryFn: () =>
+      taken(client.GET("/v1/tasks/{name}", { params: { path: { name }, query: { version } } })),
+  });
+
+export const models = () =>
+  queryOptions({
+    queryKey: ["models"],
+    staleTime: 60_000,
+    queryFn: () => taken(client.GET("/v1/models", {})),
+  });

@@ -1,0 +1,69 @@
+/** Figures and times as people read them. */
+const NONE = "–";
+
+export function number(value: number | null | undefined, digits = 1): string {
+  if (value === null || value === undefined || !Number.isFinite(value)) return NONE;
+  const size = Math.abs(value);
+  const shown = size >= 1000 ? 0 : size !== 0 && size < 0.1 ? Math.max(digits, 3) : digits;
+  return value.toLocaleString("en", { minimumFractionDigits: shown, maximumFractionDigits: shown });
+}
+
+export function count(value: number | null | undefined): string {
+  return value === null || value === undefined ? NONE : Math.round(value).toLocaleString("en");
+}
+
+export function percent(share: number | null | undefined, digits = 0): string {
+  return share === null || share === undefined ? NONE : `${(100 * share).toFixed(digits)} %`;
+}
+
+export function dollars(value: number | null | undefined): string {
+  if (value === null || value === undefined) return NONE;
+  const digits = value !== 0 && Math.abs(value) < 0.1 ? 4 : 2;
+  return `$${value.toLocaleString("en", { minimumFractionDigits: digits, maximumFractionDigits: digits })}`;
+}
+
+export function compact(value: number | null | undefined): string {
+  if (value === null || value === undefined) return NONE;
+  return value.toLocaleString("en", { notation: "compact", maximumFractionDigits: 1 });
+}
+
+export function bytes(size: number): string {
+  if (size < 1024) return `${size} B`;
+  const mebibytes = size / 1024 / 1024;
+  return mebibytes < 1 ? `${(size / 1024).toFixed(1)} KiB` : `${mebibytes.toFixed(1)} MiB`;
+}
+
+/** "2 h 5 min", for a time in seconds. */
+export function duration(seconds: number | null | undefined): string {
+  if (seconds === null || seconds === undefined || !Number.isFinite(seconds)) return NONE;
+  if (seconds < 1) return `${Math.round(1000 * seconds)} ms`;
+  if (seconds < 60) return `${seconds.toFixed(seconds < 10 ? 1 : 0)} s`;
+  const minutes = Math.round(seconds / 60);
+  if (minutes < 60) return `${minutes} min`;
+  const hours = Math.floor(minutes / 60);
+  if (hours < 48) return `${hours} h ${minutes % 60} min`;
+  return `${Math.round(hours / 24)} days`;
+}
+
+/** A place, with the interval that holds it: "1" or "1–3". */
+export function places(low: number | null, high: number | null): string {
+  if (low === null || high === null) return NONE;
+  return low === high ? String(low) : `${low}–${high}`;
+}
+
+export function words(name: string): string {
+  return name.replaceAll("_", " ");
+}
+
+/** "five-role · pybullet 3", for a track's long name. */
+export function trackLabel(track: string): string {
+  const [workflow, simulator, prompts] = track.split("/");
+  if (workflow === undefined || simulator === undefined || prompts === undefined) return track;
+  const [name, hash] = prompts.split("-");
+  return `${workflow} · ${simulator.replace(/-(\d+)$/, " $1")} · ${name ?? ""} prompts ${hash ?? ""}`;
+}
+
+export function secondsBetween(from: string | null, to: string | null): number | null {
+  if (from === null || to === null) return null;
+  return (Date.parse(to) - Date.parse(from)) / 1000;
+}

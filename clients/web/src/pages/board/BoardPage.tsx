@@ -1,0 +1,68 @@
+import { Anchor, Group, Stack, Text, Title } from "@mantine/core";
+import { useQuery } from "@tanstack/react-query";
+import { getRouteApi, Link } from "@tanstack/react-router";
+import { lazy, Suspense } from "react";
+import { board, type Board } from "../../api/queries";
+import { Section } from "../../parts/Section";
+import { Answered, Empty, Loading } from "../../parts/States";
+import { Controls } from "./Controls";
+import { Exports } from "./Exports";
+import { HeatMap } from "./HeatMap";
+import { Overall } from "./Overall";
+import type { BoardSearch } from "./search";
+
+const BoardPlots = lazy(() => import("./BoardPlots"));
+const route = getRouteApi("/");
+
+/** The leaderboard of one track. */
+export default function BoardPage() {
+  const search = route.useSearch();
+  const query = useQuery(board(search));
+  return (
+    <Stack gap="lg">
+      <div>
+        <Title order={1}>Leaderboard</Title>
+        <Text size="sm" className="dimmed">
+          Who builds machines that work? Each model builds every task several times; a simulator tries each machine.
+        </Text>
+      </div>
+      <Answered query={query} rows={12}>
+        {(found) => <Found found={found} search={search} />}
+      </Answered>
+    </Stack>
+  );
+}
+
+function Found({ found, search }: { found: Board; search: BoardSearch }) {
+  if (found.track === null) {
+    return (
+      <Empty title="No job has ended yet">
+        Submit one with <code>buildarena sweep submit</code>, or watch those that run on the{" "}
+        <Anchor component={Link} to="/sweeps" inherit>
+          sweeps page
+        </Anchor>
+        .
+      </Empty>
+    );
+  }
+  return (
+    <>
+      <Controls board={found} search={search} />
+      <Section title="Overall" aside={<Exports track={found.track} search={search} />}>
+        <Overall board={found} search={search} />
+      </Section>
+      <Section title="Model by task">
+        <HeatMap board={found} search={search} />
+      </Section>
+      <Suspense fallback={<Loading rows={8} />}>
+        <BoardPlots board={found} search={search} />
+      </Suspense>
+      <Group>
+        <Text size="xs" className="dimmed">
+          Intervals hold at 95 %. Places are given with the interval that holds them; models whose trials do not show
+          which is better are tied and share a rank.
+        </Text>
+      </Group>
+    </>
+  );
+}

@@ -1,0 +1,101 @@
+import { Group, MultiSelect, SegmentedControl, Select, Stack, Switch, Text, TextInput } from "@mantine/core";
+import { useQuery } from "@tanstack/react-query";
+import { useNavigate } from "@tanstack/react-router";
+import { tasks, type Board } from "../../api/queries";
+import { trackLabel } from "../../format";
+import type { BoardSearch } from "./search";
+
+/** The switches of the board. Each is a word of the address, so that a view can be sent. */
+export function Controls({ board, search }: { board: Board; search: BoardSearch }) {
+  const navigate = useNavigate({ from: "/" });
+  const known = useQuery(tasks());
+  const set = (change: Partial<BoardSearch>): void => {
+    void navigate({ search: (before) => ({ ...before, ...change }), replace: true, resetScroll: false });
+  };
+  const names = (known.data ?? []).map((task) => task.name);
+  return (
+    <Group align="end" gap="sm">
+      <Select
+        label="Track"
+        data={board.tracks.map((track) => ({ value: track, label: trackLabel(track) }))}
+        value={board.track}
+        allowDeselect={false}
+        w={{ base: "100%", sm: 340 }}
+        onChange={(track) => {
+          set({ track: track ?? undefined });
+        }}
+      />
+      <MultiSelect
+        label="Tasks"
+        data={names}
+        value={search.task ?? []}
+        placeholder={(search.task ?? []).length > 0 ? "" : "all"}
+        clearable
+        clearButtonProps={{ "aria-label": "All tasks" }}
+        searchable
+        w={{ base: "100%", sm: 240 }}
+        onChange={(task) => {
+          set({ task: task.length > 0 ? task : undefined });
+        }}
+      />
+      <Days search={search} set={set} />
+      <Stack gap={3}>
+        <Text size="sm" fw={500} id="reading">
+          Flagged results
+        </Text>
+        <SegmentedControl
+          aria-labelledby="reading"
+          data={[
+            { value: "ours", label: "count as failures" },
+            { value: "published", label: "as the paper" },
+          ]}
+          value={search.reading ?? "ours"}
+          onChange={(reading) => {
+            set({ reading: reading === "published" ? "published" : undefined });
+          }}
+        />
+      </Stack>
+      <Stack gap={6}>
+        <Switch
+          label="Baselines"
+          checked={search.baselines !== "no"}
+          onChange={(event) => {
+            set({ baselines: event.currentTarget.checked ? undefined : "no" });
+          }}
+        />
+        <Switch
+          label="The paper’s figures"
+          checked={search.paper === "yes"}
+          onChange={(event) => {
+            set({ paper: event.currentTarget.checked ? "yes" : undefined });
+          }}
+        />
+      </Stack>
+    </Group>
+  );
+}
+
+function Days({ search, set }: { search: BoardSearch; set: (change: Partial<BoardSearch>) => void }) {
+  return (
+    <>
+      <TextInput
+        type="date"
+        label="Ended from"
+        value={search.since ?? ""}
+        w={150}
+        onChange={(event) => {
+          set({ since: event.currentTarget.value || undefined });
+        }}
+      />
+      <TextInput
+        type="date"
+        label="Ended before"
+        value={search.until ?? ""}
+        w={150}
+        onChange={(event) => {
+          set({ until: event.currentTarget.value || undefined });
+        }}
+      />
+    </>
+  );
+}

@@ -1,0 +1,161 @@
+import { Group, SegmentedControl, Text } from "@mantine/core";
+import { Link, useNavigate } from "@tanstack/react-router";
+import type { Board, Row, TaskBoard } from "../../api/queries";
+import { dollars, number, percent } from "../../format";
+import type { BoardSearch, Figure } from "./search";
+import { shade, shareOf } from "./shades";
+
+const FIGURES: readonly { value: Figure; label: string }[] = [
+  { value: "success", label: "Success" },
+  { value: "indicator", label: "Indicator" },
+  { value: "cost", label: "Cost" },
+];
+
+/** Models in the order of the overall ranking, then those that it does not have. */
+export function modelsInOrder(board: Board, baselines: boolean): string[] {
+  const ranked = board.overall.map((row) => row.model);
+  const others = board.tasks.flatMap((task) => task.rows.map((row) => row.model));
+  const hidden = new Set(
+    baselines ? [] : board.tasks.flatMap((task) => task.rows.filter((row) => row.baseline).map((row) => row.model)),
+  );
+  return [...new Set([...ranked, ...others])].filter((model) => !hidden.has(model));
+}
+
+/** The rows of a model that has several configurations: the one with the most trials stands for it. */
+export function cellOf(task: TaskBoard, model: string): Row | undefined {
+  const rows = task.rows.filter((row) => row.model === model);
+  return rows.sort((a, b) => b.trials - a.trials)[0];
+}
+
+function valueOf(row: Row | undefined, figure: Figure): number | null {
+  if (row === undefined) return null;
+  if (figure === "success") return row.success_rate;
+  return figure === "indicator" ? row.indicator_mean : row.cost_usd_mean;
+}
+
+/** How well each model does on each task; every cell opens the jobs behind it. */
+export function HeatMap({ board, search }: { board: Board; search: BoardSearch }) {
+  const navigate = useNavigate({ from: "/" });
+  const figure = search.figure ?? "success";
+  const models = modelsInOrder(board, search.baselines !== "no");
+  return (
+    <>
+      <Group justify="space-between" mb="xs">
+        <Text size="sm" className="dimmed">
+          {figure === "success" && "Share of counted jobs that succeeded. "}
+          {figure === "indicator" && "Mean performance indicator, in each task’s unit. "}
+          {figure === "cost" && "Mean dollars a job. "}A cell opens the jobs behind it.
+        </Text>
+        <SegmentedControl
+          size="xs"
+          aria-label="Figure"
+          data={[...FIGURES]}
+          value={figure}
+          onChange={(value) => {
+            const chosen = FIGURES.find((one) => one.value === value)?.value;
+            void navigate({ search: (before) => ({ ...before, figure: chosen === "success" ? undefined : chosen }), replace: true, resetScroll: false });
+          }}
+        />
+      </Group>
+      <div style={{ overflowX: "auto" }} tabIndex={0} role="region" aria-label="Model by task, scrolls sideways">
+        <table className="heat figures sticky-first">
+          <thead>
+            <tr>
+              <th scope="col" style={{ textAlign: "left" }}>
+                <Text size="sm" fw={600}>
+                  Model
+                </Text>
+              </th>
+              {board.tasks.map((task) => (
+                <th key={task.task} scope="col">
+                  <Link className="quiet" to="/tasks/$name" params={{ name: task.task }}>
+                    <Text size="xs" fw={600}>
+                      {task.task}
+                    </Text>
+                  </Link>
+                  {figure === "indicator" && (
+                    <Text size="xs" className="dimmed">
+                      {task.indicator}, {task.unit}
+                    </Text>
+                  )}
+                </th>
+              ))}
+            </tr>
+          </thead>
+          <tbody>
+            {models.map((model) => (
+              <tr key={model}>
+                <th scope="row" style={{ textAlign: "left", paddingRight: 10 }}>
+                  <Text size="sm" fw={500} style={{ whiteSpace: "nowrap" }}>
+                    {model}
+                  </Text>
+                </th>
+                {board.tasks.map((task) => (
+                  <td key={task.task}>
+                    <Cell task={task} model={model} figure={figure} models={models} />
+                  </td>
+                ))}
+              </tr>
+            ))}
+            {search.paper === "yes" && <Ghosts board={board} figure={figure} />}
+          </tbody>
+        </table>
+      </div>
+    </>
+  );
+}
+
+function Cell({ task, model, figure, models }: { task: TaskBoard; model: string; figure: Figure; models: string[] }) {
+  const row = cellOf(task, model);
+  const value = valueOf(row, figure);
+  if (row === undefined || value === null) {
+    return <span className="heat-cell heat-empty">–</span>;
+  }
+  const values = models.map((other) => valueOf(cellOf(task, other), figure));
+  const share = figure === "success" ? value : (shareOf(value, values) ?? 0);
+  const shown = { success: percent(value), indicator: number(value), cost: dollars(value) }[figure];
+  return (
+    <Link
+      className="heat-cell"
+      to="/jobs"
+      search={{ task: task.task, model }}
+      style={shade(figure === "cost" ? 1 - share : share)}
+      title={`${model} on ${task.task}: ${row.successes} of ${row.trials} succeeded`}
+    >
+      <span>
+        {row.censored > 0 && figure === "indicator" ? "≥ " : ""}
+        {shown}
+      </span>
+      <small>
+        {row.successes} of {row.trials}
+        {row.flagged > 0 ? ` · ${row.flagged} ⚑` : ""}
+      </small>
+    </Link>
+  );
+}
+
+function Ghosts({ board, figure }: { board: Board; figure: Figure }) {
+  const ranked = board.published.map((row) => row.model);
+  const names = [...new Set([...ranked, ...board.tasks.flatMap((task) => task.published.map((row) => row.model))])];
+  return names.map((name) => (
+    <tr key={name} className="ghost">
+      <th scope="row" style={{ textAlign: "left" }}>
+        <Text size="sm" fs="italic" style={{ whiteSpace: "nowrap" }}>
+          {name} (paper)
+        </Text>
+      </th>
+      {board.tasks.map((task) => {
+        const row = task.published.find((one) => one.model === name);
+        const value = row === undefined || figure === "cost" ? null : figure === "success" ? row.success_rate : row.indicator_mean;
+        return (
+          <td key={task.task}>
+            <span className="heat-cell heat-empty">
+              {value === null ? "–" : figure === "success" ? percent(value) : number(value)}
+              {row !== undefined && <small>of {row.trials}</small>}
+            </span>
+          </td>
+        );
+      })}
+    </tr>
+  ));
+}

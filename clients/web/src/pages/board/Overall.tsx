@@ -1,0 +1,138 @@
+import { Badge, Group, Table, Text, Tooltip } from "@mantine/core";
+import { Link } from "@tanstack/react-router";
+import type { Board, OverallView } from "../../api/queries";
+import { count, dollars, number, percent, places } from "../../format";
+import { Interval } from "../../parts/Interval";
+import type { BoardSearch } from "./search";
+
+type Entry = Pick<OverallView, "rank" | "rank_low" | "rank_high" | "mean_rank" | "model">;
+
+/** Models ranked over all tasks of the board, with the intervals of their places. */
+export function Overall({ board, search }: { board: Board; search: BoardSearch }) {
+  const overall = board.overall.filter((row) => search.baselines !== "no" || !row.baseline);
+  const published = search.paper === "yes" ? board.published : [];
+  const most = Math.max(1, ...[...overall, ...published].map((row) => row.rank_high ?? 1));
+  const ties = sharedRanks(overall);
+  const paperTies = sharedRanks(published);
+  return (
+    <Table.ScrollContainer minWidth={720} type="native">
+      <Table verticalSpacing={7} className="sticky-first" highlightOnHover>
+        <Table.Thead>
+          <Table.Tr>
+            <Table.Th>Model</Table.Th>
+            <Table.Th className="figures">Rank</Table.Th>
+            <Table.Th>Place, 95 % interval</Table.Th>
+            <Table.Th className="figures">Mean rank</Table.Th>
+            <Table.Th className="figures">Success, mean of tasks</Table.Th>
+            <Table.Th className="figures">$ a job</Table.Th>
+            <Table.Th className="figures">Output tokens</Table.Th>
+            <Table.Th className="figures">Trials</Table.Th>
+          </Table.Tr>
+        </Table.Thead>
+        <Table.Tbody>
+          {overall.map((row) => (
+            <OverallRow key={`${row.model} ${row.configuration}`} row={row} most={most} tied={row.rank !== null && ties.has(row.rank)} />
+          ))}
+          {published.map((row) => (
+            <Table.Tr key={`paper ${row.model}`} className="ghost">
+              <Table.Td>
+                <Group gap={6} wrap="nowrap">
+                  {row.model}
+                  <Badge variant="outline" color="gray" size="sm" tt="none" styles={{ root: { color: "inherit" } }}>
+                    paper
+                  </Badge>
+                </Group>
+              </Table.Td>
+              <Place row={row} most={most} tied={paperTies.has(row.rank)} />
+              <Table.Td className="figures">{number(row.mean_rank, 2)}</Table.Td>
+              <Table.Td colSpan={4} className="dimmed">
+                ranked by the paper’s own trials, among its models only
+              </Table.Td>
+            </Table.Tr>
+          ))}
+        </Table.Tbody>
+      </Table>
+    </Table.ScrollContainer>
+  );
+}
+
+/** Ranks that several models share. */
+export function sharedRanks(rows: readonly { rank: number | null }[]): Set<number> {
+  const seen = new Set<number>();
+  const shared = new Set<number>();
+  for (const { rank } of rows) {
+    if (rank === null) continue;
+    if (seen.has(rank)) shared.add(rank);
+    seen.add(rank);
+  }
+  return shared;
+}
+
+function Place({ row, most, tied }: { row: Entry; most: number; tied: boolean }) {
+  const interval = places(row.rank_low, row.rank_high);
+  return (
+    <>
+      <Table.Td className="figures">
+        {row.rank === null ? (
+          "–"
+        ) : (
+          <>
+            {row.rank}
+            {tied && (
+              <Tooltip label="Statistically tied: the trials do not show which is better">
+                <Text span size="xs" ml={4} className="dimmed">
+                  tied
+                </Text>
+              </Tooltip>
+            )}
+          </>
+        )}
+      </Table.Td>
+      <Table.Td>
+        <Group gap={8} wrap="nowrap">
+          <Interval low={row.rank_low} high={row.rank_high} value={row.rank} from={1} to={most} label={`place ${interval}`} />
+          <Text size="sm" className="figures" style={{ whiteSpace: "nowrap" }}>
+            {interval}
+          </Text>
+        </Group>
+      </Table.Td>
+    </>
+  );
+}
+
+function OverallRow({ row, most, tied }: { row: OverallView; most: number; tied: boolean }) {
+  return (
+    <Table.Tr>
+      <Table.Td>
+        <Group gap={6} wrap="nowrap">
+          <Link className="quiet" to="/models/$" params={{ _splat: row.model }}>
+            <b>{row.model}</b>
+          </Link>
+          {row.baseline && (
+            <Badge variant="outline" color="gray" size="sm" tt="none" styles={{ root: { color: "inherit" } }}>
+              baseline
+            </Badge>
+          )}
+          {row.pareto && (
+            <Tooltip label="No other model is both better and cheaper">
+              <Badge variant="outline" size="sm" tt="none" styles={{ root: { color: "inherit" } }}>
+                Pareto
+              </Badge>
+            </Tooltip>
+          )}
+        </Group>
+        {row.missing.length > 0 && (
+          <Text size="xs" className="dimmed">
+            not ranked: no counted job on {row.missing.join(", ")}
+          </Text>
+        )}
+      </Table.Td>
+      <Place row={row} most={most} tied={tied} />
+      <Table.Td className="figures">{number(row.mean_rank, 2)}</Table.Td>
+      <Table.Td className="figures">{percent(row.success_rate_mean, 1)}</Table.Td>
+      <Table.Td className="figures">{dollars(row.cost_usd_mean)}</Table.Td>
+      <Table.Td className="figures">{count(row.output_tokens_mean)}</Table.Td>
+      <Table.Td className="figures">{count(row.trials)}</Table.Td>
+    </Table.Tr>
+  );
+}

@@ -1,0 +1,58 @@
+import { Group, SimpleGrid, Stack, Switch, Text } from "@mantine/core";
+import { useQueries } from "@tanstack/react-query";
+import { useMemo, useState } from "react";
+import type { JobDetail } from "../../api/queries";
+import { Empty, Loading } from "../../parts/States";
+import { useClock } from "../../scene/clock";
+import { Legend } from "../../scene/Legend";
+import { CameraLock } from "../../scene/lock";
+import { TimeLine } from "../../scene/TimeLine";
+import type { Trial } from "../../scene/trial";
+import { TrialCurves, TrialScene } from "../../scene/TrialView";
+import { rolloutsOf, scene as sceneQuery, trial as trialQuery, type Scene } from "../job/queries";
+
+/** Two trials by one clock, seen by cameras that turn together. */
+export default function Trials({ jobs }: { jobs: readonly [JobDetail, JobDetail] }) {
+  const [a, b] = jobs.map((job) => rolloutsOf(job.artifacts).at(-1) ?? 0) as [number, number];
+  const [firstScene, secondScene] = useQueries({ queries: [sceneQuery(jobs[0].id, a), sceneQuery(jobs[1].id, b)] });
+  const [first, second] = useQueries({
+    queries: [trialQuery(jobs[0].id, a, jobs[0].artifacts[`trajectory-${a}`]), trialQuery(jobs[1].id, b, jobs[1].artifacts[`trajectory-${b}`])],
+  });
+  if ([firstScene, secondScene, first, second].some((query) => query.isError)) return <Empty title="A trial could not be read" />;
+  if (firstScene.data === undefined || secondScene.data === undefined || first.data === undefined || second.data === undefined) return <Loading rows={10} />;
+  return <InStep scenes={[firstScene.data, secondScene.data]} trials={[first.data, second.data]} />;
+}
+
+function InStep({ scenes, trials }: { scenes: readonly [Scene, Scene]; trials: readonly [Trial, Trial] }) {
+  const lock = useMemo(() => new CameraLock(), []);
+  const end = Math.max(...trials.map((trial) => trial.times.at(-1) ?? 0));
+  const clock = useClock(end);
+  const [loads, setLoads] = useState(true);
+  return (
+    <Stack gap="xs">
+      <SimpleGrid cols={{ base: 1, sm: 2 }}>
+        {trials.map((trial, side) => {
+          const { machine, scenario } = scenes[side] ?? scenes[0];
+          return (
+            <div key={side} data-trial={side === 0 ? "a" : "b"}>
+              <Text size="sm" fw={650}>
+                {side === 0 ? "A" : "B"}
+              </Text>
+              {machine === null ? <Empty title="It had no machine" /> : <TrialScene scene={machine} scenario={scenario} trial={trial} clock={clock} loads={loads} follow={false} height={320} lock={lock} />}
+            </div>
+          );
+        })}
+      </SimpleGrid>
+      <TimeLine clock={clock} end={end} breaks={[...trials[0].breaks, ...trials[1].breaks]} />
+      <Group>
+        <Switch size="sm" label="Loads on joints" checked={loads} onChange={(event) => { setLoads(event.currentTarget.checked); }} />
+        {loads && <Legend whole={trials.some((trial) => trial.loads === null)} />}
+      </Group>
+      <SimpleGrid cols={{ base: 1, sm: 2 }}>
+        {trials.map((trial, side) => (
+          <TrialCurves key={side} trial={trial} clock={clock} />
+        ))}
+      </SimpleGrid>
+    </Stack>
+  );
+}

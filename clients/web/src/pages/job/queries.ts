@@ -1,0 +1,67 @@
+import { queryOptions } from "@tanstack/react-query";
+import { bytesOf, jsonOf, type Schema } from "../../api/client";
+import { ApiError } from "../../api/problem";
+import type { MachineScene } from "../../scene/machine";
+import type { Scenario } from "../../scene/Surroundings";
+import type { Replay } from "./replay";
+import type { Transcript } from "./transcript";
+
+const path = (id: string, rest: string): string => `/v1/jobs/${encodeURIComponent(id)}/${rest}`;
+
+/** Nothing is there yet of a job that nobody began: that is no error. */
+async function ifAny<Data>(asked: Promise<Data>): Promise<Data | null> {
+  try {
+    return await asked;
+  } catch (error) {
+    if (error instanceof ApiError && error.status === 404) return null;
+    throw error;
+  }
+}
+
+export const transcript = (id: string) =>
+  queryOptions({
+    queryKey: ["job", id, "transcript"],
+    staleTime: Infinity,
+    queryFn: () => ifAny(jsonOf<Transcript>(path(id, "transcript"))),
+  });
+
+export const replay = (id: string) =>
+  queryOptions({
+    queryKey: ["job", id, "replay"],
+    staleTime: Infinity,
+    queryFn: () => ifAny(jsonOf<Replay>(path(id, "replay"))),
+  });
+
+export interface Scene {
+  scenario: Scenario;
+  machine: MachineScene | null;
+}
+
+export const scene = (id: string, number: number) =>
+  queryOptions({
+    queryKey: ["job", id, "scene", number],
+    staleTime: Infinity,
+    queryFn: async (): Promise<Scene> => {
+      const found = await jsonOf<Schema<"SceneView">>(path(id, `scene?number=${number}`));
+      return { scenario: found.scenario as unknown as Scenario, machine: found.machine };
+    },
+  });
+
+export const trial = (id: string, number: number, hash: string | undefined) =>
+  queryOptions({
+    queryKey: ["trial", hash],
+    enabled: hash !== undefined,
+    staleTime: Infinity,
+    queryFn: async () => {
+      const { ARROW, readTrial } = await import("../../scene/trial");
+      return readTrial(await bytesOf(path(id, `trajectory?number=${number}`), ARROW));
+    },
+  });
+
+/** The numbers of a job's rollouts that left a trajectory, in order. */
+export function rolloutsOf(artifacts: Readonly<Record<string, string>>): number[] {
+  return Object.keys(artifacts)
+    .flatMap((name) => /^trajectory-(\d+)$/.exec(name)?.[1] ?? [])
+    .map(Number)
+    .sort((a, b) => a - b);
+}

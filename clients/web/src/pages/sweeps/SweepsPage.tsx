@@ -1,0 +1,115 @@
+import { Badge, Group, Progress, Stack, Table, Text, Title } from "@mantine/core";
+import { useQuery } from "@tanstack/react-query";
+import { Link } from "@tanstack/react-router";
+import { sweeps, type SweepView } from "../../api/queries";
+import { count, dollars, words } from "../../format";
+import { Ago } from "../../parts/Ago";
+import { Answered, Empty } from "../../parts/States";
+import { OUTCOME_COLOURS } from "../../theme";
+
+export const SWEEP_COLOURS: Readonly<Record<string, string>> = {
+  active: "blue",
+  paused: "yellow",
+  budget_exhausted: "orange",
+  cancelled: "gray",
+  done: "teal",
+};
+
+/** Sweeps, the newest first. */
+export default function SweepsPage() {
+  const query = useQuery(sweeps());
+  return (
+    <Stack gap="md">
+      <Title order={1}>Sweeps</Title>
+      <Answered query={query}>
+        {(page) =>
+          page.sweeps.length === 0 ? (
+            <Empty title="Nobody has submitted a sweep">
+              <code>buildarena sweep submit examples/sweeps/baselines.yaml</code> submits one.
+            </Empty>
+          ) : (
+            <Table.ScrollContainer minWidth={720} type="native">
+              <Table highlightOnHover verticalSpacing="sm">
+                <Table.Thead>
+                  <Table.Tr>
+                    <Table.Th>Sweep</Table.Th>
+                    <Table.Th>State</Table.Th>
+                    <Table.Th w="30%">Progress</Table.Th>
+                    <Table.Th className="figures">Jobs</Table.Th>
+                    <Table.Th className="figures">Spent</Table.Th>
+                    <Table.Th>Submitted</Table.Th>
+                  </Table.Tr>
+                </Table.Thead>
+                <Table.Tbody>
+                  {page.sweeps.map((sweep) => (
+                    <SweepRow key={sweep.id} sweep={sweep} />
+                  ))}
+                </Table.Tbody>
+              </Table>
+            </Table.ScrollContainer>
+          )
+        }
+      </Answered>
+    </Stack>
+  );
+}
+
+export function SweepState({ state }: { state: string }) {
+  return (
+    <Badge variant="outline" color={SWEEP_COLOURS[state] ?? "gray"} tt="none" styles={{ root: { color: "var(--mantine-color-text)" } }}>
+      {words(state)}
+    </Badge>
+  );
+}
+
+/** A bar of how a sweep's jobs ended; its label says it in figures. */
+export function OutcomeBar({ sweep, size = 12 }: { sweep: SweepView; size?: number }) {
+  const { total, outcomes } = sweep.progress;
+  const parts = Object.entries(outcomes);
+  const label = `${sweep.progress.done} of ${total} ended: ${parts.map(([name, n]) => `${n} ${words(name)}`).join(", ")}`;
+  return (
+    <Progress.Root size={size} role="img" aria-label={label} title={label}>
+      {parts.map(([name, n]) => (
+        <Progress.Section key={name} value={(100 * n) / Math.max(1, total)} color={OUTCOME_COLOURS[name] ?? "gray"} withAria={false} />
+      ))}
+    </Progress.Root>
+  );
+}
+
+function SweepRow({ sweep }: { sweep: SweepView }) {
+  return (
+    <Table.Tr>
+      <Table.Td>
+        <Link className="quiet" to="/sweeps/$id" params={{ id: sweep.id }}>
+          <b>{sweep.name}</b>
+        </Link>
+        <Text size="xs" ff="monospace" className="dimmed">
+          {sweep.id}
+        </Text>
+      </Table.Td>
+      <Table.Td>
+        <SweepState state={sweep.state} />
+      </Table.Td>
+      <Table.Td>
+        <OutcomeBar sweep={sweep} />
+      </Table.Td>
+      <Table.Td className="figures">
+        {count(sweep.progress.done)} of {count(sweep.progress.total)}
+      </Table.Td>
+      <Table.Td className="figures">
+        {dollars(sweep.progress.cost_usd)}
+        {sweep.budget?.max_cost_usd != null && (
+          <Text span size="xs" className="dimmed">
+            {" "}
+            of {dollars(sweep.budget.max_cost_usd)}
+          </Text>
+        )}
+      </Table.Td>
+      <Table.Td>
+        <Group gap={4}>
+          <Ago time={sweep.created_at} />
+        </Group>
+      </Table.Td>
+    </Table.Tr>
+  );
+}

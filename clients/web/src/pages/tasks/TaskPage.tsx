@@ -1,0 +1,98 @@
+import { Badge, Group, Stack, Table, Text, Title } from "@mantine/core";
+import { useQuery } from "@tanstack/react-query";
+import { getRouteApi, Link } from "@tanstack/react-router";
+import { lazy, Suspense } from "react";
+import { board, task as taskQuery, type TaskDetail } from "../../api/queries";
+import { words } from "../../format";
+import { Markdown } from "../../parts/Markdown";
+import { Section } from "../../parts/Section";
+import { Answered, Empty, Loading } from "../../parts/States";
+import { TaskTable } from "../../parts/TaskTable";
+import type { Scenario } from "../../scene/Surroundings";
+import { flattened } from "../job/JobRecords";
+
+const ScenarioView = lazy(() => import("../../scene/ScenarioView"));
+const route = getRouteApi("/tasks/$name");
+
+/** A task: what must be built, how it is tried, and how models do. */
+export default function TaskPage() {
+  const { name } = route.useParams();
+  const query = useQuery(taskQuery(name));
+  return (
+    <Answered query={query} rows={12}>
+      {(task) => (
+        <Stack gap="lg">
+          <div>
+            <Title order={1}>{task.title}</Title>
+            <Group gap={6} mt={4}>
+              <Badge variant="light" color="gray" tt="none">
+                {task.category}, level {task.level}
+              </Badge>
+              {task.custom && (
+                <Badge variant="outline" color="grape" tt="none" styles={{ root: { color: "inherit" } }}>
+                  custom
+                </Badge>
+              )}
+              <Text size="sm" className="dimmed">
+                {task.name} · version {task.version} · ranked by {words(task.indicator)}, {task.unit} ·{" "}
+                <Link to="/jobs" search={{ task: task.name }}>
+                  jobs
+                </Link>
+              </Text>
+            </Group>
+          </div>
+          <Standings name={name} />
+          <Group align="start" gap="lg" wrap="wrap">
+            <div style={{ flex: "1 1 380px", minWidth: 0 }}>
+              <Section title="Statement">
+                <Markdown text={task.statement} />
+              </Section>
+            </div>
+            <Stack style={{ flex: "1 1 380px", minWidth: 0 }} gap="lg">
+              <Section title="Scenario">
+                <Suspense fallback={<Loading rows={8} />}>
+                  <ScenarioView scenario={task.document.scenario as Scenario} />
+                </Suspense>
+              </Section>
+              <Section title="Constraints and scoring">
+                <Rules task={task} />
+              </Section>
+            </Stack>
+          </Group>
+        </Stack>
+      )}
+    </Answered>
+  );
+}
+
+function Standings({ name }: { name: string }) {
+  const query = useQuery(board({ task: [name] }));
+  return (
+    <Section title="Models">
+      <Answered query={query}>
+        {(found) => {
+          const task = found.tasks.find((one) => one.task === name);
+          return task === undefined || task.rows.length === 0 ? <Empty title="No job of this task has ended" /> : <TaskTable task={task} />;
+        }}
+      </Answered>
+    </Section>
+  );
+}
+
+function Rules({ task }: { task: TaskDetail }) {
+  const parts = { constraints: task.document.constraints, scoring: task.document.scoring, difficulty: task.difficulty };
+  return (
+    <Table fz="sm">
+      <Table.Tbody>
+        {flattened(parts).map(([name, value]) => (
+          <Table.Tr key={name}>
+            <Table.Th scope="row" fw={500}>
+              {words(name)}
+            </Table.Th>
+            <Table.Td className="figures">{value === "null" ? "any" : value}</Table.Td>
+          </Table.Tr>
+        ))}
+      </Table.Tbody>
+    </Table>
+  );
+}

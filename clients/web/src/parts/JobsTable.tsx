@@ -1,0 +1,101 @@
+import { Badge, Group, Table, Text } from "@mantine/core";
+import { Link } from "@tanstack/react-router";
+import { useVirtualizer } from "@tanstack/react-virtual";
+import { useRef } from "react";
+import type { JobView } from "../api/queries";
+import { dollars, number, words } from "../format";
+import { Ago } from "./Ago";
+import { OutcomeBadge } from "./Outcome";
+
+const ROW_PX = 41;
+const HEIGHT_PX = 620;
+
+/** A list of jobs of any length: only the rows in sight are drawn. */
+export function JobsTable({ jobs, onEnd }: { jobs: readonly JobView[]; onEnd?: () => void }) {
+  const frame = useRef<HTMLDivElement>(null);
+  const rows = useVirtualizer({
+    count: jobs.length,
+    getScrollElement: () => frame.current,
+    estimateSize: () => ROW_PX,
+    overscan: 12,
+    onChange: (instance) => {
+      const last = instance.getVirtualItems().at(-1);
+      if (last !== undefined && last.index >= jobs.length - 5) onEnd?.();
+    },
+  });
+  const shown = rows.getVirtualItems();
+  const before = shown[0]?.start ?? 0;
+  const after = rows.getTotalSize() - (shown.at(-1)?.end ?? 0);
+  return (
+    <div
+      ref={frame}
+      style={{ overflow: "auto", maxHeight: HEIGHT_PX }}
+      tabIndex={0}
+      role="region"
+      aria-label={`${jobs.length} jobs, scrolls`}
+    >
+      <Table stickyHeader highlightOnHover miw={860} aria-rowcount={jobs.length + 1}>
+        <Table.Thead>
+          <Table.Tr>
+            <Table.Th>Job</Table.Th>
+            <Table.Th>Task</Table.Th>
+            <Table.Th>Model</Table.Th>
+            <Table.Th className="figures">Seed</Table.Th>
+            <Table.Th>State</Table.Th>
+            <Table.Th className="figures">Indicator</Table.Th>
+            <Table.Th className="figures">Cost</Table.Th>
+            <Table.Th>Ended</Table.Th>
+          </Table.Tr>
+        </Table.Thead>
+        <Table.Tbody>
+          {before > 0 && <tr style={{ height: before }} aria-hidden />}
+          {shown.map((item) => {
+            const job = jobs[item.index];
+            return job === undefined ? null : <JobRow key={job.id} job={job} index={item.index} />;
+          })}
+          {after > 0 && <tr style={{ height: after }} aria-hidden />}
+        </Table.Tbody>
+      </Table>
+    </div>
+  );
+}
+
+function JobRow({ job, index }: { job: JobView; index: number }) {
+  return (
+    <Table.Tr style={{ height: ROW_PX }} aria-rowindex={index + 2}>
+      <Table.Td>
+        <Link to="/jobs/$id" params={{ id: job.id }} className="quiet">
+          <Text span size="xs" ff="monospace">
+            {job.id.slice(0, 12)}…
+          </Text>
+        </Link>
+      </Table.Td>
+      <Table.Td>{job.task}</Table.Td>
+      <Table.Td>{job.model}</Table.Td>
+      <Table.Td className="figures">{job.seed}</Table.Td>
+      <Table.Td>
+        <Group gap={6} wrap="nowrap">
+          <OutcomeBadge value={job.outcome ?? job.state} size="sm" />
+          {job.reason !== null && (
+            <Text size="xs" className="dimmed" truncate maw={180}>
+              {words(job.reason)}
+            </Text>
+          )}
+          {(job.flags ?? []).length > 0 && (
+            <Badge size="sm" color="yellow" variant="outline" tt="none" styles={{ root: { color: "inherit" } }}>
+              {(job.flags ?? []).length} flag{(job.flags ?? []).length > 1 ? "s" : ""}
+            </Badge>
+          )}
+        </Group>
+      </Table.Td>
+      <Table.Td className="figures">
+        {job.censored ? "≥ " : ""}
+        {number(job.indicator)}
+      </Table.Td>
+      <Table.Td className="figures">{dollars(job.usage.cost_usd)}</Table.Td>
+      <Table.Td style={{ whiteSpace: "nowrap" }}>
+        <Ago time={job.finished_at} />
+      </Table.Td>
+    </Table.Tr>
+  );
+}

@@ -1,0 +1,129 @@
+import {
+  ActionIcon,
+  Anchor,
+  Box,
+  Container,
+  Group,
+  Popover,
+  Text,
+  useComputedColorScheme,
+  useMantineColorScheme,
+} from "@mantine/core";
+import { IconKey, IconMoon, IconSun } from "@tabler/icons-react";
+import { Link, Outlet, useRouterState } from "@tanstack/react-router";
+import { useEffect } from "react";
+import { Empty } from "./States";
+import { KeyField, useKey } from "./KeyField";
+import { ProblemNote } from "./Problem";
+
+const PLACES = [
+  { to: "/", label: "Leaderboard" },
+  { to: "/sweeps", label: "Sweeps" },
+  { to: "/jobs", label: "Jobs" },
+  { to: "/tasks", label: "Tasks" },
+  { to: "/compare", label: "Compare" },
+] as const;
+
+/** The frame of every page: where one is, where one can go, light or dark, the key. */
+export function Shell() {
+  const path = useRouterState({ select: (state) => state.location.pathname });
+  useEffect(() => {
+    const name = path.split("/").filter((part) => part !== "").join(" · ");
+    document.title = name === "" ? "BuildArena" : `${name} – BuildArena`;
+  }, [path]);
+  return (
+    <>
+      <a className="skip-link" href="#main">
+        Skip to the content
+      </a>
+      <Box component="header" style={{ borderBottom: "1px solid var(--mantine-color-default-border)" }} bg="var(--mantine-color-body)">
+        <Container size="var(--page-width)" py={10}>
+          <Group justify="space-between" gap="xs">
+            <Group gap="md">
+              <Link className="quiet" to="/" aria-label="BuildArena, start">
+                <Group gap={8} wrap="nowrap">
+                  <img src="/favicon.svg" width={24} height={24} alt="" />
+                  <Text fw={700}>BuildArena</Text>
+                </Group>
+              </Link>
+              <Group component="nav" gap="sm" aria-label="Pages">
+                {PLACES.map(({ to, label }) => (
+                  <Anchor
+                    key={to}
+                    component={Link}
+                    to={to}
+                    size="sm"
+                    c="inherit"
+                    activeOptions={{ exact: to === "/", includeSearch: false }}
+                    activeProps={{ style: { fontWeight: 700, textDecoration: "underline", textUnderlineOffset: 6 } }}
+                  >
+                    {label}
+                  </Anchor>
+                ))}
+              </Group>
+            </Group>
+            <Group gap={6}>
+              <Anchor href="/docs" size="sm" c="inherit">
+                API
+              </Anchor>
+              <KeyButton />
+              <SchemeButton />
+            </Group>
+          </Group>
+        </Container>
+      </Box>
+      <Container component="main" id="main" tabIndex={-1} size="var(--page-width)" py="lg" style={{ outline: "none" }}>
+        <Outlet />
+      </Container>
+    </>
+  );
+}
+
+function KeyButton() {
+  const known = useKey();
+  return (
+    <Popover position="bottom-end" withArrow trapFocus>
+      <Popover.Target>
+        <ActionIcon variant={known === null ? "subtle" : "light"} color="gray" c="inherit" aria-label={known === null ? "Give an API key" : "API key is set"}>
+          <IconKey size={18} aria-hidden />
+        </ActionIcon>
+      </Popover.Target>
+      <Popover.Dropdown>
+        <KeyField />
+      </Popover.Dropdown>
+    </Popover>
+  );
+}
+
+function SchemeButton() {
+  const { setColorScheme } = useMantineColorScheme();
+  const scheme = useComputedColorScheme("light", { getInitialValueInEffect: false });
+  const other = scheme === "dark" ? "light" : "dark";
+  return (
+    <ActionIcon
+      variant="subtle"
+      color="gray"
+      c="inherit"
+      aria-label={`Use the ${other} colours`}
+      onClick={() => {
+        setColorScheme(other);
+      }}
+    >
+      {scheme === "dark" ? <IconSun size={18} aria-hidden /> : <IconMoon size={18} aria-hidden />}
+    </ActionIcon>
+  );
+}
+
+export function Missing() {
+  return (
+    <Empty title="There is no such page">
+      <Anchor component={Link} to="/" inherit>
+        To the leaderboard
+      </Anchor>
+    </Empty>
+  );
+}
+
+export function RootError({ error, reset }: { error: unknown; reset: () => void }) {
+  return <ProblemNote error={error} retry={reset} />;
+}

@@ -1,0 +1,65 @@
+import { Badge, Center, Group, Skeleton, Stack, Text } from "@mantine/core";
+import { IconCloudOff } from "@tabler/icons-react";
+import type { UseQueryResult } from "@tanstack/react-query";
+import type { ReactNode } from "react";
+import { ProblemNote } from "./Problem";
+import { Ago } from "./Ago";
+
+/** Grey bars in the place of what is being read. */
+export function Loading({ rows = 6 }: { rows?: number }) {
+  return (
+    <Stack gap="xs" aria-busy="true" aria-label="Loading" role="status">
+      {Array.from({ length: rows }, (_, index) => (
+        <Skeleton key={index} height={22} width={`${100 - ((index * 17) % 40)}%`} />
+      ))}
+    </Stack>
+  );
+}
+
+export function Empty({ title, children }: { title: string; children?: ReactNode }) {
+  return (
+    <Center py="xl">
+      <Stack gap={6} align="center" maw={520}>
+        <Text fw={600}>{title}</Text>
+        <Text size="sm" ta="center" component="div" className="dimmed">
+          {children}
+        </Text>
+      </Stack>
+    </Center>
+  );
+}
+
+/** A note that what is shown is older than it should be. */
+export function Stale({ since }: { since: number }) {
+  return (
+    <Badge color="yellow" variant="light" leftSection={<IconCloudOff size={14} aria-hidden />} tt="none" role="status">
+      not refreshed since <Ago time={new Date(since).toISOString()} />
+    </Badge>
+  );
+}
+
+/** What a query has found, or the state it is in. Data that was read once stays, marked as old. */
+export function Answered<Data>({
+  query,
+  children,
+  rows,
+}: {
+  query: UseQueryResult<Data>;
+  children: (data: Data) => ReactNode;
+  rows?: number;
+}) {
+  if (query.data !== undefined) {
+    return (
+      <>
+        {query.isError && (
+          <Group mb="xs">
+            <Stale since={query.dataUpdatedAt} />
+          </Group>
+        )}
+        {children(query.data)}
+      </>
+    );
+  }
+  if (query.isError) return <ProblemNote error={query.error} retry={() => void query.refetch()} />;
+  return <Loading rows={rows} />;
+}

@@ -1,0 +1,69 @@
+import { createRootRoute, createRoute, createRouter, lazyRouteComponent } from "@tanstack/react-router";
+import { readSearch } from "./pages/board/search";
+import { readCompareSearch } from "./pages/compare/search";
+import { readJobSearch, readJobsSearch } from "./pages/job/search";
+import { Missing, RootError, Shell } from "./parts/Shell";
+
+const root = createRootRoute({ component: Shell, notFoundComponent: Missing, errorComponent: RootError });
+
+const board = createRoute({
+  getParentRoute: () => root,
+  path: "/",
+  validateSearch: readSearch,
+  component: lazyRouteComponent(() => import("./pages/board/BoardPage")),
+});
+const sweeps = createRoute({
+  getParentRoute: () => root,
+  path: "/sweeps",
+  component: lazyRouteComponent(() => import("./pages/sweeps/SweepsPage")),
+});
+const sweep = createRoute({
+  getParentRoute: () => root,
+  path: "/sweeps/$id",
+  component: lazyRouteComponent(() => import("./pages/sweeps/SweepPage")),
+});
+const jobs = createRoute({
+  getParentRoute: () => root,
+  path: "/jobs",
+  validateSearch: readJobsSearch,
+  component: lazyRouteComponent(() => import("./pages/job/JobsPage")),
+});
+const job = createRoute({
+  getParentRoute: () => root,
+  path: "/jobs/$id",
+  validateSearch: readJobSearch,
+  component: lazyRouteComponent(() => import("./pages/job/JobPage")),
+});
+const compare = createRoute({
+  getParentRoute: () => root,
+  path: "/compare",
+  validateSearch: readCompareSearch,
+  component: lazyRouteComponent(() => import("./pages/compare/ComparePage")),
+});
+const tasks = createRoute({
+  getParentRoute: () => root,
+  path: "/tasks",
+  component: lazyRouteComponent(() => import("./pages/tasks/TasksPage")),
+});
+const task = createRoute({
+  getParentRoute: () => root,
+  path: "/tasks/$name",
+  component: lazyRouteComponent(() => import("./pages/tasks/TaskPage")),
+});
+const model = createRoute({
+  getParentRoute: () => root,
+  path: "/models/$",
+  component: lazyRouteComponent(() => import("./pages/models/ModelPage")),
+});
+
+export const router = createRouter({
+  routeTree: root.addChildren([board, sweeps, sweep, jobs, job, compare, tasks, task, model]),
+  defaultPreload: "intent",
+  scrollRestoration: true,
+});
+
+declare module "@tanstack/react-router" {
+  interface Register {
+    router: typeof router;
+  }
+}

@@ -1,0 +1,86 @@
+import { useFrame, useThree } from "@react-three/fiber";
+import { useCallback, useEffect, useMemo, useRef } from "react";
+import { Matrix4, Vector3, type Mesh } from "three";
+import type { Clock } from "./clock";
+import { Breaks, LoadedJoints } from "./Joints";
+import { loadColour, loadsOfBlocks } from "./loads";
+import type { Machine, Part, Rod } from "./machine";
+import { Parts, type PoseNow } from "./Parts";
+import { cargoAt, poseAt } from "./playing";
+import type { Trial } from "./trial";
+
+interface Orbit {
+  target: Vector3;
+  update: () => void;
+}
+
+/** The moving things of a trial; frames are drawn while it plays, and when somebody seeks. */
+export function Film({
+  machine,
+  trial,
+  clock,
+  follow,
+  loads,
+}: {
+  machine: Machine;
+  trial: Trial;
+  clock: Clock;
+  follow: boolean;
+  /** What each joint bears; null to draw the parts in their own colours. */
+  loads: Float32Array | null;
+}) {
+  const { time, shown, playing } = clock;
+  const { invalidate, camera } = useThree();
+  const controls = useThree((state) => state.controls) as Orbit | null;
+  const cargo = useRef<Mesh>(null);
+  const poses = useRef(new Map<string, Matrix4>());
+  const followed = useRef<Vector3 | null>(null);
+  const first = machine.parts.find((part) => part.id === trial.blockIds[0]);
+  useEffect(() => {
+    invalidate();
+  }, [shown, playing, follow, invalidate]);
+  useEffect(() => {
+    if (!follow) followed.current = null;
+  }, [follow]);
+  // Before the parts are placed, so that all of a frame is of one instant.
+  useFrame(() => {
+    const now = poseAt(trial, time.current);
+    for (const part of machine.parts) {
+      const known = poses.current.get(part.id) ?? new Matrix4();
+      poses.current.set(part.id, now(part, known));
+    }
+    if (cargo.current !== null) {
+      cargo.current.matrix.copy(cargoAt(trial, time.current, new Matrix4()));
+      cargo.current.matrixWorldNeedsUpdate = true;
+    }
+    if (follow && first !== undefined && controls !== null) {
+      const here = new Vector3().setFromMatrixPosition(poses.current.get(first.id) ?? first.pose);
+      if (followed.current !== null) {
+        const moved = here.clone().sub(followed.current);
+        camera.position.add(moved);
+        controls.target.add(moved);
+        controls.update();
+      }
+      followed.current = here;
+    }
+    if (playing) invalidate();
+  }, -1);
+  const blocks = useMemo(() => (loads === null ? null : loadsOfBlocks(trial, loads)), [trial, loads]);
+  const joints = useMemo(() => new Map(trial.peaks.map((peak, index) => [peak.joint, index])), [trial]);
+  const colour = useCallback((part: Part) => (blocks === null ? null : loadColour(blocks.get(part.id) ?? 0)), [blocks]);
+  const rodColour = useCallback((rod: Rod) => (loads === null ? null : loadColour(loads[joints.get(rod.joint) ?? -1] ?? 0)), [loads, joints]);
+  const pose = useMemo<PoseNow>(() => (part, into) => into.copy(poses.current.get(part.id) ?? part.pose), []);
+  return (
+    <>
+      <Parts machine={machine} pose={pose} moving colour={colour} rodColour={rodColour} />
+      {loads !== null && <LoadedJoints machine={machine} trial={trial} pose={pose} loads={loads} />}
+      <Breaks machine={machine} trial={trial} pose={pose} now={shown} />
+      {trial.cargo !== null && (
+        <mesh ref={cargo} matrixAutoUpdate={false} frustumCulled={false}>
+          <boxGeometry args={[...trial.cargo.size]} />
+          <meshLambertMaterial color="#859966" transparent opacity={0.85} />
+        </mesh>
+      )}
+    </>
+  );
+}

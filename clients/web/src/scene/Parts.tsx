@@ -1,0 +1,146 @@
+import { useFrame, useThree } from "@react-three/fiber";
+import { useEffect, useMemo, useRef } from "react";
+import { Color, Matrix4, Quaternion, Vector3, type InstancedMesh } from "three";
+import { moduleGeometry } from "./geometry";
+import type { Machine, Part, Rod } from "./machine";
+import { KIND_COLOURS, moduleShape } from "./modules";
+
+const ROD_RADIUS = 0.06;
+const CHOSEN = new Color("#ff3d8b");
+const Y = new Vector3(0, 1, 0);
+
+/** Where a part is now; the pose at the origin of its frame. */
+export type PoseNow = (part: Part, into: Matrix4) => Matrix4;
+
+export const asPlaced: PoseNow = (part, into) => into.copy(part.pose);
+
+interface PartsProps {
+  machine: Machine;
+  pose: PoseNow;
+  /** Whether poses change from frame to frame. */
+  moving?: boolean;
+  colour?: (part: Part) => string | null;
+  rodColour?: (rod: Rod) => string | null;
+  chosen?: ReadonlySet<string>;
+  onChoose?: (id: string) => void;
+}
+
+/** All blocks of a machine, one instanced mesh a module, and its connectors. */
+export function Parts(props: PartsProps) {
+  const groups = useMemo(() => {
+    const found = new Map<string, Part[]>();
+    for (const part of props.machine.parts) found.set(part.module, [...(found.get(part.module) ?? []), part]);
+    return [...found];
+  }, [props.machine]);
+  return (
+    <>
+      {groups.map(([module, parts]) => (
+        <Blocks key={module} module={module} parts={parts} {...props} />
+      ))}
+      <Rods {...props} />
+    </>
+  );
+}
+
+function Blocks({ module, parts, pose, moving, colour, chosen, onChoose }: PartsProps & { module: string; parts: Part[] }) {
+  const mesh = useRef<InstancedMesh>(null);
+  const invalidate = useThree((state) => state.invalidate);
+  const geometry = moduleGeometry(module);
+  const ids = useMemo(() => parts.map((part) => part.id), [parts]);
+  const place = (): void => {
+    const into = new Matrix4();
+    parts.forEach((part, index) => mesh.current?.setMatrixAt(index, pose(part, into)));
+    if (mesh.current !== null) mesh.current.instanceMatrix.needsUpdate = true;
+  };
+  useEffect(() => {
+    place();
+    mesh.current?.computeBoundingSphere();
+    invalidate();
+  });
+  useEffect(() => {
+    const usual = KIND_COLOURS[moduleShape(module).kind] ?? "#999999";
+    parts.forEach((part, index) => {
+      mesh.current?.setColorAt(index, chosen?.has(part.id) ? CHOSEN : new Color(colour?.(part) ?? usual));
+    });
+    if (mesh.current?.instanceColor) mesh.current.instanceColor.needsUpdate = true;
+    invalidate();
+  }, [parts, module, chosen, colour, invalidate]);
+  useFrame(() => {
+    if (moving) place();
+  });
+  return (
+    <instancedMesh
+      key={parts.length}
+      ref={mesh}
+      args={[geometry, undefined, parts.length]}
+      frustumCulled={false}
+      userData={{ blocks: ids }}
+      onClick={(event) => {
+        event.stopPropagation();
+        const part = event.instanceId === undefined ? undefined : parts[event.instanceId];
+        if (part !== undefined) onChoose?.(part.id);
+      }}
+    >
+      <meshLambertMaterial />
+    </instancedMesh>
+  );
+}
+
+function Rods({ machine, pose, moving, rodColour, chosen, onChoose }: PartsProps) {
+  const mesh = useRef<InstancedMesh>(null);
+  const invalidate = useThree((state) => state.invalidate);
+  const parts = useMemo(() => new Map(machine.parts.map((part) => [part.id, part])), [machine]);
+  const ids = useMemo(() => machine.rods.map((rod) => rod.id), [machine]);
+  const place = (): void => {
+    const block = new Matrix4();
+    const at = (id: string | null, local: Vector3): Vector3 => {
+      const part = id === null ? undefined : parts.get(id);
+      return part === undefined ? local.clone() : local.clone().applyMatrix4(pose(part, block));
+    };
+    machine.rods.forEach((rod, index) => {
+      mesh.current?.setMatrixAt(index, between(at(rod.startBlock, rod.startLocal), at(rod.endBlock, rod.endLocal)));
+    });
+    if (mesh.current !== null) mesh.current.instanceMatrix.needsUpdate = true;
+  };
+  useEffect(() => {
+    place();
+    mesh.current?.computeBoundingSphere();
+    invalidate();
+  });
+  useEffect(() => {
+    machine.rods.forEach((rod, index) => {
+      mesh.current?.setColorAt(index, chosen?.has(rod.id) ? CHOSEN : new Color(rodColour?.(rod) ?? KIND_COLOURS.connector));
+    });
+    if (mesh.current?.instanceColor) mesh.current.instanceColor.needsUpdate = true;
+    invalidate();
+  }, [machine, chosen, rodColour, invalidate]);
+  useFrame(() => {
+    if (moving) place();
+  });
+  if (machine.rods.length === 0) return null;
+  return (
+    <instancedMesh
+      key={machine.rods.length}
+      ref={mesh}
+      args={[undefined, undefined, machine.rods.length]}
+      frustumCulled={false}
+      userData={{ rods: ids }}
+      onClick={(event) => {
+        event.stopPropagation();
+        const rod = event.instanceId === undefined ? undefined : machine.rods[event.instanceId];
+        if (rod !== undefined) onChoose?.(rod.id);
+      }}
+    >
+      <cylinderGeometry args={[ROD_RADIUS, ROD_RADIUS, 1, 8]} />
+      <meshLambertMaterial />
+    </instancedMesh>
+  );
+}
+
+/** A rod of length 1 along y, stretched from one point to another. */
+function between(start: Vector3, end: Vector3): Matrix4 {
+  const along = end.clone().sub(start);
+  const length = Math.max(1e-6, along.length());
+  const turn = new Quaternion().setFromUnitVectors(Y, along.divideScalar(length));
+  return new Matrix4().compose(start.add(end).multiplyScalar(0.5), turn, new Vector3(1, length, 1));
+}

@@ -1,0 +1,101 @@
+import { Alert, Button, Group, Stack, Switch, Text } from "@mantine/core";
+import { useMemo, useState } from "react";
+import { Box3, Matrix4, Vector3 } from "three";
+import { duration } from "../format";
+import { useClock, type Clock } from "./clock";
+import { Curves } from "./Curves";
+import { curvesOf } from "./curves";
+import { Film } from "./Film";
+import { Legend } from "./Legend";
+import { loadsAt, mostLoaded } from "./loads";
+import type { CameraLock } from "./lock";
+import { boundsOf, readScene, type Machine, type MachineScene } from "./machine";
+import { cargoAt, poseAt } from "./playing";
+import { Stage } from "./Stage";
+import { Surroundings, type Scenario } from "./Surroundings";
+import { TimeLine } from "./TimeLine";
+import type { Break, Trial } from "./trial";
+
+interface TrialProps {
+  scene: MachineScene;
+  trial: Trial;
+  scenario: Scenario;
+}
+
+/** A trial, played: scrubbed, slowed, joints coloured by what they bear, breaks marked. */
+export default function TrialView(props: TrialProps) {
+  const end = props.trial.times.at(-1) ?? 0;
+  const clock = useClock(end);
+  const [loads, setLoads] = useState(true);
+  const [follow, setFollow] = useState(true);
+  return (
+    <Stack gap="xs">
+      <TrialScene {...props} clock={clock} loads={loads} follow={follow} />
+      <TimeLine clock={clock} end={end} breaks={props.trial.breaks} />
+      <Group gap="md">
+        <Switch size="sm" label="Loads on joints" checked={loads} onChange={(event) => { setLoads(event.currentTarget.checked); }} />
+        <Switch size="sm" label="Follow the machine" checked={follow} onChange={(event) => { setFollow(event.currentTarget.checked); }} />
+        <Text size="xs" className="dimmed">
+          {props.trial.engine} {props.trial.engineVersion}
+        </Text>
+      </Group>
+      {loads && <Legend whole={props.trial.loads === null} />}
+      <Broken breaks={props.trial.breaks} seek={clock.seek} />
+      <TrialCurves trial={props.trial} clock={clock} />
+    </Stack>
+  );
+}
+
+export function TrialCurves({ trial, clock }: { trial: Trial; clock: Clock }) {
+  const curves = useMemo(() => curvesOf(trial), [trial]);
+  return <Curves curves={curves} times={trial.times} now={clock.shown} breaks={trial.breaks.map((found) => found.time_s)} seek={clock.seek} />;
+}
+
+/** The drawing of a trial at the clock's time. */
+export function TrialScene({ scene, trial, scenario, clock, loads, follow, height = 420, lock }: TrialProps & { clock: Clock; loads: boolean; follow: boolean; height?: number; lock?: CameraLock }) {
+  const machine = useMemo(() => readScene(scene), [scene]);
+  const bounds = useMemo(() => startBounds(machine, trial), [machine, trial]);
+  const borne = loadsAt(trial, clock.shown);
+  const most = mostLoaded(trial, borne);
+  return (
+    <>
+      <Stage bounds={bounds} height={height} label={`The trial at ${clock.shown.toFixed(1)} seconds`} lock={lock}>
+        <Surroundings scenario={scenario} />
+        <Film machine={machine} trial={trial} clock={clock} follow={follow} loads={loads ? borne : null} />
+      </Stage>
+      {loads && (
+        <Text size="xs" className="figures">
+          {most === null ? "No joint bears anything." : `Most loaded: ${most.kind} ${most.joint}, ${(100 * most.ratio).toFixed(0)} % of its strength.`}
+        </Text>
+      )}
+    </>
+  );
+}
+
+function startBounds(machine: Machine, trial: Trial): Box3 {
+  const start = poseAt(trial, 0);
+  const whole = boundsOf({ ...machine, parts: machine.parts.map((part) => ({ ...part, pose: start(part, part.pose.clone()) })) });
+  if (trial.cargo !== null) {
+    const size = new Vector3(...trial.cargo.size);
+    whole.union(new Box3().setFromCenterAndSize(new Vector3().setFromMatrixPosition(cargoAt(trial, 0, new Matrix4())), size));
+  }
+  return whole;
+}
+
+const NAMED = 8;
+
+function Broken({ breaks, seek }: { breaks: readonly Break[]; seek: (time: number) => void }) {
+  if (breaks.length === 0) return null;
+  return (
+    <Alert color="red" py="xs" title={`${breaks.length} joint${breaks.length > 1 ? "s" : ""} broke`}>
+      <Group gap={6}>
+        {breaks.slice(0, NAMED).map((found, index) => (
+          <Button key={index} size="compact-xs" variant="default" onClick={() => { seek(Math.max(0, found.time_s - 0.2)); }}>
+            ✕ {found.kind} {found.joint} at {duration(found.time_s)}, {(100 * found.ratio).toFixed(0)} %
+          </Button>
+        ))}
+        {breaks.length > NAMED && <Text size="sm">and {breaks.length - NAMED} more</Text>}
+      </Group>
+    </Alert>
+  );
+}

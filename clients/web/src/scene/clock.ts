@@ -1,0 +1,53 @@
+import { useEffect, useRef, useState, type RefObject } from "react";
+
+const TELL_EVERY_MS = 120;
+export const SPEEDS = ["0.1", "0.25", "1", "4"] as const;
+
+export interface Clock {
+  /** The time now, for what is drawn each frame. */
+  time: RefObject<number>;
+  /** The time as it was last told, for what is written. */
+  shown: number;
+  playing: boolean;
+  speed: string;
+  setSpeed: (speed: string) => void;
+  seek: (to: number) => void;
+  toggle: () => void;
+}
+
+/** The time of a trial, which plays, stops and can be set. */
+export function useClock(end: number): Clock {
+  const time = useRef(0);
+  const [shown, setShown] = useState(0);
+  const [playing, setPlaying] = useState(false);
+  const [speed, setSpeed] = useState("1");
+  useEffect(() => {
+    if (!playing) return;
+    let frame = 0;
+    let before = performance.now();
+    let told = before;
+    const step = (now: number): void => {
+      time.current = Math.min(end, time.current + (Math.max(0, now - before) / 1000) * Number(speed));
+      before = now;
+      if (now - told > TELL_EVERY_MS || time.current >= end) {
+        told = now;
+        setShown(time.current);
+      }
+      if (time.current >= end) setPlaying(false);
+      else frame = requestAnimationFrame(step);
+    };
+    frame = requestAnimationFrame(step);
+    return () => {
+      cancelAnimationFrame(frame);
+    };
+  }, [playing, speed, end]);
+  const seek = (to: number): void => {
+    time.current = Math.min(end, Math.max(0, to));
+    setShown(time.current);
+  };
+  const toggle = (): void => {
+    if (!playing && time.current >= end) seek(0);
+    setPlaying(!playing);
+  };
+  return { time, shown, playing, speed, setSpeed, seek, toggle };
+}

@@ -1,0 +1,52 @@
+import type { Trial } from "./trial";
+
+export interface Curve {
+  name: string;
+  unit: string;
+  values: Float64Array;
+}
+
+function distances(positions: Float32Array, stride: number, count: number): Float64Array {
+  const [x, y] = [positions[0] ?? 0, positions[1] ?? 0];
+  return Float64Array.from({ length: count }, (_, i) =>
+    Math.hypot((positions[i * stride] ?? 0) - x, (positions[i * stride + 1] ?? 0) - y),
+  );
+}
+
+function heights(trial: Trial): Float64Array {
+  const blocks = trial.blockIds.length;
+  return Float64Array.from({ length: trial.times.length }, (_, i) => {
+    let sum = 0;
+    for (let block = 0; block < blocks; block += 1) sum += trial.positions[(i * blocks + block) * 3 + 2] ?? 0;
+    return sum / Math.max(1, blocks);
+  });
+}
+
+/** A blow in a collapse is many times a joint's strength, and would flatten all that led to it. */
+const MOST_SHOWN = 120;
+
+function largestLoads(loads: Float32Array, joints: number, count: number): Float64Array {
+  return Float64Array.from({ length: count }, (_, i) => {
+    let most = 0;
+    for (let joint = i * joints; joint < (i + 1) * joints; joint += 1) most = Math.max(most, loads[joint] ?? 0);
+    return Math.min(MOST_SHOWN, 100 * most);
+  });
+}
+
+/** What a trial is judged by, over time: loads, heights, distances, the cargo. */
+export function curvesOf(trial: Trial): Curve[] {
+  const count = trial.times.length;
+  const curves: Curve[] = [];
+  if (trial.loads !== null) {
+    curves.push({ name: "Largest load on a joint", unit: "% of its strength, shown up to 120", values: largestLoads(trial.loads, trial.peaks.length, count) });
+  }
+  curves.push(
+    { name: "Mean height of the machine", unit: "units", values: heights(trial) },
+    { name: "Distance of the starting block", unit: "units", values: distances(trial.positions, trial.blockIds.length * 3, count) },
+  );
+  if (trial.cargo !== null) {
+    curves.push({ name: "Distance of the cargo", unit: "units", values: distances(trial.cargo.positions, 3, count) });
+    curves.push({ name: "Mass of the cargo", unit: "mass units", values: trial.cargo.mass });
+  }
+  return curves;
+}

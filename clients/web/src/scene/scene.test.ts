@@ -1,0 +1,109 @@
+import { Matrix4, Vector3 } from "three";
+import { describe, expect, it } from "vitest";
+import { boundsOf, machineOf, readScene, type MachineScene } from "./machine";
+import { jointsOf, loadsAt, loadsOfBlocks, mostLoaded } from "./loads";
+import { moduleShape } from "./modules";
+import { poseAt } from "./playing";
+import { instantAt, type Trial } from "./trial";
+
+const CYCLE: [number, number, number, number] = [0.5, 0.5, 0.5, 0.5];
+const SCENE: MachineScene = {
+  modules: { "Own Wheel": { kind: "wheel", center: [0, 0, 1], pointing: null, bodies: [{ shape: "cylinder", center: [0, 0, 1], quaternion: [0.5 ** 0.5, 0, 0.5 ** 0.5, 0], size: [3, 3, 2] }], flames: [] } },
+  blocks: [
+    { id: "1", module: "Starting Block", position: [0, 0, 2], quaternion: [1, 0, 0, 0] },
+    { id: "2", module: "Small Wooden Block", position: [0.5, 0, 2], quaternion: CYCLE },
+  ],
+  connectors: [
+    { id: "7", module: "Brace", joint: "Brace 7", rope: false, start: { block: "1", point: [0, 0, 0.5] }, end: { block: "2", point: [0, 0, 0.5] } },
+  ],
+};
+
+const at = (matrix: Matrix4): number[] => new Vector3().setFromMatrixPosition(matrix).toArray();
+
+describe("readScene", () => {
+  it("turns blocks the way the service means: z of the block becomes x of the world", () => {
+    const part = readScene(SCENE).parts[1];
+    const top = new Vector3(0, 0, 1).applyMatrix4(part?.pose ?? new Matrix4());
+    expect(top.toArray().map((value) => Math.round(value * 1e6) / 1e6)).toEqual([1.5, 0, 2]);
+  });
+
+  it("learns what modules of somebody's own look like", () => {
+    readScene(SCENE);
+    const solid = moduleShape("Own Wheel").body[0];
+    // Its axis, the z of its own frame, is turned a quarter about y and lies along x.
+    expect(solid).toMatchObject({ shape: "cylinder", radius: 1.5 });
+    [-1, 0, 1].forEach((value, axis) => {
+      expect(solid?.from[axis]).toBeCloseTo(value);
+    });
+  });
+
+  it("puts a connector of a replay where it says, in the world", () => {
+    const { parts, rods } = machineOf([
+      { id: "1", module: "Starting Block", position: [0, 0, 2], quaternion: [1, 0, 0, 0], start: null, end: null, flipped: false, bindings: {} },
+      { id: "7", module: "Brace", position: [0, 0, 2], quaternion: CYCLE, start: [0, 0, 2], end: [1, 0, 3], flipped: false, bindings: {} },
+    ]);
+    expect([parts.length, rods[0]?.startBlock, rods[0]?.joint, rods[0]?.endLocal.toArray()]).toEqual([1, null, "Brace 7", [1, 0, 3]]);
+  });
+
+  it("finds the box around it", () => {
+    const box = boundsOf(readScene(SCENE));
+    expect(box.min.x).toBeCloseTo(-0.5);
+    expect(box.max.x).toBeCloseTo(1.5);
+  });
+});
+
+const TRIAL: Trial = {
+  times: Float64Array.of(0, 1, 2),
+  blockIds: ["1", "2"],
+  positions: Float32Array.of(0, 0, 2, 1, 0, 2, 0, 0, 3, 1, 0, 3, 0, 0, 5, 1, 0, 5),
+  quaternions: Float32Array.of(...[0, 1, 2].flatMap(() => [1, 0, 0, 0, ...CYCLE])),
+  cargo: null,
+  peaks: [
+    { joint: "1-2", kind: "attachment", force: 1, moment: 1, ratio: 1.25 },
+    { joint: "Brace 7", kind: "brace", force: 1, moment: 1, ratio: 0.5 },
+  ],
+  loads: Float32Array.of(0, 0, 1.25, 0.25, 0, 0.5),
+  breaks: [],
+  engine: "e",
+  engineVersion: "1",
+};
+
+describe("a trial", () => {
+  it.each([
+    [-1, 0, 0],
+    [0.25, 0, 0.25],
+    [1, 1, 0],
+    [9, 2, 0],
+    [NaN, 0, 0],
+  ])("at %d s is between instants", (time, index, share) => {
+    if (Number.isNaN(time)) expect(instantAt(Float64Array.of(0), time)).toEqual({ index: 0, share: 0 });
+    else expect(instantAt(TRIAL.times, time)).toEqual({ index, share });
+  });
+
+  it("gives a block's root from its shown point, between instants too", () => {
+    const part = readScene(SCENE).parts[1];
+    if (part === undefined) throw new Error("no part");
+    // The wooden block is shown at its middle, half a unit along its own z, which is the world's x.
+    const [x, y, z] = at(poseAt(TRIAL, 1.5)(part, new Matrix4()));
+    expect([x, y, z].map((value) => Math.round((value ?? 0) * 1e5) / 1e5)).toEqual([0.5, 0, 4]);
+    expect(at(poseAt(TRIAL, 99)(part, new Matrix4()))[2]).toBeCloseTo(5);
+  });
+});
+
+describe("loads", () => {
+  it("are told with the instant up to which they were borne", () => {
+    expect([...loadsAt(TRIAL, 0)]).toEqual([0, 0]);
+    expect([...loadsAt(TRIAL, 0.3)]).toEqual([1.25, 0.25]);
+    expect([...loadsAt(TRIAL, 1)]).toEqual([1.25, 0.25]);
+    expect([...loadsAt(TRIAL, 1.1)]).toEqual([0, 0.5]);
+    expect([...loadsAt(TRIAL, 99)]).toEqual([0, 0.5]);
+    expect([...loadsAt({ ...TRIAL, loads: null }, 1)]).toEqual([1.25, 0.5]);
+  });
+
+  it("belong to joints at blocks, and to connectors", () => {
+    expect(jointsOf(TRIAL).map((joint) => joint.block)).toEqual(["2", null]);
+    expect([...loadsOfBlocks(TRIAL, loadsAt(TRIAL, 1))]).toEqual([["1", 1.25], ["2", 1.25]]);
+    expect(mostLoaded(TRIAL, loadsAt(TRIAL, 2))).toMatchObject({ joint: "Brace 7", ratio: 0.5 });
+    expect(mostLoaded(TRIAL, loadsAt(TRIAL, 0))).toBeNull();
+  });
+});

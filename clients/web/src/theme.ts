@@ -1,0 +1,26 @@
+import { createTheme } from "@mantine/core";
+
+export const theme = createTheme({
+  primaryColor: "blue",
+  primaryShade: { light: 8, dark: 5 },
+  autoContrast: true,
+  luminanceThreshold: 0.35,
+  fontFamily: "system-ui, -apple-system, 'Segoe UI', Roboto, 'Noto Sans', sans-serif",
+  fontFamilyMonospace: "ui-monospace, SFMono-Regular, Menlo, 'DejaVu Sans Mono', monospace",
+  headings: { fontWeight: "650", sizes: { h1: { fontSize: "1.6rem" }, h2: { fontSize: "1.15rem" } } },
+  defaultRadius: "md",
+  cursorType: "pointer",
+});
+
+/** A colour for each way a job can end or stand; a word always stands beside it. */
+export const OUTCOME_COLOURS: Readonly<Record<string, string>> = {
+  success: "teal",
+  unsuccessful: "orange",
+  construction_failed: "red",
+  limit: "grape",
+  errored: "pink",
+  cancelled: "gray",
+  running: "blue",
+  queued: "gray",
+  on_hold: "yellow",
+};

@@ -1,0 +1,42 @@
+import react from "@vitejs/plugin-react";
+import { readFileSync } from "node:fs";
+import { fileURLToPath } from "node:url";
+import type { Plugin } from "vite";
+import { defineConfig } from "vitest/config";
+
+const here = (path: string): string => fileURLToPath(new URL(path, import.meta.url));
+
+const MODULES = here("../../libs/geometry/src/buildarena_geometry/modules/modules.yaml");
+
+interface ModulesFile {
+  modules: { name: string; kind: string; center?: number[]; body?: unknown[] }[];
+}
+
+/** What of the geometry library's modules a page draws; the file is JSON, whatever its ending says. */
+const moduleShapes: Plugin = {
+  name: "module-shapes",
+  resolveId: (id) => (id === "virtual:modules" ? "\0modules" : null),
+  load(id) {
+    if (id !== "\0modules") return null;
+    const { modules } = JSON.parse(readFileSync(MODULES, "utf8")) as ModulesFile;
+    const shapes = modules.map(({ name, kind, center, body }) => ({ name, kind, center, body }));
+    return `export default ${JSON.stringify(shapes)};`;
+  },
+};
+
+export default defineConfig({
+  plugins: [react(), moduleShapes],
+  build: {
+    outDir: here("../../services/api/src/buildarena_api/pages"),
+    emptyOutDir: true,
+    target: "es2022",
+    // The policy has no data: for scripts, and small files compress well.
+    assetsInlineLimit: 0,
+    chunkSizeWarningLimit: 1200,
+  },
+  server: {
+    fs: { allow: [here("../..")] },
+    proxy: { "/v1": process.env.BUILDARENA_URL ?? "http://127.0.0.1:8000" },
+  },
+  test: { include: ["src/**/*.test.ts"] },
+});

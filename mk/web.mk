@@ -1,0 +1,34 @@
+.PHONY: web test-web bench-web
+
+WEB := clients/web
+WEB_OUT := services/api/src/buildarena_api/pages
+WEB_STAMP := $(WEB_OUT)/.built
+WEB_PARTS := $(WEB)/node_modules/.installed
+WEB_SOURCES := $(shell find $(WEB)/src $(WEB)/public $(WEB)/scripts -type f -not -name contract.ts 2>/dev/null) \
+	$(addprefix $(WEB)/,index.html vite.config.ts tsconfig.json postcss.config.cjs) \
+	tests/data/openapi.json libs/geometry/src/buildarena_geometry/modules/modules.yaml
+
+web: $(WEB_STAMP) ## Builds the dashboard's pages, which the API serves at /
+
+$(WEB_PARTS): $(STAMP) $(WEB)/package-lock.json $(WEB)/.npmrc
+	@bash mk/node.sh npm --prefix $(WEB) ci --loglevel error
+	@touch $@
+
+$(WEB_STAMP): $(WEB_PARTS) $(WEB_SOURCES)
+	@bash mk/node.sh npm --prefix $(WEB) run --silent build
+	@touch $@
+
+test-web: $(WEB_STAMP) ## Types, lint, logic and pages of the dashboard, in a real browser
+	@bash mk/node.sh npm --prefix $(WEB) run --silent check
+	@bash mk/node.sh npm --prefix $(WEB) test
+	@BUILDARENA_TEST_WEB=1 $(BIN)/pytest tests/web -rs
+
+bench-web: $(WEB_STAMP) ## Measures the dashboard's pages in a browser that draws in software
+	@$(BIN)/python tests/benchmarks/web/bench_web.py
+
+# People who look at a service want its pages; without them it runs all the same.
+up: | web-if-it-can-be
+
+.PHONY: web-if-it-can-be
+web-if-it-can-be: $(STAMP)
+	@$(MAKE) --no-print-directory web || echo "The dashboard could not be built; the service runs without its pages."

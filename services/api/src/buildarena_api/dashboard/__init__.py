@@ -1,0 +1,1 @@
+"""The dashboard: pages that were built beforehand, served from memory."""

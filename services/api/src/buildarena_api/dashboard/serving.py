@@ -1,0 +1,100 @@
+"""Answers with the dashboard's pages what no route of the API answers."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Final
+
+from starlette.datastructures import Headers
+from starlette.responses import HTMLResponse, Response
+from starlette.types import ASGIApp, Receive, Scope, Send
+
+from buildarena_api.dashboard.files import INDEX, PageFile
+
+PAGE: Final = re.compile(
+    r"/(?:(?:sweeps|jobs|tasks|models|compare|build|machine)(?:/[^\x00-\x1f\x7f]*)?)?"
+)
+"""Addresses of pages: the page itself reads which, so all of them get the same file."""
+_SOURCES: Final = {
+    "default-src": "'none'",
+    "script-src": "'self'",
+    # The component library sets its variables in a style element.
+    "style-src": "'self' 'unsafe-inline'",
+    "img-src": "'self' data: blob:",
+    "font-src": "'self'",
+    "connect-src": "'self'",
+    "base-uri": "'none'",
+    "form-action": "'none'",
+    "frame-ancestors": "'none'",
+}
+POLICY: Final = "; ".join(f"{what} {where}" for what, where in _SOURCES.items())
+"""What a page may load and run: its own files only, and no script that stands in a page."""
+NOT_BUILT: Final = """<!doctype html>
+<html lang="en"><meta charset="utf-8"><title>BuildArena</title>
+<h1>BuildArena</h1>
+<p>The service runs; its dashboard has not been built. <code>make web</code> builds it, and the
+service shows it here after its next start.</p>
+<p>Meanwhile: the API's <a href="/docs">documentation</a> and the
+<a href="/v1/leaderboard">leaderboard as JSON</a>.</p>
+</html>
+"""
+
+
+class Dashboard:
+    """An ASGI application for the paths that no route has.
+
+    Args:
+        files: The built pages by path.
+        otherwise: What answers when it is no page either.
+    """
+
+    def __init__(self, files: Mapping[str, PageFile], otherwise: ASGIApp) -> None:
+        self._files = files
+        self._otherwise = otherwise
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answers with a page or one of its files, or passes the request on."""
+        found = self._find(scope) if scope["type"] == "http" else None
+        await (found or self._otherwise)(scope, receive, send)
+
+    def _find(self, scope: Scope) -> Response | None:
+        path: str = scope["path"]
+        if scope["method"] not in {"GET", "HEAD"}:
+            return None
+        headers = Headers(scope=scope)
+        if path != INDEX and path in self._files:
+            return _answer(self._files[path], headers)
+        if PAGE.fullmatch(path) is None:
+            return None
+        if INDEX not in self._files:
+            return HTMLResponse(NOT_BUILT, headers={"Content-Security-Policy": POLICY})
+        return _answer(self._files[INDEX], headers)
+
+
+def _answer(file: PageFile, headers: Headers) -> Response:
+    encoding = _accepted(headers.get("accept-encoding", ""), file.encoded)
+    # Each encoding is another body, so it has another tag.
+    etag = file.etag if encoding is None else f'{file.etag[:-1]}-{encoding}"'
+    answer = {
+        "ETag": etag,
+        "Cache-Control": "public, max-age=31536000, immutable" if file.immutable else "no-cache",
+        "Vary": "Accept-Encoding",
+        "Content-Security-Policy": POLICY,
+    }
+    if etag in [tag.strip() for tag in headers.get("if-none-match", "").split(",")]:
+        return Response(status_code=304, headers=answer)
+    if encoding is not None:
+        answer["Content-Encoding"] = encoding
+    data = file.data if encoding is None else file.encoded[encoding]
+    return Response(data, media_type=file.media_type, headers=answer)
+
+
+def _accepted(accept: str, encoded: Mapping[str, bytes]) -> str | None:
+    """The best encoding there is that the reader accepts."""
+    weights: dict[str, float] = {}
+    for entry in accept.split(","):
+        name, _, quality = entry.partition(";")
+        weight = re.fullmatch(r"\s*q\s*=\s*([01](?:\.[0-9]{0,3})?)\s*", quality)
+        weights[name.strip().lower()] = 1.0 if weight is None else float(weight[1])
+    return next((name for name in encoded if weights.get(name, 0.0) > 0), None)

@@ -1,0 +1,174 @@
+"""The dashboard's pages as the API serves them, and what they may never stand in the place of."""
+
+from __future__ import annotations
+
+import gzip
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from starlette.applications import Starlette
+from starlette.responses import PlainTextResponse
+from starlette.routing import Route
+from starlette.testclient import TestClient
+
+from buildarena_api.dashboard.files import read_pages
+from buildarena_api.dashboard.serving import Dashboard
+
+INDEX = b"<!doctype html><title>index</title>" + b" " * 600
+SCRIPT = b"console.log(1);" * 100
+SECRET = "not for everybody"
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    pages = tmp_path / "pages"
+    (pages / "assets").mkdir(parents=True)
+    (tmp_path / "secret.txt").write_text(SECRET)
+    (pages / ".built").write_text(SECRET)
+    (pages / "index.html").write_bytes(INDEX)
+    script = pages / "assets" / "main-abc123.js"
+    script.write_bytes(SCRIPT)
+    Path(f"{script}.gz").write_bytes(gzip.compress(SCRIPT))
+    Path(f"{script}.br").write_bytes(b"brotli")
+    return pages
+
+
+def served(folder: Path) -> TestClient:
+    app = Starlette(routes=[Route("/v1/health", lambda _: PlainTextResponse("api"))])
+    app.router.default = Dashboard(read_pages(folder), app.router.default)
+    return TestClient(app)
+
+
+@pytest.fixture
+def pages(folder: Path) -> Iterator[TestClient]:
+    with served(folder) as client:
+        yield client
+
+
+@pytest.mark.parametrize(
+    "path",
+    ["/", "/sweeps", "/sweeps/sweep_1", "/jobs/job_1?view=trial", "/tasks/lift-1", "/models/a/b"],
+)
+def test_addresses_of_pages_get_the_page(pages: TestClient, path: str) -> None:
+    answer = pages.get(path)
+    assert answer.status_code == 200
+    assert answer.content == INDEX
+    assert answer.headers["cache-control"] == "no-cache"
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        *("/v1/nothing", "/v1", "/docs/x", "/openapi.jsonx", "/sweepsx", "/.built", "/favicon.ico"),
+        *("/assets/", "/assets/gone.js", "/assets/main-abc123.js.gz", "/index.html"),
+        *("/../secret.txt", "/assets/../../secret.txt", "/assets/%2e%2e/%2e%2e/secret.txt"),
+        *(
+            "/..%2fsecret.txt",
+            "http://testserver//secret.txt",
+            "/assets\\..\\..\\secret.txt",
+            "/jobs%0a",
+        ),
+    ],
+)
+def test_nothing_else_is_a_page(pages: TestClient, path: str) -> None:
+    answer = pages.get(path)
+    assert SECRET not in answer.text
+    assert answer.status_code == 404
+
+
+def test_the_api_comes_first(pages: TestClient) -> None:
+    assert pages.get("/v1/health").text == "api"
+
+
+@pytest.mark.parametrize("method", ["POST", "PUT", "DELETE", "PATCH"])
+def test_pages_are_only_read(pages: TestClient, method: str) -> None:
+    assert pages.request(method, "/sweeps").status_code == 404
+
+
+def test_a_head_request_has_no_body(pages: TestClient) -> None:
+    answer = pages.head("/")
+    assert answer.status_code == 200
+    assert answer.content == b""
+
+
+def test_hashed_files_stay_with_the_reader(pages: TestClient) -> None:
+    answer = pages.get("/assets/main-abc123.js")
+    assert answer.headers["cache-control"] == "public, max-age=31536000, immutable"
+    assert answer.headers["content-type"].startswith("text/javascript")
+    again = pages.get("/assets/main-abc123.js", headers={"If-None-Match": answer.headers["etag"]})
+    assert again.status_code == 304
+    assert again.content == b""
+
+
+@pytest.mark.parametrize(
+    ("accept", "encoding"),
+    [
+        ("gzip", "gzip"),
+        ("gzip, br", "br"),
+        ("br;q=0, gzip;q=0.5", "gzip"),
+        ("br;q=0.000, gzip;q=0", None),
+        ("identity", None),
+        ("", None),
+        ("BR", "br"),
+        ("brotli", None),
+    ],
+)
+def test_files_come_as_compressed_as_the_reader_takes_them(
+    folder: Path, accept: str, encoding: str | None
+) -> None:
+    file = read_pages(folder)["/assets/main-abc123.js"]
+    with (
+        served(folder) as client,
+        client.stream(
+            "GET", "/assets/main-abc123.js", headers={"Accept-Encoding": accept}
+        ) as answer,
+    ):
+        body = b"".join(answer.iter_raw())
+    assert answer.headers.get("content-encoding") == encoding
+    assert answer.headers["vary"] == "Accept-Encoding"
+    assert body == (file.data if encoding is None else file.encoded[encoding])
+
+
+def test_each_encoding_has_a_tag_of_its_own(pages: TestClient) -> None:
+    path = "/assets/main-abc123.js"
+    tags = {
+        pages.head(path, headers={"Accept-Encoding": accept}).headers["etag"]
+        for accept in ("br", "gzip", "identity")
+    }
+    assert len(tags) == 3
+
+
+def test_pages_run_no_script_but_their_own(pages: TestClient) -> None:
+    policy = dict(
+        part.strip().split(" ", 1)
+        for part in pages.get("/").headers["content-security-policy"].split(";")
+    )
+    assert policy["default-src"] == "'none'"
+    assert policy["script-src"] == "'self'"
+    assert policy["connect-src"] == "'self'"
+    assert policy["frame-ancestors"] == "'none'"
+
+
+def test_without_a_build_the_start_says_how_to_make_one(tmp_path: Path) -> None:
+    with served(tmp_path / "none") as client:
+        answer = client.get("/")
+        assert "make web" in answer.text
+        assert "<script" not in answer.text
+        assert client.get("/assets/main.js").status_code == 404
+
+
+def test_the_application_serves_it_beside_the_api(api: TestClient) -> None:
+    start = api.get("/")
+    assert start.status_code == 200
+    assert "BuildArena" in start.text
+    assert start.headers["x-frame-options"] == "DENY"
+    missing = api.get("/v1/nothing")
+    assert missing.status_code == 404
+    assert missing.headers["content-type"] == "application/problem+json"
+    assert api.get("/openapi.json").json()["info"]["title"] == "BuildArena"
+
+
+def test_pages_need_no_key_and_figures_do(guarded: TestClient) -> None:
+    assert guarded.get("/jobs/job_1").status_code == 200
+    assert guarded.get("/v1/leaderboard").status_code == 401
