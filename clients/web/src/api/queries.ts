@@ -4,6 +4,10 @@ import { client, jsonOf, taken, type Schema } from "./client";
 import type { paths } from "./contract";
 
 export type Board = Schema<"Board">;
+export type Figures = Schema<"Figures">;
+export type Caller = Schema<"CallerView">;
+export type SweepComparison = Schema<"SweepComparison">;
+export type Trouble = Schema<"TroubleView">;
 export type Row = Schema<"Row">;
 export type TaskBoard = Schema<"TaskBoard">;
 export type OverallView = Schema<"OverallView">;
@@ -34,6 +38,23 @@ export const board = (search: BoardSearch) =>
     refetchInterval: 4 * LIVE_MS,
   });
 
+/** What the board's drawings are made of: the same that reports are drawn from. */
+export const figures = (search: BoardSearch) =>
+  queryOptions({
+    queryKey: ["figures", boardQuery(search)],
+    queryFn: () => taken(client.GET("/v1/leaderboard/figures", { params: { query: boardQuery(search) } })),
+    placeholderData: keepPreviousData,
+    refetchInterval: 4 * LIVE_MS,
+  });
+
+/** Who the service takes this tab for. */
+export const caller = () =>
+  queryOptions({
+    queryKey: ["caller"],
+    staleTime: 60_000,
+    queryFn: () => taken(client.GET("/v1/caller", {})),
+  });
+
 export const sweeps = (cursor?: string) =>
   queryOptions({
     queryKey: ["sweeps", cursor ?? ""],
@@ -46,6 +67,25 @@ export const sweep = (id: string) =>
   queryOptions({
     queryKey: ["sweep", id],
     queryFn: () => taken(client.GET("/v1/sweeps/{sweep_id}", { params: { path: { sweep_id: id } } })),
+  });
+
+export const sweepTroubles = (id: string) =>
+  queryOptions({
+    queryKey: ["sweep-troubles", id],
+    refetchInterval: 2 * LIVE_MS,
+    queryFn: () =>
+      taken(client.GET("/v1/sweeps/{sweep_id}/troubles", { params: { path: { sweep_id: id } } })),
+  });
+
+export const sweepComparison = (first: string, second: string) =>
+  queryOptions({
+    queryKey: ["sweep-comparison", first, second],
+    queryFn: () =>
+      taken(
+        client.GET("/v1/sweeps/{sweep_id}/compare/{other_id}", {
+          params: { path: { sweep_id: first, other_id: second } },
+        }),
+      ),
   });
 
 /** Every job of a sweep, page after page; events keep it true from then on. */
