@@ -21,6 +21,20 @@ const sweep = createRoute({
   path: "/sweeps/$id",
   component: lazyRouteComponent(() => import("./pages/sweeps/SweepPage")),
 });
+const newSweep = createRoute({
+  getParentRoute: () => root,
+  path: "/sweeps/new",
+  component: lazyRouteComponent(() => import("./pages/sweeps/NewSweepPage")),
+});
+const twoSweeps = createRoute({
+  getParentRoute: () => root,
+  path: "/sweeps/compare",
+  validateSearch: (raw: Record<string, unknown>): { a?: string; b?: string } => ({
+    a: typeof raw.a === "string" ? raw.a : undefined,
+    b: typeof raw.b === "string" ? raw.b : undefined,
+  }),
+  component: lazyRouteComponent(() => import("./pages/sweeps/TwoSweepsPage")),
+});
 const jobs = createRoute({
   getParentRoute: () => root,
   path: "/jobs",
@@ -53,7 +67,7 @@ const model = createRoute({
 });
 
 export const router = createRouter({
-  routeTree: root.addChildren([board, sweeps, sweep, jobs, job, tasks, task, model]),
+  routeTree: root.addChildren([board, sweeps, newSweep, twoSweeps, sweep, jobs, job, tasks, task, model]),
   defaultPreload: "intent",
   scrollRestoration: true,
 });

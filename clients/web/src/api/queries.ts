@@ -81,29 +81,16 @@ export const sweepComparison = (first: string, second: string) =>
   queryOptions({
     queryKey: ["sweep-comparison", first, second],
     queryFn: () =>
-      taken(
-        client.GET("/v1/sweeps/{sweep_id}/compare/{other_id}", {
-          params: { path: { sweep_id: first, other_id: second } },
-        }),
-      ),
+      jsonOf<SweepComparison>(`/v1/sweeps/${encodeURIComponent(first)}/compare/${encodeURIComponent(second)}`),
   });
 
-/** Every job of a sweep, page after page; events keep it true from then on. */
-export const sweepJobs = (id: string) =>
+/** Jobs that faults ended: they are in no average until they are retried. */
+export const deadLetters = (id: string) =>
   queryOptions({
-    queryKey: ["sweep-jobs", id],
-    staleTime: Infinity,
-    queryFn: async () => {
-      const found: JobView[] = [];
-      let cursor: string | undefined;
-      do {
-        const query = { sweep: id, limit: 1000, cursor };
-        const page = await taken(client.GET("/v1/jobs", { params: { query } }));
-        found.push(...page.jobs);
-        cursor = page.next_cursor ?? undefined;
-      } while (cursor !== undefined);
-      return found;
-    },
+    queryKey: ["sweep-jobs", id, "errored"],
+    refetchInterval: 3 * LIVE_MS,
+    queryFn: () =>
+      taken(client.GET("/v1/jobs", { params: { query: { sweep: id, outcome: "errored", sort: "finished", limit: 100 } } })),
   });
 
 export const jobPage = (filters: JobFilters) => client.GET("/v1/jobs", { params: { query: filters } });

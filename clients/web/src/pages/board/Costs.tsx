@@ -19,6 +19,7 @@ export function Costs({ figures, entries }: { figures: Figures; entries: readonl
       height: 300,
       marginRight: 120,
       marginTop: 26,
+      marginBottom: 42,
       style: { fontSize: "12px" },
       x: { label: priced ? "dollars a job →" : "output tokens a job →", grid: true, zero: true },
       y: { label: "↑ mean rank over tasks, 1 is best", reverse: true, grid: true, nice: true, zero: false },

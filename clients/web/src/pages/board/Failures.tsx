@@ -63,7 +63,8 @@ export function Failures({ figures, entries }: { figures: Figures; entries: read
 
 function Shares({ name, what, parts, labels }: { name: string; what: string; parts: Part[]; labels: string[] }) {
   const options = (width: number): Plot.PlotOptions => ({
-      height: 64 + 38 * labels.length,
+      height: 76 + 38 * labels.length,
+      marginBottom: 42,
       marginLeft: Math.min(150, 0.3 * width),
       style: { fontSize: "12px" },
       color: { legend: true, range: [...COLOURS], domain: [...new Set(parts.map((part) => part.name))] },
@@ -72,7 +73,7 @@ function Shares({ name, what, parts, labels }: { name: string; what: string; par
       marks: [
         Plot.barX(parts, { x: "share", y: "label", fill: "name", inset: 0.5, order: null }),
         // A bar's number stands in it, so that nobody depends on its colour.
-        Plot.text(parts, Plot.stackX({ x: "share", y: "label", order: null, text: (part: Part) => (part.share > 0.08 ? String(part.count) : ""), fill: "#111111", fontWeight: "600" })),
+        Plot.text(parts, Plot.stackX({ x: "share", y: "label", order: null, text: (part: Part) => (part.share > 0.08 ? String(part.count) : ""), fill: "#111111", stroke: "#ffffff", strokeWidth: 3, fontWeight: "600" })),
       ],
   });
   if (parts.length === 0) return <Text size="sm">None yet.</Text>;

@@ -39,7 +39,7 @@ export function Overall({ board, search }: { board: Board; search: BoardSearch }
           {published.map((row) => (
             <Table.Tr key={`paper ${row.model}`} className="ghost">
               <Table.Td>
-                <Group gap={6} wrap="nowrap">
+                <Group gap={6} maw={{ base: 150, sm: 420 }}>
                   {row.model}
                   <Badge variant="outline" color="gray" size="sm" tt="none" styles={{ root: { color: "inherit" } }}>
                     paper
@@ -95,7 +95,7 @@ function OverallRow({ row, label, most, tied }: { row: OverallView; label: strin
   return (
     <Table.Tr>
       <Table.Td>
-        <Group gap={6} wrap="nowrap">
+        <Group gap={6} maw={{ base: 150, sm: 420 }}>
           <Link className="quiet" to="/models/$" params={{ _splat: row.model }}>
             <b>{label}</b>
           </Link>

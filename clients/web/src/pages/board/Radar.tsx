@@ -32,6 +32,10 @@ export function Radar({ figures, entries }: { figures: Figures; entries: readonl
   const options = (width: number): Plot.PlotOptions => {
     const corners = (score: (name: string) => number): Spot[] =>
       [...names, ...names.slice(0, 1)].map((name, index) => spotOf(index, names.length, score(name)));
+    const labels = names.map((name, index) => {
+      const spot = spotOf(index, names.length, 1.1);
+      return { name: words(name), ...spot, textAnchor: spot.x > 0.1 ? "start" : spot.x < -0.1 ? "end" : "middle" };
+    });
     const wide = (EDGE * width) / HEIGHT;
     return {
       height: HEIGHT,
@@ -41,8 +45,10 @@ export function Radar({ figures, entries }: { figures: Figures; entries: readonl
       marks: [
         ...RINGS.map((ring) => Plot.line(corners(() => ring), { x: "x", y: "y", strokeOpacity: 0.25, strokeWidth: 1 })),
         Plot.link(names.map((_, index) => spotOf(index, names.length, 1)), { x1: 0, y1: 0, x2: "x", y2: "y", strokeOpacity: 0.2 }),
-        Plot.text(names.map((name, index) => ({ name: words(name), ...spotOf(index, names.length, 1.2) })), { x: "x", y: "y", text: "name", fontSize: 12 }),
-        Plot.text(RINGS.map((ring) => ({ ring: String(ring), ...spotOf(0.5, names.length, ring) })), { x: "x", y: "y", text: "ring", fontSize: 9, fillOpacity: 0.7 }),
+        ...(["start", "middle", "end"] as const).map((textAnchor) =>
+          Plot.text(labels.filter((label) => label.textAnchor === textAnchor), { x: "x", y: "y", text: "name", fontSize: 12, textAnchor }),
+        ),
+        Plot.text(RINGS.map((ring) => ({ ring: String(ring), ...spotOf(0.5, names.length, 0.86 * ring) })), { x: "x", y: "y", text: "ring", fontSize: 9, fillOpacity: 0.7 }),
         ...rows.map(({ dimensions }, index) => Plot.line(corners((name) => dimensions[name] ?? 0), { x: "x", y: "y", strokeWidth: 2.2, ...strokeOf(index) })),
       ],
     };
