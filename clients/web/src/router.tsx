@@ -3,6 +3,10 @@ import { readSearch } from "./pages/board/search";
 import { readJobsSearch } from "./pages/job/search";
 import { Missing, RootError, Shell } from "./parts/Shell";
 
+function readTrack(raw: Record<string, unknown>): { track?: string } {
+  return { track: typeof raw.track === "string" && raw.track !== "" ? raw.track : undefined };
+}
+
 const root = createRootRoute({ component: Shell, notFoundComponent: Missing, errorComponent: RootError });
 
 const board = createRoute({
@@ -58,11 +62,13 @@ const tasks = createRoute({
 const task = createRoute({
   getParentRoute: () => root,
   path: "/tasks/$name",
+  validateSearch: readTrack,
   component: lazyRouteComponent(() => import("./pages/tasks/TaskPage")),
 });
 const model = createRoute({
   getParentRoute: () => root,
   path: "/models/$",
+  validateSearch: readTrack,
   component: lazyRouteComponent(() => import("./pages/models/ModelPage")),
 });
 

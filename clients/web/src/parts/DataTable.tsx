@@ -1,10 +1,10 @@
 import { Table } from "@mantine/core";
 
 /** The figures of a drawing, for those who want to read them. */
-export function DataTable({ name, columns, rows }: { name: string; columns: readonly string[]; rows: readonly (readonly string[])[] }) {
+export function DataTable({ name, title = "As a table", columns, rows }: { name: string; title?: string; columns: readonly string[]; rows: readonly (readonly string[])[] }) {
   return (
     <details>
-      <summary style={{ cursor: "pointer", fontSize: 13 }}>As a table</summary>
+      <summary style={{ cursor: "pointer", fontSize: 13 }}>{title}</summary>
       <Table.ScrollContainer minWidth={260} type="native">
         <Table fz="sm" aria-label={name} verticalSpacing={4}>
           <Table.Thead>

@@ -70,8 +70,8 @@ function JobRow({ job, index }: { job: JobView; index: number }) {
           </Text>
         </Link>
       </Table.Td>
-      <Table.Td>{job.task}</Table.Td>
-      <Table.Td>{job.model}</Table.Td>
+      <Table.Td style={{ whiteSpace: "nowrap" }}>{job.task}</Table.Td>
+      <Table.Td style={{ whiteSpace: "nowrap" }}>{job.model}</Table.Td>
       <Table.Td className="figures">{job.seed}</Table.Td>
       <Table.Td>
         <Group gap={6} wrap="nowrap">

@@ -100,7 +100,7 @@ function Facts({ sweep, rate }: { sweep: SweepView; rate: Rate | null }) {
   const running = sweep.state === "active";
   const facts: readonly [string, string, string, number?][] = [
     ["Jobs ended", `${count(progress.done)} of ${count(progress.total)}`, Object.entries(progress.stages).map(([name, n]) => `${n} ${name}`).join(", ")],
-    ["Rate", speed.perMinute === null ? "–" : `${number(speed.perMinute)} a minute`, running && speed.leftSeconds !== null ? `about ${duration(speed.leftSeconds)} left` : ""],
+    ["Rate", speed.perMinute === null ? "–" : `${number(speed.perMinute)} a minute`, running && (speed.leftSeconds ?? 0) >= 1 ? `about ${duration(speed.leftSeconds)} left` : ""],
     ["Spent", dollars(progress.cost_usd), budget?.max_cost_usd == null ? "no budget in dollars" : `of ${dollars(budget.max_cost_usd)}`, shareOf(budget?.spent_cost_usd, budget?.max_cost_usd)],
     ["Model requests", count(progress.requests), budget?.max_requests == null ? "" : `of ${count(budget.max_requests)}`, shareOf(budget?.spent_requests, budget?.max_requests)],
     ["Tokens", `${compact(progress.input_tokens)} in`, `${compact(progress.output_tokens)} out`],

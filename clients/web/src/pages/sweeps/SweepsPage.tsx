@@ -84,7 +84,7 @@ export default function SweepsPage() {
 
 export function SweepState({ state }: { state: string }) {
   return (
-    <Badge variant="outline" color={SWEEP_COLOURS[state] ?? "gray"} tt="none" styles={{ root: { color: "var(--mantine-color-text)" } }}>
+    <Badge variant="outline" color={SWEEP_COLOURS[state] ?? "gray"} tt="none" styles={{ root: { color: "var(--mantine-color-text)", minWidth: "max-content" } }}>
       {words(state)}
     </Badge>
   );
@@ -93,7 +93,8 @@ export function SweepState({ state }: { state: string }) {
 /** A bar of how a sweep's jobs ended; its label says it in figures. */
 export function OutcomeBar({ sweep, size = 12 }: { sweep: SweepView; size?: number }) {
   const { total, outcomes } = sweep.progress;
-  const parts = Object.entries(outcomes);
+  const places = Object.keys(OUTCOME_COLOURS);
+  const parts = Object.entries(outcomes).sort(([one], [another]) => places.indexOf(one) - places.indexOf(another));
   const label = `${sweep.progress.done} of ${total} ended: ${parts.map(([name, n]) => `${n} ${words(name)}`).join(", ")}`;
   return (
     <Progress.Root size={size} role="img" aria-label={label} title={label}>

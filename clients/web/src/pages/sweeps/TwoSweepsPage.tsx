@@ -117,7 +117,7 @@ function Differences({ pair }: { pair: Pair }) {
           <Table.Tbody>
             {pair.tasks.map((task) => (
               <Table.Tr key={task.task}>
-                <Table.Td>
+                <Table.Td style={{ whiteSpace: "nowrap" }}>
                   <Link className="quiet" to="/tasks/$name" params={{ name: task.task }}>
                     {task.task}
                   </Link>

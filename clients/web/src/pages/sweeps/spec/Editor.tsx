@@ -7,7 +7,7 @@ import { EditorState } from "@codemirror/state";
 import { EditorView, keymap, lineNumbers } from "@codemirror/view";
 import { useEffect, useRef } from "react";
 import schema from "../../../../../../docs/sweep.schema.json";
-import { suggestionsAt, type Known, type SchemaNode } from "./completion";
+import { suggestionsAt, type Known } from "./completion";
 import type { Fault } from "./spec";
 
 interface Editing {
@@ -43,7 +43,7 @@ export default function Editor({ text, onText, faults, known }: Editing) {
   useEffect(() => {
     if (place.current === null) return;
     const complete = (context: CompletionContext): CompletionResult | null => {
-      const found = suggestionsAt(context.state.doc.toString(), context.pos, schema as SchemaNode, latest.current.known);
+      const found = suggestionsAt(context.state.doc.toString(), context.pos, schema, latest.current.known);
       if (found === null || found.suggestions.length === 0 || (!context.explicit && found.from === context.pos)) return null;
       return {
         from: found.from,
