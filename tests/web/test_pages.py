@@ -5,10 +5,12 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import httpx
 import pytest
+from pydantic import SecretStr
 from running import finished, running_stack
 
 from buildarena_api.dashboard.files import FOLDER
@@ -23,6 +25,8 @@ SWEEP = {
     "seeds": [0],
     "simulator": "mujoco",
 }
+ADMIN = "operator-secret-that-is-long-enough"
+BUILDARENA = str(Path(sys.executable).with_name("buildarena"))
 LONGEST_S = 420
 
 pytestmark = [
@@ -41,10 +45,14 @@ pytestmark = [
 
 
 def test_pages_work_in_a_browser(tmp_path: Path) -> None:
-    with running_stack(tmp_path) as stack:
+    keys = {"require_keys": True, "admin_key": SecretStr(ADMIN)}
+    report = tmp_path / "report.md"
+    with running_stack(tmp_path) as stack, running_stack(tmp_path / "guarded", **keys) as guarded:
         with httpx.Client(base_url=stack.url) as client:
             sweep_id = client.post("/v1/sweeps", json=SWEEP).raise_for_status().json()["id"]
             finished(client, sweep_id)
+        write = [BUILDARENA, "report", sweep_id, "--out", str(report), "--url", stack.url]
+        subprocess.run(write, check=True, timeout=60)
         command = ["bash", str(NODE), "npm", "--prefix", str(WEB), "run", "--silent", "test:pages"]
         done = subprocess.run(
             command,
@@ -52,6 +60,9 @@ def test_pages_work_in_a_browser(tmp_path: Path) -> None:
             env={
                 **os.environ,
                 "BUILDARENA_WEB_URL": stack.url,
+                "BUILDARENA_WEB_GUARDED_URL": guarded.url,
+                "BUILDARENA_WEB_ADMIN_KEY": ADMIN,
+                "BUILDARENA_WEB_REPORT": str(report),
                 "BUILDARENA_CHROMIUM": str(CHROMIUM),
                 "NO_COLOR": "1",
             },

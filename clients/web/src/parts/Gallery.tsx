@@ -72,5 +72,5 @@ export function Thumbnail({ id, label }: { id: string; label: string }) {
     );
   }
   if (data === undefined) return <Skeleton height={150} radius={0} />;
-  return <img ref={show} alt={label} style={{ width: "100%", height: 150, objectFit: "contain", display: "block", background: "#eef1f4" }} />;
+  return <img ref={show} alt={label} style={{ width: "100%", height: 150, objectFit: "cover", display: "block", background: "#eef1f4" }} />;
 }

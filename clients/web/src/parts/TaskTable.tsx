@@ -3,7 +3,7 @@ import { Link } from "@tanstack/react-router";
 import type { Row, TaskBoard } from "../api/queries";
 import { sharedRanks } from "../pages/board/ranks";
 import { jobsBehind, type BoardSearch } from "../pages/board/search";
-import { count, dollars, number, percent, places } from "../format";
+import { count, dollars, measured, number, percent, places } from "../format";
 import { Interval } from "./Interval";
 
 /** All models on one task, the best first. */
@@ -20,7 +20,7 @@ export function TaskTable({ task, search = {} }: { task: TaskBoard; search?: Boa
             <Table.Th className="figures">Place</Table.Th>
             <Table.Th>Success, 95 % interval</Table.Th>
             <Table.Th className="figures">
-              {task.indicator}, {task.unit}
+              {measured(task.indicator, task.unit)}
             </Table.Th>
             <Table.Th className="figures">Best</Table.Th>
             <Table.Th className="figures">Parts</Table.Th>

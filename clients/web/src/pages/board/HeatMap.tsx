@@ -1,7 +1,7 @@
 import { Group, SegmentedControl, Text } from "@mantine/core";
 import { Link, useNavigate } from "@tanstack/react-router";
 import type { Board, Row, TaskBoard } from "../../api/queries";
-import { dollars, number, percent } from "../../format";
+import { dollars, measured, number, percent } from "../../format";
 import { cellOf, entriesOf, type Entry } from "./entries";
 import { jobsBehind, type BoardSearch, type Figure } from "./search";
 import { shade, shareOf } from "./shades";
@@ -60,7 +60,7 @@ export function HeatMap({ board, search }: { board: Board; search: BoardSearch }
                   </Link>
                   {figure === "indicator" && (
                     <Text size="xs" className="dimmed">
-                      {task.indicator}, {task.unit}
+                      {measured(task.indicator, task.unit)}
                     </Text>
                   )}
                 </th>

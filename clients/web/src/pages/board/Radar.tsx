@@ -10,6 +10,7 @@ import { strokeOf } from "./palette";
 const RINGS = [0.25, 0.5, 0.75, 1];
 const EDGE = 1.42;
 const HEIGHT = 300;
+const NARROW = 430;
 
 interface Spot {
   x: number;
@@ -36,12 +37,14 @@ export function Radar({ figures, entries }: { figures: Figures; entries: readonl
       const spot = spotOf(index, names.length, 1.1);
       return { name: words(name), ...spot, textAnchor: spot.x > 0.1 ? "start" : spot.x < -0.1 ? "end" : "middle" };
     });
-    const wide = (EDGE * width) / HEIGHT;
+    // Labels beside the circle need room that a phone has only if the circle is smaller.
+    const edge = width < NARROW ? 1.5 * EDGE : EDGE;
+    const wide = (edge * width) / HEIGHT;
     return {
       height: HEIGHT,
       margin: 4,
       x: { axis: null, domain: [-wide, wide] },
-      y: { axis: null, domain: [-EDGE, EDGE] },
+      y: { axis: null, domain: [-edge, edge] },
       marks: [
         ...RINGS.map((ring) => Plot.line(corners(() => ring), { x: "x", y: "y", strokeOpacity: 0.25, strokeWidth: 1 })),
         Plot.link(names.map((_, index) => spotOf(index, names.length, 1)), { x1: 0, y1: 0, x2: "x", y2: "y", strokeOpacity: 0.2 }),

@@ -133,7 +133,7 @@ function Effort({ tasks }: { tasks: Board["tasks"] }) {
 }
 
 const LOOKED_AT = 60;
-const SHOWN = 4;
+const SHOWN = 8;
 
 /** The model's best machines, at most one a task; and how long its last jobs took. */
 function Best({ name, track }: { name: string; track: string | undefined }) {

@@ -3,7 +3,7 @@ import * as Plot from "@observablehq/plot";
 import { useQuery } from "@tanstack/react-query";
 import { client, taken } from "../../api/client";
 import type { JobView, TaskDetail } from "../../api/queries";
-import { number, words } from "../../format";
+import { measured, number, words } from "../../format";
 import Drawing from "../../parts/Plot";
 import { Section } from "../../parts/Section";
 import { Answered, Empty } from "../../parts/States";
@@ -34,13 +34,13 @@ function Drawn({ jobs, task, more }: { jobs: readonly JobView[]; task: TaskDetai
     marginLeft: Math.min(150, 0.32 * width),
     marginBottom: 42,
     style: { fontSize: "12px" },
-    x: { label: `${words(task.indicator)}, ${task.unit} →`, grid: true, zero: true, type: "sqrt" },
+    x: { label: `${measured(task.indicator, task.unit)} →`, grid: true, zero: true, type: "sqrt" },
     y: { label: null, domain: models },
     color: { domain: ["success", "failure"], range: ["#009e73", "#d55e00"], legend: true },
     symbol: { domain: ["success", "failure"], range: ["circle", "times"], legend: false },
     marks: [
       Plot.tickX(jobs, Plot.groupY({ x: "median" }, { y: "model", x: "indicator", strokeWidth: 2, strokeOpacity: 0.5 })),
-      Plot.dot(jobs, { x: "indicator", y: "model", r: 4, strokeWidth: 1.6, stroke: (job: JobView) => (job.success === true ? "success" : "failure"), symbol: (job: JobView) => (job.success === true ? "success" : "failure"), tip: true, title: (job: JobView) => `${job.model}, seed ${job.seed}: ${number(job.indicator)} ${task.unit}` }),
+      Plot.dot(jobs, { x: "indicator", y: "model", r: 4, strokeWidth: 1.6, stroke: (job: JobView) => (job.success === true ? "success" : "failure"), symbol: (job: JobView) => (job.success === true ? "success" : "failure"), tip: true, title: (job: JobView) => `${job.model}, seed ${job.seed}: ${number(job.indicator)} ${task.unit === "1" ? "" : task.unit}` }),
     ],
   });
   const range = (model: string): string => {

@@ -3,7 +3,7 @@ import { useQuery } from "@tanstack/react-query";
 import { getRouteApi, Link, useNavigate } from "@tanstack/react-router";
 import { lazy, Suspense } from "react";
 import { board, task as taskQuery, type TaskDetail } from "../../api/queries";
-import { words } from "../../format";
+import { measured, words } from "../../format";
 import { Markdown } from "../../parts/Markdown";
 import { Section } from "../../parts/Section";
 import { Answered, Empty, Loading } from "../../parts/States";
@@ -37,7 +37,7 @@ export default function TaskPage() {
                 </Badge>
               )}
               <Text size="sm" className="dimmed">
-                {task.name} · version {task.version} · ranked by {words(task.indicator)}, {task.unit} ·{" "}
+                {task.name} · version {task.version} · ranked by {measured(task.indicator, task.unit)} ·{" "}
                 <Link to="/jobs" search={{ task: task.name }}>
                   jobs
                 </Link>
