@@ -12,8 +12,8 @@ const REPORT = process.env.BUILDARENA_WEB_REPORT ?? "";
 const CHROMIUM = process.env.BUILDARENA_CHROMIUM ?? "/usr/bin/chromium";
 const ARGUMENTS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"];
 const TASK = "support-1";
-/** No worker of the tests' service runs this simulator, so its jobs wait. */
-const WAITING = { tasks: [TASK], models: ["builtin/idle"], simulator: "pybullet" };
+/** No worker of the tests' service runs this simulator, so its jobs wait once they are built. */
+const WAITING = { tasks: [TASK], models: ["builtin/expert"], simulator: "pybullet" };
 
 let browser: Browser;
 
@@ -166,7 +166,7 @@ describe("sweeps", () => {
   it("are submitted once, however often the button is clicked", async () => {
     const before = (await ask<Schemas["SweepPage"]>("/v1/sweeps?limit=100")).sweeps.length;
     const { page, context } = await opened("/sweeps/new");
-    await page.getByLabel("Simulator").fill("pybullet");
+    await page.getByRole("textbox", { name: "Simulator" }).or(page.getByRole("combobox", { name: "Simulator" })).first().fill("pybullet");
     await page.getByLabel("Name", { exact: true }).fill("clicked twice");
     const button = page.getByRole("button", { name: "Submit the sweep" });
     await expect.poll(() => button.isEnabled(), { timeout: 10_000 }).toBe(true);

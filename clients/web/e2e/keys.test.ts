@@ -29,7 +29,7 @@ describe.skipIf(GUARDED === "")("with keys required", () => {
     const page = await context.newPage();
     await page.goto(`${GUARDED}/sweeps`);
     await page.getByRole("alert").getByLabel("API key").fill(secret);
-    await page.getByRole("button", { name: "Use" }).click();
+    await page.getByRole("button", { name: "Use", exact: true }).click();
     await page.getByText("Nobody has submitted a sweep").waitFor();
     await expect.poll(() => page.getByRole("link", { name: "New sweep" }).count()).toBe(buttons);
     const other = await context.newPage();
