@@ -25,7 +25,7 @@ const complete = performance.now() - start;
 const loadedAt = await page.evaluate(() => performance.now());
 
 const clicks = [];
-const jobsShown = async () => page.getByText(/^unsuccessful: /).first().textContent().catch(() => null);
+const jobsShown = () => page.getByText(/^construction failed: /).first().textContent({ timeout: 2_000 }).catch(() => null);
 const before = await jobsShown();
 const memory = () => page.evaluate(() => performance.memory.usedJSHeapSize / 2 ** 20);
 const heap = [await memory()];
@@ -34,7 +34,7 @@ while (performance.now() < end) {
   // From a click's event to the frame that shows what it did.
   clicks.push(
     await page.evaluate(async () => {
-      const button = document.querySelector("button[aria-label^='Use the']");
+      const button = document.querySelector("button[aria-label='Give an API key']");
       const at = performance.now();
       button.click();
       await new Promise((resolve) => requestAnimationFrame(() => setTimeout(resolve)));

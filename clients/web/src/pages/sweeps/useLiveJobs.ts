@@ -7,7 +7,7 @@ import { LiveJobs, type Moment } from "./live";
 
 const PAGE = 1000;
 /** How often the page is drawn again, and what ended is read, at most. */
-const DRAW_MS = 700;
+const DRAW_MS = 1_000;
 const READ_MS = 3_000;
 
 export interface Live {
