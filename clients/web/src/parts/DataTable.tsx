@@ -5,7 +5,7 @@ export function DataTable({ name, title = "As a table", columns, rows }: { name:
   return (
     <details>
       <summary style={{ cursor: "pointer", fontSize: 13 }}>{title}</summary>
-      <Table.ScrollContainer minWidth={260} type="native">
+      <Table.ScrollContainer minWidth={260} type="native" tabIndex={0} role="region" aria-label={`${name}, scrolls sideways`}>
         <Table fz="sm" aria-label={name} verticalSpacing={4}>
           <Table.Thead>
             <Table.Tr>

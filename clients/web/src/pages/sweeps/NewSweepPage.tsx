@@ -122,7 +122,7 @@ function Estimate({ found, waiting }: { found: Schema<"SweepEstimate"> | undefin
           <Text size="lg" fw={650} className="figures">
             {count(found.jobs)} jobs, {dollars(found.cost_usd)}
           </Text>
-          <Table.ScrollContainer minWidth={300} type="native">
+          <Table.ScrollContainer minWidth={300} type="native" tabIndex={0} role="region" aria-label="Estimate, scrolls sideways">
             <Table fz="sm" aria-label="Estimate by model">
               <Table.Thead>
                 <Table.Tr>

@@ -75,7 +75,7 @@ export function Troubles({ id }: { id: string }) {
       <Text size="sm" className="dimmed" mb="xs">
         {count(attempts)} attempts failed and were made again, or will be: faults never count as failures of a model.
       </Text>
-      <Table.ScrollContainer minWidth={560} type="native" mah={300}>
+      <Table.ScrollContainer minWidth={560} type="native" mah={300} tabIndex={0} role="region" aria-label="Troubles, scrolls">
         <Table fz="sm">
           <Table.Thead>
             <Table.Tr>

@@ -1,10 +1,11 @@
 import { autocompletion, closeBrackets, completionKeymap, type CompletionContext, type CompletionResult } from "@codemirror/autocomplete";
 import { defaultKeymap, history, historyKeymap } from "@codemirror/commands";
 import { yaml } from "@codemirror/lang-yaml";
-import { bracketMatching, defaultHighlightStyle, syntaxHighlighting } from "@codemirror/language";
+import { bracketMatching, HighlightStyle, syntaxHighlighting } from "@codemirror/language";
 import { lintGutter, setDiagnostics, type Diagnostic } from "@codemirror/lint";
 import { EditorState } from "@codemirror/state";
 import { EditorView, keymap, lineNumbers } from "@codemirror/view";
+import { tags } from "@lezer/highlight";
 import { useEffect, useRef } from "react";
 import schema from "../../../../../../docs/sweep.schema.json";
 import { suggestionsAt, type Known } from "./completion";
@@ -24,6 +25,12 @@ const LOOK = EditorView.theme({
   ".cm-gutters": { background: "transparent", color: "inherit", border: "none" },
   ".cm-tooltip": { background: "var(--mantine-color-body)", color: "var(--mantine-color-text)", border: "1px solid var(--mantine-color-default-border)" },
 });
+
+const COLOURS = HighlightStyle.define([
+  { tag: [tags.propertyName, tags.definition(tags.propertyName)], color: "var(--code-key)", fontWeight: "600" },
+  { tag: [tags.string, tags.content, tags.literal, tags.number, tags.bool], color: "var(--mantine-color-text)" },
+  { tag: tags.comment, color: "var(--code-comment)", fontStyle: "italic" },
+]);
 
 function diagnostic(fault: Fault, length: number): Diagnostic {
   const choices = fault.choices.length > 0 ? ` (choose from ${fault.choices.join(", ")})` : "";
@@ -56,8 +63,8 @@ export default function Editor({ text, onText, faults, known }: Editing) {
       state: EditorState.create({
         doc: latest.current.text,
         extensions: [
-          ...[lineNumbers(), lintGutter(), history(), bracketMatching(), closeBrackets(), yaml(), LOOK],
-          syntaxHighlighting(defaultHighlightStyle, { fallback: true }),
+          ...[lineNumbers(), lintGutter(), history(), bracketMatching(), closeBrackets(), yaml(), EditorView.lineWrapping, LOOK],
+          syntaxHighlighting(COLOURS),
           autocompletion({ override: [complete] }),
           keymap.of([...completionKeymap, ...defaultKeymap, ...historyKeymap]),
           EditorView.contentAttributes.of({ "aria-label": "The sweep as YAML" }),
