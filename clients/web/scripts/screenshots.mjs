@@ -5,6 +5,7 @@ import { chromium } from "playwright-core";
 
 const [url, folder, ...options] = process.argv.slice(2);
 const SIZES = [1280, 390];
+const LOADED_STEPS = 240;
 const SCHEMES = ["light", "dark"];
 
 const ask = async (path) => (await fetch(url + path)).json();
@@ -65,7 +66,10 @@ async function shown(browser) {
   const bridge = await opened(browser, trial, 1280, "light", 800);
   const canvas = bridge.page.locator("canvas").first();
   await canvas.waitFor({ timeout: 30_000 });
-  await bridge.page.getByRole("slider").first().press("End").catch(() => undefined);
+  // Late enough that the load shows, and before most bridges give way.
+  const slider = bridge.page.getByRole("slider").first();
+  await slider.press("Home");
+  for (let step = 0; step < LOADED_STEPS; step += 1) await slider.press("ArrowRight");
   await canvas.evaluate((drawn) => {
     scrollTo(0, drawn.getBoundingClientRect().top + scrollY - 90);
   });
