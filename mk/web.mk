@@ -6,7 +6,7 @@ WEB_STAMP := $(WEB_OUT)/.built
 WEB_PARTS := $(WEB)/node_modules/.installed
 WEB_SOURCES := $(shell find $(WEB)/src $(WEB)/public $(WEB)/scripts -type f -not -name contract.ts 2>/dev/null) \
 	$(addprefix $(WEB)/,index.html vite.config.ts tsconfig.json postcss.config.cjs) \
-	tests/data/openapi.json libs/geometry/src/buildarena_geometry/modules/modules.yaml
+	tests/data/openapi.json docs/sweep.schema.json libs/geometry/src/buildarena_geometry/modules/modules.yaml
 
 web: $(WEB_STAMP) ## Builds the dashboard's pages, which the API serves at /
 
@@ -32,3 +32,12 @@ up: | web-if-it-can-be
 .PHONY: web-if-it-can-be
 web-if-it-can-be: $(STAMP)
 	@$(MAKE) --no-print-directory web || echo "The dashboard could not be built; the service runs without its pages."
+
+.PHONY: bench-web screenshots
+
+bench-web: $(WEB_STAMP) ## Measures a sweep's page at 10,000 jobs while they end; JSON in .buildarena/
+	@$(BIN)/python tests/benchmarks/web/bench_sweep_page.py --json .buildarena/bench-web.json
+
+# ALL=folder photographs every page there, light and dark, 1280 and 390 wide, in place of docs/images.
+screenshots: $(WEB_STAMP) ## Photographs the dashboard on a demo of its own into docs/images; ALL=FOLDER: every page
+	@$(BIN)/python tests/web/screenshots.py $(if $(ALL),--all $(ALL))

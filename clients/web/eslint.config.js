@@ -25,6 +25,6 @@ export default tseslint.config(
   },
   {
     files: ["public/*.js", "scripts/*.mjs"],
-    languageOptions: { globals: { localStorage: "readonly", matchMedia: "readonly", document: "readonly", process: "readonly", console: "readonly", URL: "readonly" } },
+    languageOptions: { globals: { localStorage: "readonly", matchMedia: "readonly", document: "readonly", process: "readonly", console: "readonly", URL: "readonly", fetch: "readonly", scrollTo: "readonly", scrollY: "readonly", performance: "readonly", PerformanceObserver: "readonly", requestAnimationFrame: "readonly", setTimeout: "readonly" } },
   },
 );

@@ -186,3 +186,41 @@ def test_cursors_of_any_shape_are_refused(api, text) -> None:
 def test_an_unknown_order_names_the_choices(api) -> None:
     problem = api.get("/v1/jobs", params={"sort": "luck"}).json()
     assert problem["errors"][0]["choices"] == SORTS
+
+
+def test_jobs_of_one_track_version_configuration_and_time_are_found(api, jobs) -> None:
+    tracks = {job["track"] for job in jobs}
+    assert len(tracks) == 2
+    for name in ("track", "task_version"):
+        for value in {job[name] for job in jobs}:
+            found = pages(api, 1000, **{name: value})
+            assert {job["id"] for job in found} == {j["id"] for j in jobs if j[name] == value}
+    [row] = [row for task in api.get("/v1/leaderboard").json()["tasks"] for row in task["rows"]][:1]
+    found = pages(api, 3, configuration=row["configuration"])
+    assert {job["model"] for job in found} == {row["model"]}
+    ended = sorted(job["finished_at"] for job in jobs if job["finished_at"])
+    later = pages(api, 3, since=ended[3])
+    assert sorted(job["finished_at"] for job in later) == ended[3:]
+    assert sorted(j["finished_at"] for j in pages(api, 3, until=ended[3])) == ended[:3]
+    assert pages(api, 3, since=ended[-1], until=ended[-1]) == []
+
+
+@pytest.mark.usefixtures("jobs")
+def test_the_jobs_of_a_row_are_just_those_it_counts(api) -> None:
+    for task in api.get("/v1/leaderboard").json()["tasks"]:
+        for row in task["rows"]:
+            listed = api.get(f"{row['jobs']}&state=done").json()["jobs"]
+            assert len(listed) == row["ended"]
+
+
+@pytest.mark.parametrize("name", ["since", "until"])
+def test_a_time_without_a_zone_is_refused(api, name) -> None:
+    answer = api.get("/v1/jobs", params={name: "2026-01-02T00:00:00"})
+    assert answer.status_code == 422
+    assert answer.json()["errors"][0]["field"] == name
+
+
+def test_a_track_that_nobody_has_is_refused_with_those_there_are(api, jobs) -> None:
+    answer = api.get("/v1/jobs", params={"track": "none"})
+    assert answer.status_code == 422
+    assert answer.json()["errors"][0]["choices"] == sorted({job["track"] for job in jobs})

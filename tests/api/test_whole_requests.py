@@ -170,6 +170,49 @@ def test_foreign_pages_are_not_served(api, context, headers) -> None:
     assert context.store.jobs.page(limit=1) == []
 
 
+LINK = {"Sec-Fetch-Site": "cross-site", "Sec-Fetch-Mode": "navigate", "Sec-Fetch-Dest": "document"}
+"""What a browser says of itself when a link on another site is followed."""
+
+
+@pytest.mark.parametrize("path", ["/", "/sweeps/sweep_1", "/jobs/job_1?view=trial", "/models/a/b"])
+def test_a_link_on_another_site_opens_a_page(api, path) -> None:
+    answer = api.get(path, headers=LINK)
+    assert answer.status_code == 200
+    assert "frame-ancestors 'none'" in answer.headers["content-security-policy"]
+    assert "access-control-allow-origin" not in answer.headers
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "change"),
+    [
+        ("GET", "/v1/jobs", {}),
+        ("GET", "/v1/health", {}),
+        ("GET", "/docs", {}),
+        ("GET", "/openapi.json", {}),
+        ("GET", "/jobs/%0A", {}),
+        ("GET", "//v1/jobs", {}),
+        ("GET", "/assets/index.js", {}),
+        ("POST", "/jobs", {}),
+        ("POST", "/", {}),
+        ("HEAD", "/jobs", {}),
+        ("GET", "/jobs", {"Sec-Fetch-Dest": "iframe"}),
+        ("GET", "/jobs", {"Sec-Fetch-Dest": "script"}),
+        ("GET", "/jobs", {"Sec-Fetch-Mode": "no-cors"}),
+        ("GET", "/jobs", {"Sec-Fetch-Mode": "cors"}),
+        ("GET", "/jobs", {"Sec-Fetch-Mode": ""}),
+        ("GET", "/jobs", {"Origin": "http://evil.example"}),
+        ("GET", "/jobs", {"Origin": "null"}),
+    ],
+)
+def test_nothing_else_comes_from_another_site(api, method, path, change) -> None:
+    answer = api.request(method, f"{api.base_url}{path}", headers=LINK | change)
+    assert answer.status_code == 403, answer.text[:200]
+
+
+def test_a_link_under_a_foreign_name_is_misdirected(api) -> None:
+    assert api.get("/jobs", headers=LINK | {"Host": "evil.example"}).status_code == 421
+
+
 def test_with_keys_names_do_not_matter(guarded) -> None:
     headers = {"Host": "arena.example", "Origin": "null"}
     assert operator(guarded).ask("GET", "/v1/jobs", headers=headers).status_code == 200

@@ -55,6 +55,11 @@ export function words(name: string): string {
   return name.replaceAll("_", " ");
 }
 
+/** What is measured, with its unit; a ratio has none. */
+export function measured(indicator: string, unit: string): string {
+  return unit === "1" ? words(indicator) : `${words(indicator)}, ${unit}`;
+}
+
 /** "five-role · pybullet 3", for a track's long name. */
 export function trackLabel(track: string): string {
   const [workflow, simulator, prompts] = track.split("/");

@@ -4,6 +4,10 @@ import { readCompareSearch } from "./pages/compare/search";
 import { readJobSearch, readJobsSearch } from "./pages/job/search";
 import { Missing, RootError, Shell } from "./parts/Shell";
 
+function readTrack(raw: Record<string, unknown>): { track?: string } {
+  return { track: typeof raw.track === "string" && raw.track !== "" ? raw.track : undefined };
+}
+
 const root = createRootRoute({ component: Shell, notFoundComponent: Missing, errorComponent: RootError });
 
 const board = createRoute({
@@ -21,6 +25,20 @@ const sweep = createRoute({
   getParentRoute: () => root,
   path: "/sweeps/$id",
   component: lazyRouteComponent(() => import("./pages/sweeps/SweepPage")),
+});
+const newSweep = createRoute({
+  getParentRoute: () => root,
+  path: "/sweeps/new",
+  component: lazyRouteComponent(() => import("./pages/sweeps/NewSweepPage")),
+});
+const twoSweeps = createRoute({
+  getParentRoute: () => root,
+  path: "/sweeps/compare",
+  validateSearch: (raw: Record<string, unknown>): { a?: string; b?: string } => ({
+    a: typeof raw.a === "string" ? raw.a : undefined,
+    b: typeof raw.b === "string" ? raw.b : undefined,
+  }),
+  component: lazyRouteComponent(() => import("./pages/sweeps/TwoSweepsPage")),
 });
 const jobs = createRoute({
   getParentRoute: () => root,
@@ -48,16 +66,18 @@ const tasks = createRoute({
 const task = createRoute({
   getParentRoute: () => root,
   path: "/tasks/$name",
+  validateSearch: readTrack,
   component: lazyRouteComponent(() => import("./pages/tasks/TaskPage")),
 });
 const model = createRoute({
   getParentRoute: () => root,
   path: "/models/$",
+  validateSearch: readTrack,
   component: lazyRouteComponent(() => import("./pages/models/ModelPage")),
 });
 
 export const router = createRouter({
-  routeTree: root.addChildren([board, sweeps, sweep, jobs, job, compare, tasks, task, model]),
+  routeTree: root.addChildren([board, sweeps, newSweep, twoSweeps, sweep, jobs, job, compare, tasks, task, model]),
   defaultPreload: "intent",
   scrollRestoration: true,
 });

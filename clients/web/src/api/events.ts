@@ -60,20 +60,26 @@ async function readStream(
   }
 }
 
-/** Listens to a stream of events as long as the component is there; connects again by itself. */
+/**
+ * Listens to a stream of events as long as the component is there; connects again by itself.
+ * `after` is the event up to which everything is known when it begins.
+ */
 export function useEvents(
   path: string | null,
   onEvents: (events: ServiceEvent[]) => void,
+  after = 0,
 ): StreamState {
   const [state, setState] = useState<StreamState>("connecting");
   const handler = useRef(onEvents);
+  const begin = useRef(after);
   useEffect(() => {
     handler.current = onEvents;
+    begin.current = after;
   });
   useEffect(() => {
     if (path === null) return;
     const ending = new AbortController();
-    let lastId = 0;
+    let lastId = begin.current;
     let wait = FIRST_WAIT_MS;
     const listen = async (): Promise<void> => {
       while (!ending.signal.aborted) {

@@ -4,6 +4,10 @@ import { client, jsonOf, taken, type Schema } from "./client";
 import type { paths } from "./contract";
 
 export type Board = Schema<"Board">;
+export type Figures = Schema<"Figures">;
+export type Caller = Schema<"CallerView">;
+export type SweepComparison = Schema<"SweepComparison">;
+export type Trouble = Schema<"TroubleView">;
 export type Row = Schema<"Row">;
 export type TaskBoard = Schema<"TaskBoard">;
 export type OverallView = Schema<"OverallView">;
@@ -34,6 +38,23 @@ export const board = (search: BoardSearch) =>
     refetchInterval: 4 * LIVE_MS,
   });
 
+/** What the board's drawings are made of: the same that reports are drawn from. */
+export const figures = (search: BoardSearch) =>
+  queryOptions({
+    queryKey: ["figures", boardQuery(search)],
+    queryFn: () => taken(client.GET("/v1/leaderboard/figures", { params: { query: boardQuery(search) } })),
+    placeholderData: keepPreviousData,
+    refetchInterval: 4 * LIVE_MS,
+  });
+
+/** Who the service takes this tab for. */
+export const caller = () =>
+  queryOptions({
+    queryKey: ["caller"],
+    staleTime: 60_000,
+    queryFn: () => taken(client.GET("/v1/caller", {})),
+  });
+
 export const sweeps = (cursor?: string) =>
   queryOptions({
     queryKey: ["sweeps", cursor ?? ""],
@@ -48,22 +69,28 @@ export const sweep = (id: string) =>
     queryFn: () => taken(client.GET("/v1/sweeps/{sweep_id}", { params: { path: { sweep_id: id } } })),
   });
 
-/** Every job of a sweep, page after page; events keep it true from then on. */
-export const sweepJobs = (id: string) =>
+export const sweepTroubles = (id: string) =>
   queryOptions({
-    queryKey: ["sweep-jobs", id],
-    staleTime: Infinity,
-    queryFn: async () => {
-      const found: JobView[] = [];
-      let cursor: string | undefined;
-      do {
-        const query = { sweep: id, limit: 1000, cursor };
-        const page = await taken(client.GET("/v1/jobs", { params: { query } }));
-        found.push(...page.jobs);
-        cursor = page.next_cursor ?? undefined;
-      } while (cursor !== undefined);
-      return found;
-    },
+    queryKey: ["sweep-troubles", id],
+    refetchInterval: 2 * LIVE_MS,
+    queryFn: () =>
+      taken(client.GET("/v1/sweeps/{sweep_id}/troubles", { params: { path: { sweep_id: id } } })),
+  });
+
+export const sweepComparison = (first: string, second: string) =>
+  queryOptions({
+    queryKey: ["sweep-comparison", first, second],
+    queryFn: () =>
+      jsonOf<SweepComparison>(`/v1/sweeps/${encodeURIComponent(first)}/compare/${encodeURIComponent(second)}`),
+  });
+
+/** Jobs that faults ended: they are in no average until they are retried. */
+export const deadLetters = (id: string) =>
+  queryOptions({
+    queryKey: ["sweep-jobs", id, "errored"],
+    refetchInterval: 3 * LIVE_MS,
+    queryFn: () =>
+      taken(client.GET("/v1/jobs", { params: { query: { sweep: id, outcome: "errored", sort: "finished", limit: 100 } } })),
   });
 
 export const jobPage = (filters: JobFilters) => client.GET("/v1/jobs", { params: { query: filters } });

@@ -1,7 +1,7 @@
 import { Badge, Group, Table, Text } from "@mantine/core";
 import { Link } from "@tanstack/react-router";
 import { useVirtualizer } from "@tanstack/react-virtual";
-import { useRef } from "react";
+import { memo, useRef } from "react";
 import type { JobView } from "../api/queries";
 import { dollars, number, words } from "../format";
 import { Ago } from "./Ago";
@@ -17,7 +17,7 @@ export function JobsTable({ jobs, onEnd }: { jobs: readonly JobView[]; onEnd?: (
     count: jobs.length,
     getScrollElement: () => frame.current,
     estimateSize: () => ROW_PX,
-    overscan: 12,
+    overscan: 6,
     onChange: (instance) => {
       const last = instance.getVirtualItems().at(-1);
       if (last !== undefined && last.index >= jobs.length - 5) onEnd?.();
@@ -60,7 +60,8 @@ export function JobsTable({ jobs, onEnd }: { jobs: readonly JobView[]; onEnd?: (
   );
 }
 
-function JobRow({ job, index }: { job: JobView; index: number }) {
+/** Drawn again only when its job changes: a list that lives has many that do not. */
+const JobRow = memo(function JobRow({ job, index }: { job: JobView; index: number }) {
   return (
     <Table.Tr style={{ height: ROW_PX }} aria-rowindex={index + 2}>
       <Table.Td>
@@ -70,8 +71,8 @@ function JobRow({ job, index }: { job: JobView; index: number }) {
           </Text>
         </Link>
       </Table.Td>
-      <Table.Td>{job.task}</Table.Td>
-      <Table.Td>{job.model}</Table.Td>
+      <Table.Td style={{ whiteSpace: "nowrap" }}>{job.task}</Table.Td>
+      <Table.Td style={{ whiteSpace: "nowrap" }}>{job.model}</Table.Td>
       <Table.Td className="figures">{job.seed}</Table.Td>
       <Table.Td>
         <Group gap={6} wrap="nowrap">
@@ -98,4 +99,4 @@ function JobRow({ job, index }: { job: JobView; index: number }) {
       </Table.Td>
     </Table.Tr>
   );
-}
+});

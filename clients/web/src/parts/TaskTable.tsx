@@ -1,14 +1,18 @@
 import { Badge, Group, Table, Text } from "@mantine/core";
 import { Link } from "@tanstack/react-router";
 import type { Row, TaskBoard } from "../api/queries";
-import { count, dollars, number, percent, places } from "../format";
+import { sharedRanks } from "../pages/board/ranks";
+import { jobsBehind, type BoardSearch } from "../pages/board/search";
+import { count, dollars, measured, number, percent, places } from "../format";
 import { Interval } from "./Interval";
 
 /** All models on one task, the best first. */
-export function TaskTable({ task }: { task: TaskBoard }) {
+export function TaskTable({ task, search = {} }: { task: TaskBoard; search?: BoardSearch }) {
+  const ties = sharedRanks(task.rows);
+  const several = new Set(task.rows.map((row) => row.model)).size < task.rows.length;
   return (
     <Table.ScrollContainer minWidth={820} type="native">
-      <Table highlightOnHover className="sticky-first">
+      <Table highlightOnHover className="sticky-first" aria-label={`Models on ${task.task}`}>
         <Table.Thead>
           <Table.Tr>
             <Table.Th>Model</Table.Th>
@@ -16,7 +20,7 @@ export function TaskTable({ task }: { task: TaskBoard }) {
             <Table.Th className="figures">Place</Table.Th>
             <Table.Th>Success, 95 % interval</Table.Th>
             <Table.Th className="figures">
-              {task.indicator}, {task.unit}
+              {measured(task.indicator, task.unit)}
             </Table.Th>
             <Table.Th className="figures">Best</Table.Th>
             <Table.Th className="figures">Parts</Table.Th>
@@ -26,7 +30,7 @@ export function TaskTable({ task }: { task: TaskBoard }) {
         </Table.Thead>
         <Table.Tbody>
           {task.rows.map((row) => (
-            <TaskRow key={`${row.model} ${row.configuration}`} row={row} task={task.task} />
+            <TaskRow key={`${row.model} ${row.configuration}`} row={row} search={search} tied={row.rank !== null && ties.has(row.rank)} several={several} />
           ))}
         </Table.Tbody>
       </Table>
@@ -34,14 +38,15 @@ export function TaskTable({ task }: { task: TaskBoard }) {
   );
 }
 
-function TaskRow({ row, task }: { row: Row; task: string }) {
+function TaskRow({ row, search, tied, several }: { row: Row; search: BoardSearch; tied: boolean; several: boolean }) {
   const success = `${row.successes} of ${row.trials}`;
   return (
     <Table.Tr>
       <Table.Td>
         <Group gap={6} wrap="nowrap">
-          <Link className="quiet" to="/jobs" search={{ task, model: row.model }}>
+          <Link className="quiet" to="/jobs" search={jobsBehind(row, search)}>
             {row.model}
+            {several && <small> ({row.configuration.slice(0, 8)})</small>}
           </Link>
           {row.flagged > 0 && (
             <Badge size="sm" color="yellow" variant="outline" tt="none" styles={{ root: { color: "inherit" } }}>
@@ -50,24 +55,33 @@ function TaskRow({ row, task }: { row: Row; task: string }) {
           )}
         </Group>
       </Table.Td>
-      <Table.Td className="figures">{row.rank ?? "–"}</Table.Td>
+      <Table.Td className="figures">
+        {row.rank ?? "–"}
+        {tied && <small className="dimmed"> tied</small>}
+      </Table.Td>
       <Table.Td className="figures">{places(row.rank_low, row.rank_high)}</Table.Td>
       <Table.Td>
         <Group gap={8} wrap="nowrap">
           <Interval low={row.success_low} high={row.success_high} value={row.success_rate} from={0} to={1} label={`success ${success}`} />
           <Text size="sm" className="figures" style={{ whiteSpace: "nowrap" }}>
             {percent(row.success_rate)} ({success})
+            <Text span size="xs" className="dimmed" display="block">
+              {percent(row.success_low)} to {percent(row.success_high)}
+            </Text>
           </Text>
         </Group>
       </Table.Td>
       <Table.Td className="figures">
-        {row.censored > 0 ? "≥ " : ""}
+        {row.censored > 0 && row.indicator_mean !== null ? "≥ " : ""}
         {number(row.indicator_mean)}
         <Text size="xs" className="dimmed">
           {row.indicator_low === null ? (row.too_few_data ? "too few data" : "") : `${number(row.indicator_low)} to ${number(row.indicator_high)}`}
         </Text>
       </Table.Td>
-      <Table.Td className="figures">{number(row.indicator_best)}</Table.Td>
+      <Table.Td className="figures">
+        {row.censored > 0 && row.indicator_best !== null ? "≥ " : ""}
+        {number(row.indicator_best)}
+      </Table.Td>
       <Table.Td className="figures">{count(row.parts_mean)}</Table.Td>
       <Table.Td className="figures">{dollars(row.cost_per_success_usd)}</Table.Td>
       <Table.Td className="figures">{percent(row.invalid_action_rate)}</Table.Td>

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from datetime import datetime
-from typing import Any
+from datetime import datetime, timedelta
+from typing import Any, Final
 
 from sqlalchemy import Connection, cast, func, insert, literal, or_, select
 from sqlalchemy.dialects.postgresql import JSONB
@@ -17,6 +17,9 @@ from buildarena_store.tables import events, sweep_jobs
 
 now = func.clock_timestamp()
 """The database's clock: workers' own clocks are never compared."""
+SETTLED_AFTER: Final = timedelta(seconds=5)
+"""Ids are given out before their transactions end, so an event may appear behind later ones:
+readers go back this far."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,6 +62,20 @@ class Events:
         """The greatest id so far; 0 when nothing has happened."""
         with self._database.transaction() as connection:
             return int(connection.execute(select(func.max(events.c.id))).scalar_one() or 0)
+
+    def settled(self) -> int:
+        """An id up to which no further event will appear; 0 when nothing has happened.
+
+        Ids are given out before their transactions end, so the newest ones are left out.
+        """
+        query = (
+            select(events.c.id)
+            .where(events.c.at < now - SETTLED_AFTER)
+            .order_by(events.c.id.desc())
+            .limit(1)
+        )
+        with self._database.statement() as connection:
+            return int(connection.execute(query).scalar() or 0)
 
     def after(
         self,

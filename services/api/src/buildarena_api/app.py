@@ -10,7 +10,7 @@ from fastapi_offline import FastAPIOffline
 from starlette.routing import Route
 
 from buildarena_api.dashboard.files import read_pages
-from buildarena_api.dashboard.serving import Dashboard
+from buildarena_api.dashboard.serving import Dashboard, is_page
 from buildarena_api.events.hub import EventHub
 from buildarena_api.http.access import caller_of
 from buildarena_api.http.answers import KeptAnswers
@@ -29,7 +29,9 @@ from buildarena_api.leaderboard.cache import BoardCache
 from buildarena_api.replays.making import Replays
 from buildarena_api.routes import (
     archives,
+    callers,
     catalogue,
+    comparisons,
     events,
     exports,
     health,
@@ -67,10 +69,11 @@ ORDINARY = (
     leaderboard,
     tasks,
     catalogue,
+    callers,
     keys,
     metrics,
 )
-LIMITED_THEMSELVES = (events, exports, archives)
+LIMITED_THEMSELVES = (events, exports, archives, comparisons)
 """Routes whose requests take long, and don't count among a caller's ordinary ones."""
 DESCRIPTION = """Find out whether language models can engineer: submit task x model x seed jobs,
 watch machines being built and simulated, and read the leaderboard. Errors are RFC 9457 problem
@@ -160,6 +163,6 @@ def _add_middleware(app: FastAPI) -> None:
     ]
     app.add_middleware(MethodMiddleware, routes=routes)
     if not app.state.context.settings.require_keys:
-        app.add_middleware(LocalOnlyMiddleware)
+        app.add_middleware(LocalOnlyMiddleware, is_page=is_page)
     app.add_middleware(RequestLog, metrics=app.state.metrics)
     app.add_middleware(OverloadMiddleware)

@@ -197,6 +197,22 @@ class SweepView(_Answer):
     spec: dict[str, Any]
     budget: BudgetView | None
     progress: ProgressView
+    last_event: int = Field(
+        description="What later requests answer holds every event up to this one: whoever has "
+        "read the jobs gives it as `Last-Event-ID` and hears only what happened since"
+    )
+
+
+class TroubleView(_Answer):
+    """Attempts at a sweep's jobs that failed alike; faults never count as failures of a model."""
+
+    model: str
+    stage: AnyStage
+    result: Literal[AttemptResult.FAULT, AttemptResult.LOST]
+    detail: str | None = Field(description="A sentence for people")
+    attempts: int
+    jobs: int = Field(description="Of how many jobs")
+    newest: datetime = Field(description="When the last one ended")
 
 
 class SweepAccepted(_Answer):

@@ -2,9 +2,10 @@ import { Anchor, Group, Stack, Text, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { getRouteApi, Link } from "@tanstack/react-router";
 import { lazy, Suspense } from "react";
-import { board, type Board } from "../../api/queries";
+import { board, type Board, type TaskBoard } from "../../api/queries";
 import { Section } from "../../parts/Section";
 import { Answered, Empty, Loading } from "../../parts/States";
+import { TaskTable } from "../../parts/TaskTable";
 import { Controls } from "./Controls";
 import { Exports } from "./Exports";
 import { HeatMap } from "./HeatMap";
@@ -33,6 +34,10 @@ export default function BoardPage() {
   );
 }
 
+function shown(task: TaskBoard, search: BoardSearch): TaskBoard {
+  return search.baselines === "no" ? { ...task, rows: task.rows.filter((row) => !row.baseline) } : task;
+}
+
 function Found({ found, search }: { found: Board; search: BoardSearch }) {
   if (found.track === null) {
     return (
@@ -53,6 +58,19 @@ function Found({ found, search }: { found: Board; search: BoardSearch }) {
       </Section>
       <Section title="Model by task">
         <HeatMap board={found} search={search} />
+        <details style={{ marginTop: 12 }}>
+          <summary style={{ cursor: "pointer", fontSize: 14 }}>Every figure, task by task</summary>
+          <Stack gap="lg" mt="md">
+            {found.tasks.map((task) => (
+              <div key={task.task}>
+                <Title order={3} size="h5" mb={4}>
+                  {task.task}
+                </Title>
+                <TaskTable task={shown(task, search)} search={search} />
+              </div>
+            ))}
+          </Stack>
+        </details>
       </Section>
       <Suspense fallback={<Loading rows={8} />}>
         <BoardPlots board={found} search={search} />

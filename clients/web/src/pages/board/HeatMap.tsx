@@ -1,8 +1,9 @@
 import { Group, SegmentedControl, Text } from "@mantine/core";
 import { Link, useNavigate } from "@tanstack/react-router";
 import type { Board, Row, TaskBoard } from "../../api/queries";
-import { dollars, number, percent } from "../../format";
-import type { BoardSearch, Figure } from "./search";
+import { dollars, measured, number, percent } from "../../format";
+import { cellOf, entriesOf, type Entry } from "./entries";
+import { jobsBehind, type BoardSearch, type Figure } from "./search";
 import { shade, shareOf } from "./shades";
 
 const FIGURES: readonly { value: Figure; label: string }[] = [
@@ -10,22 +11,6 @@ const FIGURES: readonly { value: Figure; label: string }[] = [
   { value: "indicator", label: "Indicator" },
   { value: "cost", label: "Cost" },
 ];
-
-/** Models in the order of the overall ranking, then those that it does not have. */
-export function modelsInOrder(board: Board, baselines: boolean): string[] {
-  const ranked = board.overall.map((row) => row.model);
-  const others = board.tasks.flatMap((task) => task.rows.map((row) => row.model));
-  const hidden = new Set(
-    baselines ? [] : board.tasks.flatMap((task) => task.rows.filter((row) => row.baseline).map((row) => row.model)),
-  );
-  return [...new Set([...ranked, ...others])].filter((model) => !hidden.has(model));
-}
-
-/** The rows of a model that has several configurations: the one with the most trials stands for it. */
-export function cellOf(task: TaskBoard, model: string): Row | undefined {
-  const rows = task.rows.filter((row) => row.model === model);
-  return rows.sort((a, b) => b.trials - a.trials)[0];
-}
 
 function valueOf(row: Row | undefined, figure: Figure): number | null {
   if (row === undefined) return null;
@@ -37,7 +22,7 @@ function valueOf(row: Row | undefined, figure: Figure): number | null {
 export function HeatMap({ board, search }: { board: Board; search: BoardSearch }) {
   const navigate = useNavigate({ from: "/" });
   const figure = search.figure ?? "success";
-  const models = modelsInOrder(board, search.baselines !== "no");
+  const entries = entriesOf(board, search.baselines !== "no");
   return (
     <>
       <Group justify="space-between" mb="xs">
@@ -75,7 +60,7 @@ export function HeatMap({ board, search }: { board: Board; search: BoardSearch }
                   </Link>
                   {figure === "indicator" && (
                     <Text size="xs" className="dimmed">
-                      {task.indicator}, {task.unit}
+                      {measured(task.indicator, task.unit)}
                     </Text>
                   )}
                 </th>
@@ -83,16 +68,16 @@ export function HeatMap({ board, search }: { board: Board; search: BoardSearch }
             </tr>
           </thead>
           <tbody>
-            {models.map((model) => (
-              <tr key={model}>
+            {entries.map((entry) => (
+              <tr key={entry.key}>
                 <th scope="row" style={{ textAlign: "left", paddingRight: 10 }}>
                   <Text size="sm" fw={500} style={{ whiteSpace: "nowrap" }}>
-                    {model}
+                    {entry.label}
                   </Text>
                 </th>
                 {board.tasks.map((task) => (
                   <td key={task.task}>
-                    <Cell task={task} model={model} figure={figure} models={models} />
+                    <Cell task={task} entry={entry} figure={figure} entries={entries} search={search} />
                   </td>
                 ))}
               </tr>
@@ -105,22 +90,31 @@ export function HeatMap({ board, search }: { board: Board; search: BoardSearch }
   );
 }
 
-function Cell({ task, model, figure, models }: { task: TaskBoard; model: string; figure: Figure; models: string[] }) {
-  const row = cellOf(task, model);
+interface CellOf {
+  task: TaskBoard;
+  entry: Entry;
+  figure: Figure;
+  entries: readonly Entry[];
+  search: BoardSearch;
+}
+
+function Cell({ task, entry, figure, entries, search }: CellOf) {
+  const row = cellOf(task, entry);
   const value = valueOf(row, figure);
   if (row === undefined || value === null) {
     return <span className="heat-cell heat-empty">–</span>;
   }
-  const values = models.map((other) => valueOf(cellOf(task, other), figure));
+  const values = entries.map((other) => valueOf(cellOf(task, other), figure));
   const share = figure === "success" ? value : (shareOf(value, values) ?? 0);
   const shown = { success: percent(value), indicator: number(value), cost: dollars(value) }[figure];
+  const interval = `95 % interval ${percent(row.success_low)} to ${percent(row.success_high)}`;
   return (
     <Link
       className="heat-cell"
       to="/jobs"
-      search={{ task: task.task, model }}
+      search={jobsBehind(row, search)}
       style={shade(figure === "cost" ? 1 - share : share)}
-      title={`${model} on ${task.task}: ${row.successes} of ${row.trials} succeeded`}
+      title={`${entry.label} on ${task.task}: ${row.successes} of ${row.trials} succeeded, ${interval}${row.flagged > 0 ? `; ${row.flagged} flagged` : ""}`}
     >
       <span>
         {row.censored > 0 && figure === "indicator" ? "≥ " : ""}

@@ -3,6 +3,8 @@ import { Link } from "@tanstack/react-router";
 import type { Board, OverallView } from "../../api/queries";
 import { count, dollars, number, percent, places } from "../../format";
 import { Interval } from "../../parts/Interval";
+import { entriesOf, keyOf } from "./entries";
+import { sharedRanks } from "./ranks";
 import type { BoardSearch } from "./search";
 
 type Entry = Pick<OverallView, "rank" | "rank_low" | "rank_high" | "mean_rank" | "model">;
@@ -10,6 +12,7 @@ type Entry = Pick<OverallView, "rank" | "rank_low" | "rank_high" | "mean_rank" |
 /** Models ranked over all tasks of the board, with the intervals of their places. */
 export function Overall({ board, search }: { board: Board; search: BoardSearch }) {
   const overall = board.overall.filter((row) => search.baselines !== "no" || !row.baseline);
+  const labels = new Map(entriesOf(board, true).map((entry) => [entry.key, entry.label]));
   const published = search.paper === "yes" ? board.published : [];
   const most = Math.max(1, ...[...overall, ...published].map((row) => row.rank_high ?? 1));
   const ties = sharedRanks(overall);
@@ -31,12 +34,12 @@ export function Overall({ board, search }: { board: Board; search: BoardSearch }
         </Table.Thead>
         <Table.Tbody>
           {overall.map((row) => (
-            <OverallRow key={`${row.model} ${row.configuration}`} row={row} most={most} tied={row.rank !== null && ties.has(row.rank)} />
+            <OverallRow key={keyOf(row)} row={row} label={labels.get(keyOf(row)) ?? row.model} most={most} tied={row.rank !== null && ties.has(row.rank)} />
           ))}
           {published.map((row) => (
             <Table.Tr key={`paper ${row.model}`} className="ghost">
               <Table.Td>
-                <Group gap={6} wrap="nowrap">
+                <Group gap={6} maw={{ base: 150, sm: 420 }}>
                   {row.model}
                   <Badge variant="outline" color="gray" size="sm" tt="none" styles={{ root: { color: "inherit" } }}>
                     paper
@@ -56,18 +59,6 @@ export function Overall({ board, search }: { board: Board; search: BoardSearch }
   );
 }
 
-/** Ranks that several models share. */
-export function sharedRanks(rows: readonly { rank: number | null }[]): Set<number> {
-  const seen = new Set<number>();
-  const shared = new Set<number>();
-  for (const { rank } of rows) {
-    if (rank === null) continue;
-    if (seen.has(rank)) shared.add(rank);
-    seen.add(rank);
-  }
-  return shared;
-}
-
 function Place({ row, most, tied }: { row: Entry; most: number; tied: boolean }) {
   const interval = places(row.rank_low, row.rank_high);
   return (
@@ -80,7 +71,7 @@ function Place({ row, most, tied }: { row: Entry; most: number; tied: boolean })
             {row.rank}
             {tied && (
               <Tooltip label="Statistically tied: the trials do not show which is better">
-                <Text span size="xs" ml={4} className="dimmed">
+                <Text span size="xs" ml={4} className="dimmed" tabIndex={0}>
                   tied
                 </Text>
               </Tooltip>
@@ -100,13 +91,13 @@ function Place({ row, most, tied }: { row: Entry; most: number; tied: boolean })
   );
 }
 
-function OverallRow({ row, most, tied }: { row: OverallView; most: number; tied: boolean }) {
+function OverallRow({ row, label, most, tied }: { row: OverallView; label: string; most: number; tied: boolean }) {
   return (
     <Table.Tr>
       <Table.Td>
-        <Group gap={6} wrap="nowrap">
+        <Group gap={6} maw={{ base: 150, sm: 420 }}>
           <Link className="quiet" to="/models/$" params={{ _splat: row.model }}>
-            <b>{row.model}</b>
+            <b>{label}</b>
           </Link>
           {row.baseline && (
             <Badge variant="outline" color="gray" size="sm" tt="none" styles={{ root: { color: "inherit" } }}>

@@ -1,8 +1,10 @@
 import { describe, expect, it } from "vitest";
 import { boardQuery } from "../../api/queries";
 import { exportPath } from "./Exports";
-import { sharedRanks } from "./Overall";
-import { readSearch } from "./search";
+import { sharedRanks } from "./ranks";
+import { partsOf } from "./Failures";
+import { spotOf } from "./Radar";
+import { jobsBehind, readSearch } from "./search";
 import { shade, shareOf } from "./shades";
 
 describe("readSearch", () => {
@@ -45,5 +47,26 @@ describe("shares", () => {
 
   it("of ranks are found, and no rank is no tie", () => {
     expect([...sharedRanks([{ rank: 1 }, { rank: 1 }, { rank: 3 }, { rank: null }, { rank: null }])]).toEqual([1]);
+  });
+});
+
+describe("drawings", () => {
+  it("have each dimension on an axis of its own, the first on top", () => {
+    expect(spotOf(0, 4, 1)).toEqual({ x: 0, y: 1 });
+    expect(spotOf(1, 4, 0.5).x).toBeCloseTo(0.5);
+    expect(spotOf(2, 4, 1).y).toBeCloseTo(-1);
+  });
+  it("share a model's jobs out completely, the most frequent first", () => {
+    const parts = partsOf([{ label: "a", counts: { one: 1, two_x: 3 } }, { label: "b", counts: {} }, { label: "c", counts: { one: 1 } }]);
+    expect(parts.map((part) => [part.label, part.name, part.share])).toEqual([["a", "two x", 0.75], ["a", "one", 0.25], ["c", "one", 1]]);
+  });
+});
+describe("a cell", () => {
+  it("opens exactly the jobs that the service names, within the board's days", () => {
+    const jobs = "/v1/jobs?task=a%26b&model=builtin%2Fx&track=t%2F1&task_version=v&configuration=c";
+    expect(jobsBehind({ jobs }, { since: "2026-01-02" })).toEqual({
+      ...{ task: "a&b", model: "builtin/x", track: "t/1", task_version: "v", configuration: "c", state: "done" },
+      since: "2026-01-02T00:00:00Z",
+    });
   });
 });

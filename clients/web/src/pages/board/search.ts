@@ -1,3 +1,6 @@
+import type { Row } from "../../api/queries";
+import { readJobsSearch, type JobsSearch } from "../job/search";
+
 export type Figure = "success" | "indicator" | "cost";
 
 /** What the address of the board says; everything else follows from it. */
@@ -41,4 +44,14 @@ export function readSearch(raw: Record<string, unknown>): BoardSearch {
     baselines: oneOf(raw.baselines, "no"),
     paper: oneOf(raw.paper, "yes"),
   };
+}
+
+/** The jobs that a row counts, as the address of a list: the service says which, the board's days bound them. */
+export function jobsBehind(row: Pick<Row, "jobs">, search: Pick<BoardSearch, "since" | "until">): JobsSearch {
+  const words = new URL(row.jobs, "http://here").searchParams;
+  const days = {
+    since: search.since === undefined ? undefined : `${search.since}T00:00:00Z`,
+    until: search.until === undefined ? undefined : `${search.until}T00:00:00Z`,
+  };
+  return readJobsSearch({ ...Object.fromEntries(words), state: "done", ...days });
 }

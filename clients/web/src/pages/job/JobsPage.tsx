@@ -11,6 +11,7 @@ import type { JobsSearch } from "./search";
 
 const route = getRouteApi("/jobs");
 const PAGE = 200;
+const LONGEST = 34;
 const REFRESH_MS = 10_000;
 const OUTCOMES = ["success", "unsuccessful", "construction_failed", "limit", "errored", "cancelled"];
 const STATES = ["queued", "running", "on_hold", "done"];
@@ -65,7 +66,7 @@ function Filters({ search }: { search: JobsSearch }) {
     ["state", "State", STATES],
     ["outcome", "Outcome", OUTCOMES],
   ];
-  const others = (["sweep", "reason", "flag"] as const).filter((name) => search[name] !== undefined && search[name] !== null);
+  const others = (["sweep", "reason", "flag", "track", "task_version", "configuration", "since", "until"] as const).filter((name) => search[name] !== undefined && search[name] !== null);
   const set = (name: keyof JobsSearch, value: string | null): void => {
     void navigate({ search: (before) => ({ ...before, [name]: value ?? undefined }), replace: true });
   };
@@ -95,7 +96,7 @@ function Filters({ search }: { search: JobsSearch }) {
             set(name, null);
           }}
         >
-          {name}: {search[name]} ✕
+          {words(name)}: {(search[name] ?? "").slice(0, LONGEST)} ✕
         </Button>
       ))}
     </Group>

@@ -1,9 +1,12 @@
 import type { JobFilters } from "../../api/queries";
 
-/** What the address of a list of jobs says. */
-export type JobsSearch = Pick<JobFilters, "task" | "model" | "sweep" | "state" | "outcome" | "reason" | "flag">;
+const NAMES = [
+  ...(["task", "model", "sweep", "state", "outcome", "reason", "flag"] as const),
+  ...(["track", "task_version", "configuration", "since", "until"] as const),
+] as const;
 
-const NAMES = ["task", "model", "sweep", "state", "outcome", "reason", "flag"] as const;
+/** What the address of a list of jobs says. */
+export type JobsSearch = Pick<JobFilters, (typeof NAMES)[number]>;
 
 /** Reads an address; the API refuses what no job can have, and says what would be valid. */
 export function readJobsSearch(raw: Record<string, unknown>): JobsSearch {

@@ -5,7 +5,8 @@ import { IconBan, IconPlayerPause, IconPlayerPlay, IconRefresh } from "@tabler/i
 import { useMutation, useQueryClient } from "@tanstack/react-query";
 import { client, taken } from "../../api/client";
 import { headline } from "../../api/problem";
-import { sweep as sweepQuery, sweepJobs, type SweepView } from "../../api/queries";
+import { sweep as sweepQuery, type SweepView } from "../../api/queries";
+import { mayChange, useCaller } from "../../parts/may";
 import { possible } from "./live";
 
 type Act = "pause" | "resume" | "cancel" | "retry";
@@ -26,12 +27,14 @@ export function Actions({ sweep }: { sweep: SweepView }) {
     mutationFn: (what: Act) => act(sweep.id, what),
     onSuccess: (view) => {
       queries.setQueryData(sweepQuery(sweep.id).queryKey, view);
-      void queries.invalidateQueries({ queryKey: sweepJobs(sweep.id).queryKey });
+      void queries.invalidateQueries({ queryKey: ["sweep-jobs", sweep.id] });
     },
     onError: (error) => {
       notifications.show({ color: "red", title: headline(error), message: error.message });
     },
   });
+  const who = useCaller();
+  if (!mayChange(who, sweep.owner)) return null;
   const can = possible(sweep.state);
   const button = (what: Act, label: string, icon: React.ReactNode, onClick: () => void) => (
     <Button key={what} size="xs" variant="default" leftSection={icon} loading={doing.isPending && doing.variables === what} onClick={onClick}>

@@ -1,10 +1,8 @@
 import { Group, Text } from "@mantine/core";
 import { Link } from "@tanstack/react-router";
-import { useMemo } from "react";
-import type { JobView } from "../../api/queries";
-import { words } from "../../format";
+import { count, words } from "../../format";
 import { OUTCOME_COLOURS } from "../../theme";
-import { grid, type CellCounts } from "./live";
+import type { CellCounts, Moment } from "./live";
 
 /** The order of a cell's parts, from good to open. */
 const ORDER = ["success", "unsuccessful", "construction_failed", "limit", "errored", "cancelled", "running", "on_hold", "queued"];
@@ -15,10 +13,9 @@ function colour(name: string): string {
 }
 
 /** A task x model grid that fills up as jobs end. */
-export function Grid({ jobs, sweep }: { jobs: readonly JobView[]; sweep: string }) {
-  const models = useMemo(() => grid(jobs), [jobs]);
-  const tasks = [...new Set(jobs.map((job) => job.task))].sort();
-  const names = ORDER.filter((name) => jobs.some((job) => (job.outcome ?? job.state) === name));
+export function Grid({ moment, sweep }: { moment: Moment; sweep: string }) {
+  const { cells: models, tasks, totals } = moment;
+  const names = ORDER.filter((name) => totals.has(name));
   return (
     <>
       <Group gap="md" mb="xs">
@@ -26,7 +23,7 @@ export function Grid({ jobs, sweep }: { jobs: readonly JobView[]; sweep: string 
           <Group key={name} gap={5}>
             <span aria-hidden style={{ width: 12, height: 12, borderRadius: 3, background: colour(name) }} />
             <Text size="xs">
-              {words(name)}: {jobs.filter((job) => (job.outcome ?? job.state) === name).length}
+              {words(name)}: {count(totals.get(name))}
             </Text>
           </Group>
         ))}

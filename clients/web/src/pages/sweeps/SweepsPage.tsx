@@ -1,9 +1,11 @@
-import { Badge, Group, Progress, Stack, Table, Text, Title } from "@mantine/core";
+import { Badge, Button, Group, Progress, Stack, Table, Text, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { Link } from "@tanstack/react-router";
+import { useState } from "react";
 import { sweeps, type SweepView } from "../../api/queries";
 import { count, dollars, words } from "../../format";
 import { Ago } from "../../parts/Ago";
+import { has, useCaller } from "../../parts/may";
 import { Answered, Empty } from "../../parts/States";
 import { OUTCOME_COLOURS } from "../../theme";
 
@@ -17,10 +19,24 @@ export const SWEEP_COLOURS: Readonly<Record<string, string>> = {
 
 /** Sweeps, the newest first. */
 export default function SweepsPage() {
-  const query = useQuery(sweeps());
+  const [cursors, setCursors] = useState<readonly string[]>([]);
+  const query = useQuery(sweeps(cursors.at(-1)));
+  const who = useCaller();
   return (
     <Stack gap="md">
-      <Title order={1}>Sweeps</Title>
+      <Group justify="space-between">
+        <Title order={1}>Sweeps</Title>
+        <Group gap="xs">
+          <Button size="xs" variant="default" renderRoot={(props) => <Link to="/sweeps/compare" {...props} />}>
+            Compare two
+          </Button>
+          {has(who, "submit") && (
+            <Button size="xs" renderRoot={(props) => <Link to="/sweeps/new" {...props} />}>
+              New sweep
+            </Button>
+          )}
+        </Group>
+      </Group>
       <Answered query={query}>
         {(page) =>
           page.sweeps.length === 0 ? (
@@ -46,6 +62,18 @@ export default function SweepsPage() {
                   ))}
                 </Table.Tbody>
               </Table>
+              <Group mt="sm" gap="xs">
+                {cursors.length > 0 && (
+                  <Button size="xs" variant="default" onClick={() => { setCursors(cursors.slice(0, -1)); }}>
+                    Newer
+                  </Button>
+                )}
+                {page.next_cursor !== null && (
+                  <Button size="xs" variant="default" onClick={() => { setCursors([...cursors, page.next_cursor ?? ""]); }}>
+                    Older
+                  </Button>
+                )}
+              </Group>
             </Table.ScrollContainer>
           )
         }
@@ -56,7 +84,7 @@ export default function SweepsPage() {
 
 export function SweepState({ state }: { state: string }) {
   return (
-    <Badge variant="outline" color={SWEEP_COLOURS[state] ?? "gray"} tt="none" styles={{ root: { color: "var(--mantine-color-text)" } }}>
+    <Badge variant="outline" color={SWEEP_COLOURS[state] ?? "gray"} tt="none" styles={{ root: { color: "var(--mantine-color-text)", minWidth: "max-content" } }}>
       {words(state)}
     </Badge>
   );
@@ -65,7 +93,8 @@ export function SweepState({ state }: { state: string }) {
 /** A bar of how a sweep's jobs ended; its label says it in figures. */
 export function OutcomeBar({ sweep, size = 12 }: { sweep: SweepView; size?: number }) {
   const { total, outcomes } = sweep.progress;
-  const parts = Object.entries(outcomes);
+  const places = Object.keys(OUTCOME_COLOURS);
+  const parts = Object.entries(outcomes).sort(([one], [another]) => places.indexOf(one) - places.indexOf(another));
   const label = `${sweep.progress.done} of ${total} ended: ${parts.map(([name, n]) => `${n} ${words(name)}`).join(", ")}`;
   return (
     <Progress.Root size={size} role="img" aria-label={label} title={label}>

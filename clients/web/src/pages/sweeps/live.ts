@@ -14,34 +14,20 @@ function knownAt(job: JobView): number {
   return Math.max(...times.map((time) => (time === null ? 0 : Date.parse(time))));
 }
 
-function changed(job: JobView, event: ServiceEvent): JobView | null {
+/** A job after an event, or null when that says nothing new. */
+export function changed(job: JobView, event: ServiceEvent): JobView | null {
   const state = STATES[event.kind];
-  // A stream begins with what happened long ago: that never takes back what was read since.
+  // A stream begins with what happened a while ago: that never takes back what was read since.
   if (state === undefined || Date.parse(event.at) < knownAt(job)) return null;
   if (state === "done") {
+    if (job.state === "done") return null;
     const outcome = typeof event.data.outcome === "string" ? event.data.outcome : null;
-    return { ...job, state, outcome: outcome as JobView["outcome"], finished_at: event.at };
+    const reason = typeof event.data.reason === "string" ? event.data.reason : null;
+    return { ...job, state, outcome: outcome as JobView["outcome"], reason, finished_at: event.at };
   }
   const stage = event.data.stage === "simulate" ? "simulate" : "construct";
   if (job.state === state && job.stage === stage) return null;
   return { ...job, state, stage, outcome: null, finished_at: null };
-}
-
-/** The jobs after some events; the same array when nothing changed. */
-export function applyEvents(jobs: readonly JobView[], events: readonly ServiceEvent[]): readonly JobView[] {
-  const places = new Map(jobs.map((job, index) => [job.id, index]));
-  const next = [...jobs];
-  let any = false;
-  for (const event of events) {
-    const place = event.job === null ? undefined : places.get(event.job);
-    const before = place === undefined ? undefined : next[place];
-    if (place === undefined || before === undefined) continue;
-    const after = changed(before, event);
-    if (after === null) continue;
-    next[place] = after;
-    any = true;
-  }
-  return any ? next : jobs;
 }
 
 export interface CellCounts {
@@ -49,19 +35,13 @@ export interface CellCounts {
   counts: ReadonlyMap<string, number>;
 }
 
-/** Jobs by model and task, each cell by outcome or state. */
-export function grid(jobs: readonly JobView[]): Map<string, Map<string, CellCounts>> {
-  const models = new Map<string, Map<string, { total: number; counts: Map<string, number> }>>();
-  for (const job of jobs) {
-    const row = models.get(job.model) ?? new Map<string, { total: number; counts: Map<string, number> }>();
-    models.set(job.model, row);
-    const cell = row.get(job.task) ?? { total: 0, counts: new Map<string, number>() };
-    row.set(job.task, cell);
-    const name = job.outcome ?? job.state;
-    cell.total += 1;
-    cell.counts.set(name, (cell.counts.get(name) ?? 0) + 1);
-  }
-  return models;
+/** A moment of a sweep. Its jobs and cells are those of the sweep itself: read, never changed. */
+export interface Moment {
+  jobs: readonly JobView[];
+  cells: ReadonlyMap<string, ReadonlyMap<string, CellCounts>>;
+  totals: ReadonlyMap<string, number>;
+  tasks: readonly string[];
+  rate: Rate;
 }
 
 export interface Rate {
@@ -73,15 +53,92 @@ const WINDOW_MS = 5 * 60_000;
 const FEWEST = 3;
 
 /** How fast jobs end, by those of the last five minutes before the newest end. */
-export function rate(jobs: readonly JobView[]): Rate {
-  const ends = jobs.flatMap((job) => (job.finished_at === null ? [] : [Date.parse(job.finished_at)]));
-  const left = jobs.filter((job) => job.state !== "done").length;
-  const newest = Math.max(...ends);
+export function rate(ends: readonly number[], left: number): Rate {
+  let newest = -Infinity;
+  for (const end of ends) newest = Math.max(newest, end);
   const recent = ends.filter((end) => end > newest - WINDOW_MS);
-  const span = newest - Math.min(...recent);
+  const span = recent.reduce((most, end) => Math.max(most, newest - end), 0);
   if (recent.length < FEWEST || span <= 0) return { perMinute: null, leftSeconds: null };
   const perMs = (recent.length - 1) / span;
   return { perMinute: perMs * 60_000, leftSeconds: left === 0 ? 0 : left / perMs / 1000 };
+}
+
+function standing(job: JobView): string {
+  return job.outcome ?? job.state;
+}
+
+/**
+ * The jobs of a sweep, kept true by events: each costs as much as it changes, whatever the size of the sweep.
+ */
+export class LiveJobs {
+  private readonly jobs: JobView[] = [];
+  private readonly places = new Map<string, number>();
+  private readonly cells = new Map<string, Map<string, { total: number; counts: Map<string, number> }>>();
+  private readonly totals = new Map<string, number>();
+  private readonly ends = new Map<string, number>();
+  private readonly tasks = new Set<string>();
+
+  /** Takes in jobs as they were read; what events have said since stays. */
+  add(read: readonly JobView[]): void {
+    for (const job of read) {
+      const place = this.places.get(job.id);
+      const before = place === undefined ? undefined : this.jobs[place];
+      if (place === undefined || before === undefined) {
+        this.places.set(job.id, this.jobs.push(job) - 1);
+        this.count(job, 1);
+      } else if (knownAt(job) >= knownAt(before)) {
+        this.replace(place, before, job);
+      }
+    }
+  }
+
+  /** Takes in events; the number of jobs that ended by them. */
+  apply(events: readonly ServiceEvent[]): number {
+    let ended = 0;
+    for (const event of events) {
+      const place = event.job === null ? undefined : this.places.get(event.job);
+      const before = place === undefined ? undefined : this.jobs[place];
+      if (place === undefined || before === undefined) continue;
+      const after = changed(before, event);
+      if (after === null) continue;
+      this.replace(place, before, after);
+      if (after.state === "done") ended += 1;
+    }
+    return ended;
+  }
+
+  moment(): Moment {
+    return {
+      jobs: this.jobs,
+      cells: this.cells,
+      totals: this.totals,
+      tasks: [...this.tasks].sort(),
+      rate: rate([...this.ends.values()], this.jobs.length - this.ends.size),
+    };
+  }
+
+  private replace(place: number, before: JobView, after: JobView): void {
+    this.count(before, -1);
+    this.jobs[place] = after;
+    this.count(after, 1);
+  }
+
+  private count(job: JobView, by: 1 | -1): void {
+    const name = standing(job);
+    const row = this.cells.get(job.model) ?? new Map<string, { total: number; counts: Map<string, number> }>();
+    this.cells.set(job.model, row);
+    const cell = row.get(job.task) ?? { total: 0, counts: new Map<string, number>() };
+    row.set(job.task, cell);
+    cell.total += by;
+    for (const counts of [cell.counts, this.totals]) {
+      const n = (counts.get(name) ?? 0) + by;
+      if (n === 0) counts.delete(name);
+      else counts.set(name, n);
+    }
+    this.tasks.add(job.task);
+    if (by === 1 && job.finished_at !== null && job.state === "done") this.ends.set(job.id, Date.parse(job.finished_at));
+    else this.ends.delete(job.id);
+  }
 }
 
 /** What can be done with a sweep in its state. */

@@ -1,16 +1,19 @@
 import { Badge, Group, Stack, Table, Text, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
-import { getRouteApi, Link } from "@tanstack/react-router";
+import { getRouteApi, Link, useNavigate } from "@tanstack/react-router";
 import { lazy, Suspense } from "react";
 import { board, task as taskQuery, type TaskDetail } from "../../api/queries";
-import { words } from "../../format";
+import { measured, words } from "../../format";
 import { Markdown } from "../../parts/Markdown";
 import { Section } from "../../parts/Section";
 import { Answered, Empty, Loading } from "../../parts/States";
 import { TaskTable } from "../../parts/TaskTable";
+import { TrackSelect } from "../../parts/TrackSelect";
 import type { Scenario } from "../../scene/Surroundings";
 import { flattened } from "../job/JobRecords";
+import { Machines } from "./Machines";
 
+const Distribution = lazy(() => import("./Distribution"));
 const ScenarioView = lazy(() => import("../../scene/ScenarioView"));
 const route = getRouteApi("/tasks/$name");
 
@@ -34,14 +37,14 @@ export default function TaskPage() {
                 </Badge>
               )}
               <Text size="sm" className="dimmed">
-                {task.name} · version {task.version} · ranked by {words(task.indicator)}, {task.unit} ·{" "}
+                {task.name} · version {task.version} · ranked by {measured(task.indicator, task.unit)} ·{" "}
                 <Link to="/jobs" search={{ task: task.name }}>
                   jobs
                 </Link>
               </Text>
             </Group>
           </div>
-          <Standings name={name} />
+          <Standings task={task} />
           <Group align="start" gap="lg" wrap="wrap">
             <div style={{ flex: "1 1 380px", minWidth: 0 }}>
               <Section title="Statement">
@@ -59,24 +62,40 @@ export default function TaskPage() {
               </Section>
             </Stack>
           </Group>
+          <Machines task={task} />
         </Stack>
       )}
     </Answered>
   );
 }
 
-function Standings({ name }: { name: string }) {
-  const query = useQuery(board({ task: [name] }));
+function Standings({ task }: { task: TaskDetail }) {
+  const { track } = route.useSearch();
+  const query = useQuery(board({ task: [task.name], track }));
   return (
-    <Section title="Models">
-      <Answered query={query}>
-        {(found) => {
-          const task = found.tasks.find((one) => one.task === name);
-          return task === undefined || task.rows.length === 0 ? <Empty title="No job of this task has ended" /> : <TaskTable task={task} />;
-        }}
-      </Answered>
-    </Section>
+    <Answered query={query}>
+      {(found) => {
+        const ranked = found.tasks.find((one) => one.task === task.name);
+        return (
+          <>
+            <Section title="Models" aside={<Tracks known={found.tracks} chosen={found.track} />}>
+              {ranked === undefined || ranked.rows.length === 0 ? <Empty title="No job of this task has ended on this track" /> : <TaskTable task={ranked} />}
+            </Section>
+            {found.track !== null && (
+              <Suspense fallback={<Loading rows={5} />}>
+                <Distribution task={task} track={found.track} />
+              </Suspense>
+            )}
+          </>
+        );
+      }}
+    </Answered>
   );
+}
+
+function Tracks({ known, chosen }: { known: readonly string[]; chosen: string | null }) {
+  const navigate = useNavigate({ from: "/tasks/$name" });
+  return <TrackSelect known={known} chosen={chosen} onTrack={(track) => void navigate({ search: { track }, replace: true, resetScroll: false })} />;
 }
 
 function Rules({ task }: { task: TaskDetail }) {

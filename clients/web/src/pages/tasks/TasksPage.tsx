@@ -2,7 +2,7 @@ import { Badge, Card, Group, SimpleGrid, Stack, Text, Title } from "@mantine/cor
 import { useQuery } from "@tanstack/react-query";
 import { Link } from "@tanstack/react-router";
 import { tasks, type TaskView } from "../../api/queries";
-import { words } from "../../format";
+import { measured, words } from "../../format";
 import { Answered } from "../../parts/States";
 import { goalOf } from "./goal";
 
@@ -59,7 +59,7 @@ function TaskCard({ task }: { task: TaskView }) {
         {goalOf(task.statement)}
       </Text>
       <Text size="xs" mt="xs" className="dimmed">
-        ranked by {words(task.indicator)}, {task.unit}
+        ranked by {measured(task.indicator, task.unit)}
       </Text>
     </Card>
   );

@@ -60,6 +60,8 @@ class JobFilter:
         indicator_min: Only jobs with this indicator or a greater one.
         indicator_max: Only jobs with this indicator or a smaller one.
         text: Only jobs in whose id, task, model, reason or detail it stands, in any case.
+        since: Only jobs that ended then or later.
+        until: Only jobs that ended before.
         equals: Column values to match.
     """
 
@@ -69,6 +71,8 @@ class JobFilter:
     indicator_min: float | None = None
     indicator_max: float | None = None
     text: str | None = None
+    since: datetime | None = None
+    until: datetime | None = None
     equals: Mapping[str, str | int | None] = field(default_factory=dict)
 
 
@@ -121,6 +125,10 @@ def _conditions(wanted: JobFilter) -> list[ColumnElement[bool]]:
         found.append(jobs.c.indicator >= wanted.indicator_min)
     if wanted.indicator_max is not None:
         found.append(jobs.c.indicator <= wanted.indicator_max)
+    if wanted.since is not None:
+        found.append(jobs.c.finished_at >= wanted.since)
+    if wanted.until is not None:
+        found.append(jobs.c.finished_at < wanted.until)
     if wanted.text is not None:
         columns = (jobs.c[name] for name in ("id", "task", "model", "reason", "detail"))
         found.append(or_(*(column.icontains(wanted.text, autoescape=True) for column in columns)))

@@ -16,8 +16,8 @@ from buildarena_store.database import Database
 from buildarena_store.errors import UnknownIdError
 from buildarena_store.ids import begins_with
 from buildarena_store.rows import bound_texts, columns_of, value_of
-from buildarena_store.states import JobState, SweepState
-from buildarena_store.tables import jobs, sweep_jobs, sweeps
+from buildarena_store.states import AttemptResult, JobState, SweepState
+from buildarena_store.tables import attempts, jobs, sweep_jobs, sweeps
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,6 +82,29 @@ class SweepProgress:
     def done(self) -> int:
         """Jobs that have ended, however."""
         return sum(self.outcomes.values())
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trouble:
+    """Attempts at a sweep's jobs that failed alike and were, or will be, made again.
+
+    Attributes:
+        model: Whose jobs.
+        stage: At which stage.
+        result: How they ended: ``fault`` or ``lost``.
+        detail: A sentence for people, if there was one.
+        attempts: How many.
+        jobs: Of how many jobs.
+        newest: When the last one ended.
+    """
+
+    model: str
+    stage: str
+    result: str
+    detail: str | None
+    attempts: int
+    jobs: int
+    newest: datetime
 
 
 class Sweeps:
@@ -203,6 +226,35 @@ class Sweeps:
             input_tokens=int(sum(row.input_tokens for row in rows)),
             output_tokens=int(sum(row.output_tokens for row in rows)),
         )
+
+    def troubles(self, sweep_id: str, *, limit: int) -> list[Trouble]:
+        """Attempts at the sweep's jobs that faults ended or whose worker was lost, newest first.
+
+        Args:
+            sweep_id: The sweep.
+            limit: Kinds of trouble at most.
+        """
+        newest = func.max(attempts.c.ended_at)
+        alike = jobs.c.model, attempts.c.stage, attempts.c.result, attempts.c.detail
+        query = (
+            select(
+                *alike,
+                func.count().label("attempts"),
+                func.count(jobs.c.id.distinct()).label("jobs"),
+                newest.label("newest"),
+            )
+            .join(jobs, jobs.c.id == attempts.c.job_id)
+            .join(sweep_jobs, sweep_jobs.c.job_id == attempts.c.job_id)
+            .where(
+                sweep_jobs.c.sweep_id == sweep_id,
+                attempts.c.result.in_([AttemptResult.FAULT, AttemptResult.LOST]),
+            )
+            .group_by(*alike)
+            .order_by(newest.desc(), *alike)
+            .limit(limit)
+        )
+        with self._database.transaction() as connection:
+            return [value_of(Trouble, row) for row in connection.execute(query)]
 
     def job_ids(self, sweep_id: str) -> list[str]:
         """Ids of all the sweep's jobs."""

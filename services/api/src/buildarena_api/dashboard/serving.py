@@ -41,6 +41,11 @@ service shows it here after its next start.</p>
 """
 
 
+def is_page(path: str) -> bool:
+    """Whether a path is a page's; no route of the API has such a path."""
+    return PAGE.fullmatch(path) is not None
+
+
 class Dashboard:
     """An ASGI application for the paths that no route has.
 
@@ -65,7 +70,7 @@ class Dashboard:
         headers = Headers(scope=scope)
         if path != INDEX and path in self._files:
             return _answer(self._files[path], headers)
-        if PAGE.fullmatch(path) is None:
+        if not is_page(path):
             return None
         if INDEX not in self._files:
             return HTMLResponse(NOT_BUILT, headers={"Content-Security-Policy": POLICY})

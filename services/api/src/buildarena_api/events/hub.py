@@ -10,7 +10,7 @@ import asyncio
 from collections.abc import AsyncIterator
 from contextlib import suppress
 from dataclasses import dataclass, field
-from datetime import datetime, timedelta
+from datetime import datetime
 
 import structlog
 from sqlalchemy.exc import SQLAlchemyError
@@ -19,6 +19,7 @@ from buildarena_api.events.texts import event_texts
 from buildarena_api.http.own_pool import OwnPool
 from buildarena_pipeline.turns import Transcripts
 from buildarena_store import Event
+from buildarena_store.events import SETTLED_AFTER
 from buildarena_store.states import TURN
 
 log = structlog.get_logger(__name__)
@@ -26,9 +27,6 @@ log = structlog.get_logger(__name__)
 POLL_S = 0.5
 KEYS_EVERY_S = 2.0
 """How long a stream may outlive the key that it was opened with."""
-SETTLED_AFTER = timedelta(seconds=5)
-"""Ids are given out before their transactions end, so an event may appear behind later ones:
-reading goes back this far."""
 PAGE = 1000
 JOB_PAGE = 50
 """Events of a job that are read at once: those that are turns may be long."""

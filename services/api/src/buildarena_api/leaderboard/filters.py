@@ -65,12 +65,7 @@ def select_board(
     for number in level or ():
         if number not in levels:
             raise unknown("level", str(number), [str(known) for known in levels])
-    for field, time in (("since", since), ("until", until)):
-        if time is not None and time.tzinfo is None:
-            message = f"{time.isoformat()} has no time zone"
-            raise ProblemError(
-                422, f"{field}: {message}", errors=[ValidationIssue(path=field, message=message)]
-            )
+    require_zones(since=since, until=until)
     chosen = None
     if task or level:
         chosen = frozenset(
@@ -92,6 +87,23 @@ def select_board(
             overall=None if task else frozenset(builtin_tasks()),
         ),
     )
+
+
+def require_zones(**times: datetime | None) -> None:
+    """Refuses times that leave open when they are.
+
+    Args:
+        times: By the name that requests give them.
+
+    Raises:
+        ProblemError: One has no zone.
+    """
+    for field, time in times.items():
+        if time is not None and time.tzinfo is None:
+            message = f"{time.isoformat()} has no time zone"
+            raise ProblemError(
+                422, f"{field}: {message}", errors=[ValidationIssue(path=field, message=message)]
+            )
 
 
 SelectionDep = Annotated[Selection, Depends(select_board)]

@@ -215,6 +215,8 @@ def board_view(
         for found in board.tasks
     }
 
+    versions = {found.task: found.version for found in board.tasks}
+
     def is_baseline(model: str) -> bool:
         return model in registry.models and registry.models[model].baseline
 
@@ -222,6 +224,11 @@ def board_view(
         cell: Cell = ranked.cell
         values = {name: getattr(cell, name) for name in Cell.__dataclass_fields__}
         query = urlencode({"task": task, "model": cell.model})
+        one = {
+            "track": track,
+            "task_version": versions[task],
+            "configuration": cell.configuration,
+        }
         return Row.model_validate(
             {
                 **values,
@@ -229,7 +236,7 @@ def board_view(
                 "rank_low": ranked.rank_low,
                 "rank_high": ranked.rank_high,
                 "baseline": is_baseline(cell.model),
-                "jobs": f"/v1/jobs?{query}",
+                "jobs": f"/v1/jobs?{query}&{urlencode(one)}",
                 "manifest": f"/v1/leaderboard/manifest?{query}&{urlencode({'track': track})}",
             }
         )

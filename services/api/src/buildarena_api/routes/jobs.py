@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from datetime import datetime
 from hashlib import sha256
 from typing import Annotated, Literal
 
@@ -12,7 +13,7 @@ from buildarena_api.dependencies import ContextDep, IdPrefix, RegistryDep, Submi
 from buildarena_api.http import cursors
 from buildarena_api.http.access import CallerDep
 from buildarena_api.http.problems import ProblemError, problem_responses
-from buildarena_api.leaderboard.filters import unknown
+from buildarena_api.leaderboard.filters import require_zones, unknown
 from buildarena_api.routes.transcripts import as_markdown
 from buildarena_api.schemas import (
     AnyJobState,
@@ -59,6 +60,13 @@ def list_jobs(
     sweep: Annotated[str | None, Query(description="Only this sweep's jobs")] = None,
     task: Annotated[str | None, Query()] = None,
     model: Annotated[str | None, Query()] = None,
+    track: Annotated[str | None, Query()] = None,
+    task_version: Annotated[str | None, Query()] = None,
+    configuration: Annotated[
+        str | None, Query(description="Of the model: hash of its decoding and limits too")
+    ] = None,
+    since: Annotated[datetime | None, Query(description="Only jobs ended then or later")] = None,
+    until: Annotated[datetime | None, Query(description="Only jobs ended before")] = None,
     state: Annotated[AnyJobState | None, Query()] = None,
     outcome: Annotated[AnyOutcome | None, Query()] = None,
     reason: Annotated[str | None, Query(description="Class of the failure")] = None,
@@ -93,6 +101,7 @@ def list_jobs(
     A value that no job can have is refused with the choices. A cursor is good for the order that
     it was made in.
     """
+    require_zones(since=since, until=until)
     if sweep is not None:
         context.store.sweeps.get(sweep)
     in_order = Order(by=sort, descending=order == "desc")
@@ -107,9 +116,14 @@ def list_jobs(
             indicator_min=indicator_min,
             indicator_max=indicator_max,
             text=text,
+            since=since,
+            until=until,
             equals={
                 "task": task,
+                "task_version": task_version,
                 "model": model,
+                "model_hash": configuration,
+                "track": track,
                 "state": state,
                 "outcome": outcome,
                 "reason": reason,
@@ -118,7 +132,9 @@ def list_jobs(
     )
     if not found:
         _require_known(
-            context, registry, {"task": task, "model": model, "reason": reason, "flag": flag}
+            context,
+            registry,
+            {"task": task, "model": model, "track": track, "reason": reason, "flag": flag},
         )
     more = len(found) == limit
     return JobPage(

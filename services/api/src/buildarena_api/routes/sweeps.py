@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Final
 
 from fastapi import APIRouter, Header, Query, Response
 from pydantic import BaseModel, ConfigDict
@@ -20,6 +20,7 @@ from buildarena_api.schemas import (
     SweepEstimate,
     SweepPage,
     SweepView,
+    TroubleView,
 )
 from buildarena_pipeline.catalog.specs import Budget, SweepSpec
 from buildarena_pipeline.runtime.context import Context
@@ -29,6 +30,8 @@ from buildarena_store import Sweep, SweepState
 from buildarena_store.states import CONSTRUCT_QUEUE
 
 router = APIRouter(prefix="/v1/sweeps", tags=["sweeps"])
+MAX_TROUBLES: Final = 50
+"""Kinds of trouble that one answer has."""
 
 
 RequestKey = Annotated[
@@ -168,6 +171,7 @@ def list_sweeps(
     id_prefix: IdPrefix = None,
 ) -> SweepPage:
     """Lists sweeps, newest first."""
+    last_event = context.store.events.settled()
     found = context.store.sweeps.page(
         limit=limit,
         after=None if cursor is None else cursors.decode(cursor),
@@ -175,7 +179,7 @@ def list_sweeps(
     )
     more = len(found) == limit
     return SweepPage(
-        sweeps=[_view(context, sweep) for sweep in found],
+        sweeps=[_view(context, sweep, last_event) for sweep in found],
         next_cursor=cursors.encode(found[-1].created_at, found[-1].id) if more else None,
     )
 
@@ -186,7 +190,21 @@ def show_sweep(sweep_id: str, context: ContextDep) -> SweepView:
     return _view(context, context.store.sweeps.get(sweep_id))
 
 
-def _view(context: Context, sweep: Sweep) -> SweepView:
+@router.get("/{sweep_id}/troubles", responses=problem_responses(404, 503))
+def sweep_troubles(sweep_id: str, context: ContextDep) -> list[TroubleView]:
+    """Attempts at the sweep's jobs that faults ended, at providers say; the newest kinds first.
+
+    Transient ones are made again; jobs that ended by them have the outcome `errored`.
+    """
+    context.store.sweeps.get(sweep_id)
+    found = context.store.sweeps.troubles(sweep_id, limit=MAX_TROUBLES)
+    return [TroubleView.model_validate(trouble) for trouble in found]
+
+
+def _view(context: Context, sweep: Sweep, last_event: int | None = None) -> SweepView:
+    if last_event is None:
+        # Read before the progress, which then holds all that it says.
+        last_event = context.store.events.settled()
     progress = context.store.sweeps.progress(sweep.id)
     ended = sweep.state == SweepState.ACTIVE and progress.done == progress.total
     state: Any = DONE if ended else sweep.state
@@ -199,4 +217,5 @@ def _view(context: Context, sweep: Sweep) -> SweepView:
         spec=dict(sweep.spec),
         budget=BudgetView.of(context.store.budgets.get(sweep.id)),
         progress=ProgressView.of(progress),
+        last_event=last_event,
     )

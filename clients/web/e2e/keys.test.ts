@@ -1,0 +1,41 @@
+import { chromium, type Browser } from "playwright-core";
+import { afterAll, beforeAll, describe, expect, it } from "vitest";
+
+/** A service that asks for keys; without one there is nothing to test here. */
+const GUARDED = process.env.BUILDARENA_WEB_GUARDED_URL ?? "";
+const ADMIN = process.env.BUILDARENA_WEB_ADMIN_KEY ?? "";
+const CHROMIUM = process.env.BUILDARENA_CHROMIUM ?? "/usr/bin/chromium";
+
+let browser: Browser;
+
+beforeAll(async () => {
+  browser = await chromium.launch({ executablePath: CHROMIUM, args: ["--no-sandbox"] });
+});
+afterAll(() => browser.close());
+
+describe.skipIf(GUARDED === "")("with keys required", () => {
+  async function made(scope: string): Promise<string> {
+    const answer = await fetch(`${GUARDED}/v1/keys`, {
+      method: "POST",
+      body: JSON.stringify({ name: scope, scopes: [scope] }),
+      headers: { "Content-Type": "application/json", Authorization: `Bearer ${ADMIN}` },
+    });
+    return ((await answer.json()) as { secret: string }).secret;
+  }
+
+  it.each([["read", 0], ["submit", 1]])("a key of the scope %s has %d ways to submit, and is gone with its tab", async (scope, buttons) => {
+    const secret = await made(scope);
+    const context = await browser.newContext();
+    const page = await context.newPage();
+    await page.goto(`${GUARDED}/sweeps`);
+    await page.getByRole("alert").getByLabel("API key").fill(secret);
+    await page.getByRole("button", { name: "Use", exact: true }).click();
+    await page.getByText("Nobody has submitted a sweep").waitFor();
+    await expect.poll(() => page.getByRole("link", { name: "New sweep" }).count()).toBe(buttons);
+    const other = await context.newPage();
+    await other.goto(`${GUARDED}/sweeps`);
+    await other.getByRole("alert").waitFor();
+    expect(JSON.stringify(await context.storageState())).not.toContain(secret);
+    await context.close();
+  });
+});
