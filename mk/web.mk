@@ -1,4 +1,4 @@
-.PHONY: web test-web bench-web
+.PHONY: web test-web bench-web screenshots
 
 WEB := clients/web
 WEB_OUT := services/api/src/buildarena_api/pages
@@ -23,8 +23,9 @@ test-web: $(WEB_STAMP) ## Types, lint, logic and pages of the dashboard, in a re
 	@bash mk/node.sh npm --prefix $(WEB) test
 	@BUILDARENA_TEST_WEB=1 $(BIN)/pytest tests/web -rs
 
-bench-web: $(WEB_STAMP) ## Measures the dashboard's pages in a browser that draws in software
+bench-web: $(WEB_STAMP) ## Measures the pages in a browser that draws in software, and a sweep of 10,000 jobs
 	@$(BIN)/python tests/benchmarks/web/bench_web.py
+	@$(BIN)/python tests/benchmarks/web/bench_sweep_page.py --json .buildarena/bench-web.json
 
 # People who look at a service want its pages; without them it runs all the same.
 up: | web-if-it-can-be
@@ -32,11 +33,6 @@ up: | web-if-it-can-be
 .PHONY: web-if-it-can-be
 web-if-it-can-be: $(STAMP)
 	@$(MAKE) --no-print-directory web || echo "The dashboard could not be built; the service runs without its pages."
-
-.PHONY: bench-web screenshots
-
-bench-web: $(WEB_STAMP) ## Measures a sweep's page at 10,000 jobs while they end; JSON in .buildarena/
-	@$(BIN)/python tests/benchmarks/web/bench_sweep_page.py --json .buildarena/bench-web.json
 
 # ALL=folder photographs every page there, light and dark, 1280 and 390 wide, in place of docs/images.
 screenshots: $(WEB_STAMP) ## Photographs the dashboard on a demo of its own into docs/images; ALL=FOLDER: every page
