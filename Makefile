@@ -27,18 +27,18 @@ demo: $(STAMP) ## One small sweep from start to leaderboard; stops everything at
 up: $(STAMP) ## The whole service on this machine until Ctrl-C
 	@$(BIN)/buildarena up
 
-test: check ## Lints, types, import rules and all tests
-	@echo "== 5/5 tests, $(WORKERS) at once (left out: make chaos, peer and bench-*)"
+test: check check-web-if-it-can-be ## Lints, types, import rules and all tests
+	@echo "== 6/6 tests, $(WORKERS) at once (left out: make chaos, peer and bench-*)"
 	@$(BIN)/pytest -n $(WORKERS) --dist loadgroup -rs
 
 check: $(STAMP) ## Lints, types and import rules alone
-	@echo "== 1/5 format"
+	@echo "== 1/6 format"
 	@$(BIN)/ruff format --check --quiet $(CODE)
-	@echo "== 2/5 lint"
+	@echo "== 2/6 lint"
 	@$(BIN)/ruff check --quiet $(CODE)
-	@echo "== 3/5 types"
+	@echo "== 3/6 types"
 	@$(BIN)/mypy --no-error-summary $(addsuffix /src,$(PACKAGES)) migrations/env.py
-	@echo "== 4/5 import rules"
+	@echo "== 4/6 import rules"
 	@set -o pipefail; $(BIN)/lint-imports --no-cache | tail -n 3
 
 clean: ## Removes the environment, caches and local data

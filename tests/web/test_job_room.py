@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
 from pathlib import Path
 
 import httpx
 import psutil
+from pages import in_browser, needs_pages
+from provider_standin import ProviderStandIn
 from running import finished, running_stack
-from tests.web import test_pages
 from tests.web.random_machines import built_session
-from tests.web.test_pages import CHROMIUM, LONGEST_S, NODE, WEB
 
-pytestmark = test_pages.pytestmark
+pytestmark = needs_pages
 
 MACHINES, A_SESSION = 50, 10
+LATENCY_S = 0.3
 SWEEP = {
     "name": "room",
     "tasks": ["support-1"],
@@ -26,14 +25,15 @@ SWEEP = {
 }
 
 
-def processes(*names: str) -> list[int]:
-    """The service's processes with one of these words among theirs."""
+def processes(*names: str) -> str:
+    """Ids of the service's processes with one of these words among theirs."""
     found = []
     for process in psutil.Process().children(recursive=True):
         words = process.cmdline()
         if any(any(name in word for word in words) for name in names):
-            found.append(process.pid)
-    return found
+            found.append(str(process.pid))
+    assert found
+    return ",".join(found)
 
 
 def test_the_room_of_a_job_shows_what_is(tmp_path: Path) -> None:
@@ -43,28 +43,28 @@ def test_the_room_of_a_job_shows_what_is(tmp_path: Path) -> None:
             groups = [range(k, k + A_SESSION) for k in range(0, MACHINES, A_SESSION)]
             sessions = [built_session(client, f"random-{g[0]}", g) for g in groups]
             finished(client, sweep)
-        tried = [step for session in sessions for step in session["steps"] if step["ghosts"]]
-        assert tried
+        assert any(step["ghosts"] for session in sessions for step in session["steps"])
         file = tmp_path / "machines.json"
         file.write_text(json.dumps(sessions))
-        killed = processes("buildarena_api", "buildarena_worker")
-        assert killed
-        command = ["bash", str(NODE), "npm", "--prefix", str(WEB), "run", "--silent", "test:pages"]
-        done = subprocess.run(
-            [*command, "--", "e2e/room.test.ts", "--disable-console-intercept"],
-            cwd=NODE.parents[1],
-            env={
-                **os.environ,
-                "BUILDARENA_WEB_URL": stack.url,
-                "BUILDARENA_CHROMIUM": str(CHROMIUM),
-                "BUILDARENA_WEB_MACHINES": str(file),
-                "BUILDARENA_WEB_KILL": ",".join(map(str, killed)),
-                "NO_COLOR": "1",
-            },
-            capture_output=True,
-            text=True,
-            timeout=LONGEST_S,
-            check=False,
+        in_browser(stack.url, ["e2e/room"], BUILDARENA_WEB_MACHINES=str(file))
+
+
+def test_a_session_is_watched_while_processes_die(tmp_path: Path) -> None:
+    with ProviderStandIn("expert", latency_s=LATENCY_S) as standin:
+        models = tmp_path / "models.yaml"
+        models.write_text(
+            f"providers:\n  standin: {{wire: openai, base_url: '{standin.url}/v1'}}\n"
+            "models:\n  - {name: standin/expert, provider: standin, model: expert}\n"
         )
-    print(done.stdout[-3000:])  # noqa: T201 - the measured figures, for who asks with -s
-    assert done.returncode == 0, done.stdout[-6000:] + done.stderr[-2000:]
+        with running_stack(tmp_path, models_file=models) as stack:
+            wish = {"task": "support-1", "model": "standin/expert", "simulator": "mujoco"}
+            job = httpx.post(f"{stack.url}/v1/jobs", json=wish).raise_for_status().json()["id"]
+            print(  # noqa: T201 - the measured figures, for who asks with -s
+                in_browser(
+                    stack.url,
+                    ["e2e/live"],
+                    BUILDARENA_WEB_PLAYED=job,
+                    BUILDARENA_WEB_WORKERS=processes("buildarena_worker"),
+                    BUILDARENA_WEB_APIS=processes("buildarena_api"),
+                )
+            )

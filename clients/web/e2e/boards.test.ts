@@ -1,16 +1,14 @@
 import { AxeBuilder } from "@axe-core/playwright";
 import { readFileSync } from "node:fs";
-import { chromium, type Browser, type BrowserContext, type Page } from "playwright-core";
+import type { Browser, BrowserContext, Page } from "playwright-core";
 import { afterAll, beforeAll, describe, expect, it } from "vitest";
 import type { components } from "../src/api/contract";
+import { launched, URL_OF_SERVICE, visit, type Visit } from "./browser";
 import { count, dollars, number, percent, places } from "../src/format";
 
 type Schemas = components["schemas"];
 
-const URL_OF_SERVICE = process.env.BUILDARENA_WEB_URL ?? "";
 const REPORT = process.env.BUILDARENA_WEB_REPORT ?? "";
-const CHROMIUM = process.env.BUILDARENA_CHROMIUM ?? "/usr/bin/chromium";
-const ARGUMENTS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"];
 const TASK = "support-1";
 /** No worker of the tests' service runs this simulator, so its jobs wait once they are built. */
 const WAITING = { tasks: [TASK], models: ["builtin/expert"], simulator: "pybullet" };
@@ -24,13 +22,8 @@ async function ask<Data>(path: string, body?: unknown): Promise<Data> {
   return (await answer.json()) as Data;
 }
 
-async function opened(path: string, url = URL_OF_SERVICE, width = 1280): Promise<{ page: Page; context: BrowserContext }> {
-  const context = await browser.newContext({ viewport: { width, height: 900 }, colorScheme: width < 800 ? "dark" : "light" });
-  const page = await context.newPage();
-  await page.goto(url + path);
-  await page.locator("h1").waitFor();
-  await page.waitForFunction(() => document.querySelector("[aria-busy=true]") === null);
-  return { page, context };
+function opened(path: string, url = URL_OF_SERVICE, width = 1280): Promise<Visit> {
+  return visit(browser, path, { url, width, scheme: width < 800 ? "dark" : "light" });
 }
 
 async function textsOf(page: Page, table: string): Promise<string[][]> {
@@ -56,7 +49,7 @@ function agree(page: string, report: string): boolean {
 }
 
 beforeAll(async () => {
-  browser = await chromium.launch({ executablePath: CHROMIUM, args: ARGUMENTS });
+  browser = await launched();
 });
 afterAll(() => browser.close());
 

@@ -1,21 +1,55 @@
-import { chromium, type Browser, type Page } from "playwright-core";
+import { chromium, type Browser, type BrowserContext, type Page } from "playwright-core";
 
 export const URL_OF_SERVICE = process.env.BUILDARENA_WEB_URL ?? "";
 const CHROMIUM = process.env.BUILDARENA_CHROMIUM ?? "/usr/bin/chromium";
 // A machine without a graphics card draws 3D all the same; tests step faster than people.
 const ARGUMENTS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-ipc-flooding-protection"];
 
+const FACES = "ABCDEF";
+/** Arguments that put a block on a face of another. */
+export const ATTACH = (base: number, face: number): Record<string, string> => ({
+  base_block: String(base),
+  face: FACES[face % 6] ?? "A",
+  new_block: "Small Wooden Block",
+});
+
 export function launched(): Promise<Browser> {
   return chromium.launch({ executablePath: CHROMIUM, args: ARGUMENTS });
 }
 
-/** Opens a page of the service and waits until it has read what it shows. */
-export async function opened(browser: Browser, path: string, width = 1280): Promise<Page> {
-  const page = await (await browser.newContext({ viewport: { width, height: 900 } })).newPage();
-  await page.goto(URL_OF_SERVICE + path);
+/** Waits until a page has read what it shows. */
+export async function settled(page: Page): Promise<void> {
   await page.locator("h1").waitFor();
   await page.waitForFunction(() => document.querySelector("[aria-busy=true]") === null);
-  return page;
+}
+
+export interface Visit {
+  page: Page;
+  context: BrowserContext;
+  /** Errors that the page's console told. */
+  faults: string[];
+}
+
+/** Opens a page for somebody new and waits until it has read what it shows. */
+export async function visit(
+  browser: Browser,
+  path: string,
+  { url = URL_OF_SERVICE, width = 1280, scheme = "light" }: { url?: string; width?: number; scheme?: "light" | "dark" } = {},
+): Promise<Visit> {
+  const context = await browser.newContext({ viewport: { width, height: 900 }, colorScheme: scheme });
+  const page = await context.newPage();
+  const faults: string[] = [];
+  page.on("pageerror", (error) => faults.push(String(error)));
+  page.on("console", (message) => {
+    if (message.type() === "error") faults.push(message.text());
+  });
+  await page.goto(url + path);
+  await settled(page);
+  return { page, context, faults };
+}
+
+export async function opened(browser: Browser, path: string, width = 1280): Promise<Page> {
+  return (await visit(browser, path, { width })).page;
 }
 
 /** Calls a tool in an agent's session; tries again while the service does not answer. */

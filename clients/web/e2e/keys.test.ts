@@ -1,15 +1,15 @@
-import { chromium, type Browser } from "playwright-core";
+import type { Browser } from "playwright-core";
 import { afterAll, beforeAll, describe, expect, it } from "vitest";
+import { launched } from "./browser";
 
 /** A service that asks for keys; without one there is nothing to test here. */
 const GUARDED = process.env.BUILDARENA_WEB_GUARDED_URL ?? "";
 const ADMIN = process.env.BUILDARENA_WEB_ADMIN_KEY ?? "";
-const CHROMIUM = process.env.BUILDARENA_CHROMIUM ?? "/usr/bin/chromium";
 
 let browser: Browser;
 
 beforeAll(async () => {
-  browser = await chromium.launch({ executablePath: CHROMIUM, args: ["--no-sandbox"] });
+  browser = await launched();
 });
 afterAll(() => browser.close());
 

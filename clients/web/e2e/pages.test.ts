@@ -1,11 +1,7 @@
 import { AxeBuilder } from "@axe-core/playwright";
-import { chromium, type Browser, type BrowserContext, type Page } from "playwright-core";
+import type { Browser } from "playwright-core";
 import { afterAll, beforeAll, describe, expect, it } from "vitest";
-
-const URL_OF_SERVICE = process.env.BUILDARENA_WEB_URL ?? "";
-const CHROMIUM = process.env.BUILDARENA_CHROMIUM ?? "/usr/bin/chromium";
-// A machine without a graphics card draws 3D all the same.
-const ARGUMENTS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"];
+import { launched, URL_OF_SERVICE, visit, type Visit } from "./browser";
 
 let browser: Browser;
 let sweep = "";
@@ -16,30 +12,14 @@ async function json(path: string): Promise<Record<string, { id: string }[]>> {
 }
 
 beforeAll(async () => {
-  browser = await chromium.launch({ executablePath: CHROMIUM, args: ARGUMENTS });
+  browser = await launched();
   sweep = (await json("/v1/sweeps")).sweeps?.[0]?.id ?? "";
   built = (await json("/v1/jobs?model=builtin/expert&outcome=success")).jobs?.[0]?.id ?? "";
 });
 afterAll(() => browser.close());
 
-interface Opened {
-  page: Page;
-  faults: string[];
-  context: BrowserContext;
-}
-
-async function open(path: string, width = 1280, scheme: "light" | "dark" = "light"): Promise<Opened> {
-  const context = await browser.newContext({ viewport: { width, height: 900 }, colorScheme: scheme });
-  const page = await context.newPage();
-  const faults: string[] = [];
-  page.on("pageerror", (error) => faults.push(String(error)));
-  page.on("console", (message) => {
-    if (message.type() === "error") faults.push(message.text());
-  });
-  await page.goto(URL_OF_SERVICE + path);
-  await page.locator("h1").waitFor();
-  await page.waitForFunction(() => document.querySelector("[aria-busy=true]") === null);
-  return { page, faults, context };
+function open(path: string, width = 1280, scheme: "light" | "dark" = "light"): Promise<Visit> {
+  return visit(browser, path, { width, scheme });
 }
 
 const PAGES: readonly (readonly [string, () => string])[] = [

@@ -2,7 +2,7 @@ import { readFileSync } from "node:fs";
 import { AxeBuilder } from "@axe-core/playwright";
 import type { Browser, Page } from "playwright-core";
 import { afterAll, beforeAll, describe, expect, it } from "vitest";
-import { act, launched, opened, openSession, URL_OF_SERVICE } from "./browser";
+import { act, ATTACH, launched, opened, openSession, URL_OF_SERVICE } from "./browser";
 
 /** Poses of blocks by id, as (x, y, z, w, x, y, z), and those of refused blocks. */
 interface Expected {
@@ -12,9 +12,6 @@ interface Expected {
 
 const FILE = process.env.BUILDARENA_WEB_MACHINES ?? "";
 const sessions: Expected[] = FILE === "" ? [] : (JSON.parse(readFileSync(FILE, "utf8")) as Expected[]);
-const PIDS = (process.env.BUILDARENA_WEB_KILL ?? "").split(",").filter((pid) => pid !== "");
-const AXIS = "ABCDEF";
-const ATTACH = (base: number, face: number) => ({ base_block: String(base), face: AXIS[face % 6], new_block: "Small Wooden Block" });
 
 let browser: Browser;
 beforeAll(async () => {
@@ -119,42 +116,6 @@ describe.skipIf(sessions.length === 0)("random machines", () => {
   });
 });
 
-describe.skipIf(PIDS.length === 0)("a session under way", () => {
-  it("builds before the reader's eyes, also over a service that dies; no turn is lost or doubled", async () => {
-    const session = await openSession("watched");
-    const page = await opened(browser, `/jobs/${session}`);
-    await page.locator("[data-live=live]").waitFor();
-    await page.evaluate(() => Object.assign(window, { kept: true }));
-    const waits: number[] = [];
-    const total = 36;
-    const before = 31;
-    for (let turn = 0; turn < total; turn += 1) {
-      const began = performance.now();
-      await act(session, turn === 0 ? "start" : "attach_block_to", turn === 0 ? {} : ATTACH(1 + Math.floor(turn / 3), turn));
-      await page.waitForFunction((count) => document.querySelector("[data-steps]")?.getAttribute("data-steps") === String(count), turn + 1, { timeout: 40_000 });
-      if (turn < before) waits.push(performance.now() - began);
-      if (turn === before - 1) for (const pid of PIDS) process.kill(Number(pid), "SIGKILL");
-    }
-    waits.sort((a, b) => a - b);
-    const median = waits[before >> 1] ?? Infinity;
-    console.log(JSON.stringify({ live_turns: waits.length, median_ms: Math.round(median), worst_ms: Math.round(waits.at(-1) ?? 0) }));
-    expect(median).toBeLessThan(1500);
-    expect(await page.getByText(`${total} turns`, { exact: true }).count()).toBe(1);
-    expect(await page.evaluate(() => "kept" in window)).toBe(true);
-    const seen = new Set<string>();
-    const box = page.getByRole("region", { name: "Transcript, scrolls" });
-    for (let top = 0; top < 20; top += 1) {
-      await box.evaluate((element, at) => { element.scrollTop = at * 400; }, top);
-      await page.waitForTimeout(30);
-      const now = await page.locator("[data-turn]").evaluateAll((found) => found.map((one) => one.getAttribute("data-turn") ?? ""));
-      expect(new Set(now).size).toBe(now.length);
-      for (const one of now) seen.add(one);
-    }
-    expect(seen.size).toBe(total);
-    await page.close();
-  });
-});
-
 describe.skipIf(sessions.length === 0)("two jobs", () => {
   it("stand side by side, seen by cameras that turn together", async () => {
     const { jobs } = (await (await fetch(`${URL_OF_SERVICE}/v1/jobs?task=support-1&state=done&outcome=success`)).json()) as { jobs: { id: string }[] };
@@ -174,12 +135,18 @@ describe.skipIf(sessions.length === 0)("two jobs", () => {
     const [before] = await eyes();
     const box = await page.locator("[data-trial=a] canvas").boundingBox();
     if (box === null) throw new Error("no drawing");
-    await page.mouse.move(box.x + 100, box.y + 100);
-    await page.mouse.down();
-    await page.mouse.move(box.x + 220, box.y + 140, { steps: 4 });
-    await page.mouse.up();
-    await expect.poll(async () => (await eyes())[1], { timeout: 5000 }).toEqual((await eyes())[0]);
-    expect((await eyes())[0]).not.toEqual(before);
+    // Where software draws, the hands may be there before the picture can be turned.
+    const turned = async (): Promise<number[] | undefined> => {
+      await page.mouse.move(box.x + 100, box.y + 100);
+      await page.mouse.down();
+      await page.mouse.move(box.x + 220, box.y + 140, { steps: 4 });
+      await page.mouse.up();
+      return (await eyes())[0];
+    };
+    await expect.poll(turned, { timeout: 10_000, interval: 500 }).not.toEqual(before);
+    await expect
+      .poll(async () => new Set((await eyes()).map((eye) => eye.join())).size, { timeout: 10_000 })
+      .toBe(1);
     await page.close();
   });
 });
