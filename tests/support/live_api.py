@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -23,9 +22,10 @@ LOOPBACK = "http://127.0.0.1"
 @contextmanager
 def live_api(context: Context) -> Iterator[str]:
     """Serves the API of a context; yields its URL."""
-    # Commands run in this process too: its log must not be part of what they print.
+    # Commands run in this process too: its log must not be part of what they print, nor of what the
+    # suite prints.
     usual_logs = structlog.get_config()
-    structlog.configure(logger_factory=structlog.PrintLoggerFactory(file=sys.__stderr__))
+    structlog.configure(logger_factory=structlog.ReturnLoggerFactory())
     port = free_port()
     config = uvicorn.Config(
         create_app(context, load_registry()), host="127.0.0.1", port=port, log_config=None
