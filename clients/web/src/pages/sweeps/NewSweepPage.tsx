@@ -6,11 +6,12 @@ import { lazy, Suspense, useMemo, useRef, useState } from "react";
 import { client, taken, type Schema } from "../../api/client";
 import { ApiError } from "../../api/problem";
 import { models, tasks } from "../../api/queries";
+import { isSite } from "../../api/site";
 import { compact, count, dollars } from "../../format";
 import { has, useCaller } from "../../parts/may";
 import { ProblemNote } from "../../parts/Problem";
 import { Section } from "../../parts/Section";
-import { Loading } from "../../parts/States";
+import { Empty, Loading } from "../../parts/States";
 import type { Known } from "./spec/completion";
 import { Form } from "./spec/Form";
 import { faultsOf, readSpec, type Fault, type SweepSpec } from "./spec/spec";
@@ -55,6 +56,10 @@ function useKnown(): Known {
 
 /** A sweep from a form or as YAML; what it would take is told before it is submitted. */
 export default function NewSweepPage() {
+  return isSite ? <Empty title="Sweeps are submitted to a running service">This is a published copy of its results.</Empty> : <Writing />;
+}
+
+function Writing() {
   const [text, setText] = useState(BEGIN);
   const [way, setWay] = useState("form");
   const known = useKnown();
