@@ -136,7 +136,9 @@ def leaderboard(
     return conditional(request, answer, "application/json")
 
 
-@router.get("/leaderboard/figures", response_model=Figures, responses=problem_responses(404, 422, 503))
+@router.get(
+    "/leaderboard/figures", response_model=Figures, responses=problem_responses(404, 422, 503)
+)
 def figures(boards: BoardsDep, selection: SelectionDep, request: Request) -> Any:
     """What the figures of a board are drawn from; reports are drawn from the same."""
     track, reading = selection.track, selection.query.reading
