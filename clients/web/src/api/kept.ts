@@ -5,6 +5,8 @@ import { SITE, type Site } from "./site";
 const JOB = /^\/v1\/jobs\/([^/]+)/;
 /** Nobody may change anything here, so no page offers it. */
 const READER = { key: null, scope: "read", keys_required: false };
+/** Statuses of what a site does not hold, or can't do. */
+export const NOT_KEPT: ReadonlySet<number> = new Set([405, 410]);
 const WORDS: Readonly<Record<string, string>> = {
   "/v1/leaderboard": "It holds its boards as a whole and task by task; other choices need a running service.",
   "/v1/leaderboard/export": "It holds exports of its boards as a whole and task by task.",
@@ -55,8 +57,8 @@ async function ofJob(id: string, key: string): Promise<Response> {
   const rows = await once<Rows>(site.jobs);
   if (!rows.kept.includes(id)) {
     const known = rows.jobs.some((job) => job.id === id);
-    const why = known ? "this job’s result, without transcript, replay and trials" : "no such job";
-    return problem(410, "Not on this site", `This site holds ${why}: ${site.holds}`);
+    const why = known ? "of this job only its result, which lists and boards show" : "no such job";
+    return problem(410, "Not on this site", `This site holds ${why}.`);
   }
   const files = await once<{ answers: Record<string, string | null> }>(`jobs/${id}.json`, "no-cache");
   return found(files.answers[key], "This file of the job was left out of this site.");

@@ -57,7 +57,7 @@ export function Shell() {
       </a>
       <Box component="header" style={{ borderBottom: "1px solid var(--mantine-color-default-border)" }} bg="var(--mantine-color-body)">
         <Container size="var(--page-width)" py={10}>
-          <Group justify="space-between" gap="xs">
+          <Group justify="space-between" align={isSite ? "start" : undefined} gap="xs" wrap={isSite ? "nowrap" : "wrap"}>
             <Group gap="md">
               <Link className="quiet" to="/" aria-label="BuildArena, start">
                 <Group gap={8} wrap="nowrap">

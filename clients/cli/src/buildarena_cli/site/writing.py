@@ -64,9 +64,9 @@ class Plan:
         what = _many(len(names), "sweep") + f" ({', '.join(names)})" if names else ""
         track = f"the track {self.scope.track}" if self.scope.track else ""
         about = " on ".join(filter(None, [what, track]))
+        whole = f"{len(self.chosen):,} of them" if len(self.chosen) < jobs else "all"
         return (
-            f"It holds {about}, {_many(jobs, 'job')}, {len(self.chosen):,} of them with "
-            "transcript, replay and trials."
+            f"It holds {about}, {_many(jobs, 'job')}, {whole} with transcript, replay and trials."
         )
 
 

@@ -89,7 +89,7 @@ function Writing() {
           {way === "form" && (read.value === null ? <Text size="sm">The YAML can’t be read; its faults are listed beside.</Text> : <Form {...editing} value={read.value} />)}
           <Text size="xs" className="dimmed">
             {way === "yaml" ? "Ctrl-Space completes. Escape, then Tab, leaves the field. " : "Seeds, decoding, limits and closed loops are written as YAML. "}
-            The command line takes the same file: <code>buildarena sweep submit FILE</code>
+            The command line takes the same file: <code>buildarena sweep run FILE</code>
           </Text>
         </Stack>
         <Stack style={{ flex: "1 1 300px", minWidth: 0 }} gap="lg">

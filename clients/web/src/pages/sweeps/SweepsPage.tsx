@@ -44,7 +44,7 @@ export default function SweepsPage() {
             <Empty title="This site holds a track, and no sweeps" />
           ) : page.sweeps.length === 0 ? (
             <Empty title="Nobody has submitted a sweep">
-              <code>buildarena sweep submit examples/sweeps/baselines.yaml</code> submits one.
+              <code>buildarena sweep run examples/sweeps/baselines.yaml</code> submits one.
             </Empty>
           ) : (
             <Table.ScrollContainer minWidth={720} type="native">
