@@ -8,9 +8,11 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from buildarena_cli.client import PATIENCE_S, Client, RefusedError, UnreachableError
+from buildarena_cli.errors import CommandError
 from buildarena_cli.site.folder import as_json
 
 ABSENT: Final = 404
+TOO_LARGE: Final = 413
 PAUSE_S: Final = 0.5
 
 
@@ -44,10 +46,17 @@ def question(path: str, params: Mapping[str, Any] | None = None) -> str:
     return path + ("?" + "&".join(words) if words else "")
 
 
+class TooLargeError(CommandError):
+    """The service has an answer, but it is too large to be given."""
+
+
 def ask(client: Client, path: str, *, accept: str | None = None, **params: Any) -> bytes | None:
     """The bytes of an answer; None when there is no such thing.
 
     Waits for a service that is being restarted.
+
+    Raises:
+        TooLargeError: The answer is larger than the service gives.
     """
     deadline = time.monotonic() + PATIENCE_S
     while True:
@@ -56,6 +65,8 @@ def ask(client: Client, path: str, *, accept: str | None = None, **params: Any) 
         except RefusedError as error:
             if error.status == ABSENT:
                 return None
+            if error.status == TOO_LARGE:
+                raise TooLargeError(str(error)) from error
             raise
         except UnreachableError:
             if time.monotonic() > deadline:

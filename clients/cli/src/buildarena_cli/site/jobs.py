@@ -7,7 +7,7 @@ import re
 from typing import Final
 
 from buildarena_cli.client import Client, at
-from buildarena_cli.site.asking import Answer, Answers, ask, question
+from buildarena_cli.site.asking import Answer, Answers, TooLargeError, ask, question
 
 ARROW: Final = "application/vnd.apache.arrow.stream"
 ROLLOUT: Final = re.compile(r"trajectory-([0-9]+)")
@@ -27,7 +27,11 @@ def job_answers(client: Client, job_id: str) -> Answers:
         rest: str = "", *, ending: str = "json", accept: str | None = None, **asked: object
     ) -> None:
         parts = [job_id, *filter(None, rest.split("/"))]
-        content = ask(client, at("jobs", *parts), accept=accept, **asked)
+        try:
+            content = ask(client, at("jobs", *parts), accept=accept, **asked)
+        except TooLargeError:
+            # Pages say of a file without an entry that it was left out.
+            return
         key = question("/".join(["/v1/jobs", *parts]), asked)
         found[key] = None if content is None else Answer(content, ending)
 
