@@ -39,11 +39,16 @@ class Folder:
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        with self._writing():
+            self._check()
+
+    def _check(self) -> None:
+        path = self.path
         if path.exists() and not path.is_dir():
             raise CommandError(f"{path} is a file; --out names a folder")
         marker = path / MARKER
         if marker.is_file():
-            found = marker.read_text(encoding="utf-8").strip()
+            found = marker.read_text(encoding="utf-8", errors="replace").strip()
             if found not in {VERSION, ""}:
                 raise CommandError(f"{path} holds a site of another version of this program")
         elif path.is_dir():

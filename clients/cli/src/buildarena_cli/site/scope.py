@@ -9,6 +9,7 @@ from typing import Any, Final
 
 from buildarena_cli.client import Client, at
 from buildarena_cli.errors import CommandError
+from buildarena_cli.ids import checked_id
 
 PAGE: Final = 1000
 EVERY: Final = "all"
@@ -75,7 +76,8 @@ def read_scope(client: Client, sweeps: Sequence[str], track: str | None) -> Scop
             for page in client.pages("/v1/jobs", sweep=sweep, track=track, limit=PAGE)
             for job in page["jobs"]
         ]
-        jobs.update((job["id"], job) for job in rows)
+        # Ids become names of files.
+        jobs.update((checked_id("job", job["id"]), job) for job in rows)
         if sweep is not None:
             members[sweep] = [job["id"] for job in rows]
     ordered = sorted(jobs.values(), key=lambda job: (job["created_at"], job["id"]), reverse=True)
