@@ -28,10 +28,15 @@ const PLACES = [
   { to: "/compare", label: "Compare" },
 ] as const;
 
+/** Places that a published site has; all others need a running service. */
+const PUBLISHED: ReadonlySet<string> = new Set(["/", "/sweeps", "/jobs", "/tasks", "/compare"]);
+
 /** Where one can go; a published site may be of a track, and hold no sweeps. */
 function usePlaces() {
   const { data } = useQuery(site());
-  return isSite && (data?.sweeps.length ?? 0) === 0 ? PLACES.filter(({ to }) => to !== "/sweeps") : PLACES;
+  if (!isSite) return PLACES;
+  const withSweeps = (data?.sweeps.length ?? 0) > 0;
+  return PLACES.filter(({ to }) => PUBLISHED.has(to) && (to !== "/sweeps" || withSweeps));
 }
 
 /** The frame of every page: where one is, where one can go, light or dark, the key. */
