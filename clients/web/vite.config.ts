@@ -26,6 +26,8 @@ const moduleShapes: Plugin = {
 
 export default defineConfig({
   plugins: [react(), moduleShapes],
+  // Scripts find each other wherever the pages lie: `buildarena site` publishes them under any path.
+  experimental: { renderBuiltUrl: (file, { hostType }) => (hostType === "html" ? `/${file}` : { relative: true }) },
   build: {
     outDir: here("../../services/api/src/buildarena_api/pages"),
     emptyOutDir: true,

@@ -286,3 +286,32 @@ def test_a_sweeps_results_have_their_rounds(api, finish) -> None:
     assert results[0]["rounds"] == []
     assert json.dumps(results).count("NaN") == 0
     assert api.get("/v1/sweeps/sweep_x/results").status_code == 404
+
+
+def test_a_board_of_some_sweeps_holds_their_jobs_alone(api, finish) -> None:
+    finish()
+    small = {**SWEEP, "tasks": ["support-1"], "seeds": [0, 1]}
+    other = {**SWEEP, "tasks": ["support-1"], "models": ["builtin/expert"], "seeds": [7]}
+    shared, own = (api.post("/v1/sweeps", json=spec).json()["id"] for spec in (small, other))
+    found = board(api, sweep=shared)
+    assert [task["task"] for task in found["tasks"]] == ["support-1"]
+    rows = {row["model"]: row["ended"] for row in found["tasks"][0]["rows"]}
+    assert rows == {"builtin/expert": 2, "builtin/random": 2}
+    assert [row["trials"] for row in found["overall"]] == [2, 2]
+    assert board(api, sweep=[shared, own]) == found
+    # Nothing of the other one has ended, so it has no track and no board.
+    assert board(api, sweep=own)["track"] is None
+    asked = api.get("/v1/leaderboard", params={"sweep": own, "track": found["track"]})
+    assert asked.status_code == 422
+    figures = api.get("/v1/leaderboard/figures", params={"sweep": shared}).json()
+    assert sum(sum(row["outcomes"].values()) for row in figures["failures"]) == 4
+    assert len(board(api)["tasks"]) == 2
+
+
+@pytest.mark.parametrize("route", ["", "/figures", "/export?format=csv"])
+def test_a_board_of_an_unknown_sweep_is_refused(api, finish, route) -> None:
+    finish(1)
+    joint = "&" if "?" in route else "?"
+    answer = api.get(f"/v1/leaderboard{route}{joint}sweep=sweep_{'0' * 20}")
+    assert answer.status_code == 404
+    assert "sweep_" in answer.json()["detail"]

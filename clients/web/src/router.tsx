@@ -1,4 +1,5 @@
-import { createRootRoute, createRoute, createRouter, lazyRouteComponent } from "@tanstack/react-router";
+import { createHashHistory, createRootRoute, createRoute, createRouter, lazyRouteComponent } from "@tanstack/react-router";
+import { isSite } from "./api/site";
 import { readSearch } from "./pages/board/search";
 import { readCompareSearch } from "./pages/compare/search";
 import { readJobSearch, readJobsSearch } from "./pages/job/search";
@@ -78,6 +79,8 @@ const model = createRoute({
 
 export const router = createRouter({
   routeTree: root.addChildren([board, sweeps, newSweep, twoSweeps, sweep, jobs, job, compare, tasks, task, model]),
+  // A file server knows one page only, so the rest of the address stands behind its #.
+  history: isSite ? createHashHistory() : undefined,
   defaultPreload: "intent",
   scrollRestoration: true,
 });

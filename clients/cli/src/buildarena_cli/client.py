@@ -78,9 +78,16 @@ class Client:
         """The JSON answer to a GET; parameters that are None are left out."""
         return _document(self._answer("GET", path, params=_given(params)))
 
-    def get_bytes(self, path: str, **params: Any) -> bytes:
-        """The bytes of a GET; parameters that are None are left out."""
-        return self._answer("GET", path, params=_given(params)).body
+    def get_bytes(self, path: str, *, accept: str | None = None, **params: Any) -> bytes:
+        """The bytes of a GET; parameters that are None are left out.
+
+        Args:
+            path: What is asked for.
+            accept: Media type that is wanted, where there are several.
+            params: Parameters of the request.
+        """
+        headers = {"Accept": accept} if accept else None
+        return self._answer("GET", path, params=_given(params), headers=headers).body
 
     def pages(self, path: str, *, cursor: str | None = None, **params: Any) -> Iterator[Any]:
         """The answer to a GET of a list, and those of the pages behind it.

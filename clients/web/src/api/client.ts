@@ -1,7 +1,9 @@
 import createClient, { type Middleware } from "openapi-fetch";
 import type { components, paths } from "./contract";
 import { authorization } from "./key";
+import { keptAnswer } from "./kept";
 import { ApiError, refusal } from "./problem";
+import { isSite } from "./site";
 
 export type Schema<Name extends keyof components["schemas"]> = components["schemas"][Name];
 
@@ -12,8 +14,12 @@ const withKey: Middleware = {
   },
 };
 
+/** Where every answer comes from: the service, or a published site's files. */
+const ask = (request: Request): Promise<Response> => (isSite ? keptAnswer(request) : fetch(request));
+
 export const client = createClient<paths>({
   baseUrl: "/",
+  fetch: ask,
   querySerializer: { array: { style: "form", explode: true } },
 });
 client.use(withKey);
@@ -25,7 +31,8 @@ export async function taken<Data>(
   let answer;
   try {
     answer = await asked;
-  } catch {
+  } catch (error) {
+    if (error instanceof ApiError) throw error;
     throw new ApiError(0, null, "no answer came: is it running, and is the network there?");
   }
   if (!answer.response.ok || answer.data === undefined) {
@@ -38,8 +45,9 @@ export async function taken<Data>(
 export async function bytesOf(path: string, accept = "*/*"): Promise<ArrayBuffer> {
   let response: Response;
   try {
-    response = await fetch(path, { headers: { ...authorization(), Accept: accept } });
-  } catch {
+    response = await ask(new Request(path, { headers: { ...authorization(), Accept: accept } }));
+  } catch (error) {
+    if (error instanceof ApiError) throw error;
     throw new ApiError(0, null, "no answer came: is it running, and is the network there?");
   }
   if (!response.ok) {

@@ -1,6 +1,7 @@
 import { createParser } from "eventsource-parser";
 import { useEffect, useRef, useState } from "react";
 import { authorization } from "./key";
+import { isSite } from "./site";
 
 export interface ServiceEvent {
   id: number;
@@ -77,7 +78,7 @@ export function useEvents(
     begin.current = after;
   });
   useEffect(() => {
-    if (path === null) return;
+    if (path === null || isSite) return;
     const ending = new AbortController();
     let lastId = begin.current;
     let wait = FIRST_WAIT_MS;

@@ -1,4 +1,5 @@
 import type { components } from "./contract";
+import { isSite } from "./site";
 
 export type Problem = components["schemas"]["Problem"];
 
@@ -33,7 +34,7 @@ export function refusal(status: number, body: unknown): ApiError {
 /** A heading for an error, for people. */
 export function headline(error: unknown): string {
   if (!(error instanceof ApiError)) return "Something went wrong in the page";
-  if (error.status === 0) return "The service does not answer";
+  if (error.status === 0) return isSite ? "A part of this site is missing" : "The service does not answer";
   if (error.status === 401) return "An API key is needed";
   if (error.status === 403) return "This key may not do that";
   if (error.status === 404) return "There is no such thing";

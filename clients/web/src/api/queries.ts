@@ -2,6 +2,8 @@ import { keepPreviousData, queryOptions } from "@tanstack/react-query";
 import type { BoardSearch } from "../pages/board/search";
 import { client, jsonOf, taken, type Schema } from "./client";
 import type { paths } from "./contract";
+import { readSite } from "./kept";
+import { every, isSite } from "./site";
 
 export type Board = Schema<"Board">;
 export type Figures = Schema<"Figures">;
@@ -35,7 +37,7 @@ export const board = (search: BoardSearch) =>
     queryKey: ["board", boardQuery(search)],
     queryFn: () => taken(client.GET("/v1/leaderboard", { params: { query: boardQuery(search) } })),
     placeholderData: keepPreviousData,
-    refetchInterval: 4 * LIVE_MS,
+    refetchInterval: every(4 * LIVE_MS),
   });
 
 /** What the board's drawings are made of: the same that reports are drawn from. */
@@ -44,8 +46,11 @@ export const figures = (search: BoardSearch) =>
     queryKey: ["figures", boardQuery(search)],
     queryFn: () => taken(client.GET("/v1/leaderboard/figures", { params: { query: boardQuery(search) } })),
     placeholderData: keepPreviousData,
-    refetchInterval: 4 * LIVE_MS,
+    refetchInterval: every(4 * LIVE_MS),
   });
+
+/** What a published site says of itself. */
+export const site = () => queryOptions({ queryKey: ["site"], enabled: isSite, staleTime: Infinity, queryFn: readSite });
 
 /** Who the service takes this tab for. */
 export const caller = () =>
@@ -60,7 +65,7 @@ export const sweeps = (cursor?: string) =>
     queryKey: ["sweeps", cursor ?? ""],
     queryFn: () => taken(client.GET("/v1/sweeps", { params: { query: { limit: 50, cursor } } })),
     placeholderData: keepPreviousData,
-    refetchInterval: LIVE_MS,
+    refetchInterval: every(LIVE_MS),
   });
 
 export const sweep = (id: string) =>
@@ -72,7 +77,7 @@ export const sweep = (id: string) =>
 export const sweepTroubles = (id: string) =>
   queryOptions({
     queryKey: ["sweep-troubles", id],
-    refetchInterval: 2 * LIVE_MS,
+    refetchInterval: every(2 * LIVE_MS),
     queryFn: () =>
       taken(client.GET("/v1/sweeps/{sweep_id}/troubles", { params: { path: { sweep_id: id } } })),
   });
@@ -88,7 +93,7 @@ export const sweepComparison = (first: string, second: string) =>
 export const deadLetters = (id: string) =>
   queryOptions({
     queryKey: ["sweep-jobs", id, "errored"],
-    refetchInterval: 3 * LIVE_MS,
+    refetchInterval: every(3 * LIVE_MS),
     queryFn: () =>
       taken(client.GET("/v1/jobs", { params: { query: { sweep: id, outcome: "errored", sort: "finished", limit: 100 } } })),
   });

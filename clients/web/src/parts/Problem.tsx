@@ -1,10 +1,27 @@
-import { Alert, Button, Group, List, Stack, Text } from "@mantine/core";
+import { Alert, Anchor, Button, Group, List, Stack, Text } from "@mantine/core";
 import { IconAlertTriangle } from "@tabler/icons-react";
+import { Link } from "@tanstack/react-router";
+import { NOT_KEPT } from "../api/kept";
 import { ApiError, headline } from "../api/problem";
+import { isSite } from "../api/site";
+import { Empty } from "./Empty";
 import { KeyField } from "./KeyField";
+
+/** What a published site was not given to hold: no fault, and asking again finds it no more. */
+function NotHere({ error }: { error: ApiError }) {
+  return (
+    <Empty title={headline(error)}>
+      <p>{error.message}</p>
+      <Anchor component={Link} to="/jobs" inherit>
+        To the jobs
+      </Anchor>
+    </Empty>
+  );
+}
 
 /** An error in words: what went wrong, in which field, what would be valid, what can be done. */
 export function ProblemNote({ error, retry }: { error: unknown; retry?: () => void }) {
+  if (error instanceof ApiError && NOT_KEPT.has(error.status) && isSite) return <NotHere error={error} />;
   const problem = error instanceof ApiError ? error.problem : null;
   const issues = problem?.errors ?? [];
   const asksForKey = error instanceof ApiError && (error.status === 401 || error.status === 403);

@@ -10,11 +10,15 @@ import {
   useMantineColorScheme,
 } from "@mantine/core";
 import { IconKey, IconMoon, IconSun } from "@tabler/icons-react";
+import { useQuery } from "@tanstack/react-query";
 import { Link, Outlet, useRouterState } from "@tanstack/react-router";
 import { useEffect } from "react";
+import { site } from "../api/queries";
+import { beside, isSite } from "../api/site";
 import { Empty } from "./States";
 import { KeyField, useKey } from "./KeyField";
 import { ProblemNote } from "./Problem";
+import { SiteNote } from "./SiteNote";
 
 const PLACES = [
   { to: "/", label: "Leaderboard" },
@@ -24,8 +28,20 @@ const PLACES = [
   { to: "/compare", label: "Compare" },
 ] as const;
 
+/** Places that a published site has; all others need a running service. */
+const PUBLISHED: ReadonlySet<string> = new Set(["/", "/sweeps", "/jobs", "/tasks", "/compare"]);
+
+/** Where one can go; a published site may be of a track, and hold no sweeps. */
+function usePlaces() {
+  const { data } = useQuery(site());
+  if (!isSite) return PLACES;
+  const withSweeps = (data?.sweeps.length ?? 0) > 0;
+  return PLACES.filter(({ to }) => PUBLISHED.has(to) && (to !== "/sweeps" || withSweeps));
+}
+
 /** The frame of every page: where one is, where one can go, light or dark, the key. */
 export function Shell() {
+  const places = usePlaces();
   const path = useRouterState({ select: (state) => state.location.pathname });
   useEffect(() => {
     const name = path.split("/").filter((part) => part !== "").join(" · ");
@@ -33,21 +49,29 @@ export function Shell() {
   }, [path]);
   return (
     <>
-      <a className="skip-link" href="#main">
+      <a
+        className="skip-link"
+        href="#main"
+        onClick={(event) => {
+          // Behind its # a published site has the address of the page.
+          event.preventDefault();
+          document.getElementById("main")?.focus();
+        }}
+      >
         Skip to the content
       </a>
       <Box component="header" style={{ borderBottom: "1px solid var(--mantine-color-default-border)" }} bg="var(--mantine-color-body)">
         <Container size="var(--page-width)" py={10}>
-          <Group justify="space-between" gap="xs">
+          <Group justify="space-between" align={isSite ? "start" : undefined} gap="xs" wrap={isSite ? "nowrap" : "wrap"}>
             <Group gap="md">
               <Link className="quiet" to="/" aria-label="BuildArena, start">
                 <Group gap={8} wrap="nowrap">
-                  <img src="/favicon.svg" width={24} height={24} alt="" />
+                  <img src={beside("favicon.svg")} width={24} height={24} alt="" />
                   <Text fw={700}>BuildArena</Text>
                 </Group>
               </Link>
               <Group component="nav" gap="sm" aria-label="Pages">
-                {PLACES.map(({ to, label }) => (
+                {places.map(({ to, label }) => (
                   <Anchor
                     key={to}
                     component={Link}
@@ -63,10 +87,14 @@ export function Shell() {
               </Group>
             </Group>
             <Group gap={6}>
-              <Anchor href="/docs" size="sm" c="inherit">
-                API
-              </Anchor>
-              <KeyButton />
+              {!isSite && (
+                <>
+                  <Anchor href="/docs" size="sm" c="inherit">
+                    API
+                  </Anchor>
+                  <KeyButton />
+                </>
+              )}
               <SchemeButton />
             </Group>
           </Group>
@@ -75,6 +103,7 @@ export function Shell() {
       <Container component="main" id="main" tabIndex={-1} size="var(--page-width)" py="lg" style={{ outline: "none" }}>
         <Outlet />
       </Container>
+      {isSite && <SiteNote />}
     </>
   );
 }

@@ -1,9 +1,11 @@
-import { Badge, Center, Group, Skeleton, Stack, Text } from "@mantine/core";
+import { Badge, Group, Skeleton, Stack } from "@mantine/core";
 import { IconCloudOff } from "@tabler/icons-react";
 import type { UseQueryResult } from "@tanstack/react-query";
 import type { ReactNode } from "react";
 import { ProblemNote } from "./Problem";
 import { Ago } from "./Ago";
+
+export { Empty } from "./Empty";
 
 /** Grey bars in the place of what is being read. */
 export function Loading({ rows = 6 }: { rows?: number }) {
@@ -13,19 +15,6 @@ export function Loading({ rows = 6 }: { rows?: number }) {
         <Skeleton key={index} height={22} width={`${100 - ((index * 17) % 40)}%`} />
       ))}
     </Stack>
-  );
-}
-
-export function Empty({ title, children }: { title: string; children?: ReactNode }) {
-  return (
-    <Center py="xl">
-      <Stack gap={6} align="center" maw={520}>
-        <Text fw={600}>{title}</Text>
-        <Text size="sm" ta="center" component="div" className="dimmed">
-          {children}
-        </Text>
-      </Stack>
-    </Center>
   );
 }
 

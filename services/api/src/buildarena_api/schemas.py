@@ -74,6 +74,7 @@ class JobView(_Answer):
     task: str = Field(examples=["support-1"])
     task_version: str
     model: str = Field(examples=["builtin/expert"])
+    configuration: str = Field(description="Hash of model, decoding and limits")
     track: str
     seed: int
     owner: str | None = Field(description="Id of the API key that submitted it")
@@ -107,6 +108,7 @@ class JobView(_Answer):
         return JobView.model_validate(
             {
                 **{name: getattr(job, name, None) for name in JobView.model_fields},
+                "configuration": job.model_hash,
                 "censored": is_censored(job.flags or ()),
                 "usage": UsageView.of(job),
             }

@@ -36,6 +36,9 @@ COMMANDS: Final[Mapping[str, Entry]] = {
     "leaderboard": Entry("leaderboard", "leaderboard", "Show who builds best on each track."),
     "compare": Entry("leaderboard", "compare", "Show whether one model is better than another."),
     "report": Entry("report", "report", "Write a report of sweeps: tables and plots."),
+    "site": Entry(
+        "site", "site", "Write a board as a static site, which any file server can show."
+    ),
     "export": Entry("leaderboard", "export", "Write the leaderboard to a file."),
     "audit": Entry("leaderboard", "audit", "Replay and simulate a model's results again."),
     "task": Entry("tasks", "app", "Look at tasks, and add your own."),

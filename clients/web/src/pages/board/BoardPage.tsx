@@ -42,7 +42,7 @@ function Found({ found, search }: { found: Board; search: BoardSearch }) {
   if (found.track === null) {
     return (
       <Empty title="No job has ended yet">
-        Submit one with <code>buildarena sweep submit</code>, or watch those that run on the{" "}
+        Submit one with <code>buildarena sweep run</code>, or watch those that run on the{" "}
         <Anchor component={Link} to="/sweeps" inherit>
           sweeps page
         </Anchor>

@@ -2,6 +2,7 @@ import { Group, MultiSelect, SegmentedControl, Select, Stack, Switch, Text, Text
 import { useQuery } from "@tanstack/react-query";
 import { useNavigate } from "@tanstack/react-router";
 import { tasks, type Board } from "../../api/queries";
+import { isSite } from "../../api/site";
 import { trackLabel } from "../../format";
 import type { BoardSearch } from "./search";
 
@@ -30,6 +31,8 @@ export function Controls({ board, search }: { board: Board; search: BoardSearch 
         data={names}
         value={search.task ?? []}
         placeholder={(search.task ?? []).length > 0 ? "" : "all"}
+        // A published site holds its boards as a whole and task by task.
+        maxValues={isSite ? 1 : undefined}
         clearable
         clearButtonProps={{ "aria-label": "All tasks" }}
         searchable
@@ -38,7 +41,7 @@ export function Controls({ board, search }: { board: Board; search: BoardSearch 
           set({ task: task.length > 0 ? task : undefined });
         }}
       />
-      <Days search={search} set={set} />
+      {!isSite && <Days search={search} set={set} />}
       <Stack gap={3}>
         <Text size="sm" fw={500} id="reading">
           Flagged results

@@ -3,6 +3,7 @@ import { useInfiniteQuery, useQuery } from "@tanstack/react-query";
 import { getRouteApi, useNavigate } from "@tanstack/react-router";
 import { taken } from "../../api/client";
 import { jobPage, models, tasks } from "../../api/queries";
+import { every } from "../../api/site";
 import { words } from "../../format";
 import { JobsTable } from "../../parts/JobsTable";
 import { ProblemNote } from "../../parts/Problem";
@@ -24,7 +25,7 @@ export default function JobsPage() {
     queryFn: ({ pageParam }) => taken(jobPage({ ...search, limit: PAGE, cursor: pageParam })),
     initialPageParam: undefined as string | undefined,
     getNextPageParam: (page) => page.next_cursor ?? undefined,
-    refetchInterval: (running) => ((running.state.data?.pages.length ?? 1) === 1 ? REFRESH_MS : false),
+    refetchInterval: (running) => ((running.state.data?.pages.length ?? 1) === 1 && every(REFRESH_MS)),
   });
   const jobs = (query.data?.pages ?? []).flatMap((page) => page.jobs);
   const more = (): void => {

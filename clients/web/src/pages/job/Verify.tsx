@@ -3,6 +3,7 @@ import { IconShieldCheck } from "@tabler/icons-react";
 import { useMutation, useQuery } from "@tanstack/react-query";
 import { client, taken } from "../../api/client";
 import type { JobDetail } from "../../api/queries";
+import { isSite } from "../../api/site";
 import { words } from "../../format";
 import { ProblemNote } from "../../parts/Problem";
 
@@ -25,7 +26,7 @@ export function Verify({ job }: { job: JobDetail }) {
     queryFn: () => taken(client.GET("/v1/verifications/{verification_id}", { params: { path: { verification_id: id ?? "" } } })),
     refetchInterval: (query) => (query.state.data?.state === "done" ? false : ASK_EVERY_MS),
   });
-  if (job.success === null) return null;
+  if (job.success === null || isSite) return null;
   const report = found.data?.report as Report | null | undefined;
   const busy = asked.isPending || (id !== undefined && !found.isError && report == null);
   return (

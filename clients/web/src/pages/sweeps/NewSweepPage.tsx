@@ -6,11 +6,12 @@ import { lazy, Suspense, useMemo, useRef, useState } from "react";
 import { client, taken, type Schema } from "../../api/client";
 import { ApiError } from "../../api/problem";
 import { models, tasks } from "../../api/queries";
+import { isSite } from "../../api/site";
 import { compact, count, dollars } from "../../format";
 import { has, useCaller } from "../../parts/may";
 import { ProblemNote } from "../../parts/Problem";
 import { Section } from "../../parts/Section";
-import { Loading } from "../../parts/States";
+import { Empty, Loading } from "../../parts/States";
 import type { Known } from "./spec/completion";
 import { Form } from "./spec/Form";
 import { faultsOf, readSpec, type Fault, type SweepSpec } from "./spec/spec";
@@ -55,6 +56,10 @@ function useKnown(): Known {
 
 /** A sweep from a form or as YAML; what it would take is told before it is submitted. */
 export default function NewSweepPage() {
+  return isSite ? <Empty title="Sweeps are submitted to a running service">This is a published copy of its results.</Empty> : <Writing />;
+}
+
+function Writing() {
   const [text, setText] = useState(BEGIN);
   const [way, setWay] = useState("form");
   const known = useKnown();
@@ -84,7 +89,7 @@ export default function NewSweepPage() {
           {way === "form" && (read.value === null ? <Text size="sm">The YAML can’t be read; its faults are listed beside.</Text> : <Form {...editing} value={read.value} />)}
           <Text size="xs" className="dimmed">
             {way === "yaml" ? "Ctrl-Space completes. Escape, then Tab, leaves the field. " : "Seeds, decoding, limits and closed loops are written as YAML. "}
-            The command line takes the same file: <code>buildarena sweep submit FILE</code>
+            The command line takes the same file: <code>buildarena sweep run FILE</code>
           </Text>
         </Stack>
         <Stack style={{ flex: "1 1 300px", minWidth: 0 }} gap="lg">

@@ -2,6 +2,7 @@ import { Badge, Button, Group, Progress, SimpleGrid, Stack, Text, Title } from "
 import { useQuery } from "@tanstack/react-query";
 import { getRouteApi, Link } from "@tanstack/react-router";
 import type { StreamState } from "../../api/events";
+import { every, isSite } from "../../api/site";
 import { sweep as sweepQuery, type SweepView } from "../../api/queries";
 import { compact, count, dollars, duration, number, percent } from "../../format";
 import { Ago } from "../../parts/Ago";
@@ -22,7 +23,7 @@ export default function SweepPage() {
   const { id } = route.useParams();
   const query = useQuery({
     ...sweepQuery(id),
-    refetchInterval: (running) => (running.state.data?.state === "active" ? 10_000 : 30_000),
+    refetchInterval: (running) => every(running.state.data?.state === "active" ? 10_000 : 30_000),
   });
   const { moment, complete, stream, error } = useLiveJobs(id);
   return (
@@ -58,7 +59,7 @@ function Head({ sweep, stream }: { sweep: SweepView; stream: StreamState }) {
           <Group gap="sm">
             <Title order={1}>{sweep.name}</Title>
             <SweepState state={sweep.state} />
-            <LiveMark state={stream} />
+            {!isSite && <LiveMark state={stream} />}
           </Group>
           <Text size="sm" className="dimmed">
             <span style={{ fontFamily: "monospace" }}>{sweep.id}</span>, submitted <Ago time={sweep.created_at} />

@@ -3,6 +3,7 @@ import { useQuery } from "@tanstack/react-query";
 import { Link } from "@tanstack/react-router";
 import { useState } from "react";
 import { sweeps, type SweepView } from "../../api/queries";
+import { isSite } from "../../api/site";
 import { count, dollars, words } from "../../format";
 import { Ago } from "../../parts/Ago";
 import { has, useCaller } from "../../parts/may";
@@ -39,9 +40,11 @@ export default function SweepsPage() {
       </Group>
       <Answered query={query}>
         {(page) =>
-          page.sweeps.length === 0 ? (
+          page.sweeps.length === 0 && isSite ? (
+            <Empty title="This site holds a track, and no sweeps" />
+          ) : page.sweeps.length === 0 ? (
             <Empty title="Nobody has submitted a sweep">
-              <code>buildarena sweep submit examples/sweeps/baselines.yaml</code> submits one.
+              <code>buildarena sweep run examples/sweeps/baselines.yaml</code> submits one.
             </Empty>
           ) : (
             <Table.ScrollContainer minWidth={720} type="native">

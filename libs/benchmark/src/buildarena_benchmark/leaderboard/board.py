@@ -23,6 +23,7 @@ class BoardQuery:
     Attributes:
         tasks: Task names.
         models: Model names.
+        jobs: Ids of jobs.
         since: Only jobs that ended then or later.
         until: Only jobs that ended before.
         reading: How flags are read.
@@ -31,13 +32,16 @@ class BoardQuery:
 
     tasks: frozenset[str] | None = None
     models: frozenset[str] | None = None
+    jobs: frozenset[str] | None = None
     since: datetime | None = None
     until: datetime | None = None
     reading: Reading = Reading.OURS
     overall: frozenset[str] | None = None
 
     def holds(self, trial: EndedJob) -> bool:
-        """Whether a trial ended in the time that was asked for."""
+        """Whether a trial is among the jobs, and ended in the time, that were asked for."""
+        if self.jobs is not None and trial.job_id not in self.jobs:
+            return False
         if self.since is None and self.until is None:
             return True
         ended = trial.finished_at
@@ -182,7 +186,10 @@ class TrackBoard:
                 version = max(versions, key=lambda v: (self._newest(versions[v]), v))
             chosen[task, version] = sorted(versions[version])
             outdated[task] = sum(
-                len(self._cells[key]) for v in versions if v != version for key in versions[v]
+                sum(map(query.holds, self._cells[key].values()))
+                for v in versions
+                if v != version
+                for key in versions[v]
             )
         return chosen, outdated
 

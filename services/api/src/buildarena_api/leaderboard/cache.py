@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections import OrderedDict
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Final
 
 from buildarena_api.http.etags import Answer
@@ -40,10 +40,16 @@ class BoardCache:
         self._generations: dict[str, int] = {}
         self._answers: OrderedDict[tuple[str, BoardQuery, str], tuple[int, Answer]] = OrderedDict()
 
-    def tracks(self) -> list[str]:
-        """Tracks with ended jobs."""
+    def tracks(self, jobs: Collection[str] | None = None) -> list[str]:
+        """Tracks with ended jobs.
+
+        Args:
+            jobs: Only tracks with one of these; all by default.
+        """
         with self._lock:
             self._refresh()
+            if jobs is not None:
+                return sorted({self._track_of[job] for job in jobs if job in self._track_of})
             return sorted(track for track, board in self._tracks.items() if len(board))
 
     def tasks(self) -> Mapping[str, Task]:

@@ -8,11 +8,16 @@ from typing import Annotated
 
 from fastapi import Depends, Query, Request
 
+from buildarena_api.dependencies import ContextDep
 from buildarena_api.http.problems import ProblemError
 from buildarena_api.leaderboard.cache import BoardCache
 from buildarena_benchmark import ValidationIssue, builtin_tasks
 from buildarena_benchmark.flags import Reading
 from buildarena_benchmark.leaderboard import BoardQuery
+from buildarena_pipeline.runtime.context import Context
+
+MAX_SWEEPS = 50
+"""Sweeps that one board is made of at most."""
 
 
 async def _boards(request: Request) -> BoardCache:
@@ -34,11 +39,16 @@ class Selection:
 
 def select_board(
     boards: BoardsDep,
+    context: ContextDep,
     *,
     track: Annotated[str | None, Query(description="Default: the first with ended jobs")] = None,
     task: Annotated[list[str] | None, Query(description="Only these tasks")] = None,
     level: Annotated[list[int] | None, Query(description="Only tasks of these levels")] = None,
     model: Annotated[list[str] | None, Query(description="Only these models")] = None,
+    sweep: Annotated[
+        list[str] | None,
+        Query(max_length=MAX_SWEEPS, description="Only jobs of these sweeps, and their tracks"),
+    ] = None,
     since: Annotated[datetime | None, Query(description="Only jobs ended then or later")] = None,
     until: Annotated[datetime | None, Query(description="Only jobs ended before")] = None,
     reading: Annotated[
@@ -53,8 +63,10 @@ def select_board(
 
     Raises:
         ProblemError: A track, task or level is unknown, or a time has no zone.
+        NotFoundError: A sweep is unknown.
     """
-    tracks = boards.tracks()
+    jobs = _jobs_of(context, sweep) if sweep else None
+    tracks = boards.tracks(jobs)
     if track is not None and track not in tracks:
         raise unknown("track", track, tracks)
     tasks = boards.tasks()
@@ -79,6 +91,7 @@ def select_board(
         query=BoardQuery(
             tasks=chosen,
             models=frozenset(model) if model else None,
+            jobs=jobs,
             since=since,
             until=until,
             reading=reading,
@@ -87,6 +100,14 @@ def select_board(
             overall=None if task else frozenset(builtin_tasks()),
         ),
     )
+
+
+def _jobs_of(context: Context, sweeps: list[str]) -> frozenset[str]:
+    found: set[str] = set()
+    for id_ in sweeps:
+        context.store.sweeps.get(id_)
+        found.update(context.store.sweeps.job_ids(id_))
+    return frozenset(found)
 
 
 def require_zones(**times: datetime | None) -> None:

@@ -91,7 +91,7 @@ RESULTS = TypeAdapter(list[Result])
     response_class=Response,
     responses={
         200: {"content": {kind.split(";")[0]: {} for kind in MEDIA_TYPES.values()}},
-        **problem_responses(422, 503),
+        **problem_responses(404, 422, 503),
     },
 )
 async def export(

@@ -104,7 +104,7 @@ class VerifyAccepted(BaseModel):
     )
 
 
-@router.get("/leaderboard", response_model=Board, responses=problem_responses(422, 503))
+@router.get("/leaderboard", response_model=Board, responses=problem_responses(404, 422, 503))
 def leaderboard(
     boards: BoardsDep,
     selection: SelectionDep,
@@ -136,7 +136,9 @@ def leaderboard(
     return conditional(request, answer, "application/json")
 
 
-@router.get("/leaderboard/figures", response_model=Figures, responses=problem_responses(422, 503))
+@router.get(
+    "/leaderboard/figures", response_model=Figures, responses=problem_responses(404, 422, 503)
+)
 def figures(boards: BoardsDep, selection: SelectionDep, request: Request) -> Any:
     """What the figures of a board are drawn from; reports are drawn from the same."""
     track, reading = selection.track, selection.query.reading
@@ -156,7 +158,7 @@ def figures(boards: BoardsDep, selection: SelectionDep, request: Request) -> Any
     return conditional(request, answer, "application/json")
 
 
-@router.get("/leaderboard/compare", responses=problem_responses(422, 503))
+@router.get("/leaderboard/compare", responses=problem_responses(404, 422, 503))
 def compare(
     boards: BoardsDep,
     selection: SelectionDep,
@@ -192,7 +194,7 @@ def compare(
     )
 
 
-@router.get("/leaderboard/agreement", responses=problem_responses(422, 503))
+@router.get("/leaderboard/agreement", responses=problem_responses(404, 422, 503))
 def agreement_table(context: ContextDep, selection: SelectionDep) -> AgreementTable:
     """How far our engines say the same as the game, task by task, of the machines it tried."""
     if selection.track is None:
@@ -201,7 +203,7 @@ def agreement_table(context: ContextDep, selection: SelectionDep) -> AgreementTa
     return AgreementTable(track=selection.track, rows=agreement_rows(found))
 
 
-@router.get("/leaderboard/changes", responses=problem_responses(422, 503))
+@router.get("/leaderboard/changes", responses=problem_responses(404, 422, 503))
 def changes(
     context: ContextDep,
     selection: SelectionDep,
@@ -223,7 +225,7 @@ def changes(
     )
 
 
-@router.get("/leaderboard/manifest", responses=problem_responses(422, 503))
+@router.get("/leaderboard/manifest", responses=problem_responses(404, 422, 503))
 def manifest(
     context: ContextDep, boards: BoardsDep, selection: SelectionDep
 ) -> list[ManifestEntry]:

@@ -1,0 +1,152 @@
+"""The answers of a site that are of no single job: boards, tasks, models, sweeps, rows."""
+
+from __future__ import annotations
+
+import itertools
+import json
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, Final
+
+from buildarena_cli.client import Client, at
+from buildarena_cli.site.asking import Answer, Answers, ask, document, question
+from buildarena_cli.site.scope import Job, Scope
+
+READINGS: Final = (None, "published")
+"""How pages ask for our reading, and for the other."""
+EXPORTS: Final = {"csv": "csv", "parquet": "parquet", "latex": "tex"}
+MAX_COMPARED: Final = 20
+"""Models of a track whose comparisons are kept: each with each other is asked for."""
+LISTED_SWEEPS: Final = 50
+"""As many as a page of sweeps shows."""
+BOARD: Final = "/v1/leaderboard"
+
+
+class Collected:
+    """Answers as they come in.
+
+    Args:
+        client: The API.
+        scope: What the site is about.
+        progress: Called after each answer.
+    """
+
+    def __init__(self, client: Client, scope: Scope, progress: Callable[[], None]) -> None:
+        self._client = client
+        self._scope = scope
+        self._progress = progress
+        self.answers: Answers = {}
+        self.left_out: list[str] = []
+
+    def collect(self) -> None:
+        """Asks for everything."""
+        self._boards()
+        self._comparisons()
+        self._tasks()
+        self._models()
+        self._sweeps()
+
+    def _put(self, key: str, answer: Answer | None) -> None:
+        self.answers[key] = answer
+        self._progress()
+
+    def _boards(self) -> None:
+        tasks = sorted({job["task"] for job in self._scope.ended})
+        # Pages ask without a track first, and get that of the scope or the first.
+        for track, reading, task in itertools.product(
+            (None, *self._scope.tracks), READINGS, (None, *tasks)
+        ):
+            asked = {"track": track, "reading": reading, "task": task}
+            self._put(question(BOARD, asked), self._board(asked))
+            self._put(question(f"{BOARD}/figures", asked), self._held(f"{BOARD}/figures", asked))
+            for form, ending in EXPORTS.items():
+                if track is not None:
+                    exported = {**asked, "format": form}
+                    answer = self._held(f"{BOARD}/export", exported, ending)
+                    self._put(question(f"{BOARD}/export", exported), answer)
+
+    def _held(self, path: str, asked: dict[str, Any], ending: str = "json") -> Answer | None:
+        """The answer to what a page asks, held to the site's scope."""
+        scope = {name: value for name, value in self._scope.asked.items() if value is not None}
+        content = ask(self._client, path, **{**asked, **scope})
+        return None if content is None else Answer(content, ending)
+
+    def _board(self, asked: dict[str, Any]) -> Answer | None:
+        answer = self._held(BOARD, asked)
+        if answer is None or self._scope.track is None:
+            return answer
+        # The service has other tracks too, but they are not on this site.
+        return document({**json.loads(answer.content), "tracks": list(self._scope.tracks)})
+
+    def _comparisons(self) -> None:
+        path = f"{BOARD}/compare"
+        for track in (None, *self._scope.tracks):
+            models = sorted(
+                {
+                    job["model"]
+                    for job in self._scope.ended
+                    if job["track"] == (track or self._scope.tracks[0])
+                }
+            )
+            if len(models) > MAX_COMPARED:
+                self.left_out.append(
+                    f"Comparisons of models on {track or 'the first track'} are left out: "
+                    f"there are {len(models)} models."
+                )
+                continue
+            on_board = self._models_on(track)
+            for first, second in itertools.permutations(filter(on_board.__contains__, models), 2):
+                asked = {"first": first, "second": second, "track": track}
+                self._put(question(path, asked), self._held(path, asked))
+
+    def _models_on(self, track: str | None) -> set[str]:
+        """Models that a board compares: those with a job that counts."""
+        board = self.answers[question(BOARD, {"track": track})]
+        tasks = [] if board is None else json.loads(board.content)["tasks"]
+        return {row["model"] for task in tasks for row in task["rows"]}
+
+    def _tasks(self) -> None:
+        versions = {(job["task"], job["task_version"]) for job in self._scope.jobs}
+        names = {name for name, _ in versions}
+        listed = self._client.get("/v1/tasks")
+        self._put("/v1/tasks", document([task for task in listed if task["name"] in names]))
+        for name, version in sorted({*versions, *((name, None) for name in names)}, key=str):
+            path = at("tasks", name)
+            content = ask(self._client, path, version=version)
+            key = question(f"/v1/tasks/{name}", {"version": version})
+            self._put(key, None if content is None else Answer(content))
+
+    def _models(self) -> None:
+        used = {job["model"] for job in self._scope.jobs}
+        listed = self._client.get("/v1/models")
+        self._put("/v1/models", document([one for one in listed if one["name"] in used]))
+
+    def _sweeps(self) -> None:
+        sweeps = list(self._scope.sweeps)
+        page = {"sweeps": sweeps, "next_cursor": None}
+        self._put(question("/v1/sweeps", {"limit": LISTED_SWEEPS}), document(page))
+        for sweep in sweeps:
+            self._put(f"/v1/sweeps/{sweep['id']}", document(sweep))
+            troubles = ask(self._client, at("sweeps", sweep["id"], "troubles"))
+            self._put(f"/v1/sweeps/{sweep['id']}/troubles", (troubles and Answer(troubles)) or None)
+        for first, second in itertools.product([sweep["id"] for sweep in sweeps], repeat=2):
+            content = ask(self._client, at("sweeps", first, "compare", second))
+            key = f"/v1/sweeps/{first}/compare/{second}"
+            self._put(key, None if content is None else Answer(content))
+
+
+def rows_of(scope: Scope, kept: Sequence[Job]) -> Answer:
+    """All jobs as rows of lists, and which of them are kept whole."""
+    return document(
+        {"jobs": list(scope.jobs), "kept": [job["id"] for job in kept], "sweeps": scope.places}
+    )
+
+
+def questions(scope: Scope) -> Iterator[int]:
+    """About how many questions there are, as a sum of parts; for progress bars."""
+    tasks = len({job["task"] for job in scope.ended}) + 1
+    models = min(MAX_COMPARED, len({job["model"] for job in scope.ended}))
+    tracks = len(scope.tracks)
+    yield len(READINGS) * tasks * (2 * (tracks + 1) + len(EXPORTS) * tracks)
+    yield models * (models - 1) * (tracks + 1)
+    yield 2 * tasks + 2
+    yield len(scope.sweeps) * (len(scope.sweeps) + 2)

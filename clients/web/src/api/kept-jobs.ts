@@ -1,0 +1,91 @@
+import type { components } from "./contract";
+
+type JobView = components["schemas"]["JobView"];
+type JobPage = components["schemas"]["JobPage"];
+
+/** The rows of a site's jobs, and which of them are kept with everything they made. */
+export interface Rows {
+  jobs: JobView[];
+  kept: string[];
+  /** By sweep, the places of its jobs among all. */
+  sweeps: Record<string, number[]>;
+}
+
+type Value = string | number | null;
+
+const EQUAL: Readonly<Record<string, (job: JobView) => Value>> = {
+  task: (job) => job.task,
+  task_version: (job) => job.task_version,
+  model: (job) => job.model,
+  configuration: (job) => job.configuration,
+  track: (job) => job.track,
+  state: (job) => job.state,
+  outcome: (job) => job.outcome,
+  reason: (job) => job.reason,
+};
+
+const SORTED: Readonly<Record<string, (job: JobView) => Value>> = {
+  created: (job) => job.created_at,
+  finished: (job) => job.finished_at,
+  indicator: (job) => job.indicator,
+  cost: (job) => job.usage.cost_usd,
+  task: (job) => job.task,
+  model: (job) => job.model,
+  seed: (job) => job.seed,
+};
+
+const TIMES = new Set(["created", "finished"]);
+
+/** Times to the microsecond: browsers read them to the millisecond, and the rest stands in the text. */
+function compareTimes(a: string, b: string): number {
+  const apart = Date.parse(a) - Date.parse(b);
+  if (apart !== 0) return apart;
+  const digits = (time: string): string => (/\.(\d+)/.exec(time)?.[1] ?? "").padEnd(6, "0");
+  return digits(a) < digits(b) ? -1 : digits(a) > digits(b) ? 1 : 0;
+}
+
+function compare(a: Value, b: Value, by: string): number {
+  if (TIMES.has(by)) return compareTimes(String(a), String(b));
+  if (a === b) return 0;
+  return (a ?? 0) < (b ?? 0) ? -1 : 1;
+}
+
+function ended(job: JobView, since: string | null, until: string | null): boolean {
+  if (since === null && until === null) return true;
+  const at = job.finished_at;
+  return at !== null && (since === null || compareTimes(at, since) >= 0) && (until === null || compareTimes(at, until) < 0);
+}
+
+function holds(job: JobView, words: URLSearchParams): boolean {
+  for (const [name, read] of Object.entries(EQUAL)) {
+    const wanted = words.get(name);
+    if (wanted !== null && read(job) !== wanted) return false;
+  }
+  const [flag, least, most, text, prefix] = [words.get("flag"), words.get("indicator_min"), words.get("indicator_max"), words.get("text"), words.get("id_prefix")];
+  if (flag !== null && !(job.flags ?? []).includes(flag)) return false;
+  if (least !== null && (job.indicator === null || job.indicator < Number(least))) return false;
+  if (most !== null && (job.indicator === null || job.indicator > Number(most))) return false;
+  if (prefix !== null && !job.id.startsWith(prefix)) return false;
+  if (text !== null && ![job.id, job.task, job.model, job.reason, job.detail].some((one) => one?.toLowerCase().includes(text.toLowerCase()))) return false;
+  return ended(job, words.get("since"), words.get("until"));
+}
+
+/** A page of jobs, filtered and sorted as the service does it; a cursor is the place where it begins. */
+export function listed(rows: Rows, words: URLSearchParams): JobPage {
+  const sweep = words.get("sweep");
+  const all = sweep === null ? rows.jobs : (rows.sweeps[sweep] ?? []).flatMap((place) => rows.jobs[place] ?? []);
+  const by = words.get("sort") ?? "created";
+  const value = SORTED[by] ?? ((job: JobView) => job.created_at);
+  const sign = words.get("order") === "asc" ? 1 : -1;
+  const found = all
+    .filter((job) => holds(job, words))
+    .sort((a, b) => {
+      const [one, other] = [value(a), value(b)];
+      // Jobs without such a figure come last, in both directions.
+      if (one === null || other === null) return Number(one === null) - Number(other === null) || (a.id < b.id ? -1 : 1);
+      return sign * compare(one, other, by) || (a.id < b.id ? -1 : 1);
+    });
+  const begin = Number(words.get("cursor") ?? 0);
+  const end = begin + Number(words.get("limit") ?? 100);
+  return { jobs: found.slice(begin, end), next_cursor: end < found.length ? String(end) : null };
+}

@@ -1,0 +1,56 @@
+import { describe, expect, it } from "vitest";
+import { keyOf } from "./kept";
+import { listed, type Rows } from "./kept-jobs";
+
+describe("keyOf", () => {
+  const key = (address: string): string => keyOf(new URL(address, "http://here/some/where/"));
+
+  it("is the spelling of a site's index: decoded, the parameters in order", () => {
+    expect(key("/v1/leaderboard")).toBe("/v1/leaderboard");
+    expect(key("/v1/leaderboard?track=a%2Fb&reading=published")).toBe("/v1/leaderboard?reading=published&track=a/b");
+    expect(key("/v1/leaderboard?task=b&task=a")).toBe("/v1/leaderboard?task=a&task=b");
+    expect(key("/v1/leaderboard/compare?first=x+y%26z")).toBe("/v1/leaderboard/compare?first=x y&z");
+    expect(key("/v1/jobs/j/artifacts/a%20b")).toBe("/v1/jobs/j/artifacts/a b");
+  });
+});
+
+describe("listed", () => {
+  const job = (id: string, change: object): object => ({ id, task: "t", model: "m", created_at: "2026-01-01T00:00:00Z", finished_at: null, indicator: null, flags: null, reason: null, detail: null, usage: { cost_usd: null }, ...change });
+  const rows = {
+    jobs: [
+      job("a", { indicator: 1, finished_at: "2026-01-01T00:00:00.100000Z" }),
+      job("b", { finished_at: "2026-01-01T00:00:00Z" }),
+      job("c", { indicator: 3, finished_at: "2026-01-01T00:00:00.000001Z", flags: ["odd"], detail: "It FELL" }),
+      job("d", { indicator: 1 }),
+    ],
+    kept: [],
+    sweeps: { s: [2, 0] },
+  } as unknown as Rows;
+  const ids = (words: string): string => listed(rows, new URLSearchParams(words)).jobs.map((one) => one.id).join("");
+
+  it("has jobs without a figure last, in both directions, and equal ones by their ids", () => {
+    expect(ids("sort=indicator")).toBe("cadb");
+    expect(ids("sort=indicator&order=asc")).toBe("adcb");
+    expect(ids("sort=finished&order=asc")).toBe("bcad");
+    expect(ids("sort=created")).toBe("abcd");
+  });
+
+  it("chooses by what the address says", () => {
+    expect(ids("sweep=s&sort=model")).toBe("ac");
+    expect(ids("sweep=nobody")).toBe("");
+    expect(ids("flag=odd")).toBe("c");
+    expect(ids("text=fell")).toBe("c");
+    expect(ids("indicator_min=2")).toBe("c");
+    expect(ids("indicator_max=1")).toBe("ad");
+    expect(ids("since=2026-01-01T00:00:00.000001Z")).toBe("ac");
+    expect(ids("until=2026-01-01T00:00:00.000001Z")).toBe("b");
+    expect(ids("id_prefix=a")).toBe("a");
+  });
+
+  it("goes on from page to page, and ends", () => {
+    const first = listed(rows, new URLSearchParams("limit=3"));
+    expect(first.next_cursor).toBe("3");
+    const last = listed(rows, new URLSearchParams("limit=3&cursor=3"));
+    expect([last.jobs.map((one) => one.id), last.next_cursor]).toEqual([["d"], null]);
+  });
+});

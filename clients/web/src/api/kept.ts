@@ -1,0 +1,78 @@
+import { listed, type Rows } from "./kept-jobs";
+import { ApiError } from "./problem";
+import { SITE, type Site } from "./site";
+
+const JOB = /^\/v1\/jobs\/([^/]+)/;
+/** Nobody may change anything here, so no page offers it. */
+const READER = { key: null, scope: "read", keys_required: false };
+/** Statuses of what a site does not hold, or can't do. */
+export const NOT_KEPT: ReadonlySet<number> = new Set([405, 410]);
+const WORDS: Readonly<Record<string, string>> = {
+  "/v1/leaderboard": "It holds its boards as a whole and task by task; other choices need a running service.",
+  "/v1/leaderboard/export": "It holds exports of its boards as a whole and task by task.",
+  "/v1/leaderboard/compare": "It holds comparisons of models as the boards name them, on the tracks that they share.",
+};
+
+/** Path and parameters as a site's index has them: decoded, and the parameters in order. */
+export function keyOf(url: URL): string {
+  const words = [...url.searchParams].map(([name, value]) => `${name}=${value}`).sort();
+  return decodeURIComponent(url.pathname) + (words.length > 0 ? `?${words.join("&")}` : "");
+}
+
+async function file(name: string, cache: RequestCache = "default"): Promise<Response> {
+  try {
+    const response = await fetch(new URL(name, document.baseURI), { cache });
+    if (response.ok) return response;
+  } catch {
+    // Told below, as an answer that is no file.
+  }
+  throw new ApiError(0, null, "a file of this site can’t be read: perhaps it was written again meanwhile, and reloading the page helps");
+}
+
+const read = new Map<string, Promise<unknown>>();
+
+/** A JSON file that several answers are made of, read once. */
+function once<Data>(name: string, cache: RequestCache = "default"): Promise<Data> {
+  const known = read.get(name);
+  if (known !== undefined) return known as Promise<Data>;
+  const reading = file(name, cache).then((response) => response.json() as Promise<Data>);
+  read.set(name, reading);
+  reading.catch(() => read.delete(name));
+  return reading;
+}
+
+export const readSite = (): Promise<Site> => once<Site>(SITE ?? "", "no-cache");
+
+function problem(status: number, title: string, detail: string): Response {
+  return Response.json({ type: "about:blank", status, title, detail, errors: [] }, { status });
+}
+
+function found(name: string | null | undefined, why: string): Promise<Response> | Response {
+  if (name === null) return problem(404, "There is no such thing", "The service had none when this site was written.");
+  return name === undefined ? problem(410, "Not on this site", why) : file(name);
+}
+
+async function ofJob(id: string, key: string): Promise<Response> {
+  const site = await readSite();
+  const rows = await once<Rows>(site.jobs);
+  if (!rows.kept.includes(id)) {
+    const known = rows.jobs.some((job) => job.id === id);
+    const why = known ? "of this job only its result, which lists and boards show" : "no such job";
+    return problem(410, "Not on this site", `This site holds ${why}.`);
+  }
+  const files = await once<{ answers: Record<string, string | null> }>(`jobs/${id}.json`, "no-cache");
+  return found(files.answers[key], "This file of the job was left out of this site.");
+}
+
+/** Answers a request from a site's files, as the service would. */
+export async function keptAnswer(request: Request): Promise<Response> {
+  if (request.method !== "GET") return problem(405, "Not on this site", "This is a published copy: nothing can be changed here. A running service can.");
+  const url = new URL(request.url);
+  if (url.pathname === "/v1/caller") return Response.json(READER);
+  const site = await readSite();
+  if (url.pathname === "/v1/jobs") return Response.json(listed(await once<Rows>(site.jobs), url.searchParams));
+  const key = keyOf(url);
+  const job = JOB.exec(url.pathname)?.[1];
+  if (job !== undefined) return ofJob(decodeURIComponent(job), key);
+  return found(site.answers[key], `This site does not hold that. ${WORDS[url.pathname] ?? site.holds}`);
+}

@@ -1,0 +1,72 @@
+"""A published site in a real browser, from a plain file server, under a sub-path."""
+
+from __future__ import annotations
+
+import subprocess
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+
+import httpx
+from running import finished, running_stack
+from tests.web import test_pages
+from tests.web.test_pages import BUILDARENA, in_browser
+
+pytestmark = test_pages.pytestmark
+
+SWEEP = {
+    "name": "published",
+    "tasks": ["support-1", "lift-1"],
+    "models": ["builtin/expert", "builtin/random", "builtin/idle"],
+    "seeds": [0, 1],
+    "simulator": "mujoco",
+}
+OTHER = {**SWEEP, "name": "<b>another</b>", "tasks": ["support-1"], "seeds": [1]}
+PLACE = "some/where"
+
+
+@contextmanager
+def file_server(folder: Path) -> Iterator[str]:
+    """Serves a folder as any static host does; yields its address."""
+
+    class Quiet(SimpleHTTPRequestHandler):
+        def log_message(self, format: str, *args: object) -> None:  # noqa: A002 - its name
+            pass
+
+    class Server(ThreadingHTTPServer):
+        def handle_error(self, request: object, client_address: object) -> None:
+            """Browsers hang up when a page is closed."""
+
+    server = Server(("127.0.0.1", 0), partial(Quiet, directory=str(folder)))
+    thread = threading.Thread(target=server.serve_forever)
+    thread.start()
+    try:
+        yield f"http://127.0.0.1:{server.server_port}/"
+    finally:
+        server.shutdown()
+        thread.join()
+        server.server_close()
+
+
+def test_a_site_works_from_a_file_server(tmp_path: Path) -> None:
+    host = tmp_path / "host"
+    with running_stack(tmp_path) as stack, file_server(host) as address:
+        with httpx.Client(base_url=stack.url) as client:
+            sweeps = [
+                client.post("/v1/sweeps", json=spec).raise_for_status().json()["id"]
+                for spec in (SWEEP, OTHER)
+            ]
+            for sweep in sweeps:
+                finished(client, sweep)
+        for name in ("all", "best"):
+            out = host / PLACE / name
+            words = ["--out", str(out), "--jobs", name, "--url", stack.url]
+            subprocess.run([BUILDARENA, "site", *sweeps, *words], check=True, timeout=120)
+        in_browser(
+            ["e2e/site.test.ts"],
+            BUILDARENA_WEB_URL=stack.url,
+            BUILDARENA_WEB_SITES=",".join(f"{address}{PLACE}/{name}/" for name in ("all", "best")),
+        )
