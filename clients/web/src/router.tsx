@@ -1,5 +1,6 @@
 import { createRootRoute, createRoute, createRouter, lazyRouteComponent } from "@tanstack/react-router";
 import { readSearch } from "./pages/board/search";
+import { readBuildSearch } from "./pages/build/search";
 import { readCompareSearch } from "./pages/compare/search";
 import { readJobSearch, readJobsSearch } from "./pages/job/search";
 import { Missing, RootError, Shell } from "./parts/Shell";
@@ -56,8 +57,20 @@ const model = createRoute({
   component: lazyRouteComponent(() => import("./pages/models/ModelPage")),
 });
 
+const build = createRoute({
+  getParentRoute: () => root,
+  path: "/build",
+  validateSearch: readBuildSearch,
+  component: lazyRouteComponent(() => import("./pages/build/BuildPage")),
+});
+const machine = createRoute({
+  getParentRoute: () => root,
+  path: "/machine",
+  component: lazyRouteComponent(() => import("./pages/machine/MachinePage")),
+});
+
 export const router = createRouter({
-  routeTree: root.addChildren([board, sweeps, sweep, jobs, job, compare, tasks, task, model]),
+  routeTree: root.addChildren([board, sweeps, sweep, jobs, job, compare, tasks, task, model, build, machine]),
   defaultPreload: "intent",
   scrollRestoration: true,
 });

@@ -22,6 +22,8 @@ const PLACES = [
   { to: "/jobs", label: "Jobs" },
   { to: "/tasks", label: "Tasks" },
   { to: "/compare", label: "Compare" },
+  { to: "/build", label: "Build" },
+  { to: "/machine", label: "Machine" },
 ] as const;
 
 /** The frame of every page: where one is, where one can go, light or dark, the key. */
