@@ -30,7 +30,7 @@ interface HandSceneProps {
 const FREE = "#2b8a3e";
 const TAKEN = "#e8590c";
 const FROM = "#1c7ed6";
-const ROOM = 1.5;
+const ROOM = 0.6;
 const Z = new Vector3(0, 0, 1);
 
 /** A machine under construction: a click on a part chooses it and the face that was clicked. */
@@ -67,8 +67,8 @@ function Marks({ part, face, from }: Pick<HandSceneProps, "part" | "face" | "fro
     <>
       {face !== undefined && <Mark face={face} colour={face.taken_by === null ? FREE : TAKEN} />}
       {from !== undefined && <Mark face={from} colour={FROM} />}
-      {part?.faces.map((one) => (
-        <Html key={one.label} center position={lifted(one, 0.12)} zIndexRange={[10, 0]} wrapperClass="face-letter" aria-hidden>
+      {part?.faces.filter((one) => one.taken_by === null).map((one) => (
+        <Html key={`${part.id} ${one.label}`} center occlude position={lifted(one, 0.12)} zIndexRange={[10, 0]} wrapperClass="face-letter" aria-hidden>
           {one.label}
         </Html>
       ))}

@@ -2,7 +2,6 @@ import { Button, Group, Select, Stack, Text, TextInput } from "@mantine/core";
 import { IconLink, IconPlus, IconSearch } from "@tabler/icons-react";
 import { useQuery } from "@tanstack/react-query";
 import { useState } from "react";
-import { number } from "../../format";
 import { Answered } from "../../parts/States";
 import { modules as modulesQuery, type Hand, type ModuleView } from "./session";
 
@@ -86,7 +85,7 @@ function Blocks({ hand, modules }: { hand: Hand; modules: readonly ModuleView[] 
           <div>
             <Text size="sm" fw={600}>{one.name}</Text>
             <Text size="xs" className="dimmed">
-              {one.size === null ? "connector" : one.size.map((value) => number(value, value % 1 === 0 ? 0 : 2)).join(" × ")} units · mass {one.mass}
+              {one.size === null ? "connector" : one.size.join(" × ")} units · mass {one.mass}
               {one.faces.length > 0 ? ` · faces ${one.faces.join(" ")}` : " · carries nothing"}
             </Text>
             <Text size="xs">{one.description}</Text>

@@ -1,4 +1,4 @@
-import { Alert, Anchor, Group, Loader, Stack, Text, Title } from "@mantine/core";
+import { Alert, Group, Loader, Stack, Text, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { Link } from "@tanstack/react-router";
 import { job as jobQuery } from "../../api/queries";
@@ -31,8 +31,8 @@ export function Ended({ view }: { view: SessionView }) {
             <Section
               title="Your score"
               aside={
-                <Group gap="md">
-                  <Anchor component={Link} to={`/jobs/${id}`} size="sm">The whole job</Anchor>
+                <Group gap="md" fz="sm">
+                  <Link to="/jobs/$id" params={{ id }}>The whole job</Link>
                   <Link to="/" search={{ track: job.track }}>Leaderboard</Link>
                   <Link to="/build" search={{ task: job.task }}>Build again</Link>
                 </Group>

@@ -20,6 +20,7 @@ import { ToolsPanel } from "./ToolsPanel";
 
 const HandScene = lazy(() => import("../../scene/HandScene"));
 const DURATION_S = 10;
+const HEADING = /^\s*#[^\n]*\n+/;
 
 interface TaskDocument {
   constraints?: { modules?: string[] | null; max_sub_structures?: number };
@@ -49,8 +50,8 @@ export function Workroom({ view }: { view: SessionView }) {
         <SubmitButton view={view} />
       </Group>
       {task.data !== undefined && (
-        <Spoiler maxHeight={64} showLabel="Read the whole task" hideLabel="Less of the task">
-          <Markdown text={task.data.statement} />
+        <Spoiler maxHeight={56} showLabel="Read the whole task" hideLabel="Less of the task">
+          <Markdown text={task.data.statement.replace(HEADING, "")} />
         </Spoiler>
       )}
       <Machines hand={hand} view={view} several={(document.constraints?.max_sub_structures ?? 1) > 1} />
@@ -71,9 +72,8 @@ export function Workroom({ view }: { view: SessionView }) {
             Click a face to choose it; drag to turn, scroll to come closer. Green: free, orange: taken, blue: where a connector begins. The red block is the starting block; north is away from you at first.
           </Text>
           <Latest hand={hand} />
-          <FeedbackLog id={job.id} />
         </Stack>
-        <Stack gap="sm">
+        <Stack gap="sm" className="hand-tools">
           <PartsList hand={hand} />
           <Tabs defaultValue="attach" keepMounted={false}>
             <Tabs.List>
@@ -88,6 +88,7 @@ export function Workroom({ view }: { view: SessionView }) {
             <Tabs.Panel value="tools" pt="sm"><ToolsPanel hand={hand} view={view} /></Tabs.Panel>
           </Tabs>
         </Stack>
+        <FeedbackLog id={job.id} />
       </div>
     </Stack>
   );

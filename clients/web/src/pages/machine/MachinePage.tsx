@@ -112,7 +112,7 @@ function Findings({ check }: { check: Check }) {
       <Text size="sm" className="figures">
         {check.name !== "" && <b>{check.name}: </b>}
         {check.parts} parts, mass {number(check.mass, 2)}
-        {size !== null && `, ${size.map((value) => number(value, 2)).join(" × ")} units (east × north × up)`}, {check.control_sequence.length} key presses
+        {size !== null && `, ${size.map((value) => number(value, 2)).join(" × ")} units (east × north × up)`}, {check.control_sequence.length} key press{check.control_sequence.length === 1 ? "" : "es"}
       </Text>
       <Alert color={sound ? "teal" : "red"} py="xs" title={sound ? "✓ it is a sound machine" : "✗ it cannot be tried"}>
         {sound ? "No two blocks overlap, and every part sits where the document says." : <List size="sm">{check.faults.map((one) => <List.Item key={one}>{one}</List.Item>)}</List>}

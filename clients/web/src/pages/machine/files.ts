@@ -40,7 +40,18 @@ async function looked(file: File, task: string | null): Promise<Dropped> {
   return { file, glb: null, check: await sent<Check>("/v1/machines/check", task === null ? {} : { task }, file) };
 }
 
-export const useLook = () => useMutation({ mutationFn: ({ file, task }: { file: File; task: string | null }) => looked(file, task) });
+/** The same, and a refusal that names the file. */
+async function lookedAt(file: File, task: string | null): Promise<Dropped> {
+  try {
+    return await looked(file, task);
+  } catch (error) {
+    if (error instanceof ApiError && error.status !== 422) throw error;
+    const detail = error instanceof Error ? error.message : "unknown error";
+    throw refusal(422, { type: "about:blank", title: `${file.name} is not read`, status: 422, detail, errors: [] });
+  }
+}
+
+export const useLook = () => useMutation({ mutationFn: ({ file, task }: { file: File; task: string | null }) => lookedAt(file, task) });
 
 export const useTrial = () =>
   useMutation({ mutationFn: ({ file, ...query }: { file: File; task: string; simulator: string }) => sent<JobView>("/v1/machines/trials", query, file) });

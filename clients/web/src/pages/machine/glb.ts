@@ -49,16 +49,23 @@ export function describedBy(file: ArrayBuffer): Description {
   return description;
 }
 
+interface Material {
+  pbrMetallicRoughness?: { baseColorFactor?: unknown };
+}
+
+/** A material's own colour, and nothing else of it. */
+function plain(material: Material): unknown {
+  const colour = material.pbrMetallicRoughness?.baseColorFactor;
+  const numbers = Array.isArray(colour) && colour.length === 4 && colour.every((value) => typeof value === "number");
+  return { doubleSided: true, pbrMetallicRoughness: { ...(numbers ? { baseColorFactor: colour as unknown } : {}), metallicFactor: 0, roughnessFactor: 1 } };
+}
+
 /** The same file without pictures: they could be anywhere, and shapes need none. */
 export function withoutPictures(file: ArrayBuffer, description: Description): ArrayBuffer {
   const bare = structuredClone(description);
-  for (const part of ["images", "textures", "samplers", "materials", "animations", "skins", "cameras", "extensions", "extensionsUsed"]) Reflect.deleteProperty(bare, part);
-  for (const mesh of (bare.meshes ?? []) as { primitives?: { material?: number; extensions?: unknown }[] }[]) {
-    for (const primitive of mesh.primitives ?? []) {
-      Reflect.deleteProperty(primitive, "material");
-      Reflect.deleteProperty(primitive, "extensions");
-    }
-  }
+  for (const part of ["images", "textures", "samplers", "animations", "skins", "cameras", "extensions", "extensionsUsed"]) Reflect.deleteProperty(bare, part);
+  for (const mesh of (bare.meshes ?? []) as { primitives?: object[] }[]) for (const primitive of mesh.primitives ?? []) Reflect.deleteProperty(primitive, "extensions");
+  if (Array.isArray(bare.materials)) bare.materials = (bare.materials as Material[]).map(plain);
   for (const node of (bare.nodes ?? []) as Record<string, unknown>[]) for (const part of ["skin", "camera", "extensions"]) Reflect.deleteProperty(node, part);
   const text = new TextEncoder().encode(JSON.stringify(bare));
   const padded = Math.ceil(text.length / 4) * 4;
