@@ -232,6 +232,29 @@ describe("building by hand", () => {
   });
 });
 
+describe("in the dark, at 390", () => {
+  it.each(["/build", "/machine", "room"])("%s has no serious fault and does not scroll sideways", async (path) => {
+    const ask = { task: "support-1", agent: `dark-${process.pid}`, seed: 0, simulator: "mujoco", kind: "human" };
+    const post = (to: string, body: unknown) => fetch(`${URL_OF_SERVICE}${to}`, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(body) });
+    let where = path;
+    if (path === "room") {
+      const { id } = (await (await post("/v1/sessions", ask)).json()) as { id: string };
+      await post(`/v1/sessions/${id}/calls`, { tool: "start", arguments: {} });
+      where = `/build?session=${id}`;
+    }
+    const page = await opened(browser, where, 390);
+    await page.emulateMedia({ colorScheme: "dark" });
+    for (const tab of path === "room" ? ["Attach", "Part", "Keys", "All tools"] : [""]) {
+      if (tab !== "") await page.getByRole("tab", { name: tab }).click();
+      if (tab === "Part") await page.getByText("1 Starting Block").click();
+      const { violations } = await new AxeBuilder({ page }).analyze();
+      expect(violations.filter((one) => one.impact === "serious" || one.impact === "critical").map((one) => `${tab} ${one.id} ${one.nodes[0]?.html}`)).toEqual([]);
+      expect(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth)).toBe(true);
+    }
+    await page.close();
+  });
+});
+
 describe("a machine from a file", () => {
   const brick = { tool: "attach_block_to", arguments: { base_block: "1", face: "E", new_block: "Small Wooden Block" } };
 
