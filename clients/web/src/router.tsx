@@ -1,6 +1,7 @@
 import { createHashHistory, createRootRoute, createRoute, createRouter, lazyRouteComponent } from "@tanstack/react-router";
 import { isSite } from "./api/site";
 import { readSearch } from "./pages/board/search";
+import { readBuildSearch } from "./pages/build/search";
 import { readCompareSearch } from "./pages/compare/search";
 import { readJobSearch, readJobsSearch } from "./pages/job/search";
 import { Missing, RootError, Shell } from "./parts/Shell";
@@ -77,8 +78,20 @@ const model = createRoute({
   component: lazyRouteComponent(() => import("./pages/models/ModelPage")),
 });
 
+const build = createRoute({
+  getParentRoute: () => root,
+  path: "/build",
+  validateSearch: readBuildSearch,
+  component: lazyRouteComponent(() => import("./pages/build/BuildPage")),
+});
+const machine = createRoute({
+  getParentRoute: () => root,
+  path: "/machine",
+  component: lazyRouteComponent(() => import("./pages/machine/MachinePage")),
+});
+
 export const router = createRouter({
-  routeTree: root.addChildren([board, sweeps, newSweep, twoSweeps, sweep, jobs, job, compare, tasks, task, model]),
+  routeTree: root.addChildren([board, sweeps, newSweep, twoSweeps, sweep, jobs, job, compare, tasks, task, model, build, machine]),
   // A file server knows one page only, so the rest of the address stands behind its #.
   history: isSite ? createHashHistory() : undefined,
   defaultPreload: "intent",

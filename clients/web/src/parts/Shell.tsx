@@ -26,6 +26,8 @@ const PLACES = [
   { to: "/jobs", label: "Jobs" },
   { to: "/tasks", label: "Tasks" },
   { to: "/compare", label: "Compare" },
+  { to: "/build", label: "Build" },
+  { to: "/machine", label: "Machine" },
 ] as const;
 
 /** Places that a published site has; all others need a running service. */

@@ -14,6 +14,12 @@ export type PoseNow = (part: Part, into: Matrix4) => Matrix4;
 
 export const asPlaced: PoseNow = (part, into) => into.copy(part.pose);
 
+/** Where a part was clicked, and the way its surface looks there; world frame. */
+export interface Hit {
+  point: Vector3;
+  normal: Vector3;
+}
+
 interface PartsProps {
   machine: Machine;
   pose: PoseNow;
@@ -22,7 +28,7 @@ interface PartsProps {
   colour?: (part: Part) => string | null;
   rodColour?: (rod: Rod) => string | null;
   chosen?: ReadonlySet<string>;
-  onChoose?: (id: string) => void;
+  onChoose?: (id: string, hit?: Hit) => void;
 }
 
 /** All blocks of a machine, one instanced mesh a module, and its connectors. */
@@ -78,7 +84,9 @@ function Blocks({ module, parts, pose, moving, colour, chosen, onChoose }: Parts
       onClick={(event) => {
         event.stopPropagation();
         const part = event.instanceId === undefined ? undefined : parts[event.instanceId];
-        if (part !== undefined) onChoose?.(part.id);
+        if (part === undefined) return;
+        const normal = event.face?.normal.clone().transformDirection(part.pose);
+        onChoose?.(part.id, normal === undefined ? undefined : { point: event.point, normal });
       }}
     >
       <meshLambertMaterial />

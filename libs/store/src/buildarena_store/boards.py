@@ -14,7 +14,7 @@ from buildarena_benchmark.flags import is_disqualified
 from buildarena_benchmark.leaderboard import EndedJob
 from buildarena_store.database import Database
 from buildarena_store.rows import columns_of, value_of
-from buildarena_store.states import EXTERNAL_PROVIDER, JobState
+from buildarena_store.states import EXTERNAL_PROVIDER, FILE_PROVIDER, JobState
 from buildarena_store.tables import board_changes, jobs, rollouts, sweep_jobs, tasks
 
 CHUNK = 5000
@@ -115,14 +115,16 @@ class Boards:
             marks = connection.execute(select(oldest.op("::")(text("text")), uploaded)).one()
             new_mark, task_versions = int(marks[0]), int(marks[1])
             if mark is None:
-                query = select(*_COLUMNS).where(jobs.c.state == JobState.DONE)
+                query = select(*_COLUMNS).where(jobs.c.state == JobState.DONE, _RANKED)
                 put = list(_trials(connection, query))
                 return BoardFeed(mark=new_mark, put=put, gone=(), task_versions=task_versions)
             changed = select(board_changes.c.job_id).where(board_changes.c.transaction >= mark)
             ids = {row.job_id for row in connection.execute(changed.distinct())}
             put = []
             if ids:
-                query = select(*_COLUMNS).where(jobs.c.state == JobState.DONE, jobs.c.id.in_(ids))
+                query = select(*_COLUMNS).where(
+                    jobs.c.state == JobState.DONE, jobs.c.id.in_(ids), _RANKED
+                )
                 put = list(_trials(connection, query))
         gone = sorted(ids - {trial.job_id for trial in put})
         return BoardFeed(mark=new_mark, put=put, gone=gone, task_versions=task_versions)
@@ -148,8 +150,8 @@ class Boards:
         return [(trial, rounds.get(trial.job_id, [])) for trial in found]
 
     def tracks(self) -> list[str]:
-        """Every track that has jobs, ended or not."""
-        query = select(jobs.c.track).distinct().order_by(jobs.c.track)
+        """Every track that has jobs, ended or not; files that were tried have no leaderboard."""
+        query = select(jobs.c.track).where(_RANKED).distinct().order_by(jobs.c.track)
         with self._database.transaction() as connection:
             return [row.track for row in connection.execute(query)]
 
@@ -224,6 +226,7 @@ class Boards:
             return [(row.key, row.value, row.jobs) for row in connection.execute(query)]
 
 
+_RANKED = func.coalesce(jobs.c.model_config["provider"].as_string(), "") != FILE_PROVIDER
 _COLUMNS = [
     jobs.c.track,
     jobs.c.task,

@@ -45,12 +45,13 @@ class NotOwnedError(StoreError):
 
 
 class NameTakenError(StoreError):
-    """A name belongs to the key that first used it; nothing was changed."""
+    """A name belongs to the key, and is of the kind, that first used it; nothing was changed."""
 
-    def __init__(self, kind: str, name: str) -> None:
-        super().__init__(
-            f"the {kind} name {name!r} belongs to the key that first used it: choose another name"
-        )
+    def __init__(self, kind: str, name: str, *, holder: str | None = None) -> None:
+        whose = "belongs to the key that first used it"
+        if holder is not None:
+            whose = f"is the name of an {holder}" if holder == "agent" else f"is a {holder}'s name"
+        super().__init__(f"the {kind} name {name!r} {whose}: choose another name")
 
 
 class StaleLeaseError(StoreError):

@@ -16,6 +16,7 @@ __all__ = [
     "CONSTRUCT_QUEUE",
     "EXTERNAL_PROVIDER",
     "EXTERNAL_QUEUE",
+    "FILE_PROVIDER",
     "JOB_TRANSITIONS",
     "SWEEP_TRANSITIONS",
     "TURN",
@@ -36,6 +37,8 @@ CONSTRUCT_QUEUE: Final = "construct"
 VERIFY_QUEUE: Final = "verify"
 EXTERNAL_PROVIDER: Final = "external"
 """Provider in the configuration of external agents: nobody counts their requests and tokens."""
+FILE_PROVIDER: Final = "file"
+"""Provider in the configuration of machines brought as files: nobody built them here."""
 EXTERNAL_QUEUE: Final = "external"
 """Where jobs of external agents are while they build: no worker serves it."""
 

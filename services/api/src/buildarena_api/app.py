@@ -38,6 +38,7 @@ from buildarena_api.routes import (
     jobs,
     keys,
     leaderboard,
+    machines,
     metrics,
     pictures,
     replays,
@@ -61,6 +62,7 @@ EXPORTERS = 6
 ORDINARY = (
     verifications,
     sessions,
+    machines,
     replays,  # before jobs, whose artifacts have paths like theirs
     trials,
     pictures,
@@ -153,7 +155,9 @@ def _add_routes(app: FastAPI) -> None:
 def _add_middleware(app: FastAPI) -> None:
     """The last one added is the first that a request meets."""
     app.add_middleware(
-        BodyLimitMiddleware, unlimited={archives.IMPORT_PATH}, documents={tasks.PATH}
+        BodyLimitMiddleware,
+        unlimited={archives.IMPORT_PATH},
+        documents={tasks.PATH, machines.CHECK_PATH, machines.TRIAL_PATH},
     )
     routes = [
         (found.path, found.methods or ())

@@ -102,11 +102,12 @@ def scene_view(scenario: Scenario, machine: Machine | None) -> SceneView:
     """
     return SceneView(
         scenario=scenario.model_dump(mode="json"),
-        machine=None if machine is None else _machine(machine),
+        machine=None if machine is None else machine_scene(machine),
     )
 
 
-def _machine(machine: Machine) -> MachineScene:
+def machine_scene(machine: Machine) -> MachineScene:
+    """A machine's parts as it was built."""
     used = {block.module.name: block.module for block in machine.blocks.values()}
     return MachineScene(
         modules={name: _module(module) for name, module in used.items()},

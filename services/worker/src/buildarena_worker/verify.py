@@ -26,7 +26,7 @@ from buildarena_pipeline.agents.workbench import Workbench
 from buildarena_pipeline.catalog.prompt_packs import PromptPacks
 from buildarena_pipeline.catalog.simulators import BESIEGE
 from buildarena_pipeline.catalog.tasks import TaskCatalog
-from buildarena_pipeline.catalog.tracks import EXTERNAL_WORKFLOW
+from buildarena_pipeline.catalog.tracks import EXTERNAL_WORKFLOW, FILE_WORKFLOW
 from buildarena_pipeline.errors import PermanentError
 from buildarena_pipeline.runtime.machine_documents import machine_bytes
 from buildarena_pipeline.runtime.scoring import best_rollout, task_of
@@ -148,7 +148,7 @@ class Verifier:
     def _checks(self, job: Job) -> list[Check]:
         if job.state != JobState.DONE or job.success is None:
             return [_compare("scored", kept=True, found=False)]
-        if job.track_config["workflow"] == EXTERNAL_WORKFLOW:
+        if job.track_config["workflow"] in {EXTERNAL_WORKFLOW, FILE_WORKFLOW}:
             return self._external_checks(job)
         try:
             session, host, result = self._replay(job)
@@ -178,7 +178,12 @@ class Verifier:
         return checks
 
     def _external_checks(self, job: Job) -> list[Check]:
-        """An external agent's calls are made again; what it thought in between is its own."""
+        """What came about elsewhere: the calls are made again, or the machine is read again."""
+        if job.track_config["workflow"] == FILE_WORKFLOW:
+            digest = str(job.model_config.get("model"))
+            machine = Machine.from_document(json.loads(self._artifacts.get(digest)))
+            checks = [_compare("machine", self._artifact(job, "machine"), digest)]
+            return checks + self._trial_checks(job, machine)
         with self._store.database.transaction() as connection:
             calls = self._store.external_calls.read(job.id, connection=connection)
         bench = Workbench()
@@ -187,7 +192,10 @@ class Verifier:
             _compare("calls", [_answer_of(call) for call in calls], [_answer_of(c) for c in again])
         ]
         chosen = bench.result()
-        machine = None if chosen is None else chosen[1]
+        return checks + self._trial_checks(job, None if chosen is None else chosen[1])
+
+    def _trial_checks(self, job: Job, machine: Machine | None) -> list[Check]:
+        checks = []
         records = self._store.rollouts.read(job.id)
         if machine is not None:
             if job.outcome != Outcome.LIMIT:

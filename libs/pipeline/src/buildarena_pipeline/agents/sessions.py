@@ -4,45 +4,44 @@ from __future__ import annotations
 
 import re
 from collections import OrderedDict
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from threading import Lock
-from typing import Any
+from typing import Any, Literal
 
-from buildarena_benchmark import Task, ValidationIssue, broken_constraint
+from buildarena_benchmark import Task, ValidationIssue
+from buildarena_geometry import Machine
 from buildarena_pipeline.agents.briefing import (
     MAX_CALLS,
     MAX_SESSION_BYTES,
     briefing,
     briefing_digest,
 )
+from buildarena_pipeline.agents.handing_in import hand_in
 from buildarena_pipeline.agents.workbench import ASSEMBLY, Workbench, check_arguments, rebuild
 from buildarena_pipeline.catalog.simulators import simulation_version, simulator_issues
-from buildarena_pipeline.catalog.tracks import external_track
+from buildarena_pipeline.catalog.tracks import EXTERNAL_WORKFLOW, external_track
 from buildarena_pipeline.errors import PipelineError, SubmissionError
 from buildarena_pipeline.runtime.context import Context
-from buildarena_pipeline.runtime.machine_documents import machine_bytes
-from buildarena_pipeline.runtime.scoring import failure_score, task_of
 from buildarena_pipeline.transcript import Transcript
 from buildarena_pipeline.turns import turn_of_call
 from buildarena_store import (
     ExternalCall,
     Job,
     JobKey,
+    JobState,
     Lease,
     NewJob,
-    Outcome,
-    RolloutRequest,
-    Stage,
     UnknownIdError,
 )
 from buildarena_store.accounts.names import claim_name
 from buildarena_store.jobs.job import configuration_hash
-from buildarena_store.states import EXTERNAL_PROVIDER, simulate_queue
+from buildarena_store.states import EXTERNAL_PROVIDER, EXTERNAL_QUEUE
 
 AGENT_NAME = re.compile(r"[A-Za-z0-9_.-]{1,80}")
 CACHED_BENCHES = 256
-JSON = "application/json"
+PlayerKind = Literal["agent", "human"]
+"""Who plays: a program, or a person. Leaderboards show `agent/NAME` and `human/NAME`."""
 
 
 class SessionClosedError(PipelineError):
@@ -70,6 +69,25 @@ class OpenedSession:
     again: bool
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SessionState:
+    """A session as it stands.
+
+    Attributes:
+        job: Its job.
+        machines: What was built so far, by name.
+        calls: Calls made.
+        size: Bytes of all arguments and feedback.
+        open: Whether it takes calls.
+    """
+
+    job: Job
+    machines: Mapping[str, Machine]
+    calls: int
+    size: int
+    open: bool
+
+
 class ExternalSessions:
     """Lets external agents build through tool calls.
 
@@ -89,6 +107,7 @@ class ExternalSessions:
         agent: str,
         seed: int,
         simulator: str,
+        kind: PlayerKind = "agent",
         owner: str | None = None,
         force: bool = False,
     ) -> OpenedSession:
@@ -101,18 +120,20 @@ class ExternalSessions:
             agent: The agent's name, which is the key's from now on.
             seed: The seed.
             simulator: The simulator's name.
+            kind: Who plays; no name is of both kinds.
             owner: Id of the API key; None for the operator.
             force: Play under another key's name, as an admin may.
 
         Raises:
             SubmissionError: Something is unknown, or the agent's session of this seed is over or
                 another key's.
-            NameTakenError: The agent's name is another key's.
+            NameTakenError: The name is another key's, or of the other kind.
         """
         chosen = self._check(task, agent, simulator)
         version = simulation_version(simulator, self._context.settings.besiege_version)
         track = external_track(simulator, version, briefing_digest())
-        config = {"name": f"agent/{agent}", "provider": EXTERNAL_PROVIDER, "model": agent}
+        model = f"{kind}/{agent}"
+        config = {"name": model, "provider": EXTERNAL_PROVIDER, "model": agent}
         key = JobKey(
             task=task,
             task_version=chosen.version,
@@ -122,21 +143,23 @@ class ExternalSessions:
         )
         new = NewJob(
             key=key,
-            model=f"agent/{agent}",
+            model=model,
             model_config=config,
             track_config=track.as_config(),
             owner=owner,
         )
         # Refused inside the transaction, so that nothing of it stays.
         with self._context.store.database.transaction() as connection:
-            claim_name("agent", agent, owner=owner, connection=connection, force=force)
+            claim_name(kind, agent, owner=owner, connection=connection, force=force)
             self._context.store.jobs.add([new], connection=connection)
             calls = self._context.store.external_calls
             again = not calls.open(key.job_id, connection=connection)
             if again:
                 lease = calls.lease(key.job_id, connection=connection)
                 if lease is None or lease.job.owner != owner:
-                    message = f"agent {agent!r} has played seed {seed} of {task}: take another seed"
+                    message = (
+                        f"{kind} {agent!r} has played seed {seed} of {task}: take another seed"
+                    )
                     raise SubmissionError([ValidationIssue(path="seed", message=message)])
         return OpenedSession(
             job=self._context.store.jobs.get(key.job_id),
@@ -172,6 +195,36 @@ class ExternalSessions:
         self._keep_bench(job_id, count + 1, bench)
         return done
 
+    def view(self, job_id: str) -> SessionState:
+        """What stands on the workbench of a session that is, or was, under way.
+
+        Raises:
+            UnknownIdError: There is no such session.
+        """
+        try:
+            job = self._context.store.jobs.get(job_id)
+        except UnknownIdError as error:
+            raise UnknownIdError("session", job_id) from error
+        if job.track_config.get("workflow") != EXTERNAL_WORKFLOW:
+            raise UnknownIdError("session", job_id)
+        with self._context.store.database.transaction() as connection:
+            calls = self._context.store.external_calls.read(job_id, connection=connection)
+        with self._lock:
+            bench = self._benches.pop((job_id, len(calls)), None)
+        if bench is None:
+            bench = rebuild(calls)
+        # A call in between works on a workbench of its own, so this one stays as it is.
+        machines = {name: machine.copy() for name, machine in bench.machines.items()}
+        state = SessionState(
+            job=job,
+            machines=machines,
+            calls=len(calls),
+            size=bench.size,
+            open=job.state == JobState.RUNNING and job.queue == EXTERNAL_QUEUE,
+        )
+        self._keep_bench(job_id, len(calls), bench)
+        return state
+
     def submit(self, job_id: str) -> Job:
         """Ends the session: the machine is checked and goes to the simulator.
 
@@ -180,52 +233,17 @@ class ExternalSessions:
             NothingToSubmitError: There is no machine, or there are several without an assembly.
         """
         context = self._context
-        engine = None
         with context.store.database.transaction() as connection:
             lease = self._open_lease(job_id, connection)
-            job = lease.job
             calls = context.store.external_calls.read(job_id, connection=connection)
             bench = rebuild(calls)
             chosen = bench.result()
             if chosen is None:
                 raise NothingToSubmitError(_what_to_do(bench.machines))
-            _, machine = chosen
             transcript = Transcript([turn_of_call(i, call) for i, call in enumerate(calls)])
-            kept = context.artifacts.put(machine_bytes(machine), JSON)
-            made = {
-                "machine": kept,
-                "transcript": context.artifacts.put(transcript.to_json(spaced=True), JSON),
-            }
-            context.store.results.attach(job_id, made, connection=connection)
-            refusals = transcript.refusals
-            task = task_of(job, context.tasks)
-            broken = broken_constraint(task, machine)
-            if broken is not None:
-                reason, detail = broken
-                score = failure_score(
-                    job,
-                    task,
-                    machine,
-                    outcome=Outcome.CONSTRUCTION_FAILED,
-                    reason=reason,
-                    detail=detail,
-                )
-                context.store.results.finish(lease, score, connection=connection, refusals=refusals)
-            else:
-                engine = str(job.track_config["simulator"])
-                request = RolloutRequest(
-                    number=0, final=True, engine=engine, machine_hash=kept.hash
-                )
-                context.store.rollouts.request(job_id, request, connection=connection)
-                context.store.leases.queue_again(
-                    lease,
-                    stage=Stage.SIMULATE,
-                    queue=simulate_queue(engine),
-                    connection=connection,
-                    refusals=refusals,
-                )
-        if engine is not None:
-            context.queues.announce(simulate_queue(engine), [job_id])
+            queue = hand_in(context, lease, chosen[1], transcript, connection=connection)
+        if queue is not None:
+            context.queues.announce(queue, [job_id])
         return context.store.jobs.get(job_id)
 
     def _check(self, task: str, agent: str, simulator: str) -> Task:

@@ -13,6 +13,8 @@ from buildarena_pipeline.catalog.workflows import WorkflowSource
 
 EXTERNAL_WORKFLOW = "external"
 """What external agents play: their own."""
+FILE_WORKFLOW = "file"
+"""What machines come by that were built elsewhere."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,6 +79,23 @@ def external_track(simulator: str, version: str, briefing_digest: str) -> Track:
         simulation_version=version,
         prompts="own",
         prompts_digest=briefing_digest,
+        feedback_version=FEEDBACK_VERSION,
+    )
+
+
+def file_track(simulator: str, version: str) -> Track:
+    """The track of machines that were brought as files; it has no leaderboard.
+
+    Args:
+        simulator: Simulator name.
+        version: Its version, see `simulation_version`.
+    """
+    return Track(
+        workflow=FILE_WORKFLOW,
+        simulator=simulator,
+        simulation_version=version,
+        prompts="none",
+        prompts_digest="00000000",
         feedback_version=FEEDBACK_VERSION,
     )
 

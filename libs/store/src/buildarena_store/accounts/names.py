@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Final, Literal
 
-from sqlalchemy import Connection, select
+from sqlalchemy import Connection, func, select
 from sqlalchemy.dialects.postgresql import insert
 
 from buildarena_store.errors import NameTakenError
 from buildarena_store.tables import names
 
-NameKind = Literal["agent", "task"]
+NameKind = Literal["agent", "human", "task"]
+PLAYERS: Final[frozenset[NameKind]] = frozenset({"agent", "human"})
+"""Kinds that stand on leaderboards beside each other: a name is of one of them only."""
+PLAYERS_LOCK: Final = 0x706C79  # "ply"
 
 
 def claim_name(
@@ -34,8 +37,17 @@ def claim_name(
         force: Use another key's name, as an admin may; it stays the other key's.
 
     Raises:
-        NameTakenError: Another key has it; the transaction must be undone.
+        NameTakenError: Another key has it, or it is another kind's; the transaction must be undone.
     """
+    if kind in PLAYERS:
+        # Rows of two kinds do not collide: without the lock, both could be first.
+        lock = func.pg_advisory_xact_lock(PLAYERS_LOCK, func.hashtext(name))
+        connection.execute(select(lock))
+        others = names.c.kind.in_(sorted(PLAYERS - {kind}))
+        taken = select(names.c.kind).where(others, names.c.name == name)
+        other = connection.execute(taken).scalar()
+        if other is not None:
+            raise NameTakenError(kind, name, holder=other)
     row = insert(names).values(kind=kind, name=name, owner=owner)
     connection.execute(row.on_conflict_do_nothing())
     holder = connection.execute(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict, deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass, field
 from decimal import Decimal
 from pathlib import Path
@@ -16,7 +16,7 @@ from sqlalchemy.dialects.postgresql import insert
 from sqlalchemy.exc import OperationalError, StatementError
 
 from buildarena_store import events
-from buildarena_store.accounts.names import claim_name
+from buildarena_store.accounts.names import NameKind, claim_name
 from buildarena_store.archives.members import ArchiveError, Members
 from buildarena_store.archives.rows import (
     ArtifactRow,
@@ -33,6 +33,7 @@ from buildarena_store.archives.rows import (
 from buildarena_store.archives.writing import CHUNK, FORMAT
 from buildarena_store.artifacts import ArtifactStore
 from buildarena_store.database import Database, expected_schema
+from buildarena_store.errors import NameTakenError
 from buildarena_store.ids import content_hash, new_id
 from buildarena_store.states import EXTERNAL_QUEUE, JobState, Outcome, SweepState, VerificationState
 from buildarena_store.tables import (
@@ -243,14 +244,17 @@ class _Archive:
             raise ArchiveError(f"{self._sweep_id} is here, with other jobs than in the archive")
 
     def _take_in_names(self, connection: Connection) -> None:
-        """Agents that nobody here has played under are the importer's from now on."""
-        agents = {
-            str(row.model_config_.get("model"))
+        """Names that nobody here has played under are the importer's from now on."""
+        players = {
+            (str(row.model_config_.get("model")), row.model.startswith("human/"))
             for row in self._jobs.values()
             if row.track_config.get("workflow") == EXTERNAL_QUEUE
         }
-        for agent in sorted(agents):
-            claim_name("agent", agent, owner=self._owner, connection=connection, force=True)
+        for name, person in sorted(players):
+            # One that is of the other kind here stays so: results keep the names they came with.
+            with suppress(NameTakenError):
+                kind: NameKind = "human" if person else "agent"
+                claim_name(kind, name, owner=self._owner, connection=connection, force=True)
 
     def _take_in_tasks(self, connection: Connection) -> None:
         """Versions that are missing; where a name is known here, they come behind ours.

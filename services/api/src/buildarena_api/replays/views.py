@@ -126,10 +126,11 @@ def _step(step: ReplayStep) -> StepView:
 
 
 def _parts(parts: Iterable[Block | Connector]) -> list[PartView]:
-    return [_block(part) if isinstance(part, Block) else _connector(part) for part in parts]
+    return [block_view(part) if isinstance(part, Block) else connector_view(part) for part in parts]
 
 
-def _block(block: Block) -> PartView:
+def block_view(block: Block) -> PartView:
+    """A block where it is."""
     pose = block.world_from_block
     return PartView(
         id=block.id,
@@ -143,7 +144,8 @@ def _block(block: Block) -> PartView:
     )
 
 
-def _connector(link: Connector) -> PartView:
+def connector_view(link: Connector) -> PartView:
+    """A connector where it is."""
     pose = link.world_from_connector
     return PartView(
         id=link.id,

@@ -28,6 +28,11 @@ class ModuleView(BaseModel):
     mass: float
     cost: float
     description: str
+    size: tuple[float, float, float] | None = Field(
+        description="Extents along its own x, y and z, units; null for connectors"
+    )
+    faces: list[str] = Field(description="Labels of the faces that take a block")
+    actions: list[str] = Field(description="What keys can be bound to")
 
 
 @router.get("/models")
@@ -43,6 +48,15 @@ def list_models(registry: RegistryDep) -> list[ModelView]:
 def list_modules() -> list[ModuleView]:
     """Lists the basic modules."""
     return [
-        ModuleView(name=m.name, kind=m.kind, mass=m.mass, cost=m.cost, description=m.description)
+        ModuleView(
+            name=m.name,
+            kind=m.kind,
+            mass=m.mass,
+            cost=m.cost,
+            description=m.description,
+            size=m.size,
+            faces=[face.label for face in m.faces],
+            actions=list(m.actions),
+        )
         for m in load_catalogue().values()
     ]

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import contextlib
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Response
 from pydantic import BaseModel, ConfigDict, Field
 
+from buildarena_api.benches import BenchMachineView, machine_view
 from buildarena_api.dependencies import ContextDep, ExternalDep
 from buildarena_api.http.access import Caller, CallerDep
 from buildarena_api.http.problems import ProblemError, problem_responses
@@ -40,6 +41,13 @@ class OpenSession(BaseModel):
     ]
     seed: Seed = 0
     simulator: Name = SIMULATORS[0]
+    kind: Annotated[
+        Literal["agent", "human"],
+        Field(
+            description="Who builds: a program, on leaderboards `agent/NAME`, or a person, "
+            "`human/NAME`. No name is of both kinds"
+        ),
+    ] = "agent"
 
 
 class ToolView(BaseModel):
@@ -73,6 +81,20 @@ class SessionOpened(BaseModel):
     tools: list[ToolView]
     limits: LimitsView
     calls: int = Field(description="Calls made so far; more than 0 if it was open already")
+
+
+class SessionView(BaseModel):
+    """A session and what stands on its workbench."""
+
+    job: JobView
+    open: bool = Field(description="Whether it takes calls")
+    machines: list[BenchMachineView] = Field(
+        description="What was built so far; the one that is simulated is the assembly, or the only"
+    )
+    tools: list[ToolView]
+    limits: LimitsView
+    calls: int = Field(description="Calls made so far")
+    bytes: int = Field(description="Bytes of all arguments and answers so far")
 
 
 class ToolCall(BaseModel):
@@ -112,15 +134,16 @@ def open_session(
     sessions: ExternalDep,
     caller: CallerDep,
 ) -> SessionOpened:
-    """Opens a session in which an agent of yours builds for one task.
+    """Opens a session in which an agent of yours, or you yourself, build for one task.
 
-    The same agent, task, seed and simulator give the same session for as long as it is open.
+    The same name, kind, task, seed and simulator give the same session for as long as it is open.
     """
     opened = sessions.open(
         task=body.task,
         agent=body.agent,
         seed=body.seed,
         simulator=body.simulator,
+        kind=body.kind,
         owner=caller.key_id,
         force=caller.is_admin,
     )
@@ -133,10 +156,26 @@ def open_session(
         statement=opened.task.statement,
         limits=LimitsView.model_validate(LIMITS),
         calls=opened.job.actions,
-        tools=[
-            ToolView(name=tool.name, description=tool.description, parameters=dict(tool.parameters))
-            for tool in agent_tools()
-        ],
+        tools=_tools(),
+    )
+
+
+@router.get("/{session_id}", responses=problem_responses(404, 503))
+def show_session(session_id: str, sessions: ExternalDep) -> SessionView:
+    """Shows a session: its machines with every part's faces, its tools, and how much is left.
+
+    Whoever builds by hand sees by it where something can be attached. What came of each call is in
+    the job's transcript.
+    """
+    state = sessions.view(session_id)
+    return SessionView(
+        job=JobView.of(state.job),
+        open=state.open,
+        machines=[machine_view(name, machine) for name, machine in state.machines.items()],
+        tools=_tools(),
+        limits=LimitsView.model_validate(LIMITS),
+        calls=state.calls,
+        bytes=state.size,
     )
 
 
@@ -171,6 +210,13 @@ def submit_session(
         raise ProblemError(409, str(error)) from error
     response.headers["Location"] = f"/v1/jobs/{job.id}"
     return JobView.of(job)
+
+
+def _tools() -> list[ToolView]:
+    return [
+        ToolView(name=tool.name, description=tool.description, parameters=dict(tool.parameters))
+        for tool in agent_tools()
+    ]
 
 
 def _require_own(session_id: str, context: Context, caller: Caller) -> None:

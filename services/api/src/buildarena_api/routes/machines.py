@@ -1,0 +1,156 @@
+"""Routes of machines that come as files: checked, and put through a task's trial."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Final
+
+from fastapi import APIRouter, Depends, Query, Response
+from pydantic import BaseModel, Field
+
+from buildarena_api.dependencies import ContextDep
+from buildarena_api.http.access import CallerDep
+from buildarena_api.http.problems import ProblemError, problem_responses
+from buildarena_api.machine_uploads import MAX_BYTES, not_kept, read_upload, refused, uploaded
+from buildarena_api.replays.views import PressView
+from buildarena_api.scenes import MachineScene, Vector, machine_scene
+from buildarena_api.schemas import JobView
+from buildarena_benchmark import ValidationIssue, broken_constraint
+from buildarena_geometry import Machine
+from buildarena_pipeline.agents.machine_trials import TooManyTrialsError, try_machine
+from buildarena_pipeline.catalog.simulators import SIMULATORS
+from buildarena_pipeline.catalog.specs import MAX_SEED, Name
+from buildarena_pipeline.runtime.context import Context
+
+router = APIRouter(prefix="/v1/machines", tags=["machines"])
+
+CHECK_PATH: Final = "/v1/machines/check"
+TRIAL_PATH: Final = "/v1/machines/trials"
+RETRY_S: Final = 5
+"""When a caller may come back whose trials found no room."""
+FILE: Final[dict[str, Any]] = {
+    "requestBody": {
+        "required": True,
+        "description": "A machine document (JSON) or a machine file of the game (.bsg)",
+        "content": {
+            "application/octet-stream": {
+                "schema": {"type": "string", "format": "binary", "maxLength": MAX_BYTES}
+            }
+        },
+    }
+}
+
+FileDep = Annotated[bytes, Depends(uploaded)]
+TaskName = Annotated[Name | None, Query(description="Also hold it against this task's rules")]
+
+
+class TrialQuery(BaseModel):
+    """Which trial."""
+
+    task: Name
+    simulator: Name = SIMULATORS[0]
+    seed: int = Field(default=0, ge=0, le=MAX_SEED)
+
+
+class MachineCheckView(BaseModel):
+    """What a file holds, and what is wrong with it."""
+
+    name: str = Field(description='What the file calls the machine; "" if it does not')
+    faults: list[str] = Field(description="Why it cannot be put through a trial")
+    broken_rule: str | None = Field(description="The rule of the task that it breaks, if any")
+    remarks: list[str] = Field(description="What of the file the machine does not hold")
+    detached: list[str] = Field(description="Blocks without a path to the starting block")
+    parts: int = Field(description="Blocks and connectors")
+    mass: float = Field(description="Mass units")
+    bounds: tuple[Vector, Vector] | None = Field(
+        description="Smallest and largest coordinates, units; null without blocks"
+    )
+    control_sequence: list[PressView]
+    scene: MachineScene
+
+
+@router.post(
+    "/check",
+    responses=problem_responses(404, 413, 422, 503),
+    openapi_extra=FILE,
+)
+def check_machine(data: FileDep, context: ContextDep, task: TaskName = None) -> MachineCheckView:
+    """Reads a machine from a file and says what it is and what is wrong with it.
+
+    A file that holds no machine is refused, and named what makes it so.
+    """
+    found = read_upload(data)
+    machine = found.machine
+    fault = not_kept(machine)
+    return MachineCheckView(
+        name=found.name,
+        faults=[] if fault is None else [fault],
+        broken_rule=None if task is None else _broken_rule(context, found.machine, task),
+        remarks=list(found.not_understood),
+        detached=list(machine.detached),
+        parts=machine.part_count,
+        mass=machine.mass,
+        bounds=_bounds(machine),
+        control_sequence=[
+            PressView(time_s=one.time_s, key=one.key, hold_for_s=one.hold_for_s)
+            for one in machine.control_sequence
+        ],
+        scene=machine_scene(machine),
+    )
+
+
+@router.post(
+    "/trials",
+    status_code=202,
+    responses={
+        200: {"model": JobView, "description": "An equal one was tried, or is being tried"},
+        **problem_responses(413, 422, 429, 503),
+    },
+    openapi_extra=FILE,
+)
+def try_file(
+    data: FileDep,
+    wanted: Annotated[TrialQuery, Query()],
+    context: ContextDep,
+    caller: CallerDep,
+    response: Response,
+) -> JobView:
+    """Puts a machine from a file through a task's trial, on no leaderboard.
+
+    The same machine, task, simulator and seed give the same job; its score, trajectory and scene
+    are those of any job.
+    """
+    machine = read_upload(data).machine
+    fault = not_kept(machine)
+    if fault is not None:
+        raise refused(fault)
+    try:
+        job, fresh = try_machine(
+            context,
+            machine,
+            task=wanted.task,
+            simulator=wanted.simulator,
+            seed=wanted.seed,
+            owner=caller.key_id,
+        )
+    except TooManyTrialsError as error:
+        raise ProblemError(429, str(error), headers={"Retry-After": str(RETRY_S)}) from error
+    response.status_code = 202 if fresh else 200
+    response.headers["Location"] = f"/v1/jobs/{job.id}"
+    return JobView.of(job)
+
+
+def _broken_rule(context: Context, machine: Machine, name: str) -> str | None:
+    task = context.tasks.named([name]).get(name)
+    if task is None:
+        choices = tuple(sorted(context.tasks.newest()))
+        issue = ValidationIssue(path="task", message=f"there is no task {name!r}", choices=choices)
+        raise ProblemError(422, str(issue), errors=[issue])
+    broken = broken_constraint(task, machine)
+    return None if broken is None else broken[1]
+
+
+def _bounds(machine: Machine) -> tuple[Vector, Vector] | None:
+    if not machine.started:
+        return None
+    low, high = machine.bounds.tolist()
+    return (low[0], low[1], low[2]), (high[0], high[1], high[2])
