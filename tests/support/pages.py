@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,7 @@ from buildarena_api.dashboard.files import FOLDER
 WEB = Path(__file__).resolve().parents[2] / "clients" / "web"
 NODE = WEB.parents[1] / "mk" / "node.sh"
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+BUILDARENA = str(Path(sys.executable).with_name("buildarena"))
 MAX_S = 420
 
 needs_pages = [

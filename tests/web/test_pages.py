@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import subprocess
-import sys
 from pathlib import Path
 
 import httpx
 import pytest
-from pages import in_browser, needs_pages
+from pages import BUILDARENA, in_browser, needs_pages
 from pydantic import SecretStr
 from running import finished, running_stack
 
@@ -20,12 +19,11 @@ SWEEP = {
     "simulator": "mujoco",
 }
 ADMIN = "operator-secret-that-is-long-enough"
-BUILDARENA = str(Path(sys.executable).with_name("buildarena"))
 
 pytestmark = needs_pages
 
 
-@pytest.mark.parametrize("files", ["e2e/pages", "e2e/boards"])
+@pytest.mark.parametrize("files", ["e2e/pages", "e2e/boards", "e2e/build"])
 def test_pages_work_in_a_browser(tmp_path: Path, files: str) -> None:
     report = tmp_path / "report.md"
     with running_stack(tmp_path) as stack:

@@ -11,11 +11,10 @@ from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import httpx
+from pages import BUILDARENA, in_browser, needs_pages
 from running import finished, running_stack
-from tests.web import test_pages
-from tests.web.test_pages import BUILDARENA, in_browser
 
-pytestmark = test_pages.pytestmark
+pytestmark = needs_pages
 
 SWEEP = {
     "name": "published",
@@ -66,7 +65,7 @@ def test_a_site_works_from_a_file_server(tmp_path: Path) -> None:
             words = ["--out", str(out), "--jobs", name, "--url", stack.url]
             subprocess.run([BUILDARENA, "site", *sweeps, *words], check=True, timeout=120)
         in_browser(
-            ["e2e/site.test.ts"],
-            BUILDARENA_WEB_URL=stack.url,
+            stack.url,
+            ["e2e/site"],
             BUILDARENA_WEB_SITES=",".join(f"{address}{PLACE}/{name}/" for name in ("all", "best")),
         )
