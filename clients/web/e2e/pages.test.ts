@@ -69,6 +69,21 @@ describe("the leaderboard", () => {
   });
 });
 
+it("leads in three clicks to a bridge that builds itself and breaks under its cargo", async () => {
+  const { page, context } = await open("/");
+  await page.locator("a.heat-cell").first().click();
+  await page.waitForURL(/\/jobs\?.*task=/);
+  await page.locator("main a[href*='/jobs/job_']").first().click();
+  await page.getByRole("button", { name: "Build it step by step" }).click();
+  const steps = Number(await page.locator("[data-steps]").getAttribute("data-steps"));
+  await page.waitForFunction(() => Number(document.querySelector("[data-step]")?.getAttribute("data-step")) < 3);
+  await page.waitForURL(/view=trial/, { timeout: 600 * steps + 10_000 });
+  const time = page.getByText(/^\d+\.\d \/ \d+ s$/);
+  await expect.poll(async () => Number.parseFloat((await time.textContent()) ?? ""), { timeout: 15_000 }).toBeGreaterThan(0);
+  await page.getByText(/joints? broke/).waitFor();
+  await context.close();
+});
+
 describe("a job", () => {
   it("draws its machine and plays its trial", async () => {
     const { page, context } = await open(`/jobs/${built}?view=trial`);

@@ -20,12 +20,14 @@ interface TrialProps {
   scene: MachineScene;
   trial: Trial;
   scenario: Scenario;
+  /** Whether it plays from the start, as the reader asked for before. */
+  begun?: boolean;
 }
 
 /** A trial, played: scrubbed, slowed, joints coloured by what they bear, breaks marked. */
 export default function TrialView(props: TrialProps) {
   const end = props.trial.times.at(-1) ?? 0;
-  const clock = useClock(end);
+  const clock = useClock(end, props.begun);
   const [loads, setLoads] = useState(true);
   const [follow, setFollow] = useState(true);
   return (

@@ -15,11 +15,11 @@ export interface Clock {
   toggle: () => void;
 }
 
-/** The time of a trial, which plays, stops and can be set. */
-export function useClock(end: number): Clock {
+/** The time of a trial, which plays, stops and can be set; it stands still until it is asked to play. */
+export function useClock(end: number, begun = false): Clock {
   const time = useRef(0);
   const [shown, setShown] = useState(0);
-  const [playing, setPlaying] = useState(false);
+  const [playing, setPlaying] = useState(begun);
   const [speed, setSpeed] = useState("1");
   useEffect(() => {
     if (!playing) return;

@@ -10,8 +10,11 @@ import { callLine } from "./transcript";
 const BuildScene = lazy(() => import("../../scene/BuildScene"));
 const STEP_MS = 450;
 
-/** The machine after a step, with what leads from step to step: buttons, slider, arrow keys, play. */
-export function BuildPart({ build }: { build: Build }) {
+/**
+ * The machine after a step, with what leads from step to step: buttons, slider, arrow keys, play.
+ * `onBuilt` is called when it was played to its end.
+ */
+export function BuildPart({ build, onBuilt }: { build: Build; onBuilt?: () => void }) {
   const { step, at, steps } = build;
   const chapter = build.replay?.chapters[step?.chapter ?? 0];
   const onKeys = (event: KeyboardEvent): void => {
@@ -36,7 +39,7 @@ export function BuildPart({ build }: { build: Build }) {
           label={`The machine after step ${at + 1} of ${steps.length}: ${build.parts.size} parts`}
         />
       </Suspense>
-      <Buttons build={build} />
+      <Buttons build={build} onBuilt={onBuilt} />
       <Chapters build={build} />
       <Told build={build} />
       <ChosenPart build={build} />
@@ -46,20 +49,24 @@ export function BuildPart({ build }: { build: Build }) {
   );
 }
 
-function Buttons({ build }: { build: Build }) {
+function Buttons({ build, onBuilt }: { build: Build; onBuilt?: () => void }) {
   const { at, steps, go } = build;
   const last = steps.length - 1;
   const [playing, setPlaying] = useState(false);
   useEffect(() => {
     if (!playing) return;
     const timer = setTimeout(() => {
-      if (at >= last) setPlaying(false);
-      else go(at + 1);
+      if (at < last) {
+        go(at + 1);
+        return;
+      }
+      setPlaying(false);
+      onBuilt?.();
     }, STEP_MS);
     return () => {
       clearTimeout(timer);
     };
-  }, [playing, at, last, go]);
+  }, [playing, at, last, go, onBuilt]);
   const button = (label: string, icon: React.ReactNode, to: number) => (
     <ActionIcon variant="default" size="lg" aria-label={label} disabled={to < 0 || to > last || to === at} onClick={() => { setPlaying(false); go(to); }}>
       {icon}

@@ -67,6 +67,11 @@ function Room({ job }: { job: JobDetail }) {
   });
   const trials = rolloutsOf(job.artifacts);
   const ended = job.state === "done";
+  const [begun, setBegun] = useState(false);
+  const show = (view: "trial" | undefined, playing: boolean): void => {
+    setBegun(playing);
+    void navigate({ search: (before) => ({ ...before, view }), replace: true, resetScroll: false });
+  };
   return (
     <div className="job-room">
       <Section title="Machine" aside={job.artifacts.machine === undefined ? null : <GlbButton job={job} />}>
@@ -74,7 +79,7 @@ function Room({ job }: { job: JobDetail }) {
           value={search.view ?? "built"}
           keepMounted={false}
           onChange={(value) => {
-            void navigate({ search: (before) => ({ ...before, view: value === "trial" ? ("trial" as const) : undefined }), replace: true, resetScroll: false });
+            show(value === "trial" ? "trial" : undefined, false);
           }}
         >
           <Tabs.List mb="sm">
@@ -89,13 +94,13 @@ function Room({ job }: { job: JobDetail }) {
                 found === null || build.steps.length === 0 ? (
                   <Empty title={ended ? "Nothing was built" : "Nothing is built yet"}>{job.detail ?? (ended ? "No action reached a machine." : "The first action shows here as soon as it is taken.")}</Empty>
                 ) : (
-                  <BuildPart build={build} />
+                  <BuildPart build={build} onBuilt={ended && trials.length > 0 ? () => { show("trial", true); } : undefined} />
                 )
               }
             </Answered>
           </Tabs.Panel>
           <Tabs.Panel value="trial">
-            <TrialPart job={job} numbers={trials} />
+            <TrialPart job={job} numbers={trials} begun={begun} />
           </Tabs.Panel>
         </Tabs>
       </Section>

@@ -9,7 +9,7 @@ import { scene as sceneQuery, trial as trialQuery } from "./queries";
 const TrialView = lazy(() => import("../../scene/TrialView"));
 
 /** The trial of one of a job's rollouts. */
-export function TrialPart({ job, numbers }: { job: JobDetail; numbers: readonly number[] }) {
+export function TrialPart({ job, numbers, begun = false }: { job: JobDetail; numbers: readonly number[]; begun?: boolean }) {
   const [chosen, setChosen] = useState<number | null>(null);
   const number = chosen ?? numbers.at(-1) ?? 0;
   const [scene, trial] = useQueries({ queries: [sceneQuery(job.id, number), trialQuery(job.id, number, job.artifacts[`trajectory-${number}`])] });
@@ -29,7 +29,7 @@ export function TrialPart({ job, numbers }: { job: JobDetail; numbers: readonly 
       {error === null && (scene.data === undefined || trial.data === undefined) && <Loading rows={10} />}
       {scene.data !== undefined && trial.data !== undefined && (
         <Suspense fallback={<Loading rows={10} />}>
-          {scene.data.machine === null ? <Empty title="The trial had no machine" /> : <TrialView key={number} scene={scene.data.machine} trial={trial.data} scenario={scene.data.scenario} />}
+          {scene.data.machine === null ? <Empty title="The trial had no machine" /> : <TrialView key={number} scene={scene.data.machine} trial={trial.data} scenario={scene.data.scenario} begun={begun} />}
         </Suspense>
       )}
     </Stack>
