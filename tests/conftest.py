@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import shutil
 import tempfile
@@ -12,6 +13,7 @@ from typing import Any
 
 import blas_kernels  # noqa: F401 - before numpy is imported
 import pytest
+from fastapi.dependencies import models as dependencies
 from player import Player
 from redis import Redis
 from sqlalchemy import create_engine, text
@@ -76,6 +78,16 @@ def _execute(url: str, statement: str) -> None:
     with engine.connect() as connection:
         connection.execute(text(statement))
     engine.dispose()
+
+
+@pytest.fixture(autouse=True, scope="module")
+def forgotten_apps() -> Iterator[None]:
+    """FastAPI remembers functions of the last thousand apps, and these their apps: gigabytes."""
+    yield
+    for known in vars(dependencies).values():
+        if hasattr(known, "cache_clear"):
+            known.cache_clear()
+    gc.collect()
 
 
 @pytest.fixture(scope="session")

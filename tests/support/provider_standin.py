@@ -74,6 +74,7 @@ class ProviderStandIn:
         self.url = f"http://127.0.0.1:{self._server.server_port}"
         self._thread = threading.Thread(target=self._server.serve_forever, args=(0.05,))
         self.closing = threading.Event()
+        self.held = 0
         self.left = 0
 
     def __enter__(self) -> Self:
@@ -162,6 +163,8 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _keep_waiting(self, *, drips: bool) -> None:
         """Never answers, or a byte at a time; notes when the client has gone."""
+        with self.standin.lock:
+            self.standin.held += 1
         with contextlib.suppress(ConnectionError):
             if drips:
                 self.send_response(200)

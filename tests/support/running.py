@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -26,11 +26,13 @@ def wait_until(condition: Callable[[], Any], within_s: float, what: str) -> Any:
 
 
 @contextmanager
-def running_stack(folder: Path, **settings: Any) -> Iterator[Stack]:
+def running_stack(
+    folder: Path, *, simulators: Sequence[str] = ("mujoco",), **settings: Any
+) -> Iterator[Stack]:
     """A whole service in a folder; its processes are gone afterwards."""
     stack = Stack(
         Settings(data=folder / "data", port=free_port(), **{"lease_s": 3.0, **settings}),
-        simulators=("mujoco",),
+        simulators=simulators,
     )
     before = _children()
     with stack:

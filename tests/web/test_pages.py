@@ -23,7 +23,7 @@ ADMIN = "operator-secret-that-is-long-enough"
 pytestmark = needs_pages
 
 
-@pytest.mark.parametrize("files", ["e2e/pages", "e2e/boards", "e2e/build"])
+@pytest.mark.parametrize("files", ["e2e/pages", "e2e/boards"])
 def test_pages_work_in_a_browser(tmp_path: Path, files: str) -> None:
     report = tmp_path / "report.md"
     with running_stack(tmp_path) as stack:
@@ -33,6 +33,11 @@ def test_pages_work_in_a_browser(tmp_path: Path, files: str) -> None:
         write = [BUILDARENA, "report", sweep_id, "--out", str(report), "--url", stack.url]
         subprocess.run(write, check=True, timeout=60)
         in_browser(stack.url, [files], BUILDARENA_WEB_REPORT=str(report))
+
+
+def test_people_build_and_bring_machines(tmp_path: Path) -> None:
+    with running_stack(tmp_path, simulators=("pybullet", "mujoco")) as stack:
+        in_browser(stack.url, ["e2e/build"])
 
 
 def test_pages_ask_for_a_key_and_offer_what_it_may(tmp_path: Path) -> None:
