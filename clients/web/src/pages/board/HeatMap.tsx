@@ -2,6 +2,7 @@ import { Group, SegmentedControl, Text } from "@mantine/core";
 import { Link, useNavigate } from "@tanstack/react-router";
 import type { Board, Row, TaskBoard } from "../../api/queries";
 import { dollars, measured, number, percent } from "../../format";
+import { ModelByTask } from "../../parts/ModelByTask";
 import { cellOf, entriesOf, type Entry } from "./entries";
 import { jobsBehind, type BoardSearch, type Figure } from "./search";
 import { shade, shareOf } from "./shades";
@@ -42,50 +43,32 @@ export function HeatMap({ board, search }: { board: Board; search: BoardSearch }
           }}
         />
       </Group>
-      <div style={{ overflowX: "auto" }} tabIndex={0} role="region" aria-label="Model by task, scrolls sideways">
-        <table className="heat figures sticky-first">
-          <thead>
-            <tr>
-              <th scope="col" style={{ textAlign: "left" }}>
-                <Text size="sm" fw={600}>
-                  Model
+      <ModelByTask
+        heads={board.tasks.map((task) => ({
+          task: task.task,
+          head: (
+            <>
+              <Link className="quiet" to="/tasks/$name" params={{ name: task.task }}>
+                <Text size="xs" fw={600}>
+                  {task.task}
                 </Text>
-              </th>
-              {board.tasks.map((task) => (
-                <th key={task.task} scope="col">
-                  <Link className="quiet" to="/tasks/$name" params={{ name: task.task }}>
-                    <Text size="xs" fw={600}>
-                      {task.task}
-                    </Text>
-                  </Link>
-                  {figure === "indicator" && (
-                    <Text size="xs" className="dimmed">
-                      {measured(task.indicator, task.unit)}
-                    </Text>
-                  )}
-                </th>
-              ))}
-            </tr>
-          </thead>
-          <tbody>
-            {entries.map((entry) => (
-              <tr key={entry.key}>
-                <th scope="row" style={{ textAlign: "left", paddingRight: 10 }}>
-                  <Text size="sm" fw={500} style={{ whiteSpace: "nowrap" }}>
-                    {entry.label}
-                  </Text>
-                </th>
-                {board.tasks.map((task) => (
-                  <td key={task.task}>
-                    <Cell task={task} entry={entry} figure={figure} entries={entries} search={search} />
-                  </td>
-                ))}
-              </tr>
-            ))}
-            {search.paper === "yes" && <Ghosts board={board} figure={figure} />}
-          </tbody>
-        </table>
-      </div>
+              </Link>
+              {figure === "indicator" && (
+                <Text size="xs" className="dimmed">
+                  {measured(task.indicator, task.unit)}
+                </Text>
+              )}
+            </>
+          ),
+        }))}
+        rows={entries.map((entry) => ({
+          key: entry.key,
+          label: entry.label,
+          cells: board.tasks.map((task) => <Cell key={task.task} task={task} entry={entry} figure={figure} entries={entries} search={search} />),
+        }))}
+      >
+        {search.paper === "yes" && <Ghosts board={board} figure={figure} />}
+      </ModelByTask>
     </>
   );
 }

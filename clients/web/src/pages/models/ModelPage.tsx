@@ -5,6 +5,7 @@ import { lazy, Suspense } from "react";
 import { client, taken } from "../../api/client";
 import { board, figures, type Board, type Figures, type OverallView } from "../../api/queries";
 import { count, dollars, duration, number, percent, places, secondsBetween } from "../../format";
+import { Fact } from "../../parts/Fact";
 import { DataTable } from "../../parts/DataTable";
 import { Gallery } from "../../parts/Gallery";
 import { Section } from "../../parts/Section";
@@ -105,14 +106,7 @@ function Standing({ entry, row }: { entry: Entry; row: OverallView | undefined }
     >
       <Group gap="xl">
         {facts.map(([name, value]) => (
-          <div key={name}>
-            <Text size="xs" className="dimmed">
-              {name}
-            </Text>
-            <Text fw={650} size="lg" className="figures">
-              {value}
-            </Text>
-          </div>
+          <Fact key={name} name={name} value={value} />
         ))}
       </Group>
       {row.missing.length > 0 && (

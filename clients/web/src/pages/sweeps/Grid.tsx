@@ -1,6 +1,7 @@
 import { Group, Text } from "@mantine/core";
 import { Link } from "@tanstack/react-router";
 import { count, words } from "../../format";
+import { ModelByTask } from "../../parts/ModelByTask";
 import { OUTCOME_COLOURS } from "../../theme";
 import type { CellCounts, Moment } from "./live";
 
@@ -28,42 +29,21 @@ export function Grid({ moment, sweep }: { moment: Moment; sweep: string }) {
           </Group>
         ))}
       </Group>
-      <div style={{ overflowX: "auto" }} tabIndex={0} role="region" aria-label="Model by task, scrolls sideways">
-        <table className="heat figures sticky-first">
-          <thead>
-            <tr>
-              <th scope="col" style={{ textAlign: "left" }}>
-                <Text size="sm" fw={600}>
-                  Model
-                </Text>
-              </th>
-              {tasks.map((task) => (
-                <th key={task} scope="col">
-                  <Text size="xs" fw={600}>
-                    {task}
-                  </Text>
-                </th>
-              ))}
-            </tr>
-          </thead>
-          <tbody>
-            {[...models].map(([model, cells]) => (
-              <tr key={model}>
-                <th scope="row" style={{ textAlign: "left", paddingRight: 10 }}>
-                  <Text size="sm" fw={500} style={{ whiteSpace: "nowrap" }}>
-                    {model}
-                  </Text>
-                </th>
-                {tasks.map((task) => (
-                  <td key={task}>
-                    <Cell cell={cells.get(task)} task={task} model={model} sweep={sweep} />
-                  </td>
-                ))}
-              </tr>
-            ))}
-          </tbody>
-        </table>
-      </div>
+      <ModelByTask
+        heads={tasks.map((task) => ({
+          task,
+          head: (
+            <Text size="xs" fw={600}>
+              {task}
+            </Text>
+          ),
+        }))}
+        rows={[...models].map(([model, cells]) => ({
+          key: model,
+          label: model,
+          cells: tasks.map((task) => <Cell key={task} cell={cells.get(task)} task={task} model={model} sweep={sweep} />),
+        }))}
+      />
     </>
   );
 }

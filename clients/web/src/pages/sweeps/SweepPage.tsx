@@ -5,6 +5,7 @@ import type { StreamState } from "../../api/events";
 import { every, isSite } from "../../api/site";
 import { sweep as sweepQuery, type SweepView } from "../../api/queries";
 import { compact, count, dollars, duration, number, percent } from "../../format";
+import { Fact } from "../../parts/Fact";
 import { Ago } from "../../parts/Ago";
 import { JobsTable } from "../../parts/JobsTable";
 import { Section } from "../../parts/Section";
@@ -109,18 +110,12 @@ function Facts({ sweep, rate }: { sweep: SweepView; rate: Rate | null }) {
   return (
     <SimpleGrid cols={{ base: 2, sm: 3, md: 5 }}>
       {facts.map(([name, value, note, share]) => (
-        <div key={name}>
-          <Text size="xs" className="dimmed">
-            {name}
-          </Text>
-          <Text fw={650} size="lg" className="figures">
-            {value}
-          </Text>
+        <Fact key={name} name={name} value={value}>
           <Text size="xs" className="dimmed">
             {note}
           </Text>
           {share !== undefined && <Progress value={Math.min(100, 100 * share)} size="sm" mt={4} color={share > 0.9 ? "orange" : "blue"} aria-label={`${name}: ${percent(share)} of the budget`} />}
-        </div>
+        </Fact>
       ))}
     </SimpleGrid>
   );

@@ -1,13 +1,16 @@
-"""From a machine that somebody built to its trial."""
+"""What people and agents bring: the task they choose, and the way of a machine to its trial."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final
 
 from sqlalchemy import Connection
 
-from buildarena_benchmark import broken_constraint
+from buildarena_benchmark import Task, ValidationIssue, broken_constraint
 from buildarena_geometry import Machine
+from buildarena_pipeline.catalog.simulators import simulator_issues
+from buildarena_pipeline.errors import SubmissionError
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.machine_documents import machine_bytes
 from buildarena_pipeline.runtime.scoring import failure_score, task_of
@@ -16,6 +19,32 @@ from buildarena_store import Lease, Outcome, RolloutRequest, Stage
 from buildarena_store.states import simulate_queue
 
 JSON: Final = "application/json"
+
+
+def chosen_task(
+    context: Context, task: str, simulator: str, *, further: Sequence[ValidationIssue] = ()
+) -> Task:
+    """The newest version of a task, if everything that was named exists.
+
+    Args:
+        context: The process' connections.
+        task: The task's name.
+        simulator: The simulator's name.
+        further: What else is wrong with what was asked for.
+
+    Raises:
+        SubmissionError: Something is wrong; it names all of it.
+    """
+    found = context.tasks.named([task]).get(task)
+    issues = []
+    if found is None:
+        choices = tuple(sorted(context.tasks.newest()))
+        message = f"there is no task {task!r}"
+        issues.append(ValidationIssue(path="task", message=message, choices=choices))
+    issues += [*simulator_issues(simulator, context.settings.besiege_version), *further]
+    if issues or found is None:
+        raise SubmissionError(issues)
+    return found
 
 
 def hand_in(

@@ -5,12 +5,11 @@ from __future__ import annotations
 from hashlib import sha256
 from typing import Final
 
-from buildarena_benchmark import ValidationIssue
 from buildarena_geometry import Machine
-from buildarena_pipeline.agents.handing_in import hand_in
-from buildarena_pipeline.catalog.simulators import simulation_version, simulator_issues
+from buildarena_pipeline.agents.handing_in import chosen_task, hand_in
+from buildarena_pipeline.catalog.simulators import simulation_version
 from buildarena_pipeline.catalog.tracks import file_track
-from buildarena_pipeline.errors import PipelineError, SubmissionError
+from buildarena_pipeline.errors import PipelineError
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.machine_documents import machine_bytes
 from buildarena_store import Job, JobKey, NewJob
@@ -55,14 +54,7 @@ def try_machine(
         SubmissionError: The task or the simulator is unknown.
         TooManyTrialsError: Too many are under way.
     """
-    found = context.tasks.named([task]).get(task)
-    issues = simulator_issues(simulator, context.settings.besiege_version)
-    if found is None:
-        choices = tuple(sorted(context.tasks.newest()))
-        message = f"there is no task {task!r}"
-        issues.append(ValidationIssue(path="task", message=message, choices=choices))
-    if issues or found is None:
-        raise SubmissionError(issues)
+    found = chosen_task(context, task, simulator)
     digest = sha256(machine_bytes(machine)).hexdigest()
     name = f"file/{digest[:NAME_LENGTH]}"
     config = {"name": name, "provider": FILE_PROVIDER, "model": digest}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import OrderedDict
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from threading import Lock
 from typing import Any, Literal
@@ -17,9 +17,9 @@ from buildarena_pipeline.agents.briefing import (
     briefing,
     briefing_digest,
 )
-from buildarena_pipeline.agents.handing_in import hand_in
+from buildarena_pipeline.agents.handing_in import chosen_task, hand_in
 from buildarena_pipeline.agents.workbench import ASSEMBLY, Workbench, check_arguments, rebuild
-from buildarena_pipeline.catalog.simulators import simulation_version, simulator_issues
+from buildarena_pipeline.catalog.simulators import simulation_version
 from buildarena_pipeline.catalog.tracks import EXTERNAL_WORKFLOW, external_track
 from buildarena_pipeline.errors import PipelineError, SubmissionError
 from buildarena_pipeline.runtime.context import Context
@@ -129,7 +129,11 @@ class ExternalSessions:
                 another key's.
             NameTakenError: The name is another key's, or of the other kind.
         """
-        chosen = self._check(task, agent, simulator)
+        further = []
+        if not AGENT_NAME.fullmatch(agent):
+            message = "1 to 80 letters, digits, dots, dashes and underscores"
+            further.append(ValidationIssue(path="agent", message=message))
+        chosen = chosen_task(self._context, task, simulator, further=further)
         version = simulation_version(simulator, self._context.settings.besiege_version)
         track = external_track(simulator, version, briefing_digest())
         model = f"{kind}/{agent}"
@@ -246,20 +250,6 @@ class ExternalSessions:
             context.queues.announce(queue, [job_id])
         return context.store.jobs.get(job_id)
 
-    def _check(self, task: str, agent: str, simulator: str) -> Task:
-        """The newest version of the task, if everything that was named exists."""
-        errors = []
-        found = self._context.tasks.named([task]).get(task)
-        if found is None:
-            errors.append(_unknown("task", task, sorted(self._context.tasks.newest())))
-        errors += simulator_issues(simulator, self._context.settings.besiege_version)
-        if not AGENT_NAME.fullmatch(agent):
-            message = "1 to 80 letters, digits, dots, dashes and underscores"
-            errors.append(ValidationIssue(path="agent", message=message))
-        if errors or found is None:
-            raise SubmissionError(errors)
-        return found
-
     def _open_lease(self, job_id: str, connection: Any) -> Lease:
         lease = self._context.store.external_calls.lease(job_id, connection=connection)
         if lease is None:
@@ -295,10 +285,4 @@ def _what_to_do(machines: Collection[str]) -> str:
         f"there are {len(machines)} machines ({listed}) and no assembly: put them together in the "
         f"machine {ASSEMBLY!r}, with add_machine for each and connect_blocks between them, then "
         "submit again"
-    )
-
-
-def _unknown(field: str, value: str, choices: Sequence[str]) -> ValidationIssue:
-    return ValidationIssue(
-        path=field, message=f"there is no {field} {value!r}", choices=tuple(choices)
     )
