@@ -51,8 +51,7 @@ def main() -> None:
             log_config=None,
             access_log=False,
             timeout_graceful_shutdown=5,
-            proxy_headers=bool(settings.trusted_proxies),
-            forwarded_allow_ips=settings.trusted_proxies,
+            proxy_headers=False,  # the application itself reads them, from trusted proxies
         )
     finally:
         context.close()

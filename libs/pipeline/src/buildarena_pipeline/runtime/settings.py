@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Mapping
 from ipaddress import ip_network
 from pathlib import Path
@@ -23,6 +24,12 @@ from buildarena_pipeline.secret_files import read_secret
 PREFIX: Final = "BUILDARENA_"
 DEFAULT_PORT = 8321
 VERSION = r"^[A-Za-z0-9._-]{0,40}$"
+BASE_PATH: Final = re.compile(r"(?:/(?!\.{1,2}(?:/|$))[A-Za-z0-9._~-]+)+")
+OWN_PATHS: Final = frozenset(
+    "v1 docs openapi.json static-offline-docs assets sweeps jobs tasks models compare build "
+    "machine favicon.svg scheme.js index.html".split()
+)
+"""First parts of the API's and the dashboard's own paths; none can be a base path's."""
 SECRETS: Final = (
     "database_url",
     "broker_url",
@@ -108,6 +115,13 @@ class Settings(BaseSettings):
             "separated by commas; none by default"
         ),
     ] = ""
+    base_path: Annotated[
+        str,
+        Field(
+            description="Path below which a proxy shows the API and the dashboard, for example "
+            "/arena; empty at a host's root"
+        ),
+    ] = ""
     models_file: Annotated[
         Path | None, Field(description="YAML of further models, added to the built-in registry")
     ] = None
@@ -162,6 +176,22 @@ class Settings(BaseSettings):
                     f"{part!r} is neither an address nor a network such as 10.0.0.0/8"
                 ) from error
         return ",".join(named)
+
+    @field_validator("base_path")
+    @classmethod
+    def _a_path_of_its_own(cls, value: str) -> str:
+        path = value.rstrip("/")
+        if path and not BASE_PATH.fullmatch(path):
+            raise ValueError(
+                "it must begin with / and consist of letters, digits and any of . _ ~ - /, "
+                "for example /arena or /tools/arena"
+            )
+        if path.split("/")[1:2] and path.split("/")[1] in OWN_PATHS:
+            raise ValueError(
+                f"the service has paths of its own below /{path.split('/')[1]}: "
+                f"choose any but {', '.join(sorted(OWN_PATHS))}"
+            )
+        return path
 
     @classmethod
     def settings_customise_sources(  # noqa: D102 - pydantic's
