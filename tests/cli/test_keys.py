@@ -78,3 +78,33 @@ def test_running_a_file_again_takes_the_sweep_up_with_another_budget(call, tmp_p
     call("sweep", "pause", first["id"], key=key)
     assert "active" in call("sweep", "resume", first["id"], "--max-cost-usd", "3", key=key).stdout
     assert "$0.00 of $3.00" in call("sweep", "status", first["id"], key=key).stdout
+
+
+def test_a_key_is_rotated_with_what_it_owns(call) -> None:
+    key = made(call, "--scope", "submit")
+    first = json.loads(
+        call("job", "submit", "lift-1", "builtin/idle", "--json", key=key["secret"]).stdout
+    )
+    done = json.loads(call("key", "rotate", key["id"], "--overlap", "30m", "--json").stdout)
+    assert done["id"] == key["id"]
+    assert done["secret"] != key["secret"]
+    for secret in (key["secret"], done["secret"]):
+        assert call("job", "show", first["id"], key=secret).exit_code == 0
+    last = json.loads(call("key", "rotate", key["id"], "--overlap", "0", "--json").stdout)
+    with pytest.raises(CommandError, match=r"is replaced: set BUILDARENA_KEY"):
+        call("job", "list", key=done["secret"])
+    with pytest.raises(CommandError, match="unknown API key"):
+        call("job", "list", key=key["secret"])
+    assert call("job", "cancel", first["id"], key=last["secret"]).exit_code == 0
+
+
+@pytest.mark.parametrize("overlap", ["1", "-1h", "1w", "h", "1.5h", "", "9999999h", "1h "])
+def test_an_overlap_that_is_no_time_is_named(call, overlap) -> None:
+    with pytest.raises(CommandError, match=r"--overlap .* is not a time"):
+        call("key", "rotate", "key_0", f"--overlap={overlap}")
+
+
+def test_an_overlap_of_years_is_refused(call) -> None:
+    key = made(call)
+    with pytest.raises(CommandError, match="overlap_hours"):
+        call("key", "rotate", key["id"], "--overlap", "91d")

@@ -28,7 +28,11 @@ def live_api(context: Context) -> Iterator[str]:
     structlog.configure(logger_factory=structlog.ReturnLoggerFactory())
     port = free_port()
     config = uvicorn.Config(
-        create_app(context, load_registry()), host="127.0.0.1", port=port, log_config=None
+        create_app(context, load_registry()),
+        host="127.0.0.1",
+        port=port,
+        log_config=None,
+        proxy_headers=False,
     )
     server = uvicorn.Server(config)
     thread = threading.Thread(target=server.run)

@@ -9,6 +9,7 @@ import httpx
 import pytest
 from pages import BUILDARENA, in_browser, needs_pages
 from pydantic import SecretStr
+from reverse_proxy import ProxyRules, reverse_proxy
 from running import finished, running_stack
 
 SWEEP = {
@@ -44,3 +45,13 @@ def test_pages_ask_for_a_key_and_offer_what_it_may(tmp_path: Path) -> None:
     with running_stack(tmp_path, require_keys=True, admin_key=SecretStr(ADMIN)) as stack:
         given = {"BUILDARENA_WEB_GUARDED_URL": stack.url, "BUILDARENA_WEB_ADMIN_KEY": ADMIN}
         in_browser(stack.url, ["e2e/keys"], **given)
+
+
+def test_pages_work_below_a_path(tmp_path: Path) -> None:
+    with (
+        running_stack(tmp_path, base_path="/tools/arena") as stack,
+        httpx.Client(base_url=stack.url) as client,
+        reverse_proxy(stack.url, ProxyRules(prefix="/tools/arena")) as outer,
+    ):
+        client.post("/v1/sweeps", json=SWEEP).raise_for_status()
+        in_browser(outer, ["e2e/below"], BUILDARENA_WEB_ROOT_URL=stack.url)

@@ -1,5 +1,5 @@
 import { createHashHistory, createRootRoute, createRoute, createRouter, lazyRouteComponent } from "@tanstack/react-router";
-import { isSite } from "./api/site";
+import { BASE, isSite } from "./api/site";
 import { readSearch } from "./pages/board/search";
 import { readBuildSearch } from "./pages/build/search";
 import { readCompareSearch } from "./pages/compare/search";
@@ -94,6 +94,7 @@ export const router = createRouter({
   routeTree: root.addChildren([board, sweeps, newSweep, twoSweeps, sweep, jobs, job, compare, tasks, task, model, build, machine]),
   // A file server knows one page only, so the rest of the address stands behind its #.
   history: isSite ? createHashHistory() : undefined,
+  basepath: BASE === "" ? "/" : BASE,
   defaultPreload: "intent",
   scrollRestoration: true,
 });

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
-from buildarena_cli.defaults import KEY_VARIABLE
+from buildarena_cli.defaults import KEY_VARIABLE, kept_key
 from buildarena_cli.errors import CommandError
 from buildarena_cli.near import near_field
 
@@ -66,7 +66,10 @@ class Client:
 
         self._failure = Failure
         self.url = url.rstrip("/")
-        key = key or os.environ.get(KEY_VARIABLE)
+        try:
+            key = key or kept_key()
+        except ValueError as error:
+            raise CommandError(str(error)) from error
         if key and not (key.isascii() and key.isprintable()):
             raise CommandError(f"{KEY_VARIABLE} is not a key: keys are printable ASCII")
         try:
@@ -193,7 +196,9 @@ class Client:
         if response.status == 503:  # noqa: PLR2004 - Service Unavailable
             raise UnreachableError(_problem(response))
         if response.status == 401:  # noqa: PLR2004 - Unauthorized
-            raise CommandError(f"{_problem(response)}: set {KEY_VARIABLE} to a valid key")
+            raise CommandError(
+                f"{_problem(response)}: set {KEY_VARIABLE} or {KEY_VARIABLE}_FILE to a valid key"
+            )
         if response.failed:
             raise RefusedError(response)
         return response

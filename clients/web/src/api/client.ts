@@ -3,7 +3,7 @@ import type { components, paths } from "./contract";
 import { authorization } from "./key";
 import { keptAnswer } from "./kept";
 import { ApiError, refusal } from "./problem";
-import { isSite } from "./site";
+import { BASE, isSite } from "./site";
 
 export type Schema<Name extends keyof components["schemas"]> = components["schemas"][Name];
 
@@ -18,7 +18,7 @@ const withKey: Middleware = {
 const ask = (request: Request): Promise<Response> => (isSite ? keptAnswer(request) : fetch(request));
 
 export const client = createClient<paths>({
-  baseUrl: "/",
+  baseUrl: `${BASE}/`,
   fetch: ask,
   querySerializer: { array: { style: "form", explode: true } },
 });
@@ -45,7 +45,7 @@ export async function taken<Data>(
 export async function bytesOf(path: string, accept = "*/*"): Promise<ArrayBuffer> {
   let response: Response;
   try {
-    response = await ask(new Request(path, { headers: { ...authorization(), Accept: accept } }));
+    response = await ask(new Request(BASE + path, { headers: { ...authorization(), Accept: accept } }));
   } catch (error) {
     if (error instanceof ApiError) throw error;
     throw new ApiError(0, null, "no answer came: is it running, and is the network there?");

@@ -1,7 +1,7 @@
 import { createParser } from "eventsource-parser";
 import { useEffect, useRef, useState } from "react";
 import { authorization } from "./key";
-import { isSite } from "./site";
+import { BASE, isSite } from "./site";
 
 export interface ServiceEvent {
   id: number;
@@ -41,7 +41,7 @@ async function readStream(
   onEvents: (events: ServiceEvent[]) => void,
 ): Promise<void> {
   const headers = { ...authorization(), "Last-Event-ID": String(lastId), Accept: "text/event-stream" };
-  const response = await fetch(path, { headers, signal });
+  const response = await fetch(BASE + path, { headers, signal });
   if (!response.ok || response.body === null) throw new Error(`status ${response.status}`);
   onOpen();
   let batch: ServiceEvent[] = [];

@@ -20,8 +20,22 @@ export const SITE: string | null = typeof document === "undefined" ? null : (doc
 
 export const isSite = SITE !== null;
 
+/**
+ * The path below which a proxy shows the service, such as "/arena"; "" at a host's root, or when these pages were
+ * asked for without it.
+ */
+export function baseOf(told: string | null | undefined, path: string): string {
+  if (told === null || told === undefined) return "";
+  return path === told || path.startsWith(`${told}/`) ? told : "";
+}
+
+export const BASE: string =
+  typeof document === "undefined"
+    ? ""
+    : baseOf(document.querySelector('meta[name="buildarena-base"]')?.getAttribute("content"), location.pathname);
+
 /** How often something is read again: what is published does not change. */
 export const every = (ms: number): number | false => (isSite ? false : ms);
 
 /** The address of a file that lies beside the first page. */
-export const beside = (name: string): string => (isSite ? `./${name}` : `/${name}`);
+export const beside = (name: string): string => (isSite ? `./${name}` : `${BASE}/${name}`);

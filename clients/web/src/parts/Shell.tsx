@@ -91,7 +91,7 @@ export function Shell() {
             <Group gap={6}>
               {!isSite && (
                 <>
-                  <Anchor href="/docs" size="sm" c="inherit">
+                  <Anchor href={beside("docs")} size="sm" c="inherit">
                     API
                   </Anchor>
                   <KeyButton />

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import secrets
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final, cast
 
 import obstore
 from obstore.exceptions import BaseError
@@ -19,6 +19,9 @@ from buildarena_store.errors import (
     ArtifactMissingError,
     ArtifactStoreError,
 )
+
+if TYPE_CHECKING:
+    from obstore.store import S3Config
 
 HASH_LENGTH: Final = 64
 PROBE_BYTES: Final = 64 * 1024
@@ -45,14 +48,17 @@ class ArtifactStore:
 
     Args:
         location: A folder, or a URL that obstore knows, for example ``s3://bucket/prefix``.
+        options: Further settings of such a URL's store, for example ``AWS_SECRET_ACCESS_KEY``;
+            they go before those of the environment.
     """
 
-    def __init__(self, location: str | Path) -> None:
+    def __init__(self, location: str | Path, options: Mapping[str, str] | None = None) -> None:
         text = str(location)
         self._location = text.partition("?")[0]
         self._store: ObjectStore
         if "://" in text:
-            self._store = from_url(text)
+            config = cast("S3Config", dict(options)) if options else None
+            self._store = from_url(text, config=config)
         else:
             self._store = LocalStore(prefix=Path(text).absolute(), mkdir=True)
 

@@ -19,6 +19,13 @@ class UnknownIdError(StoreError):
         self.id = id_
 
 
+class EndedKeyError(StoreError):
+    """A key that was revoked or has expired can't get another secret."""
+
+    def __init__(self, key_id: str, state: str) -> None:
+        super().__init__(f"key {key_id} is {state}: make a new one")
+
+
 class TransitionError(StoreError):
     """A sweep or job is in a state that it may not leave for the one that was asked for.
 

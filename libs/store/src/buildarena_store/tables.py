@@ -177,6 +177,8 @@ api_keys = Table(
     Column("id", Text, primary_key=True),
     Column("name", Text, nullable=False),
     Column("secret_hash", Text, nullable=False, unique=True),
+    Column("previous_hash", Text, unique=True),
+    _time("previous_until"),
     Column("scopes", JSONB, nullable=False),
     _time("created_at", now=True),
     _time("expires_at"),

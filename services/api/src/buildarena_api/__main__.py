@@ -15,7 +15,7 @@ from buildarena_pipeline.errors import StartupError
 from buildarena_pipeline.runtime.context import open_context
 from buildarena_pipeline.runtime.logs import set_up_logs
 from buildarena_pipeline.runtime.processes import end_with_parent
-from buildarena_pipeline.runtime.settings import Settings
+from buildarena_pipeline.runtime.settings import load_settings
 from buildarena_pipeline.runtime.tracing import Tracing
 from buildarena_store import SchemaVersionError
 
@@ -26,7 +26,10 @@ SWITCH_S = 0.0005
 
 def main() -> None:
     """Serves the API until it is asked to stop."""
-    settings = Settings()
+    try:
+        settings = load_settings()
+    except StartupError as error:
+        sys.exit(f"api: {error}")
     sys.setswitchinterval(SWITCH_S)
     set_up_logs(settings.log_level)
     end_with_parent()
@@ -48,8 +51,7 @@ def main() -> None:
             log_config=None,
             access_log=False,
             timeout_graceful_shutdown=5,
-            proxy_headers=bool(settings.trusted_proxies),
-            forwarded_allow_ips=settings.trusted_proxies,
+            proxy_headers=False,  # the application itself reads them, from trusted proxies
         )
     finally:
         context.close()

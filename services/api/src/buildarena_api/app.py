@@ -8,6 +8,7 @@ from contextlib import asynccontextmanager
 from fastapi import Depends, FastAPI
 from fastapi_offline import FastAPIOffline
 from starlette.routing import Route
+from uvicorn.middleware.proxy_headers import ProxyHeadersMiddleware
 
 from buildarena_api.dashboard.files import read_pages
 from buildarena_api.dashboard.serving import Dashboard, is_page
@@ -21,6 +22,11 @@ from buildarena_api.http.locality import LocalOnlyMiddleware
 from buildarena_api.http.log import RequestLog
 from buildarena_api.http.methods import MethodMiddleware
 from buildarena_api.http.metrics import ServiceMetrics
+from buildarena_api.http.outer_address import (
+    BasePathMiddleware,
+    ForwardedHostMiddleware,
+    RootPathMiddleware,
+)
 from buildarena_api.http.overload import OverloadMiddleware
 from buildarena_api.http.own_pool import OwnPool
 from buildarena_api.http.problems import add_problem_handlers, problem_responses
@@ -53,6 +59,7 @@ from buildarena_pipeline.agents.sessions import ExternalSessions
 from buildarena_pipeline.catalog.models import ModelRegistry
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.reaper import Reaper
+from buildarena_pipeline.runtime.settings import Settings
 from buildarena_pipeline.submission.submission import Submissions
 
 WATCHERS = 3
@@ -136,7 +143,8 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
     add_problem_handlers(app)
     _add_routes(app)
     # Behind every route, so that no page can stand in the place of one.
-    app.router.default = Dashboard(read_pages(), app.router.default)
+    base = context.settings.base_path
+    app.router.default = Dashboard(read_pages(base=base), app.router.default, base=base)
     _add_middleware(app)
     return app
 
@@ -154,6 +162,9 @@ def _add_routes(app: FastAPI) -> None:
 
 def _add_middleware(app: FastAPI) -> None:
     """The last one added is the first that a request meets."""
+    settings: Settings = app.state.context.settings
+    if settings.base_path:
+        app.add_middleware(RootPathMiddleware, base=settings.base_path)
     app.add_middleware(
         BodyLimitMiddleware,
         unlimited={archives.IMPORT_PATH},
@@ -166,7 +177,15 @@ def _add_middleware(app: FastAPI) -> None:
         if isinstance(found, Route)
     ]
     app.add_middleware(MethodMiddleware, routes=routes)
-    if not app.state.context.settings.require_keys:
+    if not settings.require_keys:
         app.add_middleware(LocalOnlyMiddleware, is_page=is_page)
     app.add_middleware(RequestLog, metrics=app.state.metrics)
     app.add_middleware(OverloadMiddleware)
+    if settings.base_path:
+        app.add_middleware(BasePathMiddleware, base=settings.base_path)
+    if settings.trusted_proxies:
+        trusted = settings.trusted_proxies
+        app.add_middleware(ProxyHeadersMiddleware, trusted_hosts=trusted)
+        # Without keys the host itself says who may ask, and a page in a browser could send another.
+        if settings.require_keys:
+            app.add_middleware(ForwardedHostMiddleware, trusted=trusted)

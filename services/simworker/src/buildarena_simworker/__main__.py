@@ -11,7 +11,7 @@ from typing import Any
 from buildarena_geometry import __version__ as geometry_version
 from buildarena_pipeline.catalog.simulators import BESIEGE, SIMULATORS
 from buildarena_pipeline.errors import StartupError
-from buildarena_pipeline.runtime.settings import Settings
+from buildarena_pipeline.runtime.settings import Settings, load_settings
 from buildarena_pipeline.runtime.worker_process import WorkerSpec, run_worker
 from buildarena_simworker.simulate import simulate_handler
 from buildarena_simworker.simulators.engines import EngineSimulator
@@ -34,8 +34,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="buildarena_simworker", description=main.__doc__)
     parser.add_argument("--simulator", required=True, choices=sorted(SIMULATORS))
     simulator = parser.parse_args().simulator
-    settings = Settings()
     try:
+        settings = load_settings()
         served = _besiege(settings) if simulator == BESIEGE else _engine(simulator, settings)
         run_worker(
             WorkerSpec(

@@ -11,7 +11,7 @@ from buildarena_pipeline.catalog.models import load_registry
 from buildarena_pipeline.errors import StartupError
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.job_runner import StageHandler
-from buildarena_pipeline.runtime.settings import Settings
+from buildarena_pipeline.runtime.settings import load_settings
 from buildarena_pipeline.runtime.worker_process import SideWork, WorkerSpec, run_worker
 from buildarena_store.states import CONSTRUCT_QUEUE, VERIFY_QUEUE
 from buildarena_worker.wiring import construct_handler, verification_runner
@@ -19,8 +19,8 @@ from buildarena_worker.wiring import construct_handler, verification_runner
 
 def main() -> None:
     """Serves the construct queue until it is asked to stop."""
-    settings = Settings()
     try:
+        settings = load_settings()
         registry = load_registry(settings.models_file)
 
         def make_handler(context: Context) -> StageHandler:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from typing import Annotated, Any
 
 import typer
 
 from buildarena_cli.client import Client, at
+from buildarena_cli.errors import CommandError
 from buildarena_cli.ids import whole_id
 from buildarena_cli.lazy import new_group
 from buildarena_cli.options import (
@@ -22,7 +24,7 @@ from buildarena_cli.options import (
 from buildarena_cli.terminal.output import columns, minute_of, number, print_json, print_table, say
 
 app = new_group(
-    "Make, list and revoke API keys. Needs a key with the scope admin in BUILDARENA_KEY."
+    "Make, list, rotate and revoke API keys. Needs a key with the scope admin in BUILDARENA_KEY."
 )
 COLUMNS = columns(
     *("key", "name", "scopes", "used", "state", "spent"),
@@ -67,6 +69,29 @@ def list_keys(*, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) -> N
     print_table(COLUMNS, [_row(key) for key in found])
 
 
+@app.command("rotate")
+def rotate_key(
+    key_id: KeyId,
+    *,
+    overlap: Annotated[
+        str,
+        typer.Option(help="How long the present secret stays good: 30m, 24h, 7d; 0 ends it now."),
+    ] = "24h",
+    url: UrlOption = DEFAULT_URL,
+    as_json: JsonOption = False,
+) -> None:
+    """Give a key another secret; it keeps its id, jobs and budget."""
+    hours = _hours(overlap)
+    client = Client(url)
+    path = at("keys", whole_id(client, "key", key_id), "rotate")
+    key = client.post(path, {"overlap_hours": hours})
+    if as_json:
+        print_json(key)
+        return
+    say(f"{key['id']} ({key['name']}): the secret before is good until {key['previous_until']}")
+    say(f"export BUILDARENA_KEY={key['secret']}")
+
+
 @app.command("revoke")
 def revoke_key(key_id: KeyId, *, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) -> None:
     """Revoke a key at once; its jobs continue."""
@@ -96,6 +121,13 @@ def set_budget(
         print_json(key)
     else:
         say(f"{key['id']} ({key['name']}): {spent(key['budget'])}")
+
+
+def _hours(text: str) -> float:
+    found = re.fullmatch(r"([0-9]{1,6})([mhd]?)", text)
+    if found is None or (not found[2] and int(found[1])):
+        raise CommandError(f"--overlap {text!r} is not a time; give one such as 30m, 24h, 7d or 0")
+    return int(found[1]) * {"m": 1 / 60, "h": 1, "d": 24, "": 0}[found[2]]
 
 
 def spent(budget: dict[str, Any] | None) -> str:

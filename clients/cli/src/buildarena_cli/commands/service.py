@@ -136,19 +136,14 @@ def _detach(settings: Settings, *, keys: bool) -> None:
 
 
 def _settings(data: Path | None, port: int | None, *, require_keys: bool | None = None) -> Settings:
-    from pydantic import ValidationError
-
-    from buildarena_pipeline.runtime.settings import Settings
+    from buildarena_pipeline.errors import StartupError
+    from buildarena_pipeline.runtime.settings import load_settings
 
     given: dict[str, Any] = {"data": data, "port": port, "require_keys": require_keys}
     try:
-        return Settings(**{name: value for name, value in given.items() if value is not None})
-    except ValidationError as error:
-        first = error.errors()[0]
-        name = "_".join(str(part) for part in first["loc"])
-        raise CommandError(
-            f"--{name} or BUILDARENA_{name.upper()}: {first['msg']}, got {first['input']!r}"
-        ) from error
+        return load_settings(**{name: value for name, value in given.items() if value is not None})
+    except StartupError as error:
+        raise CommandError(str(error)) from error
 
 
 def _interrupt_on_terminate() -> None:

@@ -40,12 +40,13 @@ def migrate() -> None:
 
     The database is the one that BUILDARENA_DATABASE_URL names.
     """
-    from buildarena_pipeline.runtime.settings import Settings
+    from buildarena_pipeline.errors import StartupError
+    from buildarena_pipeline.runtime.settings import load_settings
     from buildarena_store import Database
 
     try:
-        url = Settings().required_database_url()
-    except ValueError as error:
+        url = load_settings().required_database_url()
+    except (StartupError, ValueError) as error:
         raise CommandError(str(error)) from error
     database = Database(url)
     say(f"schema {database.migrate()}")

@@ -11,7 +11,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any, Self
 
@@ -30,7 +30,8 @@ from buildarena_cli.wire import Failure, Wire
 from buildarena_pipeline.catalog.simulators import ENGINE_SIMULATORS
 from buildarena_pipeline.errors import StartupError
 from buildarena_pipeline.runtime.processes import PARENT, dying_with_me, tree_memory_bytes
-from buildarena_pipeline.runtime.settings import Settings
+from buildarena_pipeline.runtime.settings import PREFIX, SECRETS, Settings
+from buildarena_pipeline.secret_files import SUFFIX
 from buildarena_store import Database
 from buildarena_store.accounts.keys import new_secret
 
@@ -159,13 +160,13 @@ class Stack:
             self._launch_server(valkey)
             broker_url = valkey.url
         return {
-            **os.environ,
+            **_without_files(os.environ),
             **{
                 f"BUILDARENA_{name.upper()}": (
                     json.dumps(value) if isinstance(value, dict) else str(value)
                 )
                 for name, value in settings.model_dump(
-                    mode="json", exclude_none=True, exclude={"admin_key"}
+                    mode="json", exclude_none=True, exclude={"admin_key", "previous_admin_key"}
                 ).items()
             },
             **self._key_environment(data),
@@ -188,7 +189,11 @@ class Stack:
                 file.write_text(new_secret() + "\n")
             self.admin_key = file.read_text().strip()
             self._tell(f"the operator's key is in {file}")
-        return {"BUILDARENA_ADMIN_KEY": self.admin_key}
+        previous = self.settings.previous_admin_key
+        return {
+            "BUILDARENA_ADMIN_KEY": self.admin_key,
+            **({"BUILDARENA_PREVIOUS_ADMIN_KEY": previous.get_secret_value()} if previous else {}),
+        }
 
     def _launch_server(self, server: EmbeddedServer) -> None:
         self._tell(f"starting {server.name}")
@@ -259,6 +264,12 @@ class Stack:
         partial = target.with_suffix(".partial")
         partial.write_text(json.dumps(run))
         partial.replace(target)
+
+
+def _without_files(environment: Mapping[str, str]) -> dict[str, str]:
+    """An environment without the files of secrets: the processes get what was read from them."""
+    files = {f"{PREFIX}{name.upper()}{SUFFIX}" for name in SECRETS}
+    return {name: value for name, value in environment.items() if name not in files}
 
 
 def _locked(lock: IO[str]) -> None:

@@ -3,6 +3,7 @@ import type { Schema } from "../../api/client";
 import { authorization } from "../../api/key";
 import { ApiError, refusal } from "../../api/problem";
 import type { JobView } from "../../api/queries";
+import { BASE } from "../../api/site";
 import type { GlbShape } from "./glb";
 
 export type Check = Schema<"MachineCheckView">;
@@ -19,7 +20,7 @@ export interface Dropped {
 async function sent<Data>(path: string, query: Record<string, string>, file: File): Promise<Data> {
   let response: Response;
   try {
-    response = await fetch(`${path}?${new URLSearchParams(query).toString()}`, { method: "POST", body: file, headers: { ...authorization(), "Content-Type": "application/octet-stream" } });
+    response = await fetch(`${BASE}${path}?${new URLSearchParams(query).toString()}`, { method: "POST", body: file, headers: { ...authorization(), "Content-Type": "application/octet-stream" } });
   } catch {
     throw new ApiError(0, null, "no answer came: is it running, and is the network there?");
   }

@@ -37,7 +37,7 @@ def open_context(
     return Context(
         settings=settings,
         store=store,
-        artifacts=ArtifactStore(settings.artifacts_location),
+        artifacts=ArtifactStore(settings.artifacts_location, settings.artifact_options),
         queues=Queues(settings.required_broker_url()),
         tasks=TaskCatalog(store.tasks),
     )

@@ -2,21 +2,83 @@
 
 from __future__ import annotations
 
+import os
+import re
+from collections.abc import Mapping
 from ipaddress import ip_network
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, Final
 
-from pydantic import Field, SecretStr, field_validator
-from pydantic_settings import BaseSettings, SettingsConfigDict
+from pydantic import Field, PrivateAttr, SecretStr, ValidationError, field_validator
+from pydantic.fields import FieldInfo
+from pydantic_settings import (
+    BaseSettings,
+    PydanticBaseSettingsSource,
+    SettingsConfigDict,
+    SettingsError,
+)
 
+from buildarena_pipeline.errors import StartupError
+from buildarena_pipeline.secret_files import read_secret
+
+PREFIX: Final = "BUILDARENA_"
 DEFAULT_PORT = 8321
 VERSION = r"^[A-Za-z0-9._-]{0,40}$"
+BASE_PATH: Final = re.compile(r"(?:/(?!\.{1,2}(?:/|$))[A-Za-z0-9._~-]+)+")
+OWN_PATHS: Final = frozenset(
+    "v1 docs openapi.json static-offline-docs assets sweeps jobs tasks models compare build "
+    "machine favicon.svg scheme.js index.html".split()
+)
+"""First parts of the API's and the dashboard's own paths; none can be a base path's."""
+SECRETS: Final = (
+    "database_url",
+    "broker_url",
+    "artifacts_url",
+    "admin_key",
+    "previous_admin_key",
+)
+"""Settings that hold secrets: ``BUILDARENA_<FIELD>_FILE`` can name a file for each of them."""
+ARTIFACT_CREDENTIALS: Final = ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY", "AWS_SESSION_TOKEN")
+"""What an S3 store asks for by these names, which are everybody's; each also as a file."""
+
+
+class SecretFiles(PydanticBaseSettingsSource):
+    """Settings whose values stand in files."""
+
+    def get_field_value(self, field: FieldInfo, field_name: str) -> tuple[Any, str, bool]:
+        """The value of a field; None when it is not a secret, or not in a file."""
+        del field
+        if field_name not in SECRETS:
+            return None, field_name, False
+        return read_secret(PREFIX + field_name.upper(), os.environ), field_name, False
+
+    def __call__(self) -> dict[str, Any]:
+        """All values that are set."""
+        values = {name: self.get_field_value(field, name)[0] for name, field in self._fields}
+        return {name: value for name, value in values.items() if value is not None}
+
+    @property
+    def _fields(self) -> list[tuple[str, FieldInfo]]:
+        return list(self.settings_cls.model_fields.items())
+
+
+def _artifact_credentials() -> Mapping[str, SecretStr]:
+    found = {name: read_secret(name, os.environ) for name in ARTIFACT_CREDENTIALS}
+    return {name: SecretStr(value) for name, value in found.items() if value is not None}
 
 
 class Settings(BaseSettings):
-    """What an operator can set. Each field is the environment variable ``BUILDARENA_<FIELD>``."""
+    """What an operator can set. Each field is the environment variable ``BUILDARENA_<FIELD>``.
 
-    model_config = SettingsConfigDict(env_prefix="BUILDARENA_", extra="ignore")
+    Those that hold secrets can stand in files (see `SECRETS`).
+    """
+
+    # Compose files spell a variable that is left out as an empty one.
+    model_config = SettingsConfigDict(env_prefix=PREFIX, extra="ignore", env_ignore_empty=True)
+
+    _artifact_credentials: Mapping[str, SecretStr] = PrivateAttr(
+        default_factory=_artifact_credentials
+    )
 
     data: Annotated[Path, Field(description="Folder of databases, artifacts and logs")] = Path(
         ".buildarena"
@@ -37,6 +99,12 @@ class Settings(BaseSettings):
         SecretStr | None,
         Field(description="Secret of the operator's own key, which makes others", min_length=16),
     ] = None
+    previous_admin_key: Annotated[
+        SecretStr | None,
+        Field(
+            description="The operator's key before this one, while both are valid", min_length=16
+        ),
+    ] = None
     rate_limit: Annotated[
         str, Field(description="Requests a caller may send, for example 600/minute")
     ] = "6000/minute"
@@ -45,6 +113,13 @@ class Settings(BaseSettings):
         Field(
             description="Addresses or networks of proxies whose X-Forwarded-For counts, "
             "separated by commas; none by default"
+        ),
+    ] = ""
+    base_path: Annotated[
+        str,
+        Field(
+            description="Path below which a proxy shows the API and the dashboard, for example "
+            "/arena; empty at a host's root"
         ),
     ] = ""
     models_file: Annotated[
@@ -102,6 +177,49 @@ class Settings(BaseSettings):
                 ) from error
         return ",".join(named)
 
+    @field_validator("base_path")
+    @classmethod
+    def _a_path_of_its_own(cls, value: str) -> str:
+        path = value.rstrip("/")
+        if path and not BASE_PATH.fullmatch(path):
+            raise ValueError(
+                "it must begin with / and consist of letters, digits and any of . _ ~ - /, "
+                "for example /arena or /tools/arena"
+            )
+        if path.split("/")[1:2] and path.split("/")[1] in OWN_PATHS:
+            raise ValueError(
+                f"the service has paths of its own below /{path.split('/')[1]}: "
+                f"choose any but {', '.join(sorted(OWN_PATHS))}"
+            )
+        return path
+
+    @classmethod
+    def settings_customise_sources(  # noqa: D102 - pydantic's
+        cls,
+        settings_cls: type[BaseSettings],
+        init_settings: PydanticBaseSettingsSource,
+        env_settings: PydanticBaseSettingsSource,
+        dotenv_settings: PydanticBaseSettingsSource,
+        file_secret_settings: PydanticBaseSettingsSource,
+    ) -> tuple[PydanticBaseSettingsSource, ...]:
+        del dotenv_settings, file_secret_settings
+        return init_settings, env_settings, SecretFiles(settings_cls)
+
+    @property
+    def admin_keys(self) -> tuple[str, ...]:
+        """The secrets that make a caller the operator: two while one is being replaced."""
+        given = (self.admin_key, self.previous_admin_key)
+        return tuple(key.get_secret_value() for key in given if key is not None)
+
+    @property
+    def artifact_options(self) -> dict[str, str]:
+        """What the artifact store needs besides its location: an S3 store's credentials."""
+        if not self.artifacts_location.startswith(("s3://", "s3a://")):
+            return {}
+        return {
+            name: value.get_secret_value() for name, value in self._artifact_credentials.items()
+        }
+
     @property
     def artifacts_location(self) -> str:
         """Where artifacts are kept."""
@@ -139,3 +257,28 @@ class Settings(BaseSettings):
                 "or set it to redis://:password@host:port/0"
             )
         return self.broker_url
+
+
+def load_settings(**given: Any) -> Settings:
+    """The settings of this process' environment.
+
+    Args:
+        given: Settings that go before the environment's.
+
+    Raises:
+        StartupError: One is wrong; the message names its variable, and shows no secret.
+    """
+    try:
+        return Settings(**given)
+    except ValidationError as error:
+        raise StartupError(problem_of(error)) from error
+    except (SettingsError, ValueError) as error:
+        raise StartupError(str(error)) from error
+
+
+def problem_of(error: ValidationError) -> str:
+    """What is wrong with the first setting that is, in one line that shows no secret."""
+    first = error.errors()[0]
+    name = str(first["loc"][0]) if first["loc"] else ""
+    got = "" if name in SECRETS else f", got {first['input']!r}"
+    return f"{PREFIX}{name.upper()}: {first['msg']}{got}"

@@ -8,11 +8,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 
-from sqlalchemy import any_, func, insert, or_, select, update
+from sqlalchemy import and_, any_, func, insert, or_, select, update
 
 from buildarena_store import events
 from buildarena_store.database import Database
-from buildarena_store.errors import UnknownIdError
+from buildarena_store.errors import EndedKeyError, UnknownIdError
 from buildarena_store.ids import new_id
 from buildarena_store.rows import bound_texts, columns_of, value_of
 from buildarena_store.tables import api_keys
@@ -34,6 +34,8 @@ class ApiKey:
         expires_at: When it ends, if ever.
         revoked_at: When it was revoked, if it was.
         used_at: When it was last used, to the minute.
+        previous_until: Until when the secret before the present one is good; None when there was
+            none.
     """
 
     id: str
@@ -43,6 +45,7 @@ class ApiKey:
     expires_at: datetime | None
     revoked_at: datetime | None
     used_at: datetime | None
+    previous_until: datetime | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,7 +54,8 @@ class KeyCheck:
 
     Attributes:
         key: The key that has it.
-        refusal: ``revoked`` or ``expired``; None when the key is good.
+        refusal: ``revoked`` or ``expired``, or ``replaced`` of a secret that a newer one has
+            followed; None when the key is good.
     """
 
     key: ApiKey
@@ -96,11 +100,17 @@ class ApiKeys:
     def check(self, secret: str) -> KeyCheck | None:
         """The key that has this secret, and whether it is still valid; None when nobody has it."""
         expired = (api_keys.c.expires_at <= events.now).label("expired")
+        replaced = and_(
+            api_keys.c.secret_hash != secret_hash(secret), api_keys.c.previous_until <= events.now
+        ).label("replaced")
         stale = func.coalesce(api_keys.c.used_at < events.now - NOTED_EVERY, True).label("stale")
         with self._database.transaction() as connection:
             row = connection.execute(
-                select(*_COLUMNS, expired, stale).where(
-                    api_keys.c.secret_hash == secret_hash(secret)
+                select(*_COLUMNS, expired, replaced, stale).where(
+                    or_(
+                        api_keys.c.secret_hash == secret_hash(secret),
+                        api_keys.c.previous_hash == secret_hash(secret),
+                    )
                 )
             ).first()
             if row is None:
@@ -110,6 +120,8 @@ class ApiKeys:
                 return KeyCheck(key=key, refusal="revoked")
             if row.expired:
                 return KeyCheck(key=key, refusal="expired")
+            if row.replaced:
+                return KeyCheck(key=key, refusal="replaced")
             if row.stale:
                 connection.execute(
                     update(api_keys).where(api_keys.c.id == key.id).values(used_at=events.now)
@@ -143,6 +155,42 @@ class ApiKeys:
         if row is None:
             raise UnknownIdError("key", key_id)
         return value_of(ApiKey, row)
+
+    def rotate(self, key_id: str, *, overlap: timedelta) -> tuple[ApiKey, str]:
+        """Gives a key another secret; it keeps its id, and so all that it owns.
+
+        Args:
+            key_id: The key.
+            overlap: How long its present secret stays good. A secret before that one ends at once.
+
+        Returns:
+            The key, and its secret, which can't be read again.
+
+        Raises:
+            UnknownIdError: There is no such key.
+            EndedKeyError: It was revoked or has expired.
+        """
+        secret = new_secret()
+        statement = (
+            update(api_keys)
+            .where(
+                api_keys.c.id == key_id,
+                api_keys.c.revoked_at.is_(None),
+                or_(api_keys.c.expires_at.is_(None), api_keys.c.expires_at > events.now),
+            )
+            .values(
+                previous_hash=api_keys.c.secret_hash,
+                previous_until=events.now + overlap,
+                secret_hash=secret_hash(secret),
+            )
+            .returning(*_COLUMNS)
+        )
+        with self._database.transaction() as connection:
+            row = connection.execute(statement).first()
+        if row is None:
+            key = self.get(key_id)
+            raise EndedKeyError(key_id, "revoked" if key.revoked_at else "expired")
+        return value_of(ApiKey, row), secret
 
     def revoke(self, key_id: str) -> ApiKey:
         """Revokes a key at once; revoking it again changes nothing.

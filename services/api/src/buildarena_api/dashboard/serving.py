@@ -35,8 +35,8 @@ NOT_BUILT: Final = """<!doctype html>
 <h1>BuildArena</h1>
 <p>The service runs; its dashboard has not been built. <code>make web</code> builds it, and the
 service shows it here after its next start.</p>
-<p>Meanwhile: the API's <a href="/docs">documentation</a> and the
-<a href="/v1/leaderboard">leaderboard as JSON</a>.</p>
+<p>Meanwhile: the API's <a href="{base}/docs">documentation</a> and the
+<a href="{base}/v1/leaderboard">leaderboard as JSON</a>.</p>
 </html>
 """
 
@@ -52,9 +52,13 @@ class Dashboard:
     Args:
         files: The built pages by path.
         otherwise: What answers when it is no page either.
+        base: Path below which a proxy shows the service.
     """
 
-    def __init__(self, files: Mapping[str, PageFile], otherwise: ASGIApp) -> None:
+    def __init__(
+        self, files: Mapping[str, PageFile], otherwise: ASGIApp, *, base: str = ""
+    ) -> None:
+        self._not_built = NOT_BUILT.format(base=base)
         self._files = files
         self._otherwise = otherwise
 
@@ -64,7 +68,7 @@ class Dashboard:
         await (found or self._otherwise)(scope, receive, send)
 
     def _find(self, scope: Scope) -> Response | None:
-        path: str = scope["path"]
+        path = scope["path"].removeprefix(scope.get("root_path", ""))
         if scope["method"] not in {"GET", "HEAD"}:
             return None
         headers = Headers(scope=scope)
@@ -73,7 +77,7 @@ class Dashboard:
         if not is_page(path):
             return None
         if INDEX not in self._files:
-            return HTMLResponse(NOT_BUILT, headers={"Content-Security-Policy": POLICY})
+            return HTMLResponse(self._not_built, headers={"Content-Security-Policy": POLICY})
         return _answer(self._files[INDEX], headers)
 
 

@@ -146,9 +146,7 @@ async def _identify(
             raise _unauthorized("an API key is needed: send `Authorization: Bearer KEY`")
         return Caller(key_id=None, scope="admin")
     secret = given.credentials
-    if settings.admin_key is not None and hmac.compare_digest(
-        secret.encode(), settings.admin_key.get_secret_value().encode()
-    ):
+    if _is_operators(secret, settings):
         return Caller(key_id=None, scope="admin")
     found = await checks.check(secret)
     if found is None:
@@ -157,6 +155,12 @@ async def _identify(
         raise _unauthorized(f"API key {found.key.id} is {found.refusal}")
     scopes = [scope for scope in SCOPES if scope in found.key.scopes]
     return Caller(key_id=found.key.id, scope=scopes[-1])
+
+
+def _is_operators(secret: str, settings: Settings) -> bool:
+    """Whether it is one of the operator's keys; all are compared, so that time tells nothing."""
+    given = secret.encode()
+    return sum(hmac.compare_digest(given, key.encode()) for key in settings.admin_keys) > 0
 
 
 def _unauthorized(detail: str) -> ProblemError:

@@ -24,6 +24,7 @@ from buildarena_store import (
     ArtifactDamagedError,
     ArtifactMissingError,
     ArtifactStoreError,
+    EndedKeyError,
     NameTakenError,
     NotOwnedError,
     StoreError,
@@ -153,7 +154,8 @@ def add_problem_handlers(app: FastAPI) -> None:
 
 def _add_store_handlers(app: FastAPI) -> None:
     @app.exception_handler(TransitionError)
-    async def on_transition(_: Request, error: TransitionError) -> JSONResponse:
+    @app.exception_handler(EndedKeyError)
+    async def on_transition(_: Request, error: StoreError) -> JSONResponse:
         return _answer(409, str(error))
 
     @app.exception_handler(NotOwnedError)

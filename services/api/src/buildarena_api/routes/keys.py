@@ -38,6 +38,22 @@ class NewKey(BaseModel):
     budget: Budget | None = None
 
 
+class Rotation(BaseModel):
+    """A request for another secret of a key."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    overlap_hours: Annotated[
+        float,
+        Field(
+            ge=0,
+            le=24 * 90,
+            allow_inf_nan=False,
+            description="Hours that the present secret stays good; 0 ends it at once",
+        ),
+    ] = 24.0
+
+
 class KeyView(BaseModel):
     """A key without its secret."""
 
@@ -50,6 +66,9 @@ class KeyView(BaseModel):
     expires_at: datetime | None
     revoked_at: datetime | None
     used_at: datetime | None = Field(description="When it was last used, to the minute")
+    previous_until: datetime | None = Field(
+        description="Until when the secret before the present one is good; null without one"
+    )
     budget: BudgetView | None = None
 
 
@@ -76,6 +95,21 @@ def create_key(body: NewKey, response: Response, context: ContextDep) -> KeyCrea
 def list_keys(context: ContextDep) -> list[KeyView]:
     """Lists all keys, oldest first, including revoked and expired ones."""
     return [_view(context, key) for key in context.store.keys.all()]
+
+
+@router.post("/{key_id}/rotate", responses=problem_responses(404, 409, 422, 503))
+def rotate_key(
+    key_id: str, body: Rotation, response: Response, context: ContextDep, request: Request
+) -> KeyCreated:
+    """Gives a key another secret, which is in this answer only; it keeps what it owns.
+
+    Its present secret stays good for a while. One before that ends at once.
+    """
+    key, secret = context.store.keys.rotate(key_id, overlap=timedelta(hours=body.overlap_hours))
+    checks: KeyChecks = request.app.state.key_checks
+    checks.forget()
+    response.headers["Cache-Control"] = "no-store"
+    return KeyCreated(**_view(context, key).model_dump(), secret=secret)
 
 
 @router.post("/{key_id}/revoke", responses=problem_responses(404, 503))

@@ -17,6 +17,7 @@ import structlog
 from buildarena_pipeline.catalog.models import ModelEntry, ProviderEntry
 from buildarena_pipeline.catalog.prices import price_usd
 from buildarena_pipeline.errors import PermanentError, TransientError
+from buildarena_pipeline.secret_files import SUFFIX, SecretFileError, read_secret
 from buildarena_store import Usage
 from buildarena_store.jobs.journal import GARBAGE, OUT_OF_TIME
 from buildarena_worker.providers.answered import Answered, TokenCounts
@@ -166,11 +167,17 @@ class ProviderClient:
 
 
 def _key_of(entry: ModelEntry, provider: ProviderEntry) -> str:
-    """The provider's API key, from the environment; a provider may need none."""
-    key = "none" if provider.key is None else os.environ.get(provider.key, "")
-    if not key:
+    """The provider's API key, from the environment or a file; a provider may need none."""
+    if provider.key is None:
+        return "none"
+    try:
+        key = read_secret(provider.key, os.environ)
+    except SecretFileError as error:
+        raise PermanentError(f"{entry.name}: {error}", reason="missing_key") from error
+    if key is None:
         raise PermanentError(
-            f"{entry.name} needs the API key in {provider.key}, which is not set on the worker",
+            f"{entry.name} needs the API key in {provider.key} or {provider.key}{SUFFIX}, "
+            "which is not set on the worker",
             reason="missing_key",
         )
     return key

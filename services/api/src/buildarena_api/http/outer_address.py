@@ -1,0 +1,120 @@
+"""What the service is called outside: the path below which a proxy shows it, and its outer name."""
+
+from __future__ import annotations
+
+import re
+from ipaddress import ip_address, ip_network
+from typing import Final
+
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+HOST: Final = re.compile(rb"(?:[A-Za-z0-9._-]{1,253}|\[[0-9A-Fa-f:.]{2,45}\])(?::[0-9]{1,5})?")
+
+
+class BasePathMiddleware:
+    """Serves everything below a path too, as a proxy asks for it that passes paths on unchanged.
+
+    Paths without it are served as well: some proxies cut it off, and probes inside a cluster don't
+    know of it. Either way `Location` and the contract's server name it.
+
+    Args:
+        app: The application.
+        base: For example ``/arena``; no slash at its end.
+    """
+
+    def __init__(self, app: ASGIApp, base: str) -> None:
+        self._app = app
+        self._base = base
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Passes a request on without the base path."""
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+        path: str = scope["path"]
+        if path == self._base:
+            await _redirect(send, f"{self._base}/", scope["query_string"])
+            return
+        if path.startswith(f"{self._base}/"):
+            path = path.removeprefix(self._base)
+        inner = {**scope, "path": path, "raw_path": None}
+
+        async def sending(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                headers = message.get("headers", [])
+                message = {**message, "headers": [self._outer(*header) for header in headers]}
+            await send(message)
+
+        await self._app(inner, receive, sending)
+
+    def _outer(self, name: bytes, value: bytes) -> tuple[bytes, bytes]:
+        if name.lower() != b"location":
+            return name, value
+        # The router's own redirects are whole addresses and have the path already.
+        return name, self._base.encode() + value if value.startswith(b"/") else value
+
+
+class RootPathMiddleware:
+    """Tells the router of the base path, as ASGI has it: in the root path and in the path.
+
+    It is the last before the router: everything before it goes by the paths of our own routes.
+
+    Args:
+        app: The application.
+        base: As of `BasePathMiddleware`.
+    """
+
+    def __init__(self, app: ASGIApp, base: str) -> None:
+        self._app = app
+        self._base = base
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Passes a request on; the router notes its route in the same scope."""
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+        path = scope["path"]
+        scope.update(path=self._base + path, root_path=self._base)
+        try:
+            await self._app(scope, receive, send)
+        finally:
+            scope.update(path=path, root_path="")
+
+
+class ForwardedHostMiddleware:
+    """Takes the outer host from trusted proxies' `X-Forwarded-Host`; other senders' is ignored.
+
+    It must be asked before whatever replaces the sender's address by the client's.
+
+    Args:
+        app: The application.
+        trusted: Addresses and networks, separated by commas.
+    """
+
+    def __init__(self, app: ASGIApp, trusted: str) -> None:
+        self._app = app
+        self._networks = [ip_network(part) for part in trusted.split(",") if part]
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Passes a request on with the host that its client asked for."""
+        if scope["type"] == "http" and self._trusts(scope):
+            given = [value for name, value in scope["headers"] if name == b"x-forwarded-host"]
+            if len(given) == 1 and HOST.fullmatch(given[0]):
+                headers = [header for header in scope["headers"] if header[0] != b"host"]
+                scope = {**scope, "headers": [(b"host", given[0]), *headers]}
+        await self._app(scope, receive, send)
+
+    def _trusts(self, scope: Scope) -> bool:
+        client = scope.get("client")
+        try:
+            address = ip_address(client[0]) if client else None
+        except ValueError:
+            return False
+        return address is not None and any(address in network for network in self._networks)
+
+
+async def _redirect(send: Send, path: str, query: bytes) -> None:
+    location = path.encode() + (b"?" + query if query else b"")
+    headers = [(b"location", location), (b"content-length", b"0")]
+    await send({"type": "http.response.start", "status": 308, "headers": headers})
+    await send({"type": "http.response.body", "body": b""})
