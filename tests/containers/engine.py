@@ -55,9 +55,8 @@ class Engine:
         deadline = time.monotonic() + 60
         while not self._answers():
             if process.poll() is not None or time.monotonic() > deadline:
-                sys.exit(
-                    f"the Docker engine did not start:\n{(folder / 'dockerd.log').read_text()[-2000:]}"
-                )
+                said = (folder / "dockerd.log").read_text()[-2000:]
+                sys.exit(f"the Docker engine did not start:\n{said}")
             time.sleep(0.5)
         say("started a Docker engine of our own")
 
@@ -146,7 +145,7 @@ class Project:
 
 
 def _client() -> str:
-    """A docker client that builds with BuildKit: a newer one needs a plugin, Debian's has it inside."""
+    """A client that builds with BuildKit: newer ones need a plugin, Debian's has it inside."""
     plugin = subprocess.run(["docker", "buildx", "version"], capture_output=True, check=False)
     old = Path("/usr/bin/docker")
     return str(old) if plugin.returncode and old.exists() else "docker"

@@ -163,7 +163,7 @@ def look_from_outside(run: Run, service: Service) -> None:
     with run.step("TLS, keys, the command line"):
         bare = httpx.Client(
             base_url=service.url, verify=service.client._transport._pool._ssl_context
-        )  # noqa: SLF001
+        )
         assert bare.get("/v1/sweeps").status_code == 401
         assert bare.get("/v1/sweeps", headers={"Authorization": "Bearer wrong"}).status_code == 401
         plain = httpx.get(f"http://localhost:{PORTS['first'][1]}/v1/health")

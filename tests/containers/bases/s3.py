@@ -3,7 +3,7 @@
 import boto3
 from moto.server import ThreadedMotoServer
 
-server = ThreadedMotoServer(ip_address="0.0.0.0", port=9000, verbose=False)  # noqa: S104
+server = ThreadedMotoServer(ip_address="0.0.0.0", port=9000, verbose=False)
 server.start()
 boto3.client(
     "s3",
@@ -12,4 +12,4 @@ boto3.client(
     aws_access_key_id="x",
     aws_secret_access_key="x",
 ).create_bucket(Bucket="buildarena")
-server._thread.join()  # noqa: SLF001
+server._thread.join()
