@@ -63,6 +63,11 @@ class StageTimes:
     counts: Sequence[int]
     total_s: float
 
+    @classmethod
+    def none(cls, stage: str, result: str) -> StageTimes:
+        """No attempt of this stage that ended so."""
+        return cls(stage=stage, result=result, counts=[0] * (len(STAGE_SECONDS) + 1), total_s=0.0)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ServiceFigures:
