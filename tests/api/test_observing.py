@@ -11,6 +11,7 @@ import structlog
 from prometheus_client.parser import text_string_to_metric_families
 from sqlalchemy import text
 
+from buildarena_api.http.metrics import ServiceMetrics
 from buildarena_store import JournalEntry, Usage
 
 
@@ -155,3 +156,13 @@ def test_metrics_notice_an_artifact_store_that_fails(api, context) -> None:
     shutil.rmtree(folder)
     folder.write_text("no folder")
     assert samples(api)["buildarena_artifact_store_up"] == [({}, 0)]
+
+
+def test_metrics_say_how_many_jobs_are_at_hand_in_each_queue(api, context, sweep) -> None:
+    api.post("/v1/sweeps", json={**sweep, "seeds": [0, 1, 2]})
+    assert "buildarena_queue_running" not in samples(api)
+    for _ in range(2):
+        assert context.store.leases.claim("construct", owner="w")
+    fresh = ServiceMetrics(context)
+    (family,) = [each for each in fresh.collect() if each.name == "buildarena_queue_running"]
+    assert [(s.labels, s.value) for s in family.samples] == [({"queue": "construct"}, 2)]

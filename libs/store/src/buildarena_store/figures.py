@@ -78,6 +78,7 @@ class ServiceFigures:
     models: Sequence[ModelUse]
     stages: Sequence[StageTimes]
     sweeps: dict[str, int]
+    running: dict[str, int]
 
 
 class Figures:
@@ -96,6 +97,7 @@ class Figures:
                 models=_models(connection),
                 stages=_stages(connection),
                 sweeps=_sweeps(connection),
+                running=_running(connection),
             )
 
 
@@ -168,3 +170,12 @@ def _stages(connection: Connection) -> list[StageTimes]:
 def _sweeps(connection: Connection) -> dict[str, int]:
     query = select(sweeps.c.state, func.count().label("sweeps")).group_by(sweeps.c.state)
     return {row.state: row.sweeps for row in connection.execute(query)}
+
+
+def _running(connection: Connection) -> dict[str, int]:
+    query = (
+        select(jobs.c.queue, func.count().label("jobs"))
+        .where(jobs.c.state == JobState.RUNNING)
+        .group_by(jobs.c.queue)
+    )
+    return {row.queue: row.jobs for row in connection.execute(query)}

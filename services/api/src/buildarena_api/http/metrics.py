@@ -113,7 +113,14 @@ def _queue_metrics(figures: ServiceFigures) -> Iterable[Metric]:
     for queue in figures.queues:
         depth.add_metric([queue.queue], queue.jobs)
         oldest.add_metric([queue.queue], queue.oldest_s)
-    return depth, oldest
+    running = GaugeMetricFamily(
+        "buildarena_queue_running",
+        "Jobs that a worker is at, by the queue it took them from.",
+        labels=["queue"],
+    )
+    for name, number in sorted(figures.running.items()):
+        running.add_metric([name], number)
+    return depth, oldest, running
 
 
 def _model_metrics(figures: ServiceFigures) -> Iterable[Metric]:
