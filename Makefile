@@ -5,8 +5,9 @@ PYTHON ?=
 export PYTHON
 VENV := .venv
 BIN := $(VENV)/bin
-PACKAGES := libs/geometry libs/simulation libs/besiege libs/benchmark libs/store libs/pipeline services/api services/worker services/simworker clients/cli
-CODE := $(addsuffix /src,$(PACKAGES)) migrations tests
+PACKAGES := libs/geometry libs/simulation libs/besiege libs/benchmark libs/store libs/pipeline services/api services/worker services/simworker clients/cli clients/buildarena
+CODE := $(addsuffix /src,$(PACKAGES)) tests
+NOT_OURS := $(foreach p,$(PACKAGES),--no-emit-package $(patsubst buildarena-buildarena,buildarena,buildarena-$(notdir $(p))))
 STAMP := $(VENV)/.installed
 WORKERS ?= $(shell getconf _NPROCESSORS_ONLN)
 
@@ -37,7 +38,7 @@ check: $(STAMP) ## Lints, types and import rules alone
 	@echo "== 2/6 lint"
 	@$(BIN)/ruff check --quiet $(CODE)
 	@echo "== 3/6 types"
-	@$(BIN)/mypy --no-error-summary $(addsuffix /src,$(PACKAGES)) migrations/env.py
+	@$(BIN)/mypy --no-error-summary $(addsuffix /src,$(PACKAGES))
 	@echo "== 4/6 import rules"
 	@set -o pipefail; $(BIN)/lint-imports --no-cache | tail -n 3
 
@@ -47,12 +48,12 @@ clean: ## Removes the environment, caches and local data
 openapi: $(STAMP) ## Writes the API's contract again, after an intended change
 	@$(BIN)/python -m buildarena_api.contract > tests/data/openapi.json
 
-lock: ## Compiles requirements.lock again
+lock: ## Compiles requirements.lock again, and the locks of the images from it
 	bash mk/uv.sh pip compile --quiet --universal --generate-hashes --all-extras --no-annotate \
-		$(foreach p,$(PACKAGES),--no-emit-package $(subst /,-,buildarena-$(notdir $(p)))) \
-		--custom-compile-command "make lock" -o requirements.lock \
+		$(NOT_OURS) --custom-compile-command "make lock" -o requirements.lock \
 		$(addsuffix /pyproject.toml,$(PACKAGES)) requirements-dev.in
 	bash mk/uv.sh pip compile --quiet --universal --generate-hashes --no-annotate -c requirements.lock \
 		--custom-compile-command "make lock" -o requirements-hunt.lock requirements-hunt.in
+	$(MAKE) --no-print-directory lock-images
 
 -include mk/*.mk

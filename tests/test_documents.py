@@ -50,7 +50,7 @@ def test_links_lead_somewhere(document) -> None:
 
 def test_files_exist(document) -> None:
     named = re.findall(
-        r"`((?:libs|services|clients|tests|examples|docs|migrations|mk)/[\w./*-]+)`",
+        r"`((?:libs|services|clients|tests|examples|docs|deploy|mk)/[\w./*-]+)`",
         document.read_text(),
     )
     assert not [name for name in named if not list(ROOT.glob(name))]

@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[1]
 EXCLUDED = (
     "CHANGELOG.md",
     "LICENSE",
-    "migrations/",
+    "libs/store/src/buildarena_store/migrations/",
     "requirements",
     "tests/data/",
     "tests/test_words.py",

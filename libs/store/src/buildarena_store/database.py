@@ -19,19 +19,15 @@ from sqlalchemy.pool import ConnectionPoolEntry
 from buildarena_store.errors import SchemaVersionError
 
 IDLE_S = 2.0
+MIGRATIONS = Path(__file__).parent / "migrations"
+"""The Alembic chain."""
 MIGRATION_LOCK = 0x6275696C64  # "build": two processes that migrate at once take turns
-
-
-def migrations_folder() -> Path:
-    """Where the Alembic chain lies: in the wheel, or at the root of the source tree."""
-    packaged = Path(__file__).parent / "_migrations"
-    return packaged if packaged.exists() else Path(__file__).parents[4] / "migrations"
 
 
 def alembic_config(url: str) -> Config:
     """The Alembic settings for a database, without any ini file."""
     config = Config()
-    config.set_main_option("script_location", str(migrations_folder()))
+    config.set_main_option("script_location", str(MIGRATIONS))
     config.attributes["url"] = url
     return config
 
@@ -40,7 +36,7 @@ def expected_schema() -> str:
     """The newest revision of the chain: what this code was written for."""
     head = ScriptDirectory.from_config(alembic_config("")).get_current_head()
     if head is None:
-        raise SchemaVersionError(f"no migrations in {migrations_folder()}")
+        raise SchemaVersionError(f"no migrations in {MIGRATIONS}")
     return head
 
 

@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from buildarena_cli.errors import CommandError
+from buildarena_cli.near import did_you_mean
 from buildarena_cli.options import DataOption, PortOption
 from buildarena_cli.terminal.output import say
 
 if TYPE_CHECKING:
     from buildarena_pipeline.runtime.settings import Settings
 
-DEMO_SWEEP = {
+DEMO_SWEEP: dict[str, Any] = {
     "name": "demo",
     "tasks": [
         *("transport-1", "transport-2", "transport-3"),
@@ -63,7 +64,14 @@ def up(
         _tell("stopping")
 
 
-def demo(data: DataOption = None, port: PortOption = None) -> None:
+def demo(
+    data: DataOption = None,
+    port: PortOption = None,
+    *,
+    task: Annotated[
+        list[str] | None, typer.Option(help="Only this task; may be given several times.")
+    ] = None,
+) -> None:
     """Start everything, run one small sweep, show who builds best, and stop."""
     from buildarena_cli.client import Client
     from buildarena_cli.local.service import is_running
@@ -71,6 +79,7 @@ def demo(data: DataOption = None, port: PortOption = None) -> None:
     from buildarena_cli.terminal.boards import overview
     from buildarena_cli.terminal.progress import exit_code, watch_sweep
 
+    sweep_file = DEMO_SWEEP if not task else {**DEMO_SWEEP, "tasks": _demo_tasks(task)}
     settings = _settings(data, port)
     settings = settings.model_copy(update={"data": settings.data / "demo"})
     _interrupt_on_terminate()
@@ -79,7 +88,7 @@ def demo(data: DataOption = None, port: PortOption = None) -> None:
     _tell_simulators()
     with Stack(settings, tell=_tell) as stack:
         client = Client(stack.url, key=stack.admin_key)
-        sweep_id = client.post("/v1/sweeps", DEMO_SWEEP)["id"]
+        sweep_id = client.post("/v1/sweeps", sweep_file)["id"]
         sweep = watch_sweep(client, sweep_id)
         stack.require_running()
         say()
@@ -93,6 +102,17 @@ def demo(data: DataOption = None, port: PortOption = None) -> None:
         f"API docs are then at {stack.url}/docs."
     )
     raise typer.Exit(exit_code(sweep))
+
+
+def _demo_tasks(chosen: list[str]) -> list[str]:
+    known = list(DEMO_SWEEP["tasks"])
+    for name in chosen:
+        if name not in known:
+            raise CommandError(
+                f"there is no task {name!r}; choose from {', '.join(known)}"
+                f"{did_you_mean(name, known)}"
+            )
+    return list(dict.fromkeys(chosen))
 
 
 def _detach(settings: Settings, *, keys: bool) -> None:

@@ -162,6 +162,13 @@ class Settings(BaseSettings):
     besiege_mod: Annotated[
         str, Field(description="Version of the game's Lua Scripting Mod", pattern=VERSION)
     ] = ""
+    alive_file: Annotated[
+        Path | None,
+        Field(
+            description="File that a worker touches at each heartbeat, for its container's "
+            "health check"
+        ),
+    ] = None
     otlp_endpoint: Annotated[
         str | None, Field(description="OTLP/HTTP collector of traces; none are made without")
     ] = None

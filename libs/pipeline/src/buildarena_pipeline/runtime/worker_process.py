@@ -84,7 +84,9 @@ class _Runtime:
         )
 
     def report(self) -> None:
-        """Reports to the register that this process is alive."""
+        """Shows that this process is alive: to its container, and to the register."""
+        if self.context.settings.alive_file is not None:
+            self.context.settings.alive_file.touch()
         peak_kib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
         self.context.store.workers.report(
             worker_id=self.id,

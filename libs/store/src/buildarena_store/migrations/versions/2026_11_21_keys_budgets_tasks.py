@@ -1,5 +1,7 @@
 """keys, budgets, tasks: who may do what and spend how much, and tasks of users' own."""
 
+from typing import Any
+
 import sqlalchemy as sa
 from alembic import op
 from sqlalchemy.dialects import postgresql
@@ -17,7 +19,7 @@ def _time(name: str, *, now: bool = False) -> sa.Column[object]:
     return sa.Column(name, sa.DateTime(timezone=True), nullable=not now, server_default=default)
 
 
-def _spent(name: str, kind: sa.types.TypeEngine[object]) -> sa.Column[object]:
+def _spent(name: str, kind: sa.types.TypeEngine[Any]) -> sa.Column[object]:
     return sa.Column(name, kind, nullable=False, server_default=sa.text("0"))
 
 

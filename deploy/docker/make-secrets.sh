@@ -1,0 +1,30 @@
+#!/usr/bin/env bash
+# Makes the secrets that docker-compose.yml mounts, in ./secrets or the folder that is named. What is
+# there already stays. The folder opens for its owner alone; its files open for all, because the
+# containers' accounts are not yours.
+set -euo pipefail
+folder=${1:-secrets}
+umask 077
+mkdir -p "$folder"
+
+keep() {
+    local file=$folder/$1
+    [ -s "$file" ] || cat >"$file"
+    chmod 644 "$file"
+}
+random() {
+    head -c 32 /dev/urandom | od -An -tx1 | tr -d ' \n'
+}
+
+random | keep postgres_password
+random | keep valkey_password
+random | keep admin_key
+random | keep metrics_key
+random | keep grafana_password
+random | head -c 20 | keep s3_access_key
+random | keep s3_secret_key
+printf 'postgresql://buildarena:%s@postgres:5432/buildarena' "$(cat "$folder/postgres_password")" | keep database_url
+printf 'redis://:%s@valkey:6379/0' "$(cat "$folder/valkey_password")" | keep broker_url
+printf '{"identities": [{"name": "buildarena", "credentials": [{"accessKey": "%s", "secretKey": "%s"}], "actions": ["Admin", "Read", "Write", "List"]}]}' \
+    "$(cat "$folder/s3_access_key")" "$(cat "$folder/s3_secret_key")" | keep s3_config
+echo "secrets are in $folder; the operator's key is $folder/admin_key"

@@ -1,0 +1,7 @@
+.PHONY: dist version
+
+dist: $(WEB_STAMP) ## Builds wheels and sdists of all distributions, and the versions that were tested, into dist/
+	@bash mk/dist.sh dist
+
+version: ## Gives every distribution a new version: make version V=0.2.0
+	@bash mk/version.sh $(V) $(PACKAGES)

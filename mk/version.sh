@@ -1,0 +1,17 @@
+#!/usr/bin/env bash
+# Gives every distribution one new version: version.sh VERSION PACKAGE...
+set -euo pipefail
+version=${1:-}
+shift || true
+if ! [[ $version =~ ^[0-9]+\.[0-9]+\.[0-9]+((a|b|rc)[0-9]+)?$ ]]; then
+    echo "'$version' is no version: make version V=0.2.0, or V=0.2.0rc1" >&2
+    exit 2
+fi
+for package in "$@"; do
+    sed -E -i.before \
+        -e "s/^version = \".*\"/version = \"$version\"/" \
+        -e "s/\"(buildarena-[a-z]+(\[[a-z]+\])?)==[^\"]+\"/\"\1==$version\"/" "$package/pyproject.toml"
+    sed -E -i.before "s/^__version__ = \".*\"/__version__ = \"$version\"/" "$package"/src/*/__init__.py
+    rm -f "$package"/pyproject.toml.before "$package"/src/*/__init__.py.before
+done
+echo "every distribution is now $version; run make install, and say in CHANGELOG.md what changed"

@@ -1,0 +1,187 @@
+"""What users install: wheels of one version, and a demo, a report and pages from them alone."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+import tarfile
+import tomllib
+import zipfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from email.parser import Parser
+from pathlib import Path
+
+import httpx
+import pytest
+
+from buildarena_api.dashboard.files import FOLDER as PAGES
+from buildarena_cli.local import free_port
+
+ROOT = Path(__file__).parents[2]
+PROJECTS = sorted(
+    path
+    for room in ("libs", "services", "clients")
+    for path in (ROOT / room).glob("*/pyproject.toml")
+)
+ALL_MUST_RUN = bool(os.environ.get("BUILDARENA_TEST_ALL"))
+pytestmark = [pytest.mark.xdist_group("distributions"), pytest.mark.timeout(400)]
+needs_pages = pytest.mark.skipif(
+    not (PAGES / "index.html").is_file(), reason="the dashboard has not been built: make web"
+)
+
+
+def _needs(path: Path) -> str:
+    found = project(path)
+    return json.dumps([found["dependencies"], found.get("optional-dependencies", {})])
+
+
+def project(path: Path) -> dict[str, object]:
+    found: dict[str, object] = tomllib.loads(path.read_text())["project"]
+    return found
+
+
+@pytest.fixture(scope="module")
+def dist(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("dist")
+    built = subprocess.run(
+        ["bash", "mk/dist.sh", str(folder)], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert built.returncode == 0, built.stderr
+    return folder
+
+
+@pytest.fixture(scope="module")
+def installed(dist: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The programs of an environment that holds the wheels and what they need, nothing else."""
+    folder = tmp_path_factory.mktemp("empty")
+    venv, python = folder / "venv", str(folder / "venv/bin/python")
+    _uv("venv", "--quiet", "--no-project", "--python", sys.executable, str(venv))
+    words = ["--find-links", str(dist), "--constraint", str(dist / "constraints.txt")]
+    done = _uv("pip", "install", "--quiet", "--python", python, *words, "buildarena", check=False)
+    if done.returncode and not ALL_MUST_RUN and "Failed to fetch" in done.stderr:
+        pytest.skip("installing the wheels needs a package index, and none answers")
+    assert done.returncode == 0, done.stderr
+    return venv / "bin"
+
+
+def _uv(*words: str, check: bool = True) -> subprocess.CompletedProcess[str]:
+    command = ["bash", str(ROOT / "mk/uv.sh"), *words]
+    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=check)
+
+
+def test_every_distribution_has_one_version_and_asks_for_its_siblings_of_the_same() -> None:
+    versions = {path.parent.name: project(path)["version"] for path in PROJECTS}
+    assert len(set(versions.values())) == 1, versions
+    version = versions["buildarena"]
+    for path in PROJECTS:
+        siblings = re.findall(r'"(buildarena-[^"]+)"', _needs(path))
+        assert [s for s in siblings if not s.endswith(f"=={version}")] == [], path
+        for module in (path.parent / "src").glob("*/__init__.py"):
+            said = re.findall(r'^__version__ = "(.+)"$', module.read_text(), re.MULTILINE)
+            assert said in ([], [version]), module
+
+
+def test_the_meta_distribution_installs_every_other(installed: Path) -> None:
+    listed = _uv("pip", "list", "--format", "json", "--python", str(installed / "python"))
+    ours = {p["name"] for p in json.loads(listed.stdout) if p["name"].startswith("buildarena")}
+    assert ours == {project(path)["name"] for path in PROJECTS}
+
+
+def test_a_new_version_goes_everywhere(tmp_path) -> None:
+    for path in PROJECTS:
+        copy = tmp_path / path.parent.relative_to(ROOT)
+        for file in [path, *(path.parent / "src").glob("*/__init__.py")]:
+            target = copy / file.relative_to(path.parent)
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.write_text(file.read_text())
+    packages = [str(tmp_path / path.parent.relative_to(ROOT)) for path in PROJECTS]
+    script = ["bash", str(ROOT / "mk/version.sh")]
+    done = subprocess.run([*script, "7.1.0rc2", *packages], capture_output=True, check=False)
+    assert done.returncode == 0
+    old = str(project(PROJECTS[0])["version"])
+    changed = [p.read_text() for p in tmp_path.rglob("*") if p.is_file()]
+    assert not [text for text in changed if f'"{old}"' in text or f"=={old}" in text]
+    assert sum('version = "7.1.0rc2"' in text for text in changed) >= len(PROJECTS)
+    refused = subprocess.run([*script, "next"], capture_output=True, text=True, check=False)
+    assert (refused.returncode, "'next' is no version" in refused.stderr) == (2, True)
+
+
+def test_wheels_and_sdists_say_what_they_are(dist: Path) -> None:
+    wheels, sdists = sorted(dist.glob("*.whl")), sorted(dist.glob("*.tar.gz"))
+    assert len(wheels) == len(sdists) == len(PROJECTS)
+    for wheel in wheels:
+        with zipfile.ZipFile(wheel) as archive:
+            names = archive.namelist()
+            found = next(name for name in names if name.endswith(".dist-info/METADATA"))
+            metadata = Parser().parsestr(archive.read(found).decode())
+        assert metadata["License-Expression"] == "Apache-2.0"
+        assert metadata["License-File"] == "LICENSE"
+        assert metadata["Requires-Python"] == ">=3.11"
+        assert metadata["Summary"]
+        assert str(metadata.get_payload()).startswith("# ")
+        assert any(name.endswith("/py.typed") for name in names), wheel
+    for sdist in sdists:
+        with tarfile.open(sdist) as archive:
+            inside = [name.split("/", 1)[1] for name in archive.getnames() if "/" in name]
+        assert {"LICENSE", "README.md", "pyproject.toml", "PKG-INFO"} <= set(inside)
+
+
+def test_each_licence_is_the_repositorys() -> None:
+    licence = (ROOT / "LICENSE").read_text()
+    assert [p for p in PROJECTS if (p.parent / "LICENSE").read_text() != licence] == []
+
+
+@needs_pages
+def test_demo_report_and_pages_run_from_an_empty_environment(installed: Path, tmp_path) -> None:
+    data = tmp_path / "data"
+    words = ["demo", "--task", "support-1", "--data", str(data), "--port", str(free_port())]
+    demo = run(installed, tmp_path, *words)
+    assert demo.returncode == 0, demo.stdout + demo.stderr
+    assert re.search(r"builtin/expert\*\s+4/4", demo.stdout), demo.stdout
+    with up(installed, tmp_path, data / "demo") as url:
+        page = httpx.get(url)
+        assert "<!doctype html>" in page.text.lower()
+        script = re.search(r'src="([^"]+\.js)"', page.text)
+        assert script
+        assert httpx.get(f"{url}{script[1]}").status_code == 200
+        sweep = httpx.get(f"{url}/v1/sweeps").json()["sweeps"][0]["id"]
+        for ending in ("html", "md", "pdf"):
+            out = tmp_path / f"report.{ending}"
+            done = run(installed, tmp_path, "report", sweep, "--out", str(out), "--url", url)
+            assert done.returncode == 0, done.stderr
+            assert out.stat().st_size > 3_000
+
+
+def run(programs: Path, folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [str(programs / "buildarena"), *words],
+        cwd=folder,
+        env=alone(),
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+
+
+def alone() -> dict[str, str]:
+    """An environment in which nothing of the source tree is found."""
+    kept = ("HOME", "LANG", "TMPDIR")
+    return {name: os.environ[name] for name in kept if name in os.environ} | {
+        "PATH": "/usr/bin:/bin"
+    }
+
+
+@contextmanager
+def up(programs: Path, folder: Path, data: Path) -> Iterator[str]:
+    port = str(free_port())
+    started = run(programs, folder, "up", "--detach", "--data", str(data), "--port", port)
+    assert started.returncode == 0, started.stderr
+    try:
+        yield f"http://127.0.0.1:{port}"
+    finally:
+        run(programs, folder, "down", "--data", str(data))
