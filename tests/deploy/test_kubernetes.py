@@ -21,6 +21,7 @@ from buildarena_store.states import CONSTRUCT_QUEUE, simulate_queue
 SCHEMA = json.loads(
     (Path(__file__).parents[1] / "data" / "keda-scaledobject.schema.json").read_text()
 )
+DOCKERFILE = KUBERNETES.parent / "docker" / "Dockerfile"
 VERSIONS = ("1.29", kubernetes_validate.latest_version())
 OURS = ("api", "construct", "simulate-mujoco", "simulate-pybullet")
 FILES = sorted(path for path in KUBERNETES.rglob("*.yaml") if path.name != "kustomization.yaml")
@@ -147,7 +148,8 @@ def test_settings_are_ones_that_there_are(overlay: str) -> None:
         (container,) = pods(documents)[name]["spec"]["containers"]
         given = {entry["name"] for entry in container["env"]}
         assert "BUILDARENA_DATABASE_URL_FILE" in given
-        assert ("BUILDARENA_ADMIN_KEY_FILE" in given) == (name == "api")
+        for key in ("ADMIN_KEY", "METRICS_KEY"):
+            assert (f"BUILDARENA_{key}_FILE" in given) == (name == "api")
         keys = {f"{key}_FILE" for key in providers} if name == "construct" else set()
         assert keys <= given
         assert given <= files | keys
@@ -161,9 +163,11 @@ def test_each_workload_has_its_image_and_program(overlay: str) -> None:
         **{name: f"buildarena/{name}:latest" for name in OURS},
         "migrate": "buildarena/tools:latest",
     }
-    for engine in ENGINE_SIMULATORS:
-        words = found[f"simulate-{engine}"]["spec"]["containers"][0]["command"]
-        assert words == ["python", "-m", "buildarena_simworker", "--simulator", engine]
+    assert {f"simulate-{engine}" for engine in ENGINE_SIMULATORS} <= set(OURS)
+    targets = re.findall(r"^FROM \S+ AS (\S+)$", DOCKERFILE.read_text(), re.MULTILINE)
+    assert {image.split("/")[1].split(":")[0] for image in images.values()} <= set(targets)
+    assert not [name for name in OURS if "command" in found[name]["spec"]["containers"][0]]
+    assert found["migrate"]["spec"]["containers"][0]["args"] == ["migrate"]
 
 
 @each_overlay
@@ -177,6 +181,7 @@ def test_pods_are_stopped_and_moved_with_care(overlay: str) -> None:
         assert selector.items() <= pod["metadata"]["labels"].items()
         container = pod["spec"]["containers"][0]
         assert ("readinessProbe" in container) == (name == "api")
+        assert "livenessProbe" in container
     api = pods(documents)["api"]["spec"]["containers"][0]
     assert "tcpSocket" in api["livenessProbe"], "a lost database must not have the API killed"
     assert api["readinessProbe"]["httpGet"]["path"] == "/v1/health"

@@ -17,7 +17,7 @@ ROOT = Path(__file__).resolve().parents[2]
 MONITORING = ROOT / "deploy" / "monitoring"
 RUNBOOK = ROOT / "docs" / "runbook.md"
 DASHBOARDS = sorted((MONITORING / "grafana" / "dashboards").glob("*.json"))
-RULES = yaml.safe_load((MONITORING / "alerts.yml").read_text())["groups"][0]["rules"]
+RULES = yaml.safe_load((MONITORING / "prometheus" / "alerts.yml").read_text())["groups"][0]["rules"]
 NAME = re.compile(r"\b(?:buildarena|process|python)_[a-z0-9_]+\b")
 SUFFIXES = {"histogram": ("_bucket", "_count", "_sum"), "counter": ("",), "gauge": ("",)}
 
@@ -79,7 +79,7 @@ def test_each_alert_has_an_entry_and_each_entry_an_alert() -> None:
 
 
 def test_each_alert_is_tried_before_and_while_it_fires() -> None:
-    tried = yaml.safe_load((MONITORING / "alerts_test.yml").read_text())["tests"]
+    tried = yaml.safe_load((MONITORING / "prometheus" / "alerts_test.yml").read_text())["tests"]
     fires, quiet = set(), set()
     for test in tried:
         for one in test["alert_rule_test"]:
@@ -89,9 +89,9 @@ def test_each_alert_is_tried_before_and_while_it_fires() -> None:
 
 @needs_promtool
 def test_rules_and_configuration_are_prometheus_own() -> None:
-    promtool("check", "rules", str(MONITORING / "alerts.yml"))
-    promtool("check", "config", "--syntax-only", str(MONITORING / "prometheus.yml"))
-    promtool("test", "rules", str(MONITORING / "alerts_test.yml"))
+    promtool("check", "rules", str(MONITORING / "prometheus" / "alerts.yml"))
+    promtool("check", "config", "--syntax-only", str(MONITORING / "prometheus" / "prometheus.yml"))
+    promtool("test", "rules", str(MONITORING / "prometheus" / "alerts_test.yml"))
 
 
 @needs_promtool
@@ -143,8 +143,8 @@ def test_there_is_a_dashboard_for_each_part() -> None:
 
 
 def test_the_collectors_pipelines_use_what_it_has() -> None:
-    base = yaml.safe_load((MONITORING / "otel-collector.yaml").read_text())
-    more = yaml.safe_load((MONITORING / "otel-collector-store.yaml").read_text())
+    base = yaml.safe_load((MONITORING / "collector.yaml").read_text())
+    more = yaml.safe_load((MONITORING / "collector-store.yaml").read_text())
     base["exporters"] |= more["exporters"]
     pipelines = [
         *base["service"]["pipelines"].values(),

@@ -59,10 +59,14 @@ class SurroundingsMetrics(Collector):
         yield self._one(
             "broker_up", "1 when the broker answers, else 0.", float(broker is not None)
         )
-        folder = self._context.settings.data.absolute()
+        folder = self._context.settings.kept_folder
         disk = shutil.disk_usage(next(at for at in (folder, *folder.parents) if at.exists()))
-        yield self._one("data_free_bytes", "Free space where the data folder lies.", disk.free)
-        yield self._one("data_size_bytes", "Size of the disk of the data folder.", disk.total)
+        yield self._one(
+            "data_free_bytes",
+            "Free space where artifacts lie, or the data folder where those are in a bucket.",
+            disk.free,
+        )
+        yield self._one("data_size_bytes", "Size of that disk.", disk.total)
         yield from self._connections()
 
     def _workers(self, known: Sequence[WorkerInfo]) -> Iterable[Metric]:
