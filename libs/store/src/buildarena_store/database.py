@@ -40,6 +40,12 @@ def expected_schema() -> str:
     return head
 
 
+def known_schemas() -> frozenset[str]:
+    """All revisions of the chain: this program can bring a database of each to the newest."""
+    script = ScriptDirectory.from_config(alembic_config(""))
+    return frozenset(revision.revision for revision in script.walk_revisions())
+
+
 def ping_after_idling(engine: Engine) -> None:
     """Has connections that were idle for a while tested before they are used again.
 

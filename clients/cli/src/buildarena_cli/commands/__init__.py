@@ -48,5 +48,8 @@ COMMANDS: Final[Mapping[str, Entry]] = {
     "key": Entry("keys", "app", "Make, list, rotate and revoke API keys."),
     "mcp": Entry("mcp", "mcp", "Let agents that speak the Model Context Protocol build."),
     "worker": Entry("worker", "app", "Run workers by themselves."),
+    "backup": Entry("backups", "backup", "Back up the database and its artifacts."),
+    "restore": Entry("backups", "restore", "Restore a backup into an empty database."),
+    "artifacts": Entry("artifacts", "app", "Look after the store of artifacts."),
     "migrate": Entry("worker", "migrate", "Bring the database to this program's schema."),
 }

@@ -38,6 +38,7 @@ ADVICE = (
 )
 OPEN_FILES = Path("/proc/self/fd")
 MAKE_WITHIN_S = 120.0
+PORT_LINE = 3
 STATE_LINE = 7
 SETTINGS = {
     "listen_addresses": LOOPBACK,
@@ -208,6 +209,16 @@ class EmbeddedPostgres:
             return False
         state = lines[STATE_LINE].strip() if len(lines) > STATE_LINE else ""
         return lines[0] == str(process.pid) and state == "ready"
+
+
+def url_of_running(folder: Path) -> str | None:
+    """The address of the server that runs on a data folder's ``postgres``; None when none does."""
+    try:
+        lines = (_cluster_in(folder.absolute()) / "postmaster.pid").read_text().split("\n")
+        port, password = lines[PORT_LINE].strip(), (folder / "password").read_text()
+    except (OSError, IndexError):
+        return None
+    return f"postgresql://buildarena:{password}@{LOOPBACK}:{port}/postgres"
 
 
 def installed_postgres() -> Path:

@@ -26,11 +26,11 @@ DEFAULT_PORT = 8321
 VERSION = r"^[A-Za-z0-9._-]{0,40}$"
 BASE_PATH: Final = re.compile(r"(?:/(?!\.{1,2}(?:/|$))[A-Za-z0-9._~-]+)+")
 OWN_PATHS: Final = frozenset(
-    {
-        *("v1", "docs", "openapi.json", "static-offline-docs", "assets", "index.html"),
-        *("favicon.svg", "scheme.js", "sweeps", "jobs", "tasks", "models", "compare"),
-        *("build", "machine"),
-    }
+    (
+        *("v1", "docs", "openapi.json", "static-offline-docs"),
+        *("assets", "sweeps", "jobs", "tasks", "models", "compare", "build", "machine"),
+        *("favicon.svg", "scheme.js", "index.html"),
+    )
 )
 """First parts of the API's and the dashboard's own paths; none can be a base path's."""
 SECRETS: Final = (

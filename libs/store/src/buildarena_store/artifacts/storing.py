@@ -7,6 +7,7 @@ import secrets
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, cast
 
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from obstore.store import S3Config
 
 HASH_LENGTH: Final = 64
+TRASH: Final = "trash"
 PROBE_BYTES: Final = 64 * 1024
 """About what a session keeps: a store that is full to the last block fails already."""
 
@@ -41,6 +43,21 @@ class ArtifactInfo:
     hash: str
     media_type: str
     size: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StoredArtifact:
+    """What a store holds under a hash, without reading it.
+
+    Attributes:
+        hash: The hash that its name says.
+        size: Length in bytes.
+        stored_at: When it was last written.
+    """
+
+    hash: str
+    size: int
+    stored_at: datetime
 
 
 class ArtifactStore:
@@ -90,6 +107,55 @@ class ArtifactStore:
             raise ArtifactDamagedError(f"artifact {digest} is damaged: its bytes changed")
         return data
 
+    def all(self, prefix: str = "", *, trashed: bool = False) -> Iterator[StoredArtifact]:
+        """What is stored, in no order; what is not an artifact is passed over.
+
+        Args:
+            prefix: Only hashes that begin with these two digits.
+            trashed: What lies in the trash instead.
+
+        Raises:
+            ArtifactStoreError: The store can't be read now.
+        """
+        with self._translated("listed"):
+            where = "/".join(filter(None, (TRASH if trashed else "", prefix)))
+            for chunk in obstore.list(self._store, prefix=where or None):
+                for item in chunk:
+                    path = str(item["path"]).removeprefix(f"{TRASH}/" if trashed else "")
+                    digest = path[-HASH_LENGTH:]
+                    if _is_hash(digest) and path == _path(digest):
+                        yield StoredArtifact(
+                            hash=digest, size=item["size"], stored_at=item["last_modified"]
+                        )
+
+    def trash(self, digest: str) -> None:
+        """Moves bytes where `get` does not find them; `take_back` undoes it.
+
+        Raises:
+            ArtifactStoreError: The store can't be written now.
+        """
+        self._move(_path(digest), f"{TRASH}/{_path(digest)}")
+
+    def take_back(self, digest: str) -> None:
+        """Moves bytes out of the trash; errors as for `trash`."""
+        self._move(f"{TRASH}/{_path(digest)}", _path(digest))
+
+    def delete_trashed(self, digest: str) -> None:
+        """Deletes bytes that lie in the trash; errors as for `trash`."""
+        with self._translated("deleted"):
+            obstore.delete(self._store, f"{TRASH}/{_path(digest)}")
+
+    def _move(self, old: str, new: str) -> None:
+        # A copy and a deletion: a rename would keep the time at which it was written, and the trash
+        # counts from when something came there.
+        with self._translated("moved"):
+            try:
+                data = obstore.get(self._store, old).bytes()
+            except FileNotFoundError:
+                return
+            obstore.put(self._store, new, data)
+            obstore.delete(self._store, old)
+
     def probe(self) -> None:
         """Writes and reads something, to see whether the store works.
 
@@ -118,7 +184,11 @@ class ArtifactStore:
             ) from error
 
 
+def _is_hash(text: str) -> bool:
+    return len(text) == HASH_LENGTH and set(text) <= set("0123456789abcdef")
+
+
 def _path(digest: str) -> str:
-    if len(digest) != HASH_LENGTH or not set(digest) <= set("0123456789abcdef"):
+    if not _is_hash(digest):
         raise ArtifactMissingError(f"{digest!r} is not an artifact hash (64 hex digits)")
     return f"{digest[:2]}/{digest}"

@@ -1,0 +1,141 @@
+"""The place of backups: a folder or a bucket that holds several, and shares their artifacts.
+
+::
+
+    artifacts/ab/ab12…          by the hash of their bytes, each once for all backups
+    2026-11-22T09-30-00Z/database.dump    as pg_dump's custom format
+    2026-11-22T09-30-00Z/artifacts.txt    a line "hash size" for each artifact
+    2026-11-22T09-30-00Z/manifest.json    written last: without it, the backup is not whole
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import obstore
+from obstore.exceptions import BaseError
+from obstore.store import LocalStore, ObjectStore, from_url
+
+from buildarena_cli.errors import CommandError
+from buildarena_store import ArtifactStore
+
+NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,79}")
+MANIFEST: Final = "manifest.json"
+DUMP: Final = "database.dump"
+LIST: Final = "artifacts.txt"
+FORMAT: Final = 1
+PIECE: Final = 8 * 1024 * 1024
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Manifest:
+    """What a backup is.
+
+    Attributes:
+        format: Of the backup itself.
+        version: BuildArena's.
+        schema: The database's revision.
+        made_at: When the snapshot was taken, in UTC.
+        dump_sha256: Hash of the dump.
+        list_sha256: Hash of the list of artifacts.
+        artifacts: How many artifacts belong to it.
+        artifact_bytes: Their lengths together.
+        missing: Artifacts that the database refers to and the store could not give.
+    """
+
+    format: int
+    version: str
+    schema: str
+    made_at: str
+    dump_sha256: str
+    list_sha256: str
+    artifacts: int
+    artifact_bytes: int
+    missing: Sequence[str]
+
+
+class BackupPlace:
+    """Where backups lie.
+
+    Args:
+        location: A folder, or a URL such as ``s3://bucket/prefix``.
+        options: Settings of such a URL's store, for example its credentials.
+    """
+
+    def __init__(self, location: str, options: Mapping[str, str]) -> None:
+        self.location = location
+        self._store: ObjectStore
+        if "://" in location:
+            self._store = from_url(location, config=dict(options) or None)  # type: ignore[arg-type]
+            self.artifacts = ArtifactStore(f"{location.rstrip('/')}/artifacts", options)
+        else:
+            folder = Path(location).absolute()
+            try:
+                folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+                self._store = LocalStore(prefix=folder)
+                self.artifacts = ArtifactStore(folder / "artifacts")
+            except (OSError, BaseError) as error:
+                raise CommandError(f"{location} can't be used for backups: {error}") from error
+
+    def names(self) -> list[str]:
+        """The backups that are whole, the oldest first."""
+        return sorted(
+            path.split("/")[0]
+            for path in self._paths()
+            if path.count("/") == 1 and path.endswith(f"/{MANIFEST}")
+        )
+
+    def manifest(self, name: str) -> Manifest:
+        """What a backup is.
+
+        Raises:
+            CommandError: There is no whole backup of this name, or it is of another format.
+        """
+        known = self.names()
+        if name not in known:
+            choices = ", ".join(known[-5:]) or "none"
+            raise CommandError(
+                f"{self.location} has no whole backup {name!r}; the newest are: {choices}"
+            )
+        made: dict[str, Any] = json.loads(self.read(f"{name}/{MANIFEST}"))
+        if made.get("format") != FORMAT:
+            raise CommandError(f"backup {name} has the format {made.get('format')}, not {FORMAT}")
+        return Manifest(**made)
+
+    def finish(self, name: str, manifest: Manifest) -> None:
+        """Writes the manifest, which makes the backup whole."""
+        self.write(f"{name}/{MANIFEST}", json.dumps(asdict(manifest), indent=2).encode())
+
+    def read(self, path: str) -> bytes:
+        """A small file."""
+        return bytes(obstore.get(self._store, path).bytes())
+
+    def write(self, path: str, data: bytes) -> None:
+        """Writes a small file."""
+        obstore.put(self._store, path, data)
+
+    def send(self, path: str, file: Path) -> None:
+        """Writes a file of any size, in pieces."""
+        obstore.put(self._store, path, file)
+
+    def fetch(self, path: str, file: Path) -> str:
+        """Reads a file of any size into another; returns its SHA-256."""
+        digest = hashlib.sha256()
+        with file.open("wb") as out:
+            for piece in obstore.get(self._store, path).stream(min_chunk_size=PIECE):
+                digest.update(piece)
+                out.write(piece)
+        return digest.hexdigest()
+
+    def _paths(self) -> Iterator[str]:
+        # Artifacts are many, and lie beside the backups: they are not walked.
+        for folder in obstore.list_with_delimiter(self._store)["common_prefixes"]:
+            if folder.rstrip("/") != "artifacts":
+                for item in obstore.list_with_delimiter(self._store, folder)["objects"]:
+                    yield str(item["path"])

@@ -1,0 +1,70 @@
+"""Postgres' own programs for dumps: those that come with the embedded server, or installed ones."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+from collections.abc import Mapping
+from pathlib import Path
+
+from sqlalchemy import make_url
+
+from buildarena_cli.errors import CommandError
+from buildarena_cli.local.postgres import installed_postgres
+from buildarena_pipeline.errors import StartupError
+
+PASSED_ON = ("PATH", "HOME", "LANG", "SSL_CERT_FILE", "PGSSLMODE", "PGSSLROOTCERT", "TMPDIR")
+
+
+def run_program(name: str, url: str, *words: str) -> None:
+    """Runs ``pg_dump`` or ``pg_restore`` on a database.
+
+    Args:
+        name: The program.
+        url: The database; its password stands in no list of processes.
+        words: Further arguments.
+
+    Raises:
+        CommandError: It failed, with what it said; or it is not installed.
+    """
+    done = subprocess.run(
+        [str(_program(name)), "--no-password", *words],
+        env=_environment(url),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if done.returncode:
+        said = done.stderr.strip().splitlines() or [f"exit code {done.returncode}"]
+        raise CommandError(f"{name}: {' '.join(said[-3:])}")
+
+
+def _program(name: str) -> Path:
+    try:
+        folder = installed_postgres() / "bin"
+    except StartupError:
+        folder = None
+    found = shutil.which(name, path=str(folder)) if folder else None
+    found = found or shutil.which(name)
+    if found is None:
+        raise CommandError(
+            f"{name} is not installed: install Postgres' client programs, of the server's version "
+            "or a newer one"
+        )
+    return Path(found)
+
+
+def _environment(url: str) -> Mapping[str, str]:
+    parsed = make_url(url)
+    given = {
+        "PGHOST": parsed.host,
+        "PGPORT": str(parsed.port) if parsed.port else None,
+        "PGUSER": parsed.username,
+        "PGPASSWORD": parsed.password,
+        "PGDATABASE": parsed.database,
+        "PGSSLMODE": str(parsed.query["sslmode"]) if "sslmode" in parsed.query else None,
+        "PGCONNECT_TIMEOUT": "10",
+    }
+    kept = {name: os.environ[name] for name in PASSED_ON if name in os.environ}
+    return kept | {name: value for name, value in given.items() if value is not None}

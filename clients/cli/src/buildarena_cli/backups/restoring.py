@@ -1,0 +1,97 @@
+"""Restoring a backup into an empty database: artifacts first, then the database in one piece."""
+
+from __future__ import annotations
+
+import hashlib
+import tempfile
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+from obstore.exceptions import BaseError
+from sqlalchemy import inspect
+
+from buildarena_cli.backups.place import DUMP, LIST, BackupPlace, Manifest
+from buildarena_cli.backups.programs import run_program
+from buildarena_cli.backups.writing import AT_ONCE
+from buildarena_cli.errors import CommandError
+from buildarena_store import ArtifactDamagedError, ArtifactMissingError, ArtifactStore, Database
+from buildarena_store.database import known_schemas
+
+
+def restore_backup(
+    database: Database,
+    url: str,
+    artifacts: ArtifactStore,
+    place: BackupPlace,
+    name: str,
+    *,
+    tell: Callable[[str], None],
+) -> Manifest:
+    """Restores a backup. Broken off, it leaves the database empty and can be done again.
+
+    Args:
+        database: An empty database.
+        url: Its address.
+        artifacts: Where artifacts go; what is there stays.
+        place: Where the backup lies.
+        name: Its name.
+        tell: Gets a line for each step.
+
+    Raises:
+        CommandError: The database is not empty, the backup is damaged or of a newer program.
+    """
+    manifest = place.manifest(name)
+    if manifest.schema not in known_schemas():
+        raise CommandError(
+            f"backup {name} was made by version {manifest.version}, with the schema "
+            f"{manifest.schema}, which this program does not know: use that version or a newer one"
+        )
+    if inspect(database.engine).get_table_names():
+        raise CommandError("the database is not empty: restore into an empty one")
+    with tempfile.TemporaryDirectory(prefix="buildarena-restore-") as folder:
+        dump = Path(folder) / DUMP
+        try:
+            tell("checking the backup")
+            sha256, listed = place.fetch(f"{name}/{DUMP}", dump), place.read(f"{name}/{LIST}")
+        except (BaseError, OSError) as error:
+            raise CommandError(f"backup {name} can't be read: {error}") from error
+        for what, found, said in (
+            (DUMP, sha256, manifest.dump_sha256),
+            (LIST, hashlib.sha256(listed).hexdigest(), manifest.list_sha256),
+        ):
+            if found != said:
+                raise CommandError(
+                    f"{name}/{what} is damaged: its SHA-256 is {found}, the manifest says {said}"
+                )
+        hashes = [line.split()[0] for line in listed.decode().splitlines()]
+        tell(f"copying {len(hashes):,} artifacts")
+        _copy(place.artifacts, artifacts, hashes, name)
+        tell("restoring the database")
+        words = ["--no-owner", "--no-privileges", "--exit-on-error", "--single-transaction"]
+        run_program(
+            "pg_restore", url, *words, "--dbname", str(database.engine.url.database), str(dump)
+        )
+    database.migrate()
+    return manifest
+
+
+def _copy(source: ArtifactStore, target: ArtifactStore, hashes: list[str], name: str) -> None:
+    there = {item.hash for item in target.all()}
+
+    def copy(digest: str) -> str | None:
+        if digest in there:
+            return None
+        try:
+            target.put(source.get(digest), "")
+        except (ArtifactMissingError, ArtifactDamagedError) as error:
+            return str(error)
+        return None
+
+    with ThreadPoolExecutor(AT_ONCE) as pool:
+        wrong = [error for error in pool.map(copy, hashes) if error is not None]
+    if wrong:
+        raise CommandError(
+            f"{len(wrong):,} of backup {name}'s {len(hashes):,} artifacts are lost or damaged, "
+            f"the first: {wrong[0]}. The database was not touched"
+        )

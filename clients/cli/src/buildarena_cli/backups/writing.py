@@ -1,0 +1,149 @@
+"""Making a backup: one snapshot of the database, and every artifact that it refers to."""
+
+from __future__ import annotations
+
+import hashlib
+import tempfile
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Final
+
+from sqlalchemy import text
+
+from buildarena_cli.backups.place import DUMP, FORMAT, LIST, NAME, BackupPlace, Manifest
+from buildarena_cli.backups.programs import run_program
+from buildarena_cli.errors import CommandError
+from buildarena_pipeline import __version__
+from buildarena_store import (
+    ArtifactDamagedError,
+    ArtifactMissingError,
+    ArtifactStore,
+    Database,
+)
+from buildarena_store.artifacts.collecting import LOCK, referenced
+
+AT_ONCE: Final = 8
+PIECE: Final = 1024 * 1024
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Written:
+    """A backup that was made.
+
+    Attributes:
+        name: Its name.
+        manifest: What it is.
+        copied: Artifacts that no earlier backup had.
+    """
+
+    name: str
+    manifest: Manifest
+    copied: int
+
+
+def write_backup(
+    database: Database,
+    url: str,
+    artifacts: ArtifactStore,
+    place: BackupPlace,
+    *,
+    name: str | None = None,
+    tell: Callable[[str], None],
+) -> Written:
+    """Makes a backup; the service may run meanwhile.
+
+    A backup that was broken off leaves no manifest, and the next one uses what it has copied.
+
+    Args:
+        database: What is backed up.
+        url: Its address.
+        artifacts: The artifacts that belong to it.
+        place: Where the backup goes.
+        name: Its name; the time by default.
+        tell: Gets a line for each step.
+
+    Raises:
+        CommandError: The name is bad or taken, or a program failed.
+    """
+    now = datetime.now(UTC)
+    name = name or now.strftime("%Y-%m-%dT%H-%M-%SZ")
+    if not NAME.fullmatch(name) or name == "artifacts":
+        raise CommandError(f"a backup can't be called {name!r}: use letters, digits, '.-_'")
+    if name in place.names():
+        raise CommandError(f"{place.location} has a backup {name!r} already")
+    schema = database.schema()
+    if schema is None:
+        raise CommandError("the database has no tables: there is nothing to back up")
+    with tempfile.TemporaryDirectory(prefix="buildarena-backup-") as folder:
+        dump = Path(folder) / DUMP
+        with database.engine.connect() as connection:
+            connection.execute(
+                text("SELECT pg_advisory_lock_shared(:key)"), {"key": LOCK}
+            )  # until the connection closes: nothing that we copy is collected
+            connection.commit()
+            try:
+                connection.execute(
+                    text("SET TRANSACTION ISOLATION LEVEL REPEATABLE READ, READ ONLY")
+                )
+                snapshot = connection.execute(text("SELECT pg_export_snapshot()")).scalar_one()
+                tell("dumping the database")
+                words = ["--format=custom", "--no-owner", "--no-privileges"]
+                run_program("pg_dump", url, *words, f"--snapshot={snapshot}", f"--file={dump}")
+                hashes = list(referenced(connection))
+                connection.rollback()
+                place.send(f"{name}/{DUMP}", dump)
+                tell(f"copying what is new of {len(hashes):,} artifacts")
+                sizes, missing, copied = _copy(artifacts, place.artifacts, hashes)
+            finally:
+                connection.rollback()
+                connection.execute(text("SELECT pg_advisory_unlock_shared(:key)"), {"key": LOCK})
+                connection.commit()
+        listed = "".join(f"{digest} {size}\n" for digest, size in sizes).encode()
+        place.write(f"{name}/{LIST}", listed)
+        manifest = Manifest(
+            format=FORMAT,
+            version=__version__,
+            schema=schema,
+            made_at=now.isoformat(timespec="seconds"),
+            dump_sha256=_hash_of(dump),
+            list_sha256=hashlib.sha256(listed).hexdigest(),
+            artifacts=len(sizes),
+            artifact_bytes=sum(size for _, size in sizes),
+            missing=missing,
+        )
+    place.finish(name, manifest)
+    return Written(name=name, manifest=manifest, copied=copied)
+
+
+def _copy(
+    source: ArtifactStore, target: ArtifactStore, hashes: Sequence[str]
+) -> tuple[list[tuple[str, int]], list[str], int]:
+    """Copies what the target lacks: hashes with sizes, those that are missing, and how many."""
+    there = {item.hash: item.size for item in target.all()}
+
+    def size_of(digest: str) -> int | None:
+        if digest in there:
+            return there[digest]
+        try:
+            data = source.get(digest)
+        except (ArtifactMissingError, ArtifactDamagedError):
+            return None
+        target.put(data, "")
+        return len(data)
+
+    with ThreadPoolExecutor(AT_ONCE) as pool:
+        found = list(zip(hashes, pool.map(size_of, hashes), strict=True))
+    missing = [digest for digest, size in found if size is None]
+    sizes = [(digest, size) for digest, size in found if size is not None]
+    return sizes, missing, sum(digest not in there for digest, _ in sizes)
+
+
+def _hash_of(file: Path) -> str:
+    digest = hashlib.sha256()
+    with file.open("rb") as opened:
+        while piece := opened.read(PIECE):
+            digest.update(piece)
+    return digest.hexdigest()

@@ -1,0 +1,70 @@
+"""The commands of the artifact store, for whoever runs the service."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Annotated
+
+import typer
+
+from buildarena_cli.errors import CommandError
+from buildarena_cli.lazy import new_group
+from buildarena_cli.options import DataOption, JsonOption
+from buildarena_cli.terminal.output import print_json, say
+
+app = new_group("Look after the store of artifacts.")
+MEBIBYTE = 1024 * 1024
+
+
+@app.callback()
+def _artifacts() -> None:
+    """Look after the store of artifacts."""
+
+
+@app.command("gc")
+def collect(
+    *,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Only say what would be done.")
+    ] = False,
+    keep_days: Annotated[
+        float,
+        typer.Option(help="Days that what nothing refers to stays, and again in the trash.", min=1),
+    ] = 7,
+    data: DataOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Remove artifacts that nothing refers to.
+
+    They go to the trash, and are deleted by a later call; whatever is referred to again meanwhile
+    comes back. The service may run; it is that of BUILDARENA_DATABASE_URL, or of the data folder.
+    """
+    from datetime import timedelta
+
+    from sqlalchemy.exc import OperationalError
+
+    from buildarena_cli.local.stores import opened_stores
+    from buildarena_store import StoreError
+    from buildarena_store.artifacts import GarbageCollector
+
+    try:
+        with opened_stores(data) as stores:
+            stores.database.require_schema()
+            keep = timedelta(days=keep_days)
+            collector = GarbageCollector(stores.database, stores.artifacts, keep=keep)
+            done = collector.collect(dry_run=dry_run)
+    except OperationalError as error:
+        raise CommandError(f"the database can't be reached: {error.orig}") from error
+    except StoreError as error:
+        raise CommandError(str(error)) from error
+    if done is None:
+        raise CommandError("a backup or another collection is under way: try again later")
+    if as_json:
+        print_json({"dry_run": dry_run, **asdict(done)})
+        return
+    would = "would be " if dry_run else ""
+    say(f"{done.kept:,} artifacts are referred to, {done.young:,} more are too new to judge")
+    say(f"{done.trashed:,} {would}moved to the trash ({done.trashed_bytes / MEBIBYTE:,.1f} MiB)")
+    say(f"{done.deleted:,} {would}deleted from it ({done.deleted_bytes / MEBIBYTE:,.1f} MiB)")
+    if done.taken_back:
+        say(f"{done.taken_back:,} {would}taken back from it: something refers to them again")

@@ -1,0 +1,138 @@
+"""The commands for what must never be lost: backup and restore."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from buildarena_cli.errors import PARTIAL, CommandError
+from buildarena_cli.options import DataOption, JsonOption
+from buildarena_cli.terminal.output import print_json, say
+
+if TYPE_CHECKING:
+    from buildarena_cli.backups.place import BackupPlace
+
+MEBIBYTE = 1024 * 1024
+
+
+def backup(
+    place: Annotated[
+        str, typer.Argument(help="Folder of the backups, or a URL such as s3://bucket/prefix.")
+    ],
+    *,
+    name: Annotated[
+        str | None, typer.Option("--name", help="Its name; the time by default.")
+    ] = None,
+    listed: Annotated[
+        bool, typer.Option("--list", help="Only show the backups there are.")
+    ] = False,
+    data: DataOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Back up the database and its artifacts.
+
+    The service may run meanwhile: a backup is one moment of it. Several backups in one place share
+    their artifacts. Without BUILDARENA_DATABASE_URL, it is the service of the data folder.
+    The exit code is 3 when artifacts were missing already.
+    """
+    from buildarena_cli.backups.writing import write_backup
+    from buildarena_cli.local.stores import opened_stores
+
+    with _sayable():
+        where = _place(place)
+        if listed:
+            _list(where, as_json=as_json)
+            return
+        with opened_stores(data) as stores:
+            made = write_backup(
+                stores.database, stores.url, stores.artifacts, where, name=name, tell=_tell(as_json)
+            )
+    manifest = made.manifest
+    if as_json:
+        print_json({"name": made.name, "copied": made.copied, **asdict(manifest)})
+    else:
+        say(
+            f"backup {made.name}: {manifest.artifacts:,} artifacts, "
+            f"{manifest.artifact_bytes / MEBIBYTE:,.1f} MiB, {made.copied:,} of them copied"
+        )
+        for digest in manifest.missing:
+            say(f"missing or damaged in the store: {digest}")
+    if manifest.missing:
+        raise typer.Exit(PARTIAL)
+
+
+def restore(
+    place: Annotated[str, typer.Argument(help="Folder or URL of the backups.")],
+    *,
+    name: Annotated[
+        str | None, typer.Option("--name", help="Which backup; the newest by default.")
+    ] = None,
+    data: DataOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Restore a backup into an empty database.
+
+    The database is that of BUILDARENA_DATABASE_URL, or a new one in the data folder. Broken off,
+    the command can be given again. Jobs that were running at the backup's moment continue from
+    their journals.
+    """
+    from buildarena_cli.backups.restoring import restore_backup
+    from buildarena_cli.local.stores import opened_stores
+
+    with _sayable():
+        where = _place(place)
+        known = where.names()
+        if not known:
+            raise CommandError(f"there is no whole backup in {place}")
+        chosen = name or known[-1]
+        where.manifest(chosen)
+        with opened_stores(data, new=True) as stores:
+            manifest = restore_backup(
+                stores.database, stores.url, stores.artifacts, where, chosen, tell=_tell(as_json)
+            )
+    if as_json:
+        print_json({"name": chosen, **asdict(manifest)})
+    else:
+        say(f"restored {chosen} of {manifest.made_at}: {manifest.artifacts:,} artifacts")
+
+
+def _tell(quiet: bool) -> Callable[[str], None]:
+    return (lambda _: None) if quiet else (lambda line: say(f"· {line}"))
+
+
+def _place(location: str) -> BackupPlace:
+    from buildarena_cli.backups.place import BackupPlace
+    from buildarena_pipeline.runtime.settings import Settings
+
+    return BackupPlace(location, Settings().artifact_options)
+
+
+@contextmanager
+def _sayable() -> Iterator[None]:
+    """Turns what stores say into messages of the command."""
+    from obstore.exceptions import BaseError
+    from sqlalchemy.exc import OperationalError
+
+    from buildarena_store import StoreError
+
+    try:
+        yield
+    except OperationalError as error:
+        raise CommandError(f"the database can't be reached: {error.orig}") from error
+    except (StoreError, BaseError, OSError) as error:
+        raise CommandError(str(error).splitlines()[0]) from error
+
+
+def _list(place: BackupPlace, *, as_json: bool) -> None:
+    found = [(name, place.manifest(name)) for name in place.names()]
+    if as_json:
+        print_json([{"name": name, **asdict(manifest)} for name, manifest in found])
+        return
+    for name, made in found:
+        say(f"{name}  {made.artifacts:,} artifacts  {made.artifact_bytes / MEBIBYTE:,.1f} MiB")
+    if not found:
+        say(f"there is no whole backup in {place.location}")

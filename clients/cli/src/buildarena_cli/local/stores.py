@@ -1,0 +1,80 @@
+"""The database and the artifacts that a command works on by itself, without the API."""
+
+from __future__ import annotations
+
+import fcntl
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from buildarena_cli.errors import CommandError
+from buildarena_cli.local.postgres import EmbeddedPostgres, url_of_running
+from buildarena_cli.local.service import LOCK, is_running, unwritable
+from buildarena_pipeline.errors import StartupError
+from buildarena_pipeline.runtime.settings import Settings
+from buildarena_store import ArtifactStore, Database
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stores:
+    """What is worked on.
+
+    Attributes:
+        database: The database.
+        url: Its address.
+        artifacts: The artifacts.
+    """
+
+    database: Database
+    url: str
+    artifacts: ArtifactStore
+
+
+@contextmanager
+def opened_stores(data: Path | None, *, new: bool = False) -> Iterator[Stores]:
+    """The stores that the settings name, or those of a data folder.
+
+    The folder's own Postgres is used while it runs; otherwise it runs for as long as the block.
+
+    Args:
+        data: The data folder; by default the settings'.
+        new: They are about to be filled: nothing may run on the folder.
+
+    Raises:
+        CommandError: There is no such folder, or something runs there that must not.
+    """
+    try:
+        settings = Settings() if data is None else Settings(data=data)
+        with ExitStack() as stack:
+            url = settings.database_url or _embedded(settings.data.absolute(), stack, new=new)
+            database = Database(url)
+            stack.callback(database.close)
+            artifacts = ArtifactStore(settings.artifacts_location, settings.artifact_options)
+            yield Stores(database=database, url=url, artifacts=artifacts)
+    except StartupError as error:
+        raise CommandError(str(error)) from error
+
+
+def _embedded(data: Path, stack: ExitStack, *, new: bool) -> str:
+    folder = data / "postgres"
+    if not new and not folder.is_dir():
+        raise CommandError(
+            f"there is no database in {data}: name its folder with --data, or set "
+            "BUILDARENA_DATABASE_URL"
+        )
+    if is_running(data):
+        url = None if new else url_of_running(folder)
+        if url is None:
+            raise CommandError(f"a service runs on {data}: stop it first, with `buildarena down`")
+        return url
+    try:
+        (data / "logs").mkdir(parents=True, exist_ok=True)
+        lock = stack.enter_context((data / LOCK).open("w"))
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        raise unwritable(data, error) from error
+    postgres = EmbeddedPostgres(folder, data / "logs" / "postgres.log")
+    process = postgres.start()
+    stack.callback(postgres.stop, process)
+    return postgres.url
