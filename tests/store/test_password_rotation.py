@@ -43,8 +43,8 @@ def roles(database_url: str, worker_id: str) -> Iterator[tuple[Database, str, st
     operator.close()
 
 
-def login(database_url: str, role: str, database: str) -> Database:
-    url = re.sub(r"//[^@]*@", f"//{role}:secret@", database_url)
+def login(database_url: str, role: str, password: str, database: str) -> Database:
+    url = re.sub(r"//[^@]*@", f"//{role}:{password}@", database_url)
     return Database(re.sub(r"/test_\w+", f"/{database}", url))
 
 
@@ -52,10 +52,10 @@ def test_a_second_login_takes_over_while_the_first_is_still_used(
     database_url: str, worker_id: str, roles: tuple[Database, str, str]
 ) -> None:
     operator, owner, new = roles
-    first = login(database_url, owner, f"rotated_{worker_id}")
+    first = login(database_url, owner, "secret", f"rotated_{worker_id}")
     first.migrate()
     execute(operator, *STEPS.format(owner=owner, new=new).strip().splitlines())
-    second = login(database_url, new, f"rotated_{worker_id}")
+    second = login(database_url, new, "another-secret", f"rotated_{worker_id}")
     second.require_schema()
     for database in (first, second):
         execute(database, "UPDATE sweeps SET name = name")
