@@ -1,0 +1,166 @@
+"""The Docker engine and Compose, as commands; and everything they made, gone at the end."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[2]
+TARGETS = ("api", "construct", "simulate-pybullet", "simulate-mujoco", "tools", "proxy")
+BASES = ("python", "postgres", "valkey", "caddy", "s3")
+NEEDED = {"docker": "docker.io", "docker-compose": "docker-compose", "debootstrap": "debootstrap"}
+
+
+def say(line: str) -> None:
+    print(f"[{time.strftime('%H:%M:%S')}] {line}", flush=True)
+
+
+def require_programs() -> None:
+    """Stops with what to install, when something is missing."""
+    missing = sorted(package for name, package in NEEDED.items() if shutil.which(name) is None)
+    if os.geteuid() != 0:
+        sys.exit("make test-containers needs root: it runs a Docker engine and makes base images")
+    if missing:
+        sys.exit(
+            f"make test-containers needs Debian's packages: apt-get install {' '.join(missing)}"
+        )
+
+
+class Engine:
+    """Docker: the engine that runs, or one of our own for as long as this is open."""
+
+    def __init__(self, stack: ExitStack) -> None:
+        self.docker = _client()
+        if self._answers():
+            return
+        folder = Path(tempfile.mkdtemp(prefix="buildarena-docker-"))
+        stack.callback(shutil.rmtree, folder, ignore_errors=True)
+        log = (folder / "dockerd.log").open("wb")
+        stack.callback(log.close)
+        words = ["dockerd", "--data-root", str(folder / "data"), "--exec-root", str(folder / "run")]
+        process = subprocess.Popen(
+            [*words, "--pidfile", str(folder / "pid")], stdout=log, stderr=log
+        )
+        stack.callback(process.wait)
+        stack.callback(process.terminate)
+        deadline = time.monotonic() + 60
+        while not self._answers():
+            if process.poll() is not None or time.monotonic() > deadline:
+                sys.exit(
+                    f"the Docker engine did not start:\n{(folder / 'dockerd.log').read_text()[-2000:]}"
+                )
+            time.sleep(0.5)
+        say("started a Docker engine of our own")
+
+    def run(self, *words: str, check: bool = True, **environment: str) -> str:
+        """The standard output of a docker command."""
+        return command([self.docker, *words], check=check, **environment)
+
+    def json(self, *words: str) -> Any:
+        return json.loads(self.run(*words))
+
+    def _answers(self) -> bool:
+        done = subprocess.run([self.docker, "info"], capture_output=True, check=False)
+        return done.returncode == 0 and b"Server Version" in done.stdout
+
+    def build(self, source: Path, version: str, tag: str) -> dict[str, float]:
+        """Builds every image of a source tree; seconds by target."""
+        took = {}
+        for target in TARGETS:
+            began = time.monotonic()
+            self.run(
+                *("build", "--quiet", "--file", str(source / "deploy/docker/Dockerfile")),
+                *("--build-arg", f"PYTHON_IMAGE=buildarena-base/python:{tag}"),
+                *("--build-arg", f"CADDY_IMAGE=buildarena-base/caddy:{tag}"),
+                *("--target", target, "--tag", f"buildarena/{target}:{version}", str(source)),
+                DOCKER_BUILDKIT="1",
+            )
+            took[target] = time.monotonic() - began
+        return took
+
+    def megabytes(self, image: str) -> float:
+        return float(self.json("image", "inspect", image)[0]["Size"]) / 1e6
+
+
+class Project:
+    """One compose project: its containers, volumes and networks."""
+
+    def __init__(self, engine: Engine, name: str, environment: Mapping[str, str]) -> None:
+        self.engine, self.name, self.environment = engine, name, dict(environment)
+
+    def compose(self, *words: str, check: bool = True, **environment: str) -> str:
+        return command(
+            ["docker-compose", "--project-name", self.name, *words],
+            check=check,
+            **{**self.environment, **environment},
+        )
+
+    def containers(self, service: str | None = None, *, running: bool = True) -> list[str]:
+        filters = ["--filter", f"label=com.docker.compose.project={self.name}"]
+        if service:
+            filters += ["--filter", f"label=com.docker.compose.service={service}"]
+        listed = self.engine.run("ps", "--quiet", *([] if running else ["--all"]), *filters)
+        return listed.split()
+
+    def wait_healthy(self, services: Sequence[str], within_s: float = 120) -> None:
+        deadline = time.monotonic() + within_s
+        while True:
+            states = {service: self._states(service) for service in services}
+            if all(found and set(found) <= {"healthy", "running"} for found in states.values()):
+                return
+            assert time.monotonic() < deadline, f"not healthy within {within_s} s: {states}"
+            time.sleep(0.5)
+
+    def _states(self, service: str) -> list[str]:
+        found = []
+        for container in self.containers(service):
+            state = self.engine.json("inspect", container)[0]["State"]
+            found.append(state["Health"]["Status"] if "Health" in state else state["Status"])
+        return found
+
+    def destroy(self) -> None:
+        self.compose(
+            *("--profile", "s3", "--profile", "monitoring", "--profile", "tools"),
+            *("down", "--volumes", "--remove-orphans", "--timeout", "10"),
+            check=False,
+        )
+
+    def left(self) -> list[str]:
+        """What is still there of it."""
+        label = f"label=com.docker.compose.project={self.name}"
+        kinds = (("ps", "--all"), ("volume", "ls"), ("network", "ls"))
+        return [
+            thing
+            for kind in kinds
+            for thing in self.engine.run(*kind, "--quiet", "--filter", label).split()
+        ]
+
+
+def _client() -> str:
+    """A docker client that builds with BuildKit: a newer one needs a plugin, Debian's has it inside."""
+    plugin = subprocess.run(["docker", "buildx", "version"], capture_output=True, check=False)
+    old = Path("/usr/bin/docker")
+    return str(old) if plugin.returncode and old.exists() else "docker"
+
+
+def command(words: Sequence[str], *, check: bool = True, **environment: str) -> str:
+    done = subprocess.run(
+        list(words),
+        cwd=ROOT,
+        env={**os.environ, **environment},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if check and done.returncode:
+        raise RuntimeError(f"{' '.join(words)}\n{done.stdout[-3000:]}\n{done.stderr[-5000:]}")
+    return done.stdout
