@@ -155,3 +155,31 @@ def test_the_collectors_pipelines_use_what_it_has() -> None:
             assert set(names) <= set(base[kind])
     assert set(base["service"]["extensions"]) <= set(base["extensions"])
     assert base["receivers"]["otlp"]["protocols"]["http"]["endpoint"].endswith(":4318")
+
+
+def test_compose_mounts_what_is_here() -> None:
+    services = yaml.safe_load((ROOT / "docker-compose.yml").read_text())["services"]
+    mounts = {
+        name: dict(volume.split(":")[:2] for volume in services[name]["volumes"])
+        for name in ("prometheus", "grafana", "collector")
+    }
+    here = [path for found in mounts.values() for path in found if path.startswith("./")]
+    assert here
+    assert [path for path in here if not (ROOT / path).exists()] == []
+    folder = mounts["prometheus"]["./deploy/monitoring/prometheus"]
+    assert f"--config.file={folder}/prometheus.yml" in services["prometheus"]["command"]
+    (provider,) = yaml.safe_load(
+        (MONITORING / "grafana/provisioning/dashboards/buildarena.yaml").read_text()
+    )["providers"]
+    dashboards = mounts["grafana"]["./deploy/monitoring/grafana/dashboards"]
+    assert provider["options"]["path"] == dashboards
+    config = yaml.safe_load((MONITORING / "prometheus" / "prometheus.yml").read_text())
+    (job,) = config["scrape_configs"]
+    (found,) = job["dns_sd_configs"]
+    assert set(found["names"]) <= set(services)
+    secret = Path(job["authorization"]["credentials_file"])
+    assert secret.parent == Path("/run/secrets")
+    assert secret.name in services["prometheus"]["secrets"]
+    api = services["api"]
+    assert api["environment"]["BUILDARENA_METRICS_KEY_FILE"] == str(secret)
+    assert secret.name in api["secrets"]
