@@ -176,3 +176,23 @@ def test_an_open_service_stays_on_loopback(changes, advice) -> None:
     with pytest.raises(ValueError, match=advice):
         check_binding(Settings().model_copy(update=changes))
     check_binding(Settings())
+
+
+def test_the_key_of_the_metrics_opens_them_alone(context) -> None:
+    secret = "a-key-for-prometheus-alone"
+    changes = {**WITH_KEYS, "metrics_key": SecretStr(secret), "base_path": "/arena"}
+    own = open_context(context.settings.model_copy(update=changes))
+    with TestClient(create_app(own, load_registry()), base_url=LOOPBACK) as client:
+        asked = {
+            path: client.get(path, headers=bearer(secret)).status_code
+            for path in ("/v1/metrics", "/arena/v1/metrics", "/v1/jobs", "/v1/keys", "/v1/tasks")
+        }
+        assert asked == {
+            **dict.fromkeys(("/v1/metrics", "/arena/v1/metrics"), 200),
+            **dict.fromkeys(("/v1/jobs", "/v1/keys", "/v1/tasks"), 401),
+        }
+        assert client.get("/v1/metrics", headers=bearer(secret + "x")).status_code == 401
+        assert client.get("/v1/metrics").status_code == 401
+        assert client.get("/v1/metrics", headers=bearer(ADMIN)).status_code == 200
+        assert client.post("/v1/metrics", headers=bearer(secret)).status_code == 405
+    own.close()

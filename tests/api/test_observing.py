@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+import shutil
 from datetime import UTC, datetime, timedelta
 
 import pytest
 import structlog
 from prometheus_client.parser import text_string_to_metric_families
+from sqlalchemy import text
 
+from buildarena_api.http.metrics import ServiceMetrics
 from buildarena_store import JournalEntry, Usage
 
 
@@ -112,3 +115,54 @@ def test_health_names_a_worker_whose_clock_is_wrong(api, context) -> None:
     assert "late is 3600 s behind" in clocks["detail"]
     assert "good" not in clocks["detail"]
     assert "NTP" in clocks["advice"]
+
+
+def test_metrics_say_what_the_service_stands_on(api, context) -> None:
+    for name, queues in (("a", ["construct", "verify"]), ("b", ["simulate.mujoco"])):
+        context.store.workers.report(
+            worker_id=name, kind=queues[0].partition(".")[0], queues=queues, host="h", pid=1,
+            versions={}, peak_memory_bytes=7, own_time=datetime.now(UTC) + timedelta(hours=2),
+        )  # fmt: skip
+    with context.store.database.transaction() as connection:
+        connection.execute(
+            text("UPDATE workers SET seen_at = now() - interval '1 minute' WHERE id = 'b'")
+        )
+    found = samples(api)
+    serving = {labels["queue"]: value for labels, value in found["buildarena_queue_workers"]}
+    assert serving["construct"] == 1
+    assert serving["simulate.mujoco"] == 0
+    lost = {labels["kind"]: value for labels, value in found["buildarena_workers_lost"]}
+    assert lost == {"construct": 0, "simulate": 1}
+    ((_, error),) = found["buildarena_worker_clock_error_seconds"]
+    assert error == pytest.approx(7200, abs=30)
+    assert found["buildarena_worker_peak_memory_bytes"] == [({"kind": "construct"}, 7)]
+    for name in ("artifact_store_up", "broker_up"):
+        assert found[f"buildarena_{name}"] == [({}, 1)]
+    ((_, free),) = found["buildarena_data_free_bytes"]
+    ((_, size),) = found["buildarena_data_size_bytes"]
+    assert 0 < free < size
+    used = {
+        labels["pool"]: value for labels, value in found["buildarena_database_connections_used"]
+    }
+    most = {
+        labels["pool"]: value for labels, value in found["buildarena_database_connections_limit"]
+    }
+    assert set(used) == set(most) == {"ordinary", "watching", "exporting"}
+    assert all(used[pool] <= most[pool] for pool in most)
+
+
+def test_metrics_notice_an_artifact_store_that_fails(api, context) -> None:
+    folder = context.settings.data / "artifacts"
+    shutil.rmtree(folder)
+    folder.write_text("no folder")
+    assert samples(api)["buildarena_artifact_store_up"] == [({}, 0)]
+
+
+def test_metrics_say_how_many_jobs_are_at_hand_in_each_queue(api, context, sweep) -> None:
+    api.post("/v1/sweeps", json={**sweep, "seeds": [0, 1, 2]})
+    assert "buildarena_queue_running" not in samples(api)
+    for _ in range(2):
+        assert context.store.leases.claim("construct", owner="w")
+    fresh = ServiceMetrics(context)
+    (family,) = [each for each in fresh.collect() if each.name == "buildarena_queue_running"]
+    assert [(s.labels, s.value) for s in family.samples] == [({"queue": "construct"}, 2)]

@@ -305,7 +305,7 @@ UNKNOWN = "0a1b2c3d4e5f60718293"
 )
 @pytest.mark.parametrize("template", sorted(t for t in CONTRACT["paths"] if "{" in t))
 def test_what_nobody_has_in_a_path_is_404(api, template, name) -> None:
-    bodies = {"budget": {}, "calls": {"tool": "start"}}
+    bodies = {"budget": {}, "calls": {"tool": "start"}, "rotate": {}}
     for method in CONTRACT["paths"][template]:
         path = re.sub(r"\{[a-z_]+\}", name, template)
         answer = api.request(method.upper(), path, json=bodies.get(path.rpartition("/")[2]))

@@ -63,6 +63,11 @@ class StageTimes:
     counts: Sequence[int]
     total_s: float
 
+    @classmethod
+    def none(cls, stage: str, result: str) -> StageTimes:
+        """No attempt of this stage that ended so."""
+        return cls(stage=stage, result=result, counts=[0] * (len(STAGE_SECONDS) + 1), total_s=0.0)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ServiceFigures:
@@ -73,6 +78,7 @@ class ServiceFigures:
     models: Sequence[ModelUse]
     stages: Sequence[StageTimes]
     sweeps: dict[str, int]
+    running: dict[str, int]
 
 
 class Figures:
@@ -91,6 +97,7 @@ class Figures:
                 models=_models(connection),
                 stages=_stages(connection),
                 sweeps=_sweeps(connection),
+                running=_running(connection),
             )
 
 
@@ -163,3 +170,12 @@ def _stages(connection: Connection) -> list[StageTimes]:
 def _sweeps(connection: Connection) -> dict[str, int]:
     query = select(sweeps.c.state, func.count().label("sweeps")).group_by(sweeps.c.state)
     return {row.state: row.sweeps for row in connection.execute(query)}
+
+
+def _running(connection: Connection) -> dict[str, int]:
+    query = (
+        select(jobs.c.queue, func.count().label("jobs"))
+        .where(jobs.c.state == JobState.RUNNING)
+        .group_by(jobs.c.queue)
+    )
+    return {row.queue: row.jobs for row in connection.execute(query)}

@@ -31,6 +31,7 @@ from buildarena_api.http.overload import OverloadMiddleware
 from buildarena_api.http.own_pool import OwnPool
 from buildarena_api.http.problems import add_problem_handlers, problem_responses
 from buildarena_api.http.rate_limits import RateLimits
+from buildarena_api.http.surroundings import SurroundingsMetrics
 from buildarena_api.leaderboard.cache import BoardCache
 from buildarena_api.replays.making import Replays
 from buildarena_api.routes import (
@@ -128,6 +129,17 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
     app.state.metrics = ServiceMetrics(context)
     app.state.context = context
     app.state.artifact_probe = health.ArtifactProbe(context.artifacts)
+    app.state.metrics.registry.register(
+        SurroundingsMetrics(
+            context,
+            lambda: app.state.artifact_probe.check().ok,
+            {
+                "ordinary": context.store.database.engine,
+                "watching": watching.context.store.database.engine,
+                "exporting": exporting.context.store.database.engine,
+            },
+        )
+    )
     app.state.exporting = exporting
     app.state.hub = hub
     app.state.key_checks = KeyChecks(watching)

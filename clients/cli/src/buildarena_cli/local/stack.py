@@ -35,6 +35,8 @@ from buildarena_pipeline.secret_files import SUFFIX
 from buildarena_store import Database
 from buildarena_store.accounts.keys import new_secret
 
+KEYS = ("admin_key", "previous_admin_key", "metrics_key")
+"""Settings that are keys: no process gets them where none are asked for."""
 READY_WITHIN_S = 60.0
 MEMORY_EVERY_S = 0.5
 LOCK_TRIES = 5
@@ -166,7 +168,7 @@ class Stack:
                     json.dumps(value) if isinstance(value, dict) else str(value)
                 )
                 for name, value in settings.model_dump(
-                    mode="json", exclude_none=True, exclude={"admin_key", "previous_admin_key"}
+                    mode="json", exclude_none=True, exclude=set(KEYS)
                 ).items()
             },
             **self._key_environment(data),
@@ -189,11 +191,12 @@ class Stack:
                 file.write_text(new_secret() + "\n")
             self.admin_key = file.read_text().strip()
             self._tell(f"the operator's key is in {file}")
-        previous = self.settings.previous_admin_key
-        return {
-            "BUILDARENA_ADMIN_KEY": self.admin_key,
-            **({"BUILDARENA_PREVIOUS_ADMIN_KEY": previous.get_secret_value()} if previous else {}),
+        others = {
+            f"{PREFIX}{name.upper()}": key.get_secret_value()
+            for name in KEYS
+            if (key := getattr(self.settings, name)) is not None
         }
+        return {**others, "BUILDARENA_ADMIN_KEY": self.admin_key}
 
     def _launch_server(self, server: EmbeddedServer) -> None:
         self._tell(f"starting {server.name}")

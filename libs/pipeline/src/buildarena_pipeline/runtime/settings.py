@@ -39,6 +39,7 @@ SECRETS: Final = (
     "artifacts_url",
     "admin_key",
     "previous_admin_key",
+    "metrics_key",
 )
 """Settings that hold secrets: ``BUILDARENA_<FIELD>_FILE`` can name a file for each of them."""
 ARTIFACT_CREDENTIALS: Final = ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY", "AWS_SESSION_TOKEN")
@@ -107,6 +108,10 @@ class Settings(BaseSettings):
         Field(
             description="The operator's key before this one, while both are valid", min_length=16
         ),
+    ] = None
+    metrics_key: Annotated[
+        SecretStr | None,
+        Field(description="Secret that opens the metrics, and nothing else", min_length=16),
     ] = None
     rate_limit: Annotated[
         str, Field(description="Requests a caller may send, for example 600/minute")
@@ -229,6 +234,12 @@ class Settings(BaseSettings):
         return {
             name: value.get_secret_value() for name, value in self._artifact_credentials.items()
         }
+
+    @property
+    def kept_folder(self) -> Path:
+        """The folder whose disk fills up: that of artifacts, or the data folder without one."""
+        location = self.artifacts_location
+        return self.data.absolute() if "://" in location else Path(location).absolute()
 
     @property
     def artifacts_location(self) -> str:

@@ -22,6 +22,7 @@ from buildarena_pipeline.runtime.settings import Settings
 SCOPES = ("read", "submit", "admin")
 """From the least to the most; each includes those before it."""
 LOOPBACK = ("127.0.0.1", "::1", "localhost")
+METRICS_PATH = "/v1/metrics"
 READING = ("GET", "HEAD", "OPTIONS")
 _bearer = HTTPBearer(auto_error=False, description="An API key, as `buildarena key create` made it")
 
@@ -96,8 +97,10 @@ async def caller_of(
     """
     limits: RateLimits = request.app.state.rate_limits
     checks: KeyChecks = request.app.state.key_checks
+    settings: Settings = request.app.state.context.settings
     try:
-        caller = await _identify(request.app.state.context.settings, checks, given)
+        caller = _reader_of_metrics(request, settings, given)
+        caller = caller or await _identify(settings, checks, given)
     except ProblemError:
         # Guessing keys is limited too.
         await _count(limits, f"refused:{_address(request)}")
@@ -155,6 +158,19 @@ async def _identify(
         raise _unauthorized(f"API key {found.key.id} is {found.refusal}")
     scopes = [scope for scope in SCOPES if scope in found.key.scopes]
     return Caller(key_id=found.key.id, scope=scopes[-1])
+
+
+def _reader_of_metrics(
+    request: Request, settings: Settings, given: HTTPAuthorizationCredentials | None
+) -> Caller | None:
+    """Whoever has the key of the metrics and asks for them; it opens nothing else."""
+    if given is None or settings.metrics_key is None:
+        return None
+    if getattr(request.scope.get("route"), "path", None) != METRICS_PATH:
+        return None
+    secret = settings.metrics_key.get_secret_value().encode()
+    good = hmac.compare_digest(given.credentials.encode(), secret)
+    return Caller(key_id=None, scope="read") if good else None
 
 
 def _is_operators(secret: str, settings: Settings) -> bool:

@@ -18,7 +18,9 @@ from prometheus_client.process_collector import ProcessCollector
 from prometheus_client.registry import Collector
 
 from buildarena_pipeline.runtime.context import Context
-from buildarena_store import STAGE_SECONDS, Outcome, ServiceFigures
+from buildarena_store import STAGE_SECONDS, Outcome, ServiceFigures, Stage
+from buildarena_store.figures import StageTimes
+from buildarena_store.states import AttemptResult
 
 KEPT_FOR_S: Final = 10.0
 """Several scrapes within this time share one reading of the database."""
@@ -111,7 +113,14 @@ def _queue_metrics(figures: ServiceFigures) -> Iterable[Metric]:
     for queue in figures.queues:
         depth.add_metric([queue.queue], queue.jobs)
         oldest.add_metric([queue.queue], queue.oldest_s)
-    return depth, oldest
+    running = GaugeMetricFamily(
+        "buildarena_queue_running",
+        "Jobs that a worker is at, by the queue it took them from.",
+        labels=["queue"],
+    )
+    for name, number in sorted(figures.running.items()):
+        running.add_metric([name], number)
+    return depth, oldest, running
 
 
 def _model_metrics(figures: ServiceFigures) -> Iterable[Metric]:
@@ -138,8 +147,15 @@ def _stage_metric(figures: ServiceFigures) -> Metric:
         "How long attempts took, by stage and how they ended.",
         labels=["stage", "result"],
     )
+    # Rates need a counter's zero: one that begins at its first event hides it.
+    none = {
+        (stage, result): StageTimes.none(stage, result)
+        for stage in Stage
+        for result in AttemptResult
+    }
+    known = none | {(times.stage, times.result): times for times in figures.stages}
     bounds = [*(str(float(bound)) for bound in STAGE_SECONDS), "+Inf"]
-    for times in figures.stages:
+    for times in known.values():
         buckets = []
         total = 0
         for bound, count in zip(bounds, times.counts, strict=True):

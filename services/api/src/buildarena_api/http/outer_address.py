@@ -32,11 +32,8 @@ class BasePathMiddleware:
             await self._app(scope, receive, send)
             return
         path: str = scope["path"]
-        if path == self._base:
-            await _redirect(send, f"{self._base}/", scope["query_string"])
-            return
-        if path.startswith(f"{self._base}/"):
-            path = path.removeprefix(self._base)
+        if path == self._base or path.startswith(f"{self._base}/"):
+            path = path.removeprefix(self._base) or "/"
         inner = {**scope, "path": path, "raw_path": None}
 
         async def sending(message: Message) -> None:
@@ -111,10 +108,3 @@ class ForwardedHostMiddleware:
         except ValueError:
             return False
         return address is not None and any(address in network for network in self._networks)
-
-
-async def _redirect(send: Send, path: str, query: bytes) -> None:
-    location = path.encode() + (b"?" + query if query else b"")
-    headers = [(b"location", location), (b"content-length", b"0")]
-    await send({"type": "http.response.start", "status": 308, "headers": headers})
-    await send({"type": "http.response.body", "body": b""})

@@ -168,7 +168,7 @@ def _clocks(context: Context) -> Check:
 
 
 def _disk(context: Context) -> Check:
-    folder = context.settings.data.absolute()
+    folder = context.settings.kept_folder
     existing = next(path for path in (folder, *folder.parents) if path.exists())
     free = shutil.disk_usage(Path(existing)).free
     return Check(

