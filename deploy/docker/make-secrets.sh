@@ -9,7 +9,7 @@ mkdir -p "$folder"
 
 keep() {
     local file=$folder/$1
-    [ -s "$file" ] || cat >"$file"
+    if [ -s "$file" ]; then cat >/dev/null; else cat >"$file"; fi
     chmod 644 "$file"
 }
 random() {

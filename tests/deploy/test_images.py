@@ -1,0 +1,158 @@
+"""The compose file and the images' recipe: valid, closed, and saying what the settings say."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+
+from buildarena_cli.commands import COMMANDS
+from buildarena_pipeline.catalog.simulators import SIMULATORS
+from buildarena_pipeline.runtime.settings import Settings
+
+ROOT = Path(__file__).parents[2]
+COMPOSE_TEXT = (ROOT / "docker-compose.yml").read_text()
+COMPOSE = yaml.safe_load(COMPOSE_TEXT)
+SERVICES = COMPOSE["services"]
+DOCKERFILE = (ROOT / "deploy/docker/Dockerfile").read_text()
+PROGRAMS = Path(sys.executable).parent
+OURS = {
+    name: service
+    for name, service in SERVICES.items()
+    if service["image"].startswith("buildarena/")
+}
+
+
+def run(*words: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)
+
+
+def _target(service: dict) -> str:
+    return str(service["image"]).removeprefix("buildarena/").split(":")[0]
+
+
+def variables(service: dict) -> dict[str, str]:
+    found: dict[str, str] = service.get("environment", {})
+    return found
+
+
+def test_the_compose_file_follows_the_specification() -> None:
+    words = ("--builtin-schema", "vendor.compose-spec", "docker-compose.yml")
+    done = run(str(PROGRAMS / "check-jsonschema"), *words)
+    assert done.returncode == 0, done.stdout
+
+
+@pytest.mark.parametrize("path", ["deploy/docker/Dockerfile", "tests/containers/bases/Dockerfile"])
+def test_recipes_are_clean(path) -> None:
+    done = run(str(PROGRAMS / "hadolint"), "--config", "deploy/docker/hadolint.yaml", path)
+    assert (done.returncode, done.stdout) == (0, "")
+
+
+@pytest.mark.parametrize("name", SERVICES)
+def test_each_container_is_confined(name) -> None:
+    service = SERVICES[name]
+    assert service["read_only"] is True
+    assert service["cap_drop"] == ["ALL"]
+    assert "cap_add" not in service
+    assert "privileged" not in service
+    assert service["security_opt"] == ["no-new-privileges:true"]
+    assert service.get("network_mode") is None
+    if name not in OURS:
+        user = str(service["user"]).split(":")[0]
+        assert user not in {"0", "root"}
+    assert not [volume for volume in service.get("volumes", []) if "docker.sock" in volume]
+
+
+def test_images_of_ours_run_as_an_ordinary_user() -> None:
+    stages = dict(
+        re.findall(r"^FROM \S+ AS (\S+)\n(.*?)(?=^FROM |\Z)", DOCKERFILE, re.MULTILINE | re.DOTALL)
+    )
+    bases = dict(re.findall(r"^FROM (\S+) AS (\S+)$", DOCKERFILE, re.MULTILINE))
+    parents = {stage: base for base, stage in bases.items()} | {
+        stage: base
+        for base, stage in re.findall(r"^FROM (\S+) AS (\S+)$", DOCKERFILE, re.MULTILINE)
+    }
+    for service in OURS.values():
+        stage = _target(service)
+        users: list[str] = []
+        while stage in stages:
+            users = re.findall(r"^USER (\S+)$", stages[stage], re.MULTILINE)
+            if users:
+                break
+            stage = parents[stage]
+        assert users[-1:] == ["10001:10001"], _target(service)
+
+
+def test_every_queue_has_a_service_and_every_target_a_recipe() -> None:
+    targets = set(re.findall(r"^FROM \S+ AS (\S+)$", DOCKERFILE, re.MULTILINE))
+    assert {_target(service) for service in OURS.values()} <= targets
+    engines = {f"simulate-{name}" for name in SIMULATORS if name != "besiege"}
+    assert {"api", "construct", "migrate", "proxy", *engines} <= set(SERVICES)
+    assert SERVICES["migrate"]["command"][0] in COMMANDS
+
+
+def test_only_settings_that_exist_are_set() -> None:
+    known = {f"BUILDARENA_{name.upper()}" for name in Settings.model_fields}
+    client = {"BUILDARENA_URL", "BUILDARENA_KEY"}
+    proxy = {"BUILDARENA_SITE", "BUILDARENA_TLS"}
+    for name, service in OURS.items():
+        allowed = {"proxy": proxy, "tools": known | client}.get(name, known)
+        for variable in variables(service):
+            if variable.startswith("BUILDARENA_"):
+                assert variable.removesuffix("_FILE") in allowed, (name, variable)
+
+
+def test_no_secret_stands_in_a_variable() -> None:
+    for name, service in SERVICES.items():
+        for variable, value in variables(service).items():
+            secret = re.search(r"PASSWORD|SECRET|KEY|TOKEN|DATABASE_URL|BROKER_URL", variable)
+            if secret:
+                assert str(value).startswith("/run/secrets/"), (name, variable)
+                assert str(value).removeprefix("/run/secrets/") in service["secrets"]
+
+
+def test_each_secret_is_made_and_each_variable_is_explained() -> None:
+    script = (ROOT / "deploy/docker/make-secrets.sh").read_text()
+    made = set(re.findall(r"keep (\w+)$", script, re.MULTILINE))
+    assert made == set(COMPOSE["secrets"])
+    example = (ROOT / ".env.example").read_text()
+    used = dict(re.findall(r"\$\{(\w+):-([^}]*)\}", COMPOSE_TEXT))
+    explained = dict(re.findall(r"^# ([A-Z][A-Z0-9_]+)=(\S*)", example, re.MULTILINE))
+    assert set(used) == set(explained)
+    for name, default in used.items():
+        if default:
+            assert explained[name] == default or name == "BUILDARENA_ARTIFACTS_URL", name
+
+
+def test_secrets_once_made_stay_and_open_for_their_owner_alone(tmp_path) -> None:
+    folder = tmp_path / "secrets"
+    first = run("bash", "deploy/docker/make-secrets.sh", str(folder))
+    assert first.returncode == 0, first.stderr
+    before = {file.name: file.read_text() for file in folder.iterdir()}
+    assert folder.stat().st_mode & 0o777 == 0o700
+    assert before["postgres_password"] in before["database_url"]
+    assert len(before["admin_key"]) == 64
+    (folder / "admin_key").unlink()
+    assert run("bash", "deploy/docker/make-secrets.sh", str(folder)).returncode == 0
+    after = {file.name: file.read_text() for file in folder.iterdir()}
+    assert after.pop("admin_key") != before.pop("admin_key")
+    assert after == before
+
+
+def test_what_git_must_not_take_is_ignored() -> None:
+    ignored = run("git", "check-ignore", "secrets/admin_key", ".env")
+    assert ignored.stdout.split() == ["secrets/admin_key", ".env"]
+
+
+def test_locks_of_images_are_part_of_the_whole_lock() -> None:
+    def pinned(path: Path) -> set[str]:
+        return set(re.findall(r"^([a-z0-9.-]+==[^ \\;]+)", path.read_text(), re.MULTILINE))
+
+    whole = pinned(ROOT / "requirements.lock")
+    for lock in sorted((ROOT / "deploy/docker/locks").glob("*.lock")):
+        if lock.name != "build.lock":
+            assert pinned(lock) <= whole, lock.name
