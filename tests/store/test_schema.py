@@ -1,7 +1,13 @@
 from __future__ import annotations
 
+import io
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 import pytest
 from alembic import command
+from alembic.script import ScriptDirectory
 from sqlalchemy.exc import OperationalError
 
 from buildarena_pipeline.runtime.context import Context
@@ -14,20 +20,89 @@ def test_the_migrations_make_the_tables_that_the_code_knows(context: Context) ->
     command.check(alembic_config(context.store.database.url))
 
 
-def test_another_schema_is_refused_with_advice(database_url: str) -> None:
-    database = Database(database_url)
-    database.require_schema()
-    with database.transaction() as connection:
-        connection.exec_driver_sql("UPDATE alembic_version SET version_num = 'older'")
-    try:
-        with pytest.raises(SchemaVersionError, match=r"schema older.*buildarena migrate"):
-            database.require_schema()
-    finally:
+@contextmanager
+def of_schema(database: Database, revision: str, since: str | None = None) -> Iterator[None]:
+    """The database says that it has another schema, and perhaps since when programs work."""
+
+    def say(version: str, oldest: str) -> None:
         with database.transaction() as connection:
-            connection.exec_driver_sql(
-                f"UPDATE alembic_version SET version_num = '{expected_schema()}'"
-            )
-        database.close()
+            connection.exec_driver_sql(f"UPDATE alembic_version SET version_num = '{version}'")
+            connection.exec_driver_sql(f"UPDATE schema_compatibility SET since = '{oldest}'")
+
+    with database.transaction() as connection:
+        noted = connection.exec_driver_sql("SELECT since FROM schema_compatibility").scalar_one()
+    say(revision, since or noted)
+    try:
+        yield
+    finally:
+        say(expected_schema(), noted)
+
+
+@pytest.fixture
+def database(database_url: str) -> Iterator[Database]:
+    opened = Database(database_url)
+    yield opened
+    opened.close()
+
+
+def test_an_older_schema_is_refused_with_advice(database: Database) -> None:
+    database.require_schema()
+    with (
+        of_schema(database, "2026_11_22_annotations"),
+        pytest.raises(SchemaVersionError, match=r"schema 2026_11_22_anno.*buildarena migrate"),
+    ):
+        database.require_schema()
+
+
+def test_a_later_schema_that_only_adds_serves_the_programs_before(database: Database) -> None:
+    with of_schema(database, "2099_01_01_flight"):
+        database.require_schema()
+
+
+def test_a_later_schema_that_broke_with_this_program_is_refused(database: Database) -> None:
+    with (
+        of_schema(database, "2099_01_01_flight", since="2098_12_31_wings"),
+        pytest.raises(SchemaVersionError, match=r"of a later version.*upgrade"),
+    ):
+        database.require_schema()
+
+
+TAKES_AWAY = re.compile(
+    r"DROP (?:TABLE|COLUMN)|\bRENAME\b|SET NOT NULL|ALTER COLUMN \w+ TYPE"
+    r"|ADD COLUMN (?!.*DEFAULT).*NOT NULL|ADD CONSTRAINT (?!.*NOT VALID).*(?:CHECK|FOREIGN)",
+    re.IGNORECASE,
+)
+
+
+def test_migrations_only_add_or_say_that_they_break() -> None:
+    script = ScriptDirectory.from_config(alembic_config(""))
+    for revision in script.walk_revisions():
+        if revision.revision == "2026_11_22_compatibility":
+            break  # before it nothing was promised
+        out = io.StringIO()
+        config = alembic_config("postgresql+psycopg://")
+        config.output_buffer = out
+        command.upgrade(config, f"{revision.down_revision}:{revision.revision}", sql=True)
+        taken = TAKES_AWAY.findall(out.getvalue())
+        breaking = getattr(revision.module, "BREAKING", False)
+        assert breaking or not taken, f"{revision.revision} is not BREAKING and has {taken}"
+
+
+@pytest.mark.parametrize(
+    ("sql", "breaks"),
+    [
+        ("ALTER TABLE jobs DROP COLUMN seed", True),
+        ("ALTER TABLE jobs RENAME seed TO luck", True),
+        ("ALTER TABLE jobs ADD COLUMN luck INTEGER NOT NULL", True),
+        ("ALTER TABLE jobs ALTER COLUMN seed SET NOT NULL", True),
+        ("ALTER TABLE jobs ADD COLUMN luck INTEGER", False),
+        ("ALTER TABLE jobs ADD COLUMN luck INTEGER DEFAULT 0 NOT NULL", False),
+        ("CREATE TABLE luck (job_id TEXT NOT NULL)", False),
+        ("CREATE INDEX ix_luck ON jobs (seed)", False),
+    ],
+)
+def test_what_takes_away_is_recognised(sql, breaks) -> None:
+    assert bool(TAKES_AWAY.search(sql)) is breaks
 
 
 @pytest.mark.parametrize("idle_s", [0.0, 1000.0])

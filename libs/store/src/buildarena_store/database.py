@@ -128,17 +128,29 @@ class Database:
             return None if row is None else str(row[0])
 
     def require_schema(self) -> None:
-        """Checks that the database fits this code.
+        """Checks that the database fits this code: its own schema, or a later one that only adds.
 
         Raises:
-            SchemaVersionError: Its revision is another one; the message says what to do.
+            SchemaVersionError: It does not; the message says what to do.
         """
         found, wanted = self.schema(), expected_schema()
-        if found != wanted:
-            raise SchemaVersionError(
-                f"the database has schema {found or 'none'}, this program needs {wanted}: "
-                "run `buildarena migrate` with the program's version that is to be used"
-            )
+        if found == wanted:
+            return
+        known = known_schemas()
+        if found is not None and found not in known and self._compatible_since() in known:
+            return
+        advice = "run `buildarena migrate` with the program's version that is to be used"
+        if found is not None and found not in known:
+            advice = "it is of a later version, which this one does not work with: upgrade"
+        raise SchemaVersionError(
+            f"the database has schema {found or 'none'}, this program needs {wanted}: {advice}"
+        )
+
+    def _compatible_since(self) -> str | None:
+        with self.engine.connect() as connection:
+            if not inspect(connection).has_table("schema_compatibility"):
+                return None
+            return connection.execute(text("SELECT since FROM schema_compatibility")).scalar()
 
     def close(self) -> None:
         """Closes all connections."""

@@ -371,3 +371,8 @@ workers = Table(
     Column("peak_memory_bytes", BigInteger),
     Column("clock_ahead_s", Double),
 )
+
+# One row: since which schema programs work with this one; migrations write it.
+schema_compatibility = Table(
+    "schema_compatibility", metadata, Column("since", Text, primary_key=True)
+)

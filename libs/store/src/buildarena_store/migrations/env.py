@@ -1,9 +1,23 @@
 """Runs the chain against the database that the caller named."""
 
 from alembic import context
-from sqlalchemy import create_engine
+from sqlalchemy import Connection, create_engine, inspect, text
 
 from buildarena_store.tables import metadata
+
+
+def note_compatibility(connection: Connection) -> None:
+    """Notes since which schema programs work: the last that a migration broke with, if any."""
+    if not inspect(connection).has_table("schema_compatibility"):
+        return
+    since = next(
+        revision.revision
+        for revision in context.script.walk_revisions()
+        if getattr(revision.module, "BREAKING", False)
+    )
+    connection.execute(text("DELETE FROM schema_compatibility"))
+    connection.execute(text("INSERT INTO schema_compatibility VALUES (:since)"), {"since": since})
+    connection.commit()
 
 
 def run() -> None:
@@ -21,6 +35,7 @@ def run() -> None:
         )
         with context.begin_transaction():
             context.run_migrations()
+        note_compatibility(connection)
     engine.dispose()
 
 
