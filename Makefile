@@ -11,7 +11,7 @@ NOT_OURS := $(foreach p,$(PACKAGES),--no-emit-package $(patsubst buildarena-buil
 STAMP := $(VENV)/.installed
 WORKERS ?= $(shell getconf _NPROCESSORS_ONLN)
 
-.PHONY: help install demo up test check lock clean openapi
+.PHONY: help install demo up test test-long check lock clean openapi
 
 help: ## Lists the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 20
@@ -29,8 +29,11 @@ up: $(STAMP) ## The whole service on this machine until Ctrl-C
 	@$(BIN)/buildarena up
 
 test: check check-web-if-it-can-be ## Lints, types, import rules and all tests
-	@echo "== 6/6 tests, $(WORKERS) at once (left out: make chaos, peer and bench-*)"
+	@echo "== 6/6 tests, $(WORKERS) at once (left out: make test-long, chaos, peer and bench-*)"
 	@$(BIN)/pytest -n $(WORKERS) --dist loadgroup -rs
+
+test-long: $(WEB_STAMP) ## Further variants and larger sizes of what make test tries
+	@BUILDARENA_TEST_LONG=1 $(BIN)/pytest -n $(WORKERS) --dist loadgroup -rs -m "long or sized"
 
 check: $(STAMP) ## Lints, types and import rules alone
 	@echo "== 1/6 format"

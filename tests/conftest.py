@@ -14,6 +14,7 @@ from typing import Any
 import blas_kernels  # noqa: F401 - before numpy is imported
 import pytest
 from fastapi.dependencies import models as dependencies
+from long_tests import LONG
 from player import Player
 from redis import Redis
 from sqlalchemy import create_engine, text
@@ -30,6 +31,16 @@ TEMPLATE = "buildarena_template"
 SERVERS = pytest.StashKey[ExitStack]()
 VALKEY_DATABASES = 16
 LEFT_OUT = ("install the Debian packages", "make web")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leaves long variants to `make test-long`."""
+    if LONG:
+        return
+    left = [item for item in items if item.get_closest_marker("long")]
+    if left:
+        config.hook.pytest_deselected(items=left)
+        items[:] = [item for item in items if item not in left]
 
 
 def pytest_configure(config: pytest.Config) -> None:

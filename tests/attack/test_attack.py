@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from arena import Arena, arena
 from attack import small_disk
+from long_tests import long
 from scenarios import SCENARIOS
 
 SMALL = {
@@ -37,7 +38,9 @@ def place() -> Iterator[Arena]:
 
 @pytest.mark.xdist_group("attack")
 @pytest.mark.timeout(180)
-@pytest.mark.parametrize("name", list(SCENARIOS))
+@pytest.mark.parametrize(
+    "name", [long(name) if name.startswith("killed") else name for name in SCENARIOS]
+)
 def test_nothing_goes_wrong(place, name) -> None:
     place.bystander.take()
     tried = SCENARIOS[name](place)

@@ -19,6 +19,7 @@ import httpx
 import pytest
 from accounts import pick_ups, wrongs
 from faults import Fire
+from long_tests import LONG
 from running import running_stack, wait_until
 from sqlalchemy.exc import OperationalError
 
@@ -27,7 +28,7 @@ from buildarena_simulation import simulate
 from buildarena_store import Database
 
 HERE = Path(__file__).parent
-JOBS = int(os.environ.get("CHAOS_JOBS", "80"))
+JOBS = int(os.environ.get("CHAOS_JOBS", "80" if LONG else "40"))
 EVERY_S = float(os.environ.get("CHAOS_EVERY_S", "2.5"))
 LEASE_S = float(os.environ.get("CHAOS_LEASE_S", "3"))
 SEED = os.environ.get("CHAOS_SEED", "1")

@@ -3,6 +3,7 @@
 from typing import Any
 
 import pytest
+from long_tests import long
 from tests.benchmarks.simulation.bench_agreement import compared
 from tests.simulation.designs import (
     EAST,
@@ -35,7 +36,7 @@ def _tried(task: Task, machine: Machine, engine: str, **changes: Any) -> Score:
     return score(task, machine, simulate(machine, scenario, engine))
 
 
-@pytest.mark.parametrize("yaw_deg", [90, 180, 270])
+@pytest.mark.parametrize("yaw_deg", [90, long(180), long(270)])
 def test_a_turned_bridge_carries_the_same(
     engine: str, tasks: dict[str, Task], yaw_deg: int
 ) -> None:
@@ -85,7 +86,9 @@ def test_a_mirrored_car_drives_as_far(engine: str, tasks: dict[str, Task]) -> No
     assert found[0].indicator == pytest.approx(found[1].indicator, rel=TOLERANCE[engine])
 
 
-@pytest.mark.parametrize("task", TASKS)
+@pytest.mark.parametrize(
+    "task", [long(task) if task in {"transport-2", "transport-3"} else task for task in TASKS]
+)
 def test_engines_agree_on_machines_that_nobody_chose(task: str) -> None:
     result = compared(task, seed=5)
     assert result.same

@@ -4,6 +4,7 @@ import itertools
 from collections.abc import Sequence
 
 import pytest
+from long_tests import long
 from tests.simulation.designs import (
     BRACE,
     EAST,
@@ -92,10 +93,10 @@ def _beam_with(
 @pytest.mark.parametrize(
     "spans",
     [
-        ((0, 6),),
         ((0, 3), (3, 6)),
-        ((0, 6), (0, 5), (1, 6), (1, 5)),
-        tuple((k, k + 1) for k in range(6)),
+        long(((0, 6),)),
+        long(((0, 6), (0, 5), (1, 6), (1, 5))),
+        long(tuple((k, k + 1) for k in range(6))),
     ],
 )
 def test_connectors_stacked_on_the_same_faces_are_worth_one(

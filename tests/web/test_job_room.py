@@ -7,6 +7,8 @@ from pathlib import Path
 
 import httpx
 import psutil
+import pytest
+from long_tests import LONG
 from pages import in_browser, needs_pages
 from provider_standin import ProviderStandIn
 from running import finished, running_stack
@@ -14,7 +16,7 @@ from tests.web.random_machines import built_session
 
 pytestmark = needs_pages
 
-MACHINES, A_SESSION = 50, 10
+MACHINES, A_SESSION = (50, 10) if LONG else (15, 5)
 LATENCY_S = 0.3
 SWEEP = {
     "name": "room",
@@ -36,6 +38,7 @@ def processes(*names: str) -> str:
     return ",".join(found)
 
 
+@pytest.mark.sized
 def test_the_room_of_a_job_shows_what_is(tmp_path: Path) -> None:
     with running_stack(tmp_path) as stack:
         with httpx.Client(base_url=stack.url, timeout=30) as client:

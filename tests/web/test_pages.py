@@ -24,6 +24,7 @@ ADMIN = "operator-secret-that-is-long-enough"
 pytestmark = needs_pages
 
 
+@pytest.mark.sized
 @pytest.mark.parametrize("files", ["e2e/pages", "e2e/boards"])
 def test_pages_work_in_a_browser(tmp_path: Path, files: str) -> None:
     report = tmp_path / "report.md"

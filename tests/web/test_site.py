@@ -11,6 +11,7 @@ from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import httpx
+import pytest
 from pages import BUILDARENA, in_browser, needs_pages
 from running import finished, running_stack
 
@@ -50,6 +51,7 @@ def file_server(folder: Path) -> Iterator[str]:
         server.server_close()
 
 
+@pytest.mark.sized
 def test_a_site_works_from_a_file_server(tmp_path: Path) -> None:
     host = tmp_path / "host"
     with running_stack(tmp_path) as stack, file_server(host) as address:

@@ -1,6 +1,8 @@
 import { chromium, type Browser, type BrowserContext, type Page } from "playwright-core";
 
 export const URL_OF_SERVICE = process.env.BUILDARENA_WEB_URL ?? "";
+/** Whether the long tests run: every page in every look. */
+export const LONG = (process.env.BUILDARENA_TEST_LONG ?? "") !== "";
 const CHROMIUM = process.env.BUILDARENA_CHROMIUM ?? "/usr/bin/chromium";
 // A machine without a graphics card draws 3D all the same; tests step faster than people.
 const ARGUMENTS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-ipc-flooding-protection"];

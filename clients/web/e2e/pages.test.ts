@@ -1,7 +1,7 @@
 import { AxeBuilder } from "@axe-core/playwright";
 import type { Browser } from "playwright-core";
 import { afterAll, beforeAll, describe, expect, it } from "vitest";
-import { launched, URL_OF_SERVICE, visit, type Visit } from "./browser";
+import { launched, LONG, URL_OF_SERVICE, visit, type Visit } from "./browser";
 
 let browser: Browser;
 let sweep = "";
@@ -34,11 +34,11 @@ const PAGES: readonly (readonly [string, () => string])[] = [
   ["model", () => "/models/builtin/expert"],
 ];
 
-describe.each(PAGES)("the page of the %s", (_, path) => {
-  it.each([
-    [1280, "light"],
-    [390, "dark"],
-  ] as const)("at %d px, %s, has no serious fault", async (width, scheme) => {
+const LOOKS = [[1280, "light"], [390, "dark"]] as const;
+
+// Every page in one look, alternately; in both in the long tests.
+describe.each(PAGES.map((page, index) => [...page, index] as const))("the page of the %s", (_, path, index) => {
+  it.each(LOOKS.filter((__, look) => LONG || look === index % 2))("at %d px, %s, has no serious fault", async (width, scheme) => {
     const { page, faults, context } = await open(path(), width, scheme);
     const { violations } = await new AxeBuilder({ page }).analyze();
     const serious = violations.filter((one) => one.impact === "serious" || one.impact === "critical");

@@ -59,8 +59,23 @@ print(*sorted(path.name for path in (data / "postgres").iterdir()))
 )
 
 
-@pytest.mark.parametrize("user", ["root", "ordinary user"])
-@pytest.mark.parametrize("case", CASES.values(), ids=CASES)
+FEW = ("private folder", "long path", "noexec", "read-only checkout")
+
+
+@pytest.mark.parametrize(
+    ("user", "case"),
+    [
+        pytest.param(
+            *(user, case),
+            id=f"{user}-{name}",
+            marks=()
+            if name in FEW and (user == "root" or name == "private folder")
+            else pytest.mark.long,
+        )
+        for user in ("root", "ordinary user")
+        for name, case in CASES.items()
+    ],
+)
 def test_the_servers_start_anywhere(case: Case, user: str) -> None:
     case = dataclasses.replace(case, ordinary=user != "root")
     printed = run_elsewhere(case, ["-c", BOTH, "{data}"])

@@ -1,0 +1,19 @@
+"""What `make test` leaves to `make test-long`: further variants of what it tries already.
+
+A variant is long when another of the same test stays in `make test`: no rule is without one.
+"""
+
+from __future__ import annotations
+
+import os
+from typing import Any, Final
+
+import pytest
+
+LONG: Final = bool(os.environ.get("BUILDARENA_TEST_LONG"))
+"""Whether `make test-long` runs; sizes may hang on it."""
+
+
+def long(*values: Any, id: str | None = None) -> Any:  # noqa: A002 - pytest's name
+    """A variant for `make test-long` alone."""
+    return pytest.param(*values, id=id, marks=pytest.mark.long)
