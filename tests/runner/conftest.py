@@ -1,0 +1,18 @@
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+from live_api import live_api
+from tenants import WITH_KEYS
+
+from buildarena_pipeline.runtime.context import Context, open_context
+
+
+@pytest.fixture
+def url(context: Context) -> Iterator[str]:
+    """An API that asks for keys."""
+    own = open_context(context.settings.model_copy(update=WITH_KEYS))
+    with live_api(own) as found:
+        yield found
+    own.close()
