@@ -39,10 +39,14 @@ def main() -> None:
     parser.add_argument("--ca-file", type=Path, help="certificates to trust besides the system's")
     parser.add_argument("--at-once", type=int, help="trials at once")
     parser.add_argument("--allow-http", action="store_true", help="send the key unencrypted")
+    parser.add_argument("--check", action="store_true", help="only see whether it could work")
+    parser.add_argument("--json", action="store_true", help="print the checks as JSON")
     given = parser.parse_args()
     settings = Settings()
     try:
-        if given.api is not None:
+        if given.check:
+            _check(given)
+        elif given.api is not None:
             _serve_api(given, settings)
         else:
             _serve_database(given.simulator, settings)
@@ -68,6 +72,22 @@ def _serve_database(simulator: str, settings: Settings) -> None:
         ),
         settings,
     )
+
+
+def _check(given: argparse.Namespace) -> None:
+    from buildarena_simworker.remote.doctor import examined, printed
+
+    if given.api is None:
+        raise StartupError("--check needs --api URL")
+    checks = examined(
+        given.api,
+        given.simulator,
+        key_file=given.key_file,
+        ca_file=given.ca_file,
+        allow_http=given.allow_http,
+    )
+    sys.stdout.write(printed(checks, as_json=given.json))
+    sys.exit(0 if all(check["ok"] for check in checks) else 1)
 
 
 def _serve_api(given: argparse.Namespace, settings: Settings) -> None:

@@ -116,9 +116,9 @@ class RunnerApi:
         self._stopping = stopping
         self._piece_bytes = 1 << 20
 
-    def facts(self) -> dict[str, Any]:
+    def facts(self, *, patience_s: float | None = None) -> dict[str, Any]:
         """What the API says of key, versions and limits; waits for it until it answers."""
-        found: dict[str, Any] = self._json("GET", "/v1/runner", patience_s=None)
+        found: dict[str, Any] = self._json("GET", "/v1/runner", patience_s=patience_s)
         self._piece_bytes = int(found["piece_bytes"])
         return found
 
