@@ -12,10 +12,13 @@ from typing import Any
 import httpx
 from tenants import ADMIN
 
+from buildarena_benchmark.tasks.loading import parse_custom_task
+from buildarena_geometry import Machine
+from buildarena_pipeline.agents.machine_trials import try_machine
 from buildarena_pipeline.catalog.specs import JobSpec
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.submission.submission import Submissions
-from buildarena_simulation import SIMULATION_VERSION, engine_version
+from buildarena_simulation import SIMULATION_VERSION, Trajectory, engine_version, simulate
 from buildarena_simworker.remote.api import RunnerApi, tls_context
 from buildarena_simworker.remote.slots import Heartbeats, Slot
 from buildarena_simworker.simulators.engines import EngineSimulator
@@ -38,6 +41,61 @@ def submitted(context: Context, submissions: Submissions, *, owner: str | None =
     job, _ = submissions.submit_job(JobSpec.model_validate(spec), owner=owner)
     work(context, queues=("construct",))
     return context.store.jobs.get(job.id)
+
+
+SHORT = """
+name: short
+title: One block, 0.4 s
+category: trivial
+statement: Build one block.
+scenario: {duration_s: 0.4, control: {mode: held, from_s: 0}}
+scoring: {name: thrust}
+indicator: {name: thrust_to_weight, unit: "1"}
+"""
+CARRY = """
+name: carry
+title: Carry something for 0.8 s
+category: trivial
+statement: Carry it.
+scenario:
+  duration_s: 0.8
+  cargo: {size: [1, 1, 1], drop_height: 0.5, final_mass: 50, ramp_s: 0.5}
+scoring: {name: support, min_time_s: 0.5}
+indicator: {name: load, unit: mass}
+"""
+MISSING = SHORT.replace("name: short", "name: missing").replace(
+    "duration_s: 0.4", 'duration_s: 0.4, tracked_blocks: ["99"]'
+)
+"""Its trial tracks a block that no machine here has."""
+
+
+def two_blocks() -> Machine:
+    """A starting block with one more on it."""
+    machine = Machine()
+    machine.act("start", {})
+    machine.act("attach_block_to", {"base_block": "1", "face": "C", "new_block": "Torch"})
+    return machine
+
+
+def waiting(
+    context: Context, text: str = SHORT, *, seed: int = 0, owner: str | None = None
+) -> Job:
+    """A job that waits for a trial of two blocks in MuJoCo, which takes next to no time."""
+    task = parse_custom_task(text, origin="test")
+    context.tasks.add(task, text)
+    machine = two_blocks()
+    job, _ = try_machine(
+        context, machine, task=task.name, simulator="mujoco", seed=seed, owner=owner
+    )
+    assert (job.state, job.queue) == ("queued", "simulate.mujoco")
+    return job
+
+
+def true_trajectory(context: Context, job: Job) -> Trajectory:
+    """What MuJoCo says of such a job's trial."""
+    task = context.tasks.exact(job.task, job.task_version)
+    assert task is not None
+    return simulate(two_blocks(), task.scenario, "mujoco")
 
 
 def runner_key(context: Context, *simulators: str, **more: Any) -> tuple[str, str]:

@@ -138,7 +138,7 @@ def _remote(queue: str) -> list[str]:
     words = _known(queue)
     if not queue.startswith(SIMULATE):
         raise CommandError(
-            f"{queue!r} needs the database: with --api only {SIMULATE}SIMULATOR runs"
+            f"{queue!r} needs the database: with --api, {SIMULATE}SIMULATOR"
         )
     return words
 
