@@ -123,22 +123,20 @@ def test_a_fault_keeps_its_evidence_and_is_tried_again(context, do_next) -> None
 
 
 @pytest.mark.parametrize(
-    ("error", "state", "reason", "faults"),
+    ("error", "ending"),
     [
-        (PermanentError("another game", reason="game_version"), "done", "game_version", 1),
-        (SimulatorFaultError("a person must come", endless=True), "queued", None, 1),
-        (RuntimeError("nobody foresaw this"), "queued", None, 1),
+        (PermanentError("another game", reason="game_version"), ("done", "game_version", 1)),
+        (SimulatorFaultError("a person must come", endless=True), ("queued", None, 1)),
+        (RuntimeError("nobody foresaw this"), ("queued", None, 1)),
     ],
 )
-def test_failures_leave_the_job_where_they_should(
-    context, do_next, error, state, reason, faults
-) -> None:
+def test_failures_leave_the_job_where_they_should(context, do_next, error, ending) -> None:
     job = waiting(context)
     with context.store.database.transaction() as connection:
         connection.execute(text("UPDATE jobs SET faults = 0"))
     assert do_next(raising(error))
     now = context.store.jobs.get(job.id)
-    assert (now.state, now.reason, now.faults) == (state, reason, faults)
+    assert (now.state, now.reason, now.faults) == ending
     assert str(error) in now.detail
     assert now.success is None
     assert not do_next()

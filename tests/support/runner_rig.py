@@ -77,9 +77,7 @@ def two_blocks() -> Machine:
     return machine
 
 
-def waiting(
-    context: Context, text: str = SHORT, *, seed: int = 0, owner: str | None = None
-) -> Job:
+def waiting(context: Context, text: str = SHORT, *, seed: int = 0, owner: str | None = None) -> Job:
     """A job that waits for a trial of two blocks in MuJoCo, which takes next to no time."""
     task = parse_custom_task(text, origin="test")
     context.tasks.add(task, text)
@@ -124,7 +122,7 @@ def slot(
             simulator=simulator or EngineSimulator("mujoco"),
             about=about,
             stopping=stopping,
-            stop_all=lambda why: stopping.set(),
+            stop_all=lambda _: stopping.set(),
         )
     finally:
         stopping.set()
@@ -162,6 +160,9 @@ class Caller:
         answer = self.ask("POST", "/leases", json=self.about(**more))
         assert answer.status_code == 200, answer.text
         return answer.json()
+
+    def named(self, lease: dict[str, Any]) -> dict[str, Any]:
+        return {"job_id": lease["job_id"], "token": lease["token"]}
 
     def at(self, lease: dict[str, Any], path: str = "") -> str:
         return f"/leases/{lease['job_id']}/{lease['token']}{path}"
