@@ -253,6 +253,8 @@ def test_a_file_comes_once(context, caller) -> None:
     assert caller.outcome(lease, data, files=files).status_code == 422
     many = [{**files[0], "name": f"screenshot-0-{n}.png"} for n in range(20)]
     assert caller.outcome(lease, data, files=many).status_code == 422
+    # What was uploaded for an outcome that was refused is gone.
+    caller.upload(lease, b"text")
     assert caller.outcome(lease, data, files=files[:1]).status_code == 200
 
 

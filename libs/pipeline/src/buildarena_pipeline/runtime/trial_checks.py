@@ -68,10 +68,7 @@ def checked_trajectory(
     """
     count = _require_bounded(data, simulator, scenario, len(machine.blocks))
     try:
-        if schema_of(data) != SCHEMA_VERSION:
-            raise OutcomeRefusedError(
-                f"the trajectory is of schema {schema_of(data)}, not {SCHEMA_VERSION}"
-            )
+        _same("schema", schema_of(data), SCHEMA_VERSION)
         trajectory = read_trajectory(data)
         _require_sound(trajectory, scenario, count)
     except OutcomeRefusedError:

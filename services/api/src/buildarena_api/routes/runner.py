@@ -102,7 +102,12 @@ def show_runner(caller: RunnerDep, context: ContextDep) -> RunnerFacts:
     response_model=LeasedTrial,
 )
 async def lease_trial(
-    wish: LeaseWish, caller: RunnerDep, service: ServiceDep, context: ContextDep
+    *,
+    wish: LeaseWish,
+    caller: RunnerDep,
+    service: ServiceDep,
+    context: ContextDep,
+    request: Request,
 ) -> Any:
     """Leases the next trial, waiting for one for up to `wait_s` seconds; 204 when there is none.
 
@@ -119,6 +124,7 @@ async def lease_trial(
         owner=prefix + wish.name,
         prefix=prefix,
         wait_s=wish.wait_s,
+        left=request.is_disconnected,
     )
     if leased is None:
         return Response(status_code=204)

@@ -63,6 +63,7 @@ class Outcomes:
                 outcome = self._checked(named, due, said)
             except (OutcomeRefusedError, UploadError) as error:
                 log.warning("outcome_refused", job=named[0], runner=lease.owner, error=str(error))
+                self._uploads.drop(named)
                 raise ProblemError(422, str(error)) from error
             self._books.complete(lease, due, outcome)
 

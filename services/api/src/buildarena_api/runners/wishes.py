@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -67,7 +68,15 @@ class Wishes:
         self._books = TrialBooks.of(context)
         self._turns: dict[Wish, _Turn] = {}
 
-    async def granted(self, wish: Wish, *, owner: str, prefix: str, wait_s: float) -> Leased | None:
+    async def granted(
+        self,
+        wish: Wish,
+        *,
+        owner: str,
+        prefix: str,
+        wait_s: float,
+        left: Callable[[], Awaitable[bool]],
+    ) -> Leased | None:
         """The next trial that fulfils a wish, as soon as there is one; None when none came.
 
         Args:
@@ -75,6 +84,7 @@ class Wishes:
             owner: The runner, as leases and attempts name it.
             prefix: That of its key's runners.
             wait_s: How long to wait for one.
+            left: Whether the runner has left meanwhile: nothing is leased to it then.
 
         Raises:
             ProblemError: 429, when the key's runners have as many leases as they may.
@@ -89,6 +99,8 @@ class Wishes:
         try:
             while True:
                 async with turn.lock:
+                    if wait_s and await left():
+                        return None
                     if loop.time() - turn.nothing_at >= LOOK_EVERY_S or not wait_s:
                         found = await run_in_threadpool(self._next, wish, turn, owner)
                         if found is not None:

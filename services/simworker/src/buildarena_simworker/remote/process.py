@@ -8,6 +8,7 @@ import signal
 import socket
 import sys
 import threading
+import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
@@ -170,8 +171,10 @@ class Runner:
         backs = [threading.Thread(target=hand_back, args=(self._api, one)) for one in held]
         for thread in backs:
             thread.start()
+        # Slots that wait for a trial are left to it: they end with the process.
+        until = time.monotonic() + JOIN_S
         for thread in (*backs, *threads):
-            thread.join(JOIN_S)
+            thread.join(max(0.0, until - time.monotonic()))
         for simulator in self._simulators:
             simulator.close()
         with suppress(RemoteError):
