@@ -137,9 +137,7 @@ def _remote(queue: str) -> list[str]:
     """The words of the program that serves a queue through the API."""
     words = _known(queue)
     if not queue.startswith(SIMULATE):
-        raise CommandError(
-            f"{queue!r} needs the database: with --api, {SIMULATE}SIMULATOR"
-        )
+        raise CommandError(f"{queue!r} needs the database: with --api, {SIMULATE}SIMULATOR")
     return words
 
 
