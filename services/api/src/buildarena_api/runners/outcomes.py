@@ -8,13 +8,13 @@ from typing import Final, Literal
 import structlog
 
 from buildarena_api.http.problems import ProblemError
+from buildarena_api.runners.checking import shared_checker
 from buildarena_api.runners.views import Fault, NamedFile, Outcome
 from buildarena_pipeline.catalog.simulators import BESIEGE
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.trial_books import DueTrial, TrialBooks
 from buildarena_pipeline.runtime.trial_checks import (
     OutcomeRefusedError,
-    checked_trajectory,
     checked_versions,
     require_refusable,
 )
@@ -49,6 +49,7 @@ class Outcomes:
         self._context = context
         self._books = TrialBooks.of(context)
         self._uploads = uploads
+        self._checker = shared_checker()
 
     def complete(self, named: JobToken, prefix: str, said: Outcome) -> Status:
         """Scores a trial and moves its job on.
@@ -135,7 +136,7 @@ class Outcomes:
             )
         else:
             file = UploadedFile(sha256=said.trajectory.sha256, size=said.trajectory.size)
-            trajectory = checked_trajectory(
+            trajectory = self._checker.checked(
                 self._uploads.take(named, file),
                 simulator=simulator,
                 version=version,
