@@ -85,17 +85,24 @@ class WarmProcess:
             ProcessEndedError: It ended before it answered.
         """
         self.start()
-        assert self._pipe is not None  # noqa: S101 - it was started
+        pipe = self._pipe
+        assert pipe is not None  # noqa: S101 - it was started
         try:
-            self._pipe.send(question)
-            while not self._pipe.poll(LOOK_EVERY_S):
+            self._piped(lambda: pipe.send(question))
+            while not self._piped(lambda: pipe.poll(LOOK_EVERY_S)):
                 meanwhile()
-            return self._pipe.recv()
-        except (EOFError, OSError) as error:
-            raise ProcessEndedError(self._name, self._ended()) from error
+            return self._piped(pipe.recv)
+        except ProcessEndedError:
+            raise
         except BaseException:
             self.close()  # it is still at work that nobody waits for
             raise
+
+    def _piped(self, use: Callable[[], Any]) -> Any:
+        try:
+            return use()
+        except (EOFError, OSError) as error:
+            raise ProcessEndedError(self._name, self._ended()) from error
 
     def close(self) -> None:
         """Ends the process at once."""
