@@ -224,25 +224,30 @@ def test_what_is_said_beside_a_trajectory_is_checked(refused) -> None:
     assert "does not refuse this machine" in refused(lambda _: None)
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        *("machine", "trajectory-0", "transcript", "log-1.txt", "log-00.txt", "log-0.TXT"),
-        *("../log-0.txt", "log-0.txt/../../x", "/etc/log-0.txt", "log-0\\x.txt", "log-0.txt\n"),
-        *("log-0.html", "log-0.svg", "log-0", "page-0.txt", "log-0.txt\x00", "lög-0.txt", ""),
-    ],
-)
-def test_names_that_are_not_this_trials_are_refused(context, caller, name) -> None:
+NAMES = [
+    *("machine", "trajectory-0", "transcript", "log-1.txt", "log-00.txt", "log-0.TXT"),
+    *("../log-0.txt", "log-0.txt/../../x", "/etc/log-0.txt", "log-0\\x.txt", "log-0.txt\n"),
+    *("log-0.html", "log-0.svg", "log-0", "page-0.txt", "log-0.txt\x00", "lög-0.txt", ""),
+]
+
+
+def test_names_that_are_not_this_trials_are_refused(context, caller) -> None:
     job = waiting(context)
     lease = caller.lease()
-    sent = caller.upload(lease, b"text")
+    sent = caller.upload(lease, write_trajectory(true_trajectory(context, job)))
+    beat = caller.about(leases=[caller.named(lease)])
+    assert caller.ask("POST", "/heartbeat", json=beat).json()["live"]
     before = everything(context.store.database)
-    files = [{"name": name, **sent}]
-    data = write_trajectory(true_trajectory(context, job))
-    assert caller.outcome(lease, data, files=files).status_code == 422
-    fault = {"reason": "a", "detail": "b", "files": files}
-    assert caller.ask("POST", caller.at(lease, "/fault"), json=fault).status_code == 422
+    body = {"trajectory": sent, "versions": VERSIONS, "wall_s": 1}
+    for name in NAMES:
+        files = [{"name": name, **sent}]
+        answer = caller.ask("POST", caller.at(lease, "/outcome"), json={**body, "files": files})
+        assert answer.status_code == 422, name
+        fault = {"reason": "a", "detail": "b", "files": files}
+        answer = caller.ask("POST", caller.at(lease, "/fault"), json=fault)
+        assert answer.status_code == 422, name
     assert everything(context.store.database) == before
+    assert context.store.jobs.artifacts(job.id).keys() == {"machine"}
 
 
 def test_a_file_comes_once(context, caller) -> None:

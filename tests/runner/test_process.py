@@ -93,8 +93,7 @@ def test_a_killed_runner_costs_a_lease_and_leaves_no_process(context, url, tmp_p
     secret = runner_key(context)[1]
     with runner(tmp_path, url, secret, "--at-once", "1") as process:
         wait_until(lambda: context.store.jobs.get(job.id).state == "running", 60, "it runs")
-        children = engines(process)
-        assert children
+        children = wait_until(lambda: engines(process), 10, "the engine runs")
         process.kill()
         wait_until(lambda: context.store.jobs.get(job.id).faults == 1, 20, "it is recovered")
         _, alive = psutil.wait_procs(children, timeout=6)

@@ -96,6 +96,12 @@ def _serve_api(given: argparse.Namespace, settings: Settings) -> None:
 
     name: str = given.simulator
     served = _besiege(settings) if name == BESIEGE else _engine(name, settings)
+
+    def warm_engine() -> Simulator:
+        engine = EngineProcess(name)
+        engine.start()
+        return engine
+
     at_once = given.at_once or served.concurrency
     if at_once > 1 and name == BESIEGE:
         raise StartupError("a game has one window, so --at-once is 1: start a runner per machine")
@@ -105,7 +111,7 @@ def _serve_api(given: argparse.Namespace, settings: Settings) -> None:
             key=read_key(given.key_file),
             simulator=name,
             version=str(served.versions["simulation"]),
-            make=served.make if name == BESIEGE else lambda: EngineProcess(name),
+            make=served.make if name == BESIEGE else warm_engine,
             at_once=at_once,
             ca_file=given.ca_file,
             allow_http=given.allow_http,

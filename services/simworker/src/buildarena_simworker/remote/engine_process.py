@@ -33,6 +33,10 @@ class EngineProcess:
         self.versions: Mapping[str, Any] = EngineSimulator(name).versions
         self._process = WarmProcess(name, partial(_engine, name))
 
+    def start(self) -> None:
+        """Starts the process, so that the first trial finds it warm."""
+        self._process.start()
+
     def run(self, trial: Trial) -> Simulated:
         """Simulates the machine; see `Simulator`."""
         # Documents: a task and a machine have parts that no pipe takes.
