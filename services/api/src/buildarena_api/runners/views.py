@@ -21,8 +21,7 @@ def _known(name: str) -> str:
 
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
-Short = Annotated[str, Field(max_length=200)]
-Plain = str | int | Finite | bool | None
+Short = Annotated[str, Field(max_length=500)]
 Fact = (
     Annotated[str, Field(max_length=2000)]
     | int

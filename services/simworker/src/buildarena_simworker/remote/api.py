@@ -30,7 +30,7 @@ from buildarena_simworker.remote.errors import LeaseLostError, RefusedError, Unr
 TIMEOUT_S: Final = 15.0
 PATIENCE_S: Final = 15 * 60.0
 """How long an outcome is kept for an API that does not answer."""
-LONGEST_PAUSE_S: Final = 15.0
+LONGEST_PAUSE_S: Final = 5.0
 LOOPBACK: Final = ("127.0.0.1", "::1", "localhost")
 BUSY: Final = (429, 500, 502, 503, 504)
 """Answers after which the same request may be taken: the service is busy or restarts."""
@@ -237,6 +237,10 @@ class RunnerApi:
         except (httpx2.TransportError, httpx2.DecodingError) as error:
             log.info("api_unreachable", path=path, error=str(error) or type(error).__name__)
             raise _TryAgainError(str(error) or type(error).__name__) from error
+        except RuntimeError as error:
+            if not self._http.is_closed:
+                raise
+            raise UnreachableError("this runner has stopped") from error
         if answer.status_code in BUSY:
             asked = answer.headers.get("retry-after", "")
             raise _TryAgainError(_said(answer), float(asked) if asked.isdecimal() else 0.0)

@@ -168,7 +168,9 @@ class Runner:
 
     def _end(self, beats: Heartbeats, threads: list[threading.Thread]) -> None:
         held = beats.stop()
-        backs = [threading.Thread(target=hand_back, args=(self._api, one)) for one in held]
+        backs = [
+            threading.Thread(target=hand_back, args=(self._api, one), daemon=True) for one in held
+        ]
         for thread in backs:
             thread.start()
         # Slots that wait for a trial are left to it: they end with the process.
