@@ -7,12 +7,17 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import pytest
-from game_rig import Rig, experts_machine, shortened, trial_of
+from game_rig import VERSION, Rig, experts_machine, shortened, trial_of
 
 from buildarena_benchmark import builtin_tasks, score
 from buildarena_besiege import game_start
 from buildarena_pipeline.errors import PermanentError
-from buildarena_simulation import simulate
+from buildarena_pipeline.runtime.trial_checks import (
+    OutcomeRefusedError,
+    checked_trajectory,
+    checked_versions,
+)
+from buildarena_simulation import simulate, write_trajectory
 from buildarena_simworker.simulators.besiege.headless import HeadlessDesktop
 from buildarena_simworker.simulators.besiege.settings import BesiegeSettings
 from buildarena_simworker.simulators.besiege.simulator import BesiegeSimulator
@@ -48,6 +53,16 @@ def test_a_car_is_driven_as_by_our_engine(headless) -> None:
         assert found.success == right.success
         assert found.indicator == pytest.approx(right.indicator, rel=0.35)  # keys come late
         assert not list(rig.machines.iterdir())
+        # The API takes it from a runner that reaches nothing else.
+        wanted = {"simulator": "besiege", "machine": machine, "scenario": task.scenario}
+        sent = write_trajectory(done.trajectory)
+        kept = checked_trajectory(sent, version=VERSION, **wanted)
+        assert write_trajectory(kept) == sent
+        checked_versions(
+            done.versions, simulator="besiege", version=VERSION, trajectory=done.trajectory
+        )
+        with pytest.raises(OutcomeRefusedError, match="engine_version"):
+            checked_trajectory(sent, version="1.0-1", **wanted)
 
 
 @pytest.mark.parametrize("name", ["support-1", "transport-2", "lift-1", "lift-2"])

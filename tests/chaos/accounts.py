@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -76,7 +77,7 @@ class PickUp:
 
 def pick_ups(database: Database, strikes: Sequence[Strike]) -> list[PickUp]:
     """How the jobs that dead workers had were recovered, the slowest last."""
-    # A worker's id ends with its process'; a prefork worker's jobs are held by its children.
+    # A prefork worker's jobs are held by its children.
     query = text(
         "SELECT a.worker, a.stage, a.started_at, a.ended_at, (SELECT min(b.started_at) "
         "FROM attempts b WHERE b.job_id = a.job_id AND b.token > a.token) AS next "
@@ -88,7 +89,7 @@ def pick_ups(database: Database, strikes: Sequence[Strike]) -> list[PickUp]:
     found = []
     with database.transaction() as connection:
         for row in connection.execute(query):
-            pid = int(row.worker.rsplit(":", 1)[1])
+            pid = _pid(row.worker)
             died = [
                 at for dead, at in deaths if dead == pid and row.started_at <= at <= row.ended_at
             ]
@@ -103,3 +104,10 @@ def pick_ups(database: Database, strikes: Sequence[Strike]) -> list[PickUp]:
                     )
                 )
     return sorted(found, key=lambda pick_up: pick_up.seconds)
+
+
+def _pid(worker: str) -> int:
+    """The process of a worker: its id ends with it, a runner's with the slot behind it."""
+    found = re.search(r"([0-9]+)(?:\.[0-9]+)?$", worker)
+    assert found is not None, worker
+    return int(found[1])

@@ -24,6 +24,8 @@ from running import running_stack, wait_until
 from sqlalchemy.exc import OperationalError
 
 from buildarena_benchmark import builtin_tasks, score
+from buildarena_cli.local import ManagedProcess
+from buildarena_cli.local.stack import Stack
 from buildarena_simulation import simulate
 from buildarena_store import Database
 
@@ -94,22 +96,50 @@ def reachable(database: Database) -> bool:
     return True
 
 
-@pytest.mark.timeout(3600)
-def test_nothing_is_lost_or_done_twice(folder, play) -> None:
-    rng = random.Random(SEED)
-    cheap, dear = JOBS - JOBS // 4, JOBS // 4
+@contextmanager
+def serving_stack(folder: Path, way: str) -> Iterator[tuple[Stack, list[str]]]:
+    """A stack whose simulator reaches database and broker, or nothing but the API.
+
+    Yields:
+        The stack, and the words that start a further simulator of this kind.
+    """
+    simulators = (ENGINE,) if way == "database" else ()
     # On a busy machine strikes may leave a job no time to make progress; giving up is another
     # rule's test.
-    with running_stack(folder, lease_s=LEASE_S, max_faults=1000) as stack:
+    with running_stack(folder, lease_s=LEASE_S, max_faults=1000, simulators=simulators) as stack:
+        words = ["buildarena_simworker", "--simulator", ENGINE]
+        if way == "api":
+            words += ["--api", stack.url]
+            stack.supervisor.launch(
+                ManagedProcess(name="mujoco worker", start=lambda: started_runner(stack, words))
+            )
+        yield stack, words
+
+
+def started_runner(stack: Stack, words: list[str]) -> subprocess.Popen[bytes]:
+    """A runner without any settings: what it needs to know stands in its command."""
+    ours = {name: value for name, value in os.environ.items() if "BUILDARENA" not in name}
+    with (stack.logs / "runner.log").open("ab") as log:
+        return subprocess.Popen(
+            [sys.executable, "-m", *words], env=ours, stdout=log, stderr=log, cwd="/"
+        )
+
+
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize("way", ["database", "api"])
+def test_nothing_is_lost_or_done_twice(folder, play, way) -> None:
+    rng = random.Random(SEED)
+    jobs = JOBS if way == "database" else JOBS // 5
+    cheap, dear = jobs - jobs // 4, jobs // 4
+    with serving_stack(folder, way) as (stack, simulator):
         environment, logs = stack.environment, stack.logs
         database = Database(environment["BUILDARENA_DATABASE_URL"])
         with (
             httpx.Client(base_url=stack.url, timeout=30) as client,
             skewed_worker(environment, logs / "skewed.log", "buildarena_worker"),
-            skewed_worker(
-                environment, logs / "skewed.log", "buildarena_simworker", "--simulator", ENGINE
-            ),
-            Fire(stack=stack, rng=rng, every_s=EVERY_S) as fire,
+            skewed_worker(environment, logs / "skewed.log", *simulator),
+            # A runner must find both its own process and the API alive to make progress.
+            Fire(stack=stack, rng=rng, every_s=EVERY_S * (1 if way == "database" else 2)) as fire,
         ):
             started = time.monotonic()
             common = {"tasks": [TASK], "simulator": ENGINE}
@@ -149,7 +179,7 @@ def test_nothing_is_lost_or_done_twice(folder, play) -> None:
         "slowest": [asdict(pick_up) for pick_up in picked_up[-5:]],
     }
     sys.stdout.write(json.dumps(figures) + "\n")
-    assert len(rows) == JOBS
+    assert len(rows) == jobs
     _compare_with_undisturbed(rng.sample(rows, 6), play)
 
 

@@ -21,6 +21,7 @@ from buildarena_store.errors import (
     StoreError,
     TransitionError,
     UnknownIdError,
+    UploadError,
 )
 from buildarena_store.events import Event, Events
 from buildarena_store.figures import STAGE_SECONDS, Figures, ServiceFigures
@@ -31,6 +32,7 @@ from buildarena_store.jobs.journal import Journal, JournalEntry, Usage
 from buildarena_store.jobs.leases import Lease, Leases
 from buildarena_store.jobs.results import JobScore, Results
 from buildarena_store.jobs.rollouts import RolloutRecord, RolloutRequest, Rollouts
+from buildarena_store.jobs.runner_leases import RunnerLeases
 from buildarena_store.jobs.turns import TurnRecord, TurnResult, Turns
 from buildarena_store.jobs.verifications import Verification, Verifications
 from buildarena_store.states import (
@@ -43,6 +45,7 @@ from buildarena_store.store import Store, open_store
 from buildarena_store.sweeps.sweeps import NewSweep, Sweep, SweepProgress, Sweeps
 from buildarena_store.tasks import StoredTask, Tasks
 from buildarena_store.text import clean
+from buildarena_store.uploads import UploadedFile, Uploads
 from buildarena_store.workers import WorkerInfo, Workers
 
 __all__ = [
@@ -88,6 +91,7 @@ __all__ = [
     "RolloutRequest",
     "Rollouts",
     "Round",
+    "RunnerLeases",
     "SchemaVersionError",
     "ServiceFigures",
     "Shortage",
@@ -106,6 +110,9 @@ __all__ = [
     "TurnResult",
     "Turns",
     "UnknownIdError",
+    "UploadError",
+    "UploadedFile",
+    "Uploads",
     "Usage",
     "Verification",
     "Verifications",

@@ -82,5 +82,9 @@ class ArtifactStoreError(StoreError):
     """The artifact store can't be written or read now: full, out of reach, or not permitted."""
 
 
+class UploadError(StoreError):
+    """A piece or file was not received as its sender says; nothing of it counts."""
+
+
 class SchemaVersionError(StoreError):
     """The database's schema is not the one this code was written for."""

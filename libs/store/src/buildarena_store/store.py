@@ -15,6 +15,7 @@ from buildarena_store.jobs.journal import Journal
 from buildarena_store.jobs.leases import Leases
 from buildarena_store.jobs.results import Results
 from buildarena_store.jobs.rollouts import Rollouts
+from buildarena_store.jobs.runner_leases import RunnerLeases
 from buildarena_store.jobs.turns import Turns
 from buildarena_store.jobs.verifications import Verifications
 from buildarena_store.sweeps.lifecycle import SweepLifecycle
@@ -30,6 +31,7 @@ class Store:
     database: Database
     jobs: Jobs
     leases: Leases
+    runner_leases: RunnerLeases
     journal: Journal
     rollouts: Rollouts
     results: Results
@@ -59,6 +61,7 @@ def open_store(database: Database, *, lease_s: float, max_faults: int) -> Store:
         database=database,
         jobs=Jobs(database),
         leases=leases,
+        runner_leases=RunnerLeases(database, duration_s=lease_s),
         journal=Journal(database),
         rollouts=Rollouts(database),
         results=Results(database, leases),

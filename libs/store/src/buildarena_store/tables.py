@@ -180,6 +180,9 @@ api_keys = Table(
     Column("previous_hash", Text, unique=True),
     _time("previous_until"),
     Column("scopes", JSONB, nullable=False),
+    # Of a runner key: whose runners may lease these simulators' jobs, of these keys or of all.
+    Column("simulators", JSONB(none_as_null=True)),
+    Column("job_owners", JSONB(none_as_null=True)),
     _time("created_at", now=True),
     _time("expires_at"),
     _time("revoked_at"),

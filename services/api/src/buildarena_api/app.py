@@ -49,12 +49,15 @@ from buildarena_api.routes import (
     metrics,
     pictures,
     replays,
+    runner,
     sessions,
     sweeps,
     tasks,
     trials,
     verifications,
+    workers,
 )
+from buildarena_api.runners.service import RunnerService
 from buildarena_pipeline import __version__
 from buildarena_pipeline.agents.sessions import ExternalSessions
 from buildarena_pipeline.catalog.models import ModelRegistry
@@ -82,6 +85,7 @@ ORDINARY = (
     callers,
     keys,
     metrics,
+    workers,
 )
 LIMITED_THEMSELVES = (events, exports, archives, comparisons)
 """Routes whose requests take long, and don't count among a caller's ordinary ones."""
@@ -103,12 +107,15 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
     rate_limits = RateLimits(context.settings.required_broker_url(), context.settings.rate_limit)
 
     hub = EventHub(watching)
+    runners = RunnerService(context)
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
         reaper.start()
+        runners.start()
         yield
         reaper.stop()
+        runners.close()
         await hub.close()
         await rate_limits.close()
         watching.close()
@@ -142,6 +149,7 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
     )
     app.state.exporting = exporting
     app.state.hub = hub
+    app.state.runners = runners
     app.state.key_checks = KeyChecks(watching)
     app.state.concurrency = usual_limits()
     app.state.registry = registry
@@ -170,6 +178,7 @@ def _add_routes(app: FastAPI) -> None:
             dependencies=[Depends(caller_of), *own],
             responses=problem_responses(401, 403, 429),
         )
+    app.include_router(runner.router, responses=problem_responses(401, 403, 429))
 
 
 def _add_middleware(app: FastAPI) -> None:
@@ -181,10 +190,11 @@ def _add_middleware(app: FastAPI) -> None:
         BodyLimitMiddleware,
         unlimited={archives.IMPORT_PATH},
         documents={tasks.PATH, machines.CHECK_PATH, machines.TRIAL_PATH},
+        pieces=runner.is_piece,
     )
     routes = [
         (found.path, found.methods or ())
-        for part in (health, *ORDINARY, *LIMITED_THEMSELVES)
+        for part in (health, runner, *ORDINARY, *LIMITED_THEMSELVES)
         for found in part.router.routes
         if isinstance(found, Route)
     ]

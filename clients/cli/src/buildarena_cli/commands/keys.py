@@ -37,8 +37,19 @@ def create_key(
     name: Annotated[str, typer.Argument(help="Who holds it.")],
     *,
     scope: Annotated[
-        list[str], typer.Option(help="read, submit or admin; each includes those before it.")
+        list[str],
+        typer.Option(
+            help="read, submit or admin, each including those before it; or runner alone."
+        ),
     ] = ["submit"],  # noqa: B006 - typer only reads it
+    simulator: Annotated[
+        list[str] | None,
+        typer.Option(help="Of a runner key: a simulator whose jobs it may lease; repeat for more."),
+    ] = None,
+    jobs_of: Annotated[
+        list[str] | None,
+        typer.Option(help="Of a runner key: only jobs of this key (id); repeat for more."),
+    ] = None,
     days: Annotated[
         int | None, typer.Option(help="Days until it expires; never by default.")
     ] = None,
@@ -50,8 +61,10 @@ def create_key(
 ) -> None:
     """Make a key and print its secret, which can't be read again."""
     budget = budget_of(max_cost_usd, max_tokens, max_requests)
-    body = {"name": name, "scopes": scope, "days": days, "budget": budget}
-    made = Client(url).post("/v1/keys", body)
+    body: dict[str, Any] = {"name": name, "scopes": scope, "days": days, "budget": budget}
+    # Left out where they are not asked for: services of before runner keys do not know them.
+    given = {"simulators": simulator, "job_owners": jobs_of}
+    made = Client(url).post("/v1/keys", body | {k: v for k, v in given.items() if v})
     if as_json:
         print_json(made)
         return

@@ -1,18 +1,45 @@
-"""`buildarena worker start` and `migrate`: parts of a service that runs on several machines."""
+"""`buildarena worker` and `migrate`: parts of a service that runs on several machines."""
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Final
 
 import typer
 
+from buildarena_cli.defaults import KEY_VARIABLE
 from buildarena_cli.errors import CommandError
 from buildarena_cli.instead import run_instead
 from buildarena_cli.lazy import new_group
 from buildarena_cli.near import did_you_mean
-from buildarena_cli.terminal.output import say
+from buildarena_cli.options import DEFAULT_URL, JsonOption, UrlOption
+from buildarena_cli.terminal.output import columns, minute_of, number, print_json, print_table, say
 
 app = new_group("Run workers by themselves.")
+
+SIMULATE: Final = "simulate."
+MEBIBYTE: Final = 1024 * 1024
+COLUMNS = columns(
+    *("worker", "queues", "state", "version", "MiB", "since"),
+    figures=("MiB",),
+    leaving=("since", "MiB", "version"),
+)
+ApiOption = Annotated[
+    str | None,
+    typer.Option("--api", metavar="URL", help="Reach only this API, with a runner key."),
+]
+KeyFileOption = Annotated[
+    Path | None,
+    typer.Option("--key-file", help=f"File with the runner key; default: {KEY_VARIABLE}."),
+]
+CaFileOption = Annotated[
+    Path | None,
+    typer.Option("--ca-file", help="Certificates to trust besides the system's (PEM)."),
+]
+AllowHttpOption = Annotated[
+    bool, typer.Option("--allow-http", help="Send the key unencrypted to another machine.")
+]
 
 
 @app.command("start")
@@ -20,19 +47,58 @@ def start_worker(
     queue: Annotated[
         str, typer.Argument(help="construct, or simulate.SIMULATOR, such as simulate.mujoco.")
     ],
+    *,
+    api: ApiOption = None,
+    key_file: KeyFileOption = None,
+    ca_file: CaFileOption = None,
+    at_once: Annotated[
+        int | None, typer.Option("--at-once", help="Trials at once, with --api.", min=1, max=64)
+    ] = None,
+    allow_http: AllowHttpOption = False,
 ) -> None:
-    """Serve a queue from this process, with the servers that BUILDARENA_* name, until Ctrl-C."""
-    from buildarena_cli.local.programs import programs
-    from buildarena_pipeline.catalog.simulators import SIMULATORS
+    """Serve a queue from this process until Ctrl-C.
 
-    known = programs(SIMULATORS)
-    workers = {program.queue: program.words for program in known if program.queue}
-    if queue not in workers:
-        raise CommandError(
-            f"there is no queue {queue!r}; choose from {', '.join(workers)}"
-            f"{did_you_mean(queue, workers)}"
-        )
-    run_instead(workers[queue])
+    It uses the servers that BUILDARENA_* name; with --api it is a runner, which needs neither
+    database nor broker.
+    """
+    given = _options({"--key-file": key_file, "--ca-file": ca_file, "--at-once": at_once})
+    given += ["--allow-http"] * allow_http
+    if api is not None:
+        run_instead([*_remote(queue), "--api", api, *given])
+    if given:
+        raise CommandError(f"{given[0]}: only with --api URL")
+    run_instead(_known(queue))
+
+
+@app.command("list")
+def list_workers(*, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) -> None:
+    """List the workers that a service heard of within the last hour, runners included."""
+    from buildarena_cli.client import Client
+
+    found = Client(url).get("/v1/workers")
+    if as_json:
+        print_json(found)
+        return
+    print_table(COLUMNS, [_row(worker) for worker in found])
+
+
+@app.command("doctor")
+def check_runner(
+    queue: Annotated[str, typer.Argument(help="The queue to serve, such as simulate.mujoco.")],
+    *,
+    api: Annotated[str, typer.Option("--api", metavar="URL", help="The API to reach.")],
+    key_file: KeyFileOption = None,
+    ca_file: CaFileOption = None,
+    allow_http: AllowHttpOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Show whether a runner could work from here, and what to do if not.
+
+    The exit code is 1 when anything is wrong.
+    """
+    words = [*_remote(queue), "--api", api, "--check"]
+    words += _options({"--key-file": key_file, "--ca-file": ca_file})
+    run_instead([*words, *(["--allow-http"] * allow_http), *(["--json"] * as_json)])
 
 
 def migrate() -> None:
@@ -51,3 +117,44 @@ def migrate() -> None:
     database = Database(url)
     say(f"schema {database.migrate()}")
     database.close()
+
+
+def _known(queue: str) -> list[str]:
+    """The words of the program that serves a queue."""
+    from buildarena_cli.local.programs import programs
+    from buildarena_pipeline.catalog.simulators import SIMULATORS
+
+    known = programs(SIMULATORS)
+    workers = {program.queue: program.words for program in known if program.queue}
+    if queue not in workers:
+        raise CommandError(
+            f"there is no queue {queue!r}; choose from {', '.join(workers)}"
+            f"{did_you_mean(queue, workers)}"
+        )
+    return list(workers[queue])
+
+
+def _remote(queue: str) -> list[str]:
+    """The words of the program that serves a queue through the API."""
+    words = _known(queue)
+    if not queue.startswith(SIMULATE):
+        raise CommandError(f"{queue!r} needs the database: with --api, {SIMULATE}SIMULATOR")
+    return words
+
+
+def _options(given: Mapping[str, object]) -> list[str]:
+    """Options that are given, as words."""
+    return [word for name, value in given.items() if value for word in (name, str(value))]
+
+
+def _row(worker: dict[str, Any]) -> list[str]:
+    versions, peak = worker["versions"], worker["peak_memory_bytes"]
+    shown = [str(versions[name]) for name in ("engine", "simulation") if name in versions]
+    return [
+        worker["id"],
+        ", ".join(worker["queues"]),
+        "alive" if worker["alive"] else f"last seen {minute_of(worker['seen_at'])}",
+        " ".join(shown),
+        "" if peak is None else number(peak / MEBIBYTE, 0),
+        minute_of(worker["started_at"]),
+    ]

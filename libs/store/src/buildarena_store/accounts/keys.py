@@ -29,7 +29,9 @@ class ApiKey:
     Attributes:
         id: Its identifier, which also names its holder's sweeps and budget.
         name: Who holds it, for people.
-        scopes: What it may do: ``read``, ``submit``, ``admin``.
+        scopes: What it may do: ``read``, ``submit``, ``admin``, or only ``runner``.
+        simulators: Of a runner key, the simulators whose jobs may be leased with it.
+        job_owners: Of a runner key, the keys whose jobs may be leased; None for everybody's.
         created_at: When it was made.
         expires_at: When it ends, if ever.
         revoked_at: When it was revoked, if it was.
@@ -41,6 +43,8 @@ class ApiKey:
     id: str
     name: str
     scopes: Sequence[str]
+    simulators: Sequence[str] | None
+    job_owners: Sequence[str] | None
     created_at: datetime
     expires_at: datetime | None
     revoked_at: datetime | None
@@ -69,7 +73,13 @@ class ApiKeys:
         self._database = database
 
     def create(
-        self, *, name: str, scopes: Sequence[str], ttl: timedelta | None = None
+        self,
+        *,
+        name: str,
+        scopes: Sequence[str],
+        ttl: timedelta | None = None,
+        simulators: Sequence[str] | None = None,
+        job_owners: Sequence[str] | None = None,
     ) -> tuple[ApiKey, str]:
         """Makes a key.
 
@@ -77,6 +87,8 @@ class ApiKeys:
             name: Who holds it.
             scopes: What it may do.
             ttl: How long it is valid; None for no limit.
+            simulators: Of a runner key, the simulators whose jobs may be leased.
+            job_owners: Of a runner key, the keys whose jobs may be leased; None for everybody's.
 
         Returns:
             The key, and its secret, which can't be read again.
@@ -89,6 +101,8 @@ class ApiKeys:
                 name=name,
                 secret_hash=secret_hash(secret),
                 scopes=list(scopes),
+                simulators=None if simulators is None else list(simulators),
+                job_owners=None if job_owners is None else list(job_owners),
                 expires_at=None if ttl is None else events.now + ttl,
             )
             .returning(*_COLUMNS)

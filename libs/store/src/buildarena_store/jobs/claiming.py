@@ -17,7 +17,11 @@ OPERATOR = ""
 _OWNER = "COALESCE(owner, '')"
 _QUEUED = f"state = '{JobState.QUEUED}' AND queue = :queue"
 _WAITS = f"{_QUEUED} AND available_at <= clock_timestamp()"
-_ROOM = f"{_OWNER} <> ALL(CAST(:full AS text[]))"
+_ROOM = (
+    f"{_OWNER} <> ALL(CAST(:full AS text[]))"
+    f" AND (CAST(:only AS text[]) IS NULL OR {_OWNER} = ANY(CAST(:only AS text[])))"
+    " AND (CAST(:version AS text) IS NULL OR track_config ->> 'simulation_version' = :version)"
+)
 CLAIM = text(
     f"""
     WITH RECURSIVE owners (name) AS (
@@ -30,6 +34,11 @@ CLAIM = text(
     ), turns AS MATERIALIZED (
         SELECT name FROM owners
         WHERE name IS NOT NULL AND name <> ALL(CAST(:full AS text[]))
+            AND (CAST(:only AS text[]) IS NULL OR name = ANY(CAST(:only AS text[])))
+            AND (CAST(:version AS text) IS NULL OR EXISTS (
+                SELECT FROM jobs WHERE {_WAITS} AND {_OWNER} = name
+                AND track_config ->> 'simulation_version' = :version
+            ))
         ORDER BY
             name IS NOT DISTINCT FROM CAST(:last AS text),
             name < COALESCE(CAST(:last AS text), ''),
@@ -49,7 +58,7 @@ CLAIM = text(
                   OR NOT EXISTS (SELECT FROM turns WHERE name IS DISTINCT FROM :last))
              FOR UPDATE SKIP LOCKED),
             (SELECT oldest.id FROM turns CROSS JOIN LATERAL (
-                SELECT id FROM jobs WHERE {_WAITS} AND {_OWNER} = turns.name
+                SELECT id FROM jobs WHERE {_WAITS} AND {_OWNER} = turns.name AND {_ROOM}
                 ORDER BY created_at, id LIMIT 1 FOR UPDATE SKIP LOCKED
              ) AS oldest LIMIT 1)
         )
@@ -68,6 +77,7 @@ CLAIM = text(
 ).columns(*JOB_COLUMNS, column("budgeted", Boolean))
 """Takes a job of ``:queue`` for ``:owner``, and returns it with whether a budget pays for it.
 
-Owners in ``:full`` are passed over; the owner in ``:last`` comes after the others, but for its
-recovered jobs.
+Owners in ``:full`` are passed over, and all but those in ``:only`` if it is given, as are jobs for
+another version of the simulator than ``:version`` if it is given; the owner in ``:last`` comes
+after the others, but for its recovered jobs.
 """

@@ -85,6 +85,8 @@ class Leases:
         hint: str | None = None,
         full: Sequence[str] = (),
         last: str | None = None,
+        only: Sequence[str] | None = None,
+        version: str | None = None,
     ) -> Lease | None:
         """Takes a waiting job of a queue: a recovered one first, then the hinted, then the oldest.
 
@@ -97,6 +99,8 @@ class Leases:
             hint: The job that a message named.
             full: Owners whose jobs may not be taken now.
             last: The owner whose job was taken last.
+            only: Owners whose jobs may be taken; None for everybody's.
+            version: The simulator's version that jobs must have been submitted for, if given.
 
         Returns:
             The lease, or None when nothing waits.
@@ -108,6 +112,8 @@ class Leases:
             "duration": self.duration,
             "full": list(full),
             "last": last,
+            "only": None if only is None else list(only),
+            "version": version,
         }
         with self._database.statement() as connection:
             row = connection.execute(CLAIM, given).first()

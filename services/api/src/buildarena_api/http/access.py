@@ -1,13 +1,15 @@
 """Who sends a request, and what they may do: API keys, scopes and rate limits.
 
 Reading needs the scope ``read``, everything else ``submit``, the service's own affairs ``admin``;
-each includes those before it. What somebody submitted, only its owner or an admin may change.
-Where the operator asks for no keys, which is allowed on loopback only, whoever asks is admin.
+each includes those before it. The scope ``runner`` stands apart: it may lease trials, as no other
+scope may, and nothing else. What somebody submitted, only its owner or an admin may change. Where
+the operator asks for no keys, which is allowed on loopback only, whoever asks is admin.
 """
 
 from __future__ import annotations
 
 import hmac
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -17,14 +19,30 @@ from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
 from buildarena_api.http.key_checks import KeyChecks
 from buildarena_api.http.problems import ProblemError
 from buildarena_api.http.rate_limits import RateLimits
+from buildarena_pipeline.catalog.simulators import SIMULATORS
 from buildarena_pipeline.runtime.settings import Settings
 
 SCOPES = ("read", "submit", "admin")
 """From the least to the most; each includes those before it."""
+RUNNER = "runner"
+"""The scope of runner keys, beside the others."""
 LOOPBACK = ("127.0.0.1", "::1", "localhost")
 METRICS_PATH = "/v1/metrics"
 READING = ("GET", "HEAD", "OPTIONS")
 _bearer = HTTPBearer(auto_error=False, description="An API key, as `buildarena key create` made it")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunnerRights:
+    """What a caller's runners may lease.
+
+    Attributes:
+        simulators: The simulators whose jobs they may lease.
+        job_owners: The keys whose jobs they may lease; None for everybody's.
+    """
+
+    simulators: Sequence[str]
+    job_owners: Sequence[str] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,10 +52,12 @@ class Caller:
     Attributes:
         key_id: The key's id; None for the operator and where no keys are asked for.
         scope: The greatest scope that was given.
+        runner: What it may lease; None for all but runner keys and where no keys are asked for.
     """
 
     key_id: str | None
     scope: str
+    runner: RunnerRights | None = None
 
     @property
     def is_admin(self) -> bool:
@@ -50,6 +70,8 @@ class Caller:
         Raises:
             ProblemError: 403, when it may not.
         """
+        if self.scope == RUNNER:
+            raise ProblemError(403, f"this needs the scope {scope!r}; a runner key leases trials")
         if SCOPES.index(self.scope) < SCOPES.index(scope):
             raise ProblemError(403, f"this needs the scope {scope!r}; the key has {self.scope!r}")
 
@@ -95,6 +117,28 @@ async def caller_of(
         ProblemError: 401 for no or no good key, 403 for too small a scope, 429 for too many
             requests.
     """
+    caller = await _admitted(request, given)
+    caller.require("read" if request.method in READING else "submit")
+    return caller
+
+
+async def runner_of(
+    request: Request,
+    given: Annotated[HTTPAuthorizationCredentials | None, Depends(_bearer)],
+) -> Caller:
+    """As `caller_of`, for what runners ask: only runner keys may, and anybody without keys.
+
+    Raises:
+        ProblemError: As of `caller_of`.
+    """
+    caller = await _admitted(request, given)
+    if caller.runner is None:
+        raise ProblemError(403, f"this needs the scope 'runner'; the key has {caller.scope!r}")
+    return caller
+
+
+async def _admitted(request: Request, given: HTTPAuthorizationCredentials | None) -> Caller:
+    """Who sent the request, counted; what they may do is not looked at."""
     limits: RateLimits = request.app.state.rate_limits
     checks: KeyChecks = request.app.state.key_checks
     settings: Settings = request.app.state.context.settings
@@ -107,7 +151,6 @@ async def caller_of(
         raise
     request.state.caller = caller
     await _count(limits, who_asks(request))
-    caller.require("read" if request.method in READING else "submit")
     return caller
 
 
@@ -124,6 +167,7 @@ def _address(request: Request) -> str:
 
 
 CallerDep = Annotated[Caller, Depends(caller_of)]
+RunnerDep = Annotated[Caller, Depends(runner_of)]
 
 
 async def admin_only(caller: CallerDep) -> None:
@@ -147,7 +191,7 @@ async def _identify(
     if given is None:
         if settings.require_keys:
             raise _unauthorized("an API key is needed: send `Authorization: Bearer KEY`")
-        return Caller(key_id=None, scope="admin")
+        return Caller(key_id=None, scope="admin", runner=RunnerRights(simulators=SIMULATORS))
     secret = given.credentials
     if _is_operators(secret, settings):
         return Caller(key_id=None, scope="admin")
@@ -156,8 +200,12 @@ async def _identify(
         raise _unauthorized("unknown API key")
     if found.refusal is not None:
         raise _unauthorized(f"API key {found.key.id} is {found.refusal}")
-    scopes = [scope for scope in SCOPES if scope in found.key.scopes]
-    return Caller(key_id=found.key.id, scope=scopes[-1])
+    key = found.key
+    if RUNNER in key.scopes:
+        rights = RunnerRights(simulators=key.simulators or (), job_owners=key.job_owners)
+        return Caller(key_id=key.id, scope=RUNNER, runner=rights)
+    scopes = [scope for scope in SCOPES if scope in key.scopes]
+    return Caller(key_id=key.id, scope=scopes[-1])
 
 
 def _reader_of_metrics(

@@ -7,14 +7,14 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass, field
 from typing import Any
 
 from fastapi import Depends, Request
 
-from buildarena_api.http.access import CallerDep, who_asks
+from buildarena_api.http.access import Caller, caller_of, who_asks
 from buildarena_api.http.problems import ProblemError
 
 MAX_WAITING = 64
@@ -119,6 +119,8 @@ class ConcurrencyLimits:
     archives: ConcurrencyLimit
     exports: ConcurrencyLimit
     trajectories: ConcurrencyLimit
+    runner_waits: ConcurrencyLimit
+    runner_outcomes: ConcurrencyLimit
 
 
 def usual_limits() -> ConcurrencyLimits:
@@ -131,18 +133,28 @@ def usual_limits() -> ConcurrencyLimits:
         exports=ConcurrencyLimit("exports", per_caller=2, total=4),
         # One may have 64 MB in memory until it is sent.
         trajectories=ConcurrencyLimit("trajectories", per_caller=4, total=12, wait_s=30.0),
+        runner_waits=ConcurrencyLimit("waits for a trial", per_caller=64, total=1000),
+        # One may have a hundred megabytes in memory until it is scored.
+        runner_outcomes=ConcurrencyLimit("outcomes", per_caller=2, total=4, wait_s=30.0),
     )
 
 
-def limited(kind: str, *, until: str = "function") -> Any:
+def limited(
+    kind: str,
+    *,
+    until: str = "function",
+    caller: Callable[..., Awaitable[Caller]] = caller_of,
+) -> Any:
     """A dependency: the caller's place among those of a kind.
 
     Args:
         kind: A field of `ConcurrencyLimits`.
         until: ``function``, or ``request`` to keep the place until the answer was sent.
+        caller: The dependency that says who asks.
     """
 
-    async def take_place(request: Request, _: CallerDep) -> AsyncIterator[None]:
+    # Annotations are looked up outside of this function, where its arguments are not.
+    async def take_place(request: Request, _: Caller = Depends(caller)) -> AsyncIterator[None]:  # noqa: B008
         limits: ConcurrencyLimits = request.app.state.concurrency
         limit: ConcurrencyLimit = getattr(limits, kind)
         async with limit.slot(who_asks(request)):

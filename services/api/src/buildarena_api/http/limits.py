@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 
 import structlog
 from starlette.datastructures import Headers, MutableHeaders
@@ -34,6 +34,7 @@ class BodyLimitMiddleware:
         app: The application.
         unlimited: Paths of routes that read their bodies in pieces, and bound them.
         documents: Paths of routes that read something else than JSON, and bound its depth.
+        pieces: Whether a path is one of a route that takes pieces of files.
         max_bytes: Largest request body accepted.
     """
 
@@ -43,11 +44,13 @@ class BodyLimitMiddleware:
         *,
         unlimited: Collection[str] = (),
         documents: Collection[str] = (),
+        pieces: Callable[[str], bool] = lambda _: False,
         max_bytes: int = MAX_BYTES,
     ) -> None:
         self._app = app
         self._unlimited = frozenset(unlimited)
         self._documents = frozenset(documents)
+        self._pieces = pieces
         self._max_bytes = max_bytes
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -70,11 +73,14 @@ class BodyLimitMiddleware:
             return
         if body is None:
             await self._refuse(safe_send)
-        elif scope["path"] not in self._documents and is_too_deep(body):
+        elif not self._is_no_json(scope["path"]) and is_too_deep(body):
             detail = f"the body has more than {MAX_DEPTH} arrays or objects inside each other"
             await send_problem(safe_send, 422, detail)
         else:
             await self._app(scope, _replay(body, receive), safe_send)
+
+    def _is_no_json(self, path: str) -> bool:
+        return path in self._documents or self._pieces(path)
 
     async def _read(self, receive: Receive) -> bytes | None:
         """The whole body, or None when it is too large, whatever its length header says.

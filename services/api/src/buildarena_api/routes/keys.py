@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from datetime import datetime, timedelta
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 from fastapi import APIRouter, Depends, Request, Response
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from buildarena_api.dependencies import ContextDep
 from buildarena_api.http.access import admin_only
 from buildarena_api.http.key_checks import KeyChecks
 from buildarena_api.http.problems import problem_responses
 from buildarena_api.schemas import BudgetView
+from buildarena_pipeline.catalog.simulators import SIMULATORS
 from buildarena_pipeline.catalog.specs import Budget, Title
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.notify import notify_waiting
@@ -22,6 +23,12 @@ from buildarena_store.states import CONSTRUCT_QUEUE
 router = APIRouter(prefix="/v1/keys", tags=["keys"], dependencies=[Depends(admin_only)])
 
 
+def _known_simulator(name: str) -> str:
+    if name not in SIMULATORS:
+        raise ValueError(f"there is no simulator {name!r}; choose from {', '.join(SIMULATORS)}")
+    return name
+
+
 class NewKey(BaseModel):
     """A request for a key."""
 
@@ -29,13 +36,47 @@ class NewKey(BaseModel):
 
     name: Annotated[Title, Field(description="Who holds it", examples=["ada"])]
     scopes: Annotated[
-        list[Literal["read", "submit", "admin"]],
-        Field(min_length=1, max_length=3, description="Each includes those before it"),
+        list[Literal["read", "submit", "admin", "runner"]],
+        Field(
+            min_length=1,
+            max_length=3,
+            description="read, submit and admin: each includes those before it; or runner alone, "
+            "which may lease trials and nothing else",
+        ),
     ]
+    simulators: Annotated[
+        list[Annotated[str, AfterValidator(_known_simulator)]] | None,
+        Field(
+            min_length=1,
+            max_length=10,
+            description="Of a runner key: the simulators whose jobs its runners may lease",
+        ),
+    ] = None
+    job_owners: Annotated[
+        list[Annotated[str, Field(pattern=r"^key_[0-9a-f]{1,40}$")]] | None,
+        Field(
+            min_length=1,
+            max_length=100,
+            description="Of a runner key: ids of the keys whose jobs may be leased; null for all",
+        ),
+    ] = None
     days: Annotated[
         int | None, Field(ge=1, le=3650, description="Days until it expires; null for never")
     ] = None
     budget: Budget | None = None
+
+    @model_validator(mode="after")
+    def _is_of_one_kind(self) -> Self:
+        if "runner" not in self.scopes:
+            if self.simulators is not None or self.job_owners is not None:
+                raise ValueError("simulators and job_owners are for keys with the scope runner")
+        elif set(self.scopes) != {"runner"}:
+            raise ValueError("the scope runner stands alone: a runner's key may do nothing else")
+        elif self.simulators is None:
+            raise ValueError(f"a runner key names its simulators: {', '.join(SIMULATORS)}")
+        elif self.budget is not None:
+            raise ValueError("a runner key submits nothing, so it has no budget")
+        return self
 
 
 class Rotation(BaseModel):
@@ -62,6 +103,8 @@ class KeyView(BaseModel):
     id: str = Field(examples=["key_0a1b2c3d4e5f60718293"])
     name: str
     scopes: list[str]
+    simulators: list[str] | None = Field(description="Of a runner key: what it may lease jobs of")
+    job_owners: list[str] | None = Field(description="Of a runner key: whose; null for everybody's")
     created_at: datetime
     expires_at: datetime | None
     revoked_at: datetime | None
@@ -82,7 +125,13 @@ class KeyCreated(KeyView):
 def create_key(body: NewKey, response: Response, context: ContextDep) -> KeyCreated:
     """Makes a key. Its secret is in this answer only."""
     ttl = None if body.days is None else timedelta(days=body.days)
-    key, secret = context.store.keys.create(name=body.name, scopes=body.scopes, ttl=ttl)
+    key, secret = context.store.keys.create(
+        name=body.name,
+        scopes=body.scopes,
+        ttl=ttl,
+        simulators=body.simulators,
+        job_owners=body.job_owners,
+    )
     if body.budget is not None:
         with context.store.database.transaction() as connection:
             context.store.budgets.set(key.id, body.budget.as_limits(), connection=connection)

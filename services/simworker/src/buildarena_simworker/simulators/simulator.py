@@ -8,7 +8,17 @@ from typing import Any, Protocol
 
 from buildarena_benchmark import Task
 from buildarena_geometry import KeyPress, Machine
+from buildarena_pipeline.runtime.trial_outcomes import File
 from buildarena_simulation import Trajectory
+
+__all__ = [
+    "File",
+    "MachineRefusedError",
+    "Simulated",
+    "Simulator",
+    "SimulatorFaultError",
+    "Trial",
+]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,14 +44,6 @@ class Trial:
     machine: Machine
     controls: Sequence[KeyPress] | None
     require_held: Callable[[], None]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class File:
-    """Bytes to be kept with a job."""
-
-    data: bytes
-    media_type: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,0 +1,161 @@
+"""Leases of runners, which name them over HTTP: found by key, job and token.
+
+A lease's owner is ``runner@KEY/NAME``: a key's runners touch no lease of another key, and a runner
+that asks again under the same name, because an answer was lost, gets the same lease again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from datetime import timedelta
+from typing import Final
+
+from sqlalchemy import ColumnElement, and_, func, select, true, tuple_, update
+
+from buildarena_store import events
+from buildarena_store.database import Database
+from buildarena_store.errors import StaleLeaseError
+from buildarena_store.jobs.job import Job
+from buildarena_store.jobs.leases import Lease
+from buildarena_store.rows import columns_of, value_of
+from buildarena_store.states import JobState
+from buildarena_store.tables import attempts, jobs, workers
+
+OPERATOR_KEY: Final = "operator"
+"""Stands for the key where none is asked for."""
+LONGEST_TRIAL: Final = timedelta(hours=1)
+"""A lease that is older is renewed no more: a runner must not keep a job forever."""
+
+JobToken = tuple[str, int]
+
+
+def runner_prefix(key_id: str | None) -> str:
+    """What the lease owners of a key's runners begin with."""
+    return f"runner@{key_id or OPERATOR_KEY}/"
+
+
+class RunnerLeases:
+    """Finds and renews the leases of one key's runners at a time.
+
+    Args:
+        database: Where the jobs are.
+        duration_s: Seconds that a lease is valid without a heartbeat.
+    """
+
+    def __init__(self, database: Database, *, duration_s: float) -> None:
+        self._database = database
+        self._duration = timedelta(seconds=duration_s)
+
+    def of(self, owner: str) -> Lease | None:
+        """The live lease that a runner has under exactly this name, if any."""
+        query = select(*_COLUMNS).where(
+            jobs.c.state == JobState.RUNNING,
+            jobs.c.lease_owner == owner,
+            jobs.c.lease_expires_at > events.now,
+        )
+        with self._database.statement() as connection:
+            row = connection.execute(query.limit(1)).first()
+        return None if row is None else _lease(row)
+
+    def live(self, job_id: str, token: int, prefix: str) -> Lease:
+        """The lease that a key's runner names.
+
+        Raises:
+            StaleLeaseError: It is over, never was, or is not this key's.
+        """
+        query = select(*_COLUMNS).where(
+            jobs.c.id == job_id,
+            jobs.c.lease_token == token,
+            jobs.c.state == JobState.RUNNING,
+            _begins(jobs.c.lease_owner, prefix),
+        )
+        with self._database.statement() as connection:
+            row = connection.execute(query).first()
+        if row is None:
+            raise StaleLeaseError(job_id, token)
+        return _lease(row)
+
+    def ending(self, job_id: str, token: int, prefix: str) -> str | None:
+        """How an attempt of a key's runner ended; None when it has not, or is not this key's."""
+        query = select(attempts.c.result).where(
+            attempts.c.job_id == job_id,
+            attempts.c.token == token,
+            _begins(attempts.c.worker, prefix),
+        )
+        with self._database.statement() as connection:
+            return connection.execute(query).scalar_one_or_none()
+
+    def heartbeat(self, named: Collection[JobToken], prefix: str) -> set[JobToken]:
+        """Renews leases of a key's runners.
+
+        Returns:
+            Those that live on; work on the others must stop.
+        """
+        if not named:
+            return set()
+        young = (
+            select(attempts)
+            .where(
+                attempts.c.job_id == jobs.c.id,
+                attempts.c.token == jobs.c.lease_token,
+                attempts.c.started_at > events.now - LONGEST_TRIAL,
+            )
+            .exists()
+        )
+        statement = (
+            update(jobs)
+            .where(_among(named), _begins(jobs.c.lease_owner, prefix), young)
+            .values(lease_expires_at=events.now + self._duration)
+            .returning(jobs.c.id, jobs.c.lease_token)
+        )
+        with self._database.statement() as connection:
+            return {(row.id, row.lease_token) for row in connection.execute(statement)}
+
+    def alive(self, named: Collection[JobToken]) -> set[JobToken]:
+        """Those of the leases, whoever's, that are not over."""
+        if not named:
+            return set()
+        query = select(jobs.c.id, jobs.c.lease_token).where(_among(named))
+        with self._database.statement() as connection:
+            return {(row.id, row.lease_token) for row in connection.execute(query)}
+
+    def counts(self, prefix: str, *, besides: str) -> Mapping[str, int]:
+        """How much a key's runners have: ``leases``, and ``names`` in the register of workers.
+
+        Args:
+            prefix: The key's.
+            besides: The name of the one that asks, which is not counted.
+        """
+        leases = select(func.count()).where(
+            jobs.c.state == JobState.RUNNING, _begins(jobs.c.lease_owner, prefix)
+        )
+        names = select(func.count()).where(
+            _begins(workers.c.id, prefix),
+            workers.c.id != besides,
+            workers.c.seen_at > events.now - timedelta(minutes=1),
+        )
+        query = select(
+            leases.scalar_subquery().label("leases"), names.scalar_subquery().label("names")
+        )
+        with self._database.statement() as connection:
+            row = connection.execute(query).one()
+        return {"leases": row.leases, "names": row.names}
+
+
+_COLUMNS = columns_of(Job, jobs)
+
+
+def _lease(row: object) -> Lease:
+    job = value_of(Job, row)
+    return Lease(job=job, owner=str(job.lease_owner), token=job.lease_token)
+
+
+def _among(named: Collection[JobToken]) -> ColumnElement[bool]:
+    pairs: Sequence[JobToken] = list(named)
+    return and_(
+        true(), jobs.c.state == JobState.RUNNING, tuple_(jobs.c.id, jobs.c.lease_token).in_(pairs)
+    )
+
+
+def _begins(column: ColumnElement[str], prefix: str) -> ColumnElement[bool]:
+    return func.starts_with(column, prefix)

@@ -1,0 +1,312 @@
+"""The runner protocol: simulation workers that reach nothing but this API.
+
+A runner leases a trial, sends heartbeats while it runs it, uploads what came of it and hands it
+over; docs/runners.md tells the whole of it. The score is found here, never sent.
+"""
+
+# ruff: noqa: FAST003 - what names a lease and a file in paths is read by dependencies
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Final
+
+from fastapi import APIRouter, Depends, Path, Query, Request, Response
+
+from buildarena_api.dependencies import ContextDep
+from buildarena_api.http.access import Caller, RunnerDep, RunnerRights, runner_of
+from buildarena_api.http.concurrency import limited
+from buildarena_api.http.problems import ProblemError, problem_responses
+from buildarena_api.runners.outcomes import stale
+from buildarena_api.runners.service import RunnerService
+from buildarena_api.runners.views import (
+    Ended,
+    Fault,
+    Heartbeat,
+    HeartbeatAnswer,
+    LeasedTrial,
+    LeaseWish,
+    Outcome,
+    Received,
+    RunnerAbout,
+    RunnerFacts,
+)
+from buildarena_api.runners.wishes import MAX_NAMES, Leased, Wish
+from buildarena_benchmark import ValidationIssue
+from buildarena_pipeline.catalog.simulators import served, simulation_version
+from buildarena_pipeline.errors import PermanentError
+from buildarena_pipeline.runtime.context import Context
+from buildarena_pipeline.runtime.trial_books import TrialBooks
+from buildarena_store import StaleLeaseError, UploadedFile, UploadError
+from buildarena_store.jobs.runner_leases import JobToken, runner_prefix
+from buildarena_store.states import simulate_queue
+from buildarena_store.uploads import MAX_FILE_BYTES, MAX_LEASE_BYTES, PIECE_BYTES
+
+PREFIX: Final = "/v1/runner"
+OCTETS: Final = "application/octet-stream"
+router = APIRouter(prefix=PREFIX, tags=["runner"])
+
+_ORDINARY = limited("ordinary", caller=runner_of)
+
+
+def is_piece(path: str) -> bool:
+    """Whether a path is that of a piece of a file."""
+    return path.startswith(f"{PREFIX}/leases/") and "/uploads/" in path
+
+
+def _named(
+    job_id: Annotated[str, Path(pattern=r"^job_[0-9a-f]{1,40}$")],
+    token: Annotated[int, Path(ge=1, lt=2**63, description="The lease's fencing token")],
+) -> JobToken:
+    return job_id, token
+
+
+def _file(
+    sha256: Annotated[str, Path(pattern=r"^[0-9a-f]{64}$", description="Of the whole file")],
+    size: Annotated[int, Query(ge=0, le=MAX_FILE_BYTES, description="Of the whole file, bytes")],
+) -> UploadedFile:
+    return UploadedFile(sha256=sha256, size=size)
+
+
+async def _service(request: Request) -> RunnerService:
+    service: RunnerService = request.app.state.runners
+    return service
+
+
+NamedDep = Annotated[JobToken, Depends(_named)]
+FileDep = Annotated[UploadedFile, Depends(_file)]
+ServiceDep = Annotated[RunnerService, Depends(_service)]
+
+
+@router.get("", dependencies=[_ORDINARY], responses=problem_responses(503))
+def show_runner(caller: RunnerDep, context: ContextDep) -> RunnerFacts:
+    """What a runner should know before it begins: whose jobs it may lease, versions, limits."""
+    game = context.settings.besiege_version
+    allowed = list(_rights(caller).simulators)
+    return RunnerFacts(
+        simulators=allowed,
+        versions={name: simulation_version(name, game) for name in served(game) if name in allowed},
+        lease_s=context.settings.lease_s,
+        piece_bytes=PIECE_BYTES,
+        max_file_bytes=MAX_FILE_BYTES,
+        max_lease_bytes=MAX_LEASE_BYTES,
+    )
+
+
+@router.post(
+    "/leases",
+    dependencies=[limited("runner_waits", caller=runner_of)],
+    responses={
+        204: {"description": "There is none now"},
+        **problem_responses(404, 422, 429, 500, 503),
+    },
+    response_model=LeasedTrial,
+)
+async def lease_trial(
+    *,
+    wish: LeaseWish,
+    caller: RunnerDep,
+    service: ServiceDep,
+    context: ContextDep,
+    request: Request,
+) -> Any:
+    """Leases the next trial, waiting for one for up to `wait_s` seconds; 204 when there is none.
+
+    A name has one lease at a time: whoever asks again under it gets the same lease.
+    """
+    rights = _rights(caller)
+    _require_allowed(wish, rights)
+    prefix = runner_prefix(caller.key_id)
+    leased = await service.wishes.granted(
+        Wish(
+            simulators=tuple(sorted(wish.simulators.items())),
+            job_owners=None if rights.job_owners is None else tuple(rights.job_owners),
+        ),
+        owner=prefix + wish.name,
+        prefix=prefix,
+        wait_s=wish.wait_s,
+        left=request.is_disconnected,
+    )
+    if leased is None:
+        return Response(status_code=204)
+    return _view(leased, context.settings.lease_s)
+
+
+@router.post("/heartbeat", dependencies=[_ORDINARY], responses=problem_responses(422, 503))
+def send_heartbeat(body: Heartbeat, caller: RunnerDep, context: ContextDep) -> HeartbeatAnswer:
+    """Keeps leases alive, many in one request, and says which are over."""
+    _require_allowed(body, _rights(caller))
+    store, prefix = context.store, runner_prefix(caller.key_id)
+    owner = prefix + body.name
+    if store.runner_leases.counts(prefix, besides=owner)["names"] >= MAX_NAMES:
+        raise ProblemError(
+            429,
+            f"the key's runners had {MAX_NAMES} names within a minute, as many as they may",
+            headers={"Retry-After": "30"},
+        )
+    store.workers.report(
+        worker_id=owner,
+        kind="simulate",
+        queues=[simulate_queue(simulator) for simulator in sorted(body.simulators)],
+        host=body.name,
+        pid=body.pid,
+        versions=body.versions,
+        peak_memory_bytes=body.peak_memory_bytes,
+        own_time=body.own_time,
+    )
+    live = store.runner_leases.heartbeat([(one.job_id, one.token) for one in body.leases], prefix)
+    answer = HeartbeatAnswer(live=[], lost=[])
+    for one in body.leases:
+        kept = (one.job_id, one.token) in live
+        (answer.live if kept else answer.lost).append(one)
+    return answer
+
+
+@router.post("/goodbye", dependencies=[_ORDINARY], responses=problem_responses(422, 503))
+def leave(body: RunnerAbout, caller: RunnerDep, context: ContextDep) -> HeartbeatAnswer:
+    """Takes a runner that shuts down off the list of workers."""
+    context.store.workers.leave(runner_prefix(caller.key_id) + body.name)
+    return HeartbeatAnswer(live=[], lost=[])
+
+
+@router.get(
+    "/leases/{job_id}/{token}",
+    dependencies=[_ORDINARY],
+    responses=problem_responses(404, 409, 422, 500, 503),
+)
+def get_leased_trial(named: NamedDep, caller: RunnerDep, context: ContextDep) -> LeasedTrial:
+    """The trial of a live lease, as the lease's own answer had it."""
+    try:
+        lease = context.store.runner_leases.live(*named, runner_prefix(caller.key_id))
+        return _view(Leased(lease, TrialBooks.of(context).due(lease.job)), context.settings.lease_s)
+    except (StaleLeaseError, PermanentError) as error:
+        raise stale(named) from error
+
+
+@router.get(
+    "/leases/{job_id}/{token}/uploads/{sha256}",
+    dependencies=[_ORDINARY],
+    responses=problem_responses(404, 409, 422, 503),
+)
+def get_received(
+    named: NamedDep,
+    file: FileDep,
+    caller: RunnerDep,
+    context: ContextDep,
+    service: ServiceDep,
+) -> Received:
+    """How much of a file has been received: after a lost connection, go on there."""
+    _require_live(context, named, caller)
+    offset = service.uploads.offset(named, file)
+    return Received(offset=offset, whole=offset == file.size)
+
+
+@router.put(
+    "/leases/{job_id}/{token}/uploads/{sha256}",
+    dependencies=[limited("runner_outcomes", caller=runner_of)],
+    responses=problem_responses(404, 409, 413, 422, 503),
+    openapi_extra={
+        "requestBody": {
+            "required": True,
+            "content": {OCTETS: {"schema": {"type": "string", "format": "binary"}}},
+        }
+    },
+)
+async def send_piece(
+    *,
+    named: NamedDep,
+    file: FileDep,
+    offset: Annotated[
+        int, Query(ge=0, le=MAX_FILE_BYTES, description="Where the piece begins in the file")
+    ],
+    request: Request,
+    caller: RunnerDep,
+    service: ServiceDep,
+) -> Received:
+    """Takes a piece of a file; one that was received before changes nothing."""
+    data = await request.body()
+
+    def keep() -> int:
+        _require_live(service.pool.context, named, caller)
+        try:
+            return service.uploads.append(named, file, offset, data)
+        except UploadError as error:
+            raise ProblemError(
+                422, str(error), errors=[ValidationIssue(path="offset", message=str(error))]
+            ) from error
+
+    received = await service.pool.run(keep)
+    return Received(offset=received, whole=received == file.size)
+
+
+@router.post(
+    "/leases/{job_id}/{token}/outcome",
+    dependencies=[limited("runner_outcomes", caller=runner_of)],
+    responses=problem_responses(404, 409, 422, 500, 503),
+)
+async def complete_trial(
+    named: NamedDep, body: Outcome, caller: RunnerDep, service: ServiceDep
+) -> Ended:
+    """Hands over what came of a trial, which is checked and scored here; ends the lease."""
+    prefix = runner_prefix(caller.key_id)
+    status = await service.pool.run(service.outcomes.complete, named, prefix, body)
+    return Ended(status=status)
+
+
+@router.post(
+    "/leases/{job_id}/{token}/fault",
+    dependencies=[limited("runner_outcomes", caller=runner_of)],
+    responses=problem_responses(404, 409, 422, 500, 503),
+)
+async def report_fault(
+    named: NamedDep, body: Fault, caller: RunnerDep, service: ServiceDep
+) -> Ended:
+    """Reports that the runner or its simulator failed; ends the lease."""
+    prefix = runner_prefix(caller.key_id)
+    return Ended(status=await service.pool.run(service.outcomes.fault, named, prefix, body))
+
+
+@router.post(
+    "/leases/{job_id}/{token}/hand-back",
+    dependencies=[_ORDINARY],
+    responses=problem_responses(404, 409, 422, 503),
+)
+def hand_back(named: NamedDep, caller: RunnerDep, service: ServiceDep) -> Ended:
+    """Gives a trial back without fault, as at shutdown; ends the lease."""
+    return Ended(status=service.outcomes.hand_back(named, runner_prefix(caller.key_id)))
+
+
+def _rights(caller: Caller) -> RunnerRights:
+    assert caller.runner is not None, "runner_of lets nobody else pass"  # noqa: S101
+    return caller.runner
+
+
+def _require_allowed(about: RunnerAbout, rights: RunnerRights) -> None:
+    for name in about.simulators:
+        if name not in rights.simulators:
+            choices = tuple(rights.simulators)
+            message = f"the key may not lease jobs of {name}"
+            issue = ValidationIssue(path="simulators", message=message, choices=choices)
+            raise ProblemError(403, f"{message}; choose from {', '.join(choices)}", errors=[issue])
+
+
+def _require_live(context: Context, named: JobToken, caller: Caller) -> None:
+    try:
+        context.store.runner_leases.live(*named, runner_prefix(caller.key_id))
+    except StaleLeaseError as error:
+        raise stale(named) from error
+
+
+def _view(leased: Leased, lease_s: float) -> LeasedTrial:
+    lease, due = leased.lease, leased.due
+    controls = due.request.controls
+    return LeasedTrial(
+        job_id=lease.job.id,
+        token=lease.token,
+        lease_s=lease_s,
+        simulator=due.request.engine,
+        version=due.version,
+        number=due.request.number,
+        task=dict(due.task.as_document()),
+        machine=due.machine.to_document(),
+        controls=None if controls is None else [dict(press) for press in controls],
+    )

@@ -1,0 +1,90 @@
+"""Strangers' files are unpacked in a process apart: one that bursts it is refused."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from functools import cache
+from typing import Any, Final
+
+import structlog
+
+from buildarena_geometry import Machine
+from buildarena_pipeline.runtime.trial_checks import OutcomeRefusedError, checked_trajectory
+from buildarena_pipeline.runtime.warm_process import ProcessEndedError, WarmProcess
+from buildarena_simulation import Scenario, Trajectory
+
+SPARE_BYTES: Final = 1 << 30
+"""Memory for one file: that of the most block-seconds takes some 200 MB while it is read."""
+LONGEST_S: Final = 30.0
+
+log = structlog.get_logger(__name__)
+
+
+class Checker:
+    """Reads and checks trajectories, one at a time."""
+
+    def __init__(self) -> None:
+        self._process = WarmProcess("trajectories", _answering, spare_bytes=SPARE_BYTES)
+        self._lock = threading.Lock()
+
+    def checked(
+        self, data: bytes, *, simulator: str, version: str, machine: Machine, scenario: Scenario
+    ) -> Trajectory:
+        """The trajectory of a file; see `checked_trajectory`.
+
+        Raises:
+            OutcomeRefusedError: It is none of this trial, or can't be read within the bounds.
+        """
+        question = {
+            "data": data,
+            "simulator": simulator,
+            "version": version,
+            "machine": machine.to_document(),
+            "scenario": scenario.model_dump_json(),
+        }
+        with self._lock:
+            until = time.monotonic() + LONGEST_S
+
+            def meanwhile() -> None:
+                if time.monotonic() > until:
+                    raise OutcomeRefusedError(f"it can't be read within {LONGEST_S:.0f} s")
+
+            try:
+                refusal, trajectory = self._process.ask(question, meanwhile=meanwhile)
+            except ProcessEndedError as error:
+                log.warning("trajectory_burst", code=error.code)
+                detail = "it can't be read within the memory it may take"
+                raise OutcomeRefusedError(detail) from error
+        if trajectory is None:
+            raise OutcomeRefusedError(refusal)
+        found: Trajectory = trajectory
+        return found
+
+
+@cache
+def shared_checker() -> Checker:
+    """This process' checker; its own process begins with the first file and ends with this one."""
+    return Checker()
+
+
+def _answering() -> Callable[[Any], tuple[str, Trajectory | None]]:
+    # Loaded before memory is limited.
+    import pyarrow.parquet
+
+    del pyarrow
+    return _answer
+
+
+def _answer(question: Any) -> tuple[str, Trajectory | None]:
+    try:
+        return "", checked_trajectory(
+            question["data"],
+            simulator=question["simulator"],
+            version=question["version"],
+            machine=Machine.from_document(question["machine"]),
+            scenario=Scenario.model_validate_json(question["scenario"]),
+        )
+    except OutcomeRefusedError as error:
+        return str(error), None

@@ -1,0 +1,195 @@
+"""What runners hand over: checked, scored and written under their leases."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Final, Literal
+
+import structlog
+
+from buildarena_api.http.problems import ProblemError
+from buildarena_api.runners.checking import shared_checker
+from buildarena_api.runners.views import Fault, NamedFile, Outcome
+from buildarena_pipeline.catalog.simulators import BESIEGE
+from buildarena_pipeline.runtime.context import Context
+from buildarena_pipeline.runtime.trial_books import DueTrial, TrialBooks
+from buildarena_pipeline.runtime.trial_checks import (
+    OutcomeRefusedError,
+    checked_versions,
+    require_refusable,
+)
+from buildarena_pipeline.runtime.trial_outcomes import File, TrialOutcome
+from buildarena_simulation import Trajectory
+from buildarena_store import Lease, StaleLeaseError, UploadedFile, UploadError, Uploads, clean
+from buildarena_store.jobs.runner_leases import JobToken
+from buildarena_store.states import AttemptResult
+
+MEDIA_TYPES: Final = {
+    "bsg": "application/xml",
+    "json": "application/json",
+    "lua": "text/x-lua",
+    "png": "image/png",
+    "txt": "text/plain",
+}
+LONGEST_DETAIL: Final = 2000
+Status = Literal["done", "already_done"]
+
+log = structlog.get_logger(__name__)
+
+
+class Outcomes:
+    """Ends the leases of runners.
+
+    Args:
+        context: Connections.
+        uploads: What runners have uploaded.
+    """
+
+    def __init__(self, context: Context, uploads: Uploads) -> None:
+        self._context = context
+        self._books = TrialBooks.of(context)
+        self._uploads = uploads
+        self._checker = shared_checker()
+
+    def complete(self, named: JobToken, prefix: str, said: Outcome) -> Status:
+        """Scores a trial and moves its job on.
+
+        Raises:
+            ProblemError: 409 when the lease is over, 422 for what is no outcome of its trial.
+        """
+
+        def end(lease: Lease) -> None:
+            due = self._books.due(lease.job)
+            try:
+                outcome = self._checked(named, due, said)
+            except (OutcomeRefusedError, UploadError) as error:
+                log.warning("outcome_refused", job=named[0], runner=lease.owner, error=str(error))
+                self._uploads.drop(named)
+                raise ProblemError(422, str(error)) from error
+            self._books.complete(lease, due, outcome)
+
+        return self._ended(named, prefix, AttemptResult.DONE, end)
+
+    def fault(self, named: JobToken, prefix: str, said: Fault) -> Status:
+        """Records a failure of the runner or its simulator; the job is tried again, or ends.
+
+        Raises:
+            ProblemError: As of `complete`.
+        """
+
+        def end(lease: Lease) -> None:
+            try:
+                number = self._books.due(lease.job).request.number
+                self._books.keep_evidence(named[0], self._files(named, number, said.files))
+            except UploadError as error:
+                raise ProblemError(422, str(error)) from error
+            detail = str(clean(said.detail))[:LONGEST_DETAIL]
+            leases = self._context.store.leases
+            if said.permanent:
+                leases.give_up(lease, detail, reason=said.reason)
+            else:
+                leases.fault(
+                    lease,
+                    detail,
+                    delay_s=said.delay_s,
+                    reason=said.reason,
+                    endless=said.endless,
+                )
+
+        return self._ended(named, prefix, AttemptResult.FAULT, end)
+
+    def hand_back(self, named: JobToken, prefix: str) -> Status:
+        """Gives the job back, without fault.
+
+        Raises:
+            ProblemError: 409 when the lease is over.
+        """
+        return self._ended(
+            named, prefix, AttemptResult.HANDED_BACK, self._context.store.leases.hand_back
+        )
+
+    def _ended(
+        self, named: JobToken, prefix: str, as_: AttemptResult, end: Callable[[Lease], object]
+    ) -> Status:
+        """Ends a lease once: whoever asks again because an answer was lost is told so."""
+        leases = self._context.store.runner_leases
+        try:
+            end(leases.live(*named, prefix))
+        except StaleLeaseError as error:
+            if leases.ending(*named, prefix) == as_:
+                return "already_done"
+            raise stale(named) from error
+        self._uploads.drop(named)
+        return "done"
+
+    def _checked(self, named: JobToken, due: DueTrial, said: Outcome) -> TrialOutcome:
+        simulator, version = due.request.engine, due.version
+        if said.annotations is not None and simulator != BESIEGE:
+            raise OutcomeRefusedError("only trials in the game have annotations")
+        trajectory: Trajectory | None = None
+        if said.trajectory is None:
+            require_refusable(
+                simulator=simulator,
+                machine=due.machine,
+                scenario=due.task.scenario,
+                controls=due.controls,
+            )
+        else:
+            file = UploadedFile(sha256=said.trajectory.sha256, size=said.trajectory.size)
+            trajectory = self._checker.checked(
+                self._uploads.take(named, file),
+                simulator=simulator,
+                version=version,
+                machine=due.machine,
+                scenario=due.task.scenario,
+            )
+        annotations = said.annotations
+        return TrialOutcome(
+            trajectory=trajectory,
+            versions=checked_versions(
+                said.versions, simulator=simulator, version=version, trajectory=trajectory
+            ),
+            wall_s=said.wall_s,
+            files=self._files(named, due.request.number, said.files),
+            annotations=None
+            if annotations is None
+            else {engine: one.model_dump() for engine, one in annotations.items()},
+        )
+
+    def _files(self, named: JobToken, number: int, said: Sequence[NamedFile]) -> dict[str, File]:
+        """Files to be kept; their names are of this rollout alone, so none takes another's place.
+
+        Raises:
+            UploadError: One was not uploaded, or has another rollout's name.
+        """
+        found = {}
+        for one in said:
+            words, _, ending = one.name.rpartition(".")
+            if words.split("-")[1] != str(number) or one.name in found:
+                raise UploadError(
+                    f"{one.name}: files of this trial are named KIND-{number}.ENDING, each once"
+                )
+            data = self._uploads.take(named, UploadedFile(sha256=one.sha256, size=one.size))
+            found[one.name] = File(data=data, media_type=MEDIA_TYPES[ending])
+        return found
+
+
+def stale(named: JobToken) -> ProblemError:
+    """The answer to whoever names a lease that is over, or never was theirs."""
+    return ProblemError(
+        409, f"lease {named[1]} on {named[0]} is over, or is not this key's: nothing was written"
+    )
+
+
+def drop_dead_uploads(context: Context, uploads: Uploads) -> int:
+    """Removes what was uploaded under leases that are over.
+
+    Returns:
+        Under how many.
+    """
+    # Listed first: a lease that is over then never lives again.
+    listed = uploads.leases()
+    dead = listed - context.store.runner_leases.alive(listed)
+    for named in dead:
+        uploads.drop(named)
+    return len(dead)

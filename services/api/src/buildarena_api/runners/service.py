@@ -1,0 +1,60 @@
+"""All that serves runners in one API process."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import structlog
+
+from buildarena_api.http.own_pool import OwnPool
+from buildarena_api.runners.outcomes import Outcomes, drop_dead_uploads
+from buildarena_api.runners.wishes import Wishes
+from buildarena_pipeline.periodic import Periodic
+from buildarena_pipeline.runtime.context import Context
+from buildarena_store import Uploads
+
+SCORERS: Final = 3
+"""Threads and connections for outcomes: their trajectories are unpacked and scored in them."""
+DROP_EVERY_S: Final = 60.0
+
+log = structlog.get_logger(__name__)
+
+
+class RunnerService:
+    """What the routes of runners use.
+
+    Args:
+        context: The process' connections.
+
+    Attributes:
+        pool: Where outcomes are scored.
+        uploads: What runners have uploaded.
+        wishes: Finds trials.
+        outcomes: Ends leases.
+    """
+
+    def __init__(self, context: Context) -> None:
+        self.pool = OwnPool(context, size=SCORERS, name="outcomes")
+        self.uploads = Uploads(context.settings.artifacts_location)
+        self.wishes = Wishes(context)
+        self.outcomes = Outcomes(self.pool.context, self.uploads)
+        self._cleaner = Periodic(self._clean, name="uploads", period_s=DROP_EVERY_S)
+
+    def start(self) -> None:
+        """Begins to remove uploads of dead leases every now and then."""
+        self._cleaner.start()
+
+    def close(self) -> None:
+        """Ends what was started and closes the connections."""
+        self._cleaner.stop()
+        self.pool.close()
+
+    def _clean(self) -> None:
+        try:
+            dropped = drop_dead_uploads(self.pool.context, self.uploads)
+        except Exception:
+            # Whatever it was, the next time may do.
+            log.exception("uploads_not_cleaned")
+        else:
+            if dropped:
+                log.info("uploads_dropped", leases=dropped)

@@ -1,0 +1,215 @@
+"""What runners send and are answered with."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Annotated, Any, Final, Literal
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+
+from buildarena_pipeline.catalog.simulators import ENGINE_SIMULATORS, SIMULATORS
+from buildarena_store.uploads import MAX_FILE_BYTES, MAX_LEASE_FILES
+
+LONGEST_WAIT_S: Final = 25.0
+MAX_VERSIONS: Final = 32
+
+
+def _known(name: str) -> str:
+    if name not in SIMULATORS:
+        raise ValueError(f"there is no simulator {name!r}; choose from {', '.join(SIMULATORS)}")
+    return name
+
+
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Short = Annotated[str, Field(max_length=500)]
+Fact = (
+    Annotated[str, Field(max_length=2000)]
+    | int
+    | Finite
+    | bool
+    | None
+    | Annotated[list[Short | int | Finite | bool | None], Field(max_length=64)]
+    | Annotated[dict[Short, Short | int | Finite | bool | None], Field(max_length=64)]
+)
+Facts = Annotated[dict[Annotated[str, Field(max_length=60)], Fact], Field(max_length=MAX_VERSIONS)]
+SimulatorName = Annotated[str, AfterValidator(_known)]
+Version = Annotated[str, Field(pattern=r"^[A-Za-z0-9._-]{1,80}$")]
+Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$", description="64 hex digits")]
+Size = Annotated[int, Field(ge=0, le=MAX_FILE_BYTES, description="Bytes")]
+
+
+class _Document(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+
+
+class RunnerAbout(_Document):
+    """What a runner says of itself."""
+
+    name: Annotated[
+        str,
+        Field(
+            pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,59}$",
+            description="Unique among the key's runners: it has one lease at a time",
+            examples=["lab3-4711-0"],
+        ),
+    ]
+    simulators: Annotated[
+        dict[SimulatorName, Version],
+        Field(
+            min_length=1,
+            max_length=8,
+            description="The simulators that it has, each with its version: only jobs that were "
+            "submitted for this version are leased to it",
+            examples=[{"mujoco": "3"}],
+        ),
+    ]
+    versions: Facts = {}
+    pid: Annotated[int, Field(ge=0, le=2**31 - 1)] = 0
+    peak_memory_bytes: Annotated[int, Field(ge=0, le=2**50)] | None = None
+    own_time: datetime | None = Field(
+        default=None, description="Its clock, for the check of clocks in /v1/health"
+    )
+
+
+class LeaseWish(RunnerAbout):
+    """A request for a trial."""
+
+    wait_s: Annotated[
+        float, Field(ge=0, le=LONGEST_WAIT_S, description="How long to wait until there is one")
+    ] = 0.0
+
+
+class RunnerFacts(BaseModel):
+    """What a runner should know before it begins."""
+
+    simulators: list[str] = Field(description="Whose jobs the key may lease")
+    versions: dict[str, str] = Field(
+        description="The versions for which the service takes jobs, by simulator"
+    )
+    lease_s: float = Field(description="A lease ends so long after its last heartbeat")
+    piece_bytes: int = Field(description="The length of all pieces of an upload but the last")
+    max_file_bytes: int
+    max_lease_bytes: int = Field(description="Most bytes that are uploaded under one lease")
+
+
+class LeasedTrial(BaseModel):
+    """A trial that was leased: all that is needed to run it."""
+
+    job_id: str
+    token: int = Field(description="The fencing token, which names the lease with the job")
+    lease_s: float = Field(description="It ends so long after its last heartbeat")
+    simulator: str
+    version: str = Field(description="The simulator's version that the job was submitted for")
+    number: int = Field(description="Which of the job's rollouts it is")
+    task: dict[str, Any] = Field(description="The task's document, with its scenario")
+    machine: dict[str, Any] = Field(description="The machine document")
+    controls: list[dict[str, Any]] | None = Field(
+        description="Key presses of this trial; null for the machine's own"
+    )
+
+
+class HeldLease(_Document):
+    """A lease that a runner believes it has."""
+
+    job_id: Annotated[str, Field(pattern=r"^job_[0-9a-f]{1,40}$")]
+    token: Annotated[int, Field(ge=1, lt=2**63)]
+
+
+class Heartbeat(RunnerAbout):
+    """A runner's sign of life, for itself and for its leases."""
+
+    leases: Annotated[list[HeldLease], Field(max_length=128)] = []
+
+
+class HeartbeatAnswer(BaseModel):
+    """Which leases live on; work under the others must stop, nothing of it will be taken."""
+
+    live: list[HeldLease]
+    lost: list[HeldLease]
+
+
+class Received(BaseModel):
+    """How much of a file has been received."""
+
+    offset: int = Field(description="Bytes received from its start: where the next piece begins")
+    whole: bool
+
+
+class SentFile(_Document):
+    """A file that was uploaded."""
+
+    sha256: Sha256
+    size: Size
+
+
+class NamedFile(SentFile):
+    """A file to be kept with the job."""
+
+    name: Annotated[
+        str,
+        Field(
+            pattern=r"^(log|machine|screenshot|script|state)-[0-9]{1,6}(-[0-9]{1,20}){0,2}"
+            r"\.(bsg|json|lua|png|txt)$",
+            max_length=80,
+            description="KIND-NUMBER.ENDING, with the rollout's number",
+            examples=["log-0.txt"],
+        ),
+    ]
+
+
+Files = Annotated[list[NamedFile], Field(max_length=MAX_LEASE_FILES - 1)]
+Seconds = Annotated[float, Field(ge=0, le=86_400, allow_inf_nan=False)]
+
+
+class Annotation(_Document):
+    """What an engine of ours says of a machine that the game tried."""
+
+    success: bool
+    indicator: Finite
+    flags: Annotated[list[Annotated[str, Field(max_length=60)]], Field(max_length=32)]
+    simulation: Annotated[str, Field(max_length=80)]
+    engine_version: Annotated[str, Field(max_length=80)]
+
+
+EngineName = Annotated[str, AfterValidator(lambda name: _one_of(name, ENGINE_SIMULATORS))]
+
+
+class Outcome(_Document):
+    """What came of a trial; its score is found here."""
+
+    trajectory: SentFile | None = Field(
+        description="The Parquet file; null when the simulator refused the machine"
+    )
+    versions: Facts = Field(description="Everything about the simulator that can change it")
+    wall_s: Seconds = Field(description="How long the trial took")
+    files: Files = []
+    annotations: Annotated[dict[EngineName, Annotation], Field(max_length=8)] | None = None
+
+
+class Fault(_Document):
+    """A failure of the runner or its simulator: the trial is not scored."""
+
+    reason: Annotated[str, Field(pattern=r"^[a-z][a-z_]{0,39}$", examples=["simulator_fault"])]
+    detail: Annotated[str, Field(min_length=1, max_length=4000, description="For people")]
+    permanent: bool = Field(
+        default=False, description="Whether no other attempt can mend it: the job then ends"
+    )
+    delay_s: Annotated[float, Field(ge=0, le=300, allow_inf_nan=False)] = 2.0
+    endless: bool = Field(
+        default=False, description="Whether the job waits for a person, however often it is met"
+    )
+    files: Files = []
+
+
+class Ended(BaseModel):
+    """The end of a lease."""
+
+    status: Literal["done", "already_done"] = Field(
+        description="already_done: the same was asked before, and its answer was lost"
+    )
+
+
+def _one_of(name: str, names: tuple[str, ...]) -> str:
+    if name not in names:
+        raise ValueError(f"there is no engine {name!r}; choose from {', '.join(names)}")
+    return name

@@ -1,0 +1,271 @@
+"""The runner protocol, from the runner's side: each request is sent until it is answered."""
+
+from __future__ import annotations
+
+import hashlib
+import ssl
+import threading
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+from urllib.parse import urlsplit
+
+import httpx2
+import structlog
+from tenacity import (
+    RetryCallState,
+    RetryError,
+    Retrying,
+    retry_if_exception_type,
+    stop_after_delay,
+    stop_when_event_set,
+    wait_random_exponential,
+)
+from tenacity.nap import sleep_using_event
+from tenacity.stop import stop_base
+
+from buildarena_simworker.remote.errors import LeaseLostError, RefusedError, UnreachableError
+
+TIMEOUT_S: Final = 15.0
+PATIENCE_S: Final = 15 * 60.0
+"""How long an outcome is kept for an API that does not answer."""
+LONGEST_PAUSE_S: Final = 5.0
+LOOPBACK: Final = ("127.0.0.1", "::1", "localhost")
+BUSY: Final = (429, 500, 502, 503, 504)
+"""Answers after which the same request may be taken: the service is busy or restarts."""
+GONE: Final = 409
+
+log = structlog.get_logger(__name__)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HeldLease:
+    """A lease of this runner."""
+
+    job_id: str
+    token: int
+
+    @property
+    def path(self) -> str:
+        """Where the API has it."""
+        return f"/v1/runner/leases/{self.job_id}/{self.token}"
+
+    def document(self) -> dict[str, Any]:
+        """As heartbeats name it."""
+        return {"job_id": self.job_id, "token": self.token}
+
+
+class _TryAgainError(Exception):
+    """A sending failed that may succeed later."""
+
+    def __init__(self, why: str, pause_s: float = 0.0) -> None:
+        super().__init__(why)
+        self.pause_s = pause_s
+
+
+def tls_context(ca_file: Path | None) -> ssl.SSLContext:
+    """What certificates are verified with: the system's authorities, and one's own besides.
+
+    Raises:
+        ValueError: The file can't be read or holds no certificates.
+    """
+    context = ssl.create_default_context()
+    if ca_file is not None:
+        try:
+            context.load_verify_locations(cafile=str(ca_file))
+        except (OSError, ssl.SSLError) as error:
+            raise ValueError(
+                f"{ca_file} holds no certificates that can be read: {error}"
+            ) from error
+    return context
+
+
+def check_url(url: str, *, allow_http: bool) -> str:
+    """The API's URL without its last slash.
+
+    Raises:
+        ValueError: It is none, or would send the key in the clear to another machine.
+    """
+    parts = urlsplit(url)
+    if parts.scheme not in {"http", "https"} or not parts.hostname or parts.username:
+        raise ValueError(f"{url!r} is not the URL of an API: use https://HOST or http://127.0.0.1")
+    if parts.scheme == "http" and parts.hostname not in LOOPBACK and not allow_http:
+        raise ValueError(
+            f"{url} is not encrypted: others could read the key; use https, or --allow-http where "
+            "the network is your own"
+        )
+    return url.rstrip("/")
+
+
+class RunnerApi:
+    """Sends a runner's requests; any thread may.
+
+    Args:
+        url: Where the API is.
+        key: The runner key; None where none is asked for.
+        tls: What its certificate is verified with.
+        stopping: Once it is set, nothing is waited for any more.
+    """
+
+    def __init__(
+        self, url: str, key: str | None, *, tls: ssl.SSLContext, stopping: threading.Event
+    ) -> None:
+        headers = {"Authorization": f"Bearer {key}"} if key else {}
+        self._http = httpx2.Client(base_url=url, headers=headers, verify=tls, timeout=TIMEOUT_S)
+        self._stopping = stopping
+        self._piece_bytes = 1 << 20
+
+    def facts(self, *, patience_s: float | None = None) -> dict[str, Any]:
+        """What the API says of key, versions and limits; waits for it until it answers."""
+        found: dict[str, Any] = self._json("GET", "/v1/runner", patience_s=patience_s)
+        self._piece_bytes = int(found["piece_bytes"])
+        return found
+
+    def lease(self, about: Mapping[str, Any], wait_s: float) -> dict[str, Any] | None:
+        """The next trial, or None when there is none for so long; waits for an API that is away."""
+        answer: dict[str, Any] | None = self._json(
+            "POST",
+            "/v1/runner/leases",
+            json={**about, "wait_s": wait_s},
+            timeout=TIMEOUT_S + wait_s,
+            patience_s=None,
+        )
+        return answer
+
+    def heartbeat(
+        self, about: Mapping[str, Any], leases: list[HeldLease], *, within_s: float
+    ) -> set[HeldLease]:
+        """Renews leases; returns those that are lost. Sent once: the next one comes soon."""
+        body = {**about, "leases": [lease.document() for lease in leases]}
+        answer = self._json(
+            "POST", "/v1/runner/heartbeat", json=body, timeout=within_s, patience_s=0.0
+        )
+        return {HeldLease(**lost) for lost in answer["lost"]}
+
+    def upload(self, lease: HeldLease, data: bytes) -> dict[str, Any]:
+        """Uploads a file from where it was broken off; returns how requests name it."""
+        sha256 = hashlib.sha256(data).hexdigest()
+        path = f"{lease.path}/uploads/{sha256}"
+        offset, whole = 0, False
+        while not whole:
+            piece = data[offset : offset + self._piece_bytes]
+            params: dict[str, Any] = {"size": len(data), "offset": offset}
+            # A piece that was received although its answer was lost may be sent again.
+            received = self._json("PUT", path, params=params, content=piece)
+            offset, whole = int(received["offset"]), bool(received["whole"])
+        return {"sha256": sha256, "size": len(data)}
+
+    def end(
+        self,
+        lease: HeldLease,
+        how: str,
+        body: Mapping[str, Any] | None = None,
+        *,
+        patience_s: float = PATIENCE_S,
+        although_stopping: bool = False,
+    ) -> None:
+        """Ends a lease: ``outcome``, ``fault`` or ``hand-back``.
+
+        Raises:
+            LeaseLostError: It was over.
+        """
+        self._json(
+            "POST",
+            f"{lease.path}/{how}",
+            json=None if body is None else dict(body),
+            timeout=60.0 if how == "outcome" else TIMEOUT_S,
+            patience_s=patience_s,
+            although_stopping=although_stopping,
+        )
+
+    def goodbye(self, about: Mapping[str, Any]) -> None:
+        """Leaves the list of workers."""
+        self._json(
+            "POST",
+            "/v1/runner/goodbye",
+            json=dict(about),
+            timeout=2.0,
+            patience_s=0.0,
+            although_stopping=True,
+        )
+
+    def close(self) -> None:
+        """Closes the connections."""
+        self._http.close()
+
+    def _json(
+        self,
+        method: str,
+        path: str,
+        *,
+        patience_s: float | None = PATIENCE_S,
+        although_stopping: bool = False,
+        timeout: float = TIMEOUT_S,
+        **options: Any,
+    ) -> Any:
+        """The answer, once there is one.
+
+        Raises:
+            LeaseLostError: 409.
+            RefusedError: Any other refusal that will not change.
+            UnreachableError: There was none for so long, or the runner is asked to stop.
+        """
+        never = threading.Event()
+        stopping = never if although_stopping else self._stopping
+        stops: list[stop_base] = [stop_when_event_set(stopping)]
+        if patience_s is not None:
+            stops.append(stop_after_delay(patience_s))
+        sendings = Retrying(
+            retry=retry_if_exception_type(_TryAgainError),
+            wait=_pause,
+            stop=lambda state: any(stop(state) for stop in stops),
+            sleep=sleep_using_event(stopping),
+        )
+        try:
+            for sending in sendings:
+                with sending:
+                    return self._sent(method, path, timeout=timeout, **options)
+        except RetryError as error:
+            reason = error.last_attempt.exception()
+            raise UnreachableError(f"{method} {path}: {reason}") from error
+        raise AssertionError("a sending ends in an answer or an error")
+
+    def _sent(self, method: str, path: str, **options: Any) -> Any:
+        try:
+            answer = self._http.request(method, path, **options)
+        except (httpx2.TransportError, httpx2.DecodingError) as error:
+            log.info("api_unreachable", path=path, error=str(error) or type(error).__name__)
+            raise _TryAgainError(str(error) or type(error).__name__) from error
+        except RuntimeError as error:
+            if not self._http.is_closed:
+                raise
+            raise UnreachableError("this runner has stopped") from error
+        if answer.status_code in BUSY:
+            asked = answer.headers.get("retry-after", "")
+            raise _TryAgainError(_said(answer), float(asked) if asked.isdecimal() else 0.0)
+        if answer.status_code == GONE:
+            raise LeaseLostError(_said(answer))
+        if not answer.is_success:
+            raise RefusedError(answer.status_code, _said(answer))
+        if not answer.content:
+            return None
+        try:
+            return answer.json()
+        except ValueError as error:
+            raise RefusedError(answer.status_code, f"{path} does not answer in JSON") from error
+
+
+def _pause(state: RetryCallState) -> float:
+    """As long as was asked for, and a part by chance so that runners do not come all at once."""
+    error = state.outcome.exception() if state.outcome else None
+    asked = error.pause_s if isinstance(error, _TryAgainError) else 0.0
+    chance = wait_random_exponential(multiplier=0.25, max=LONGEST_PAUSE_S)(state)
+    return min(asked, LONGEST_PAUSE_S) + chance
+
+
+def _said(answer: httpx2.Response) -> str:
+    try:
+        return str(answer.json()["detail"])
+    except (ValueError, KeyError, TypeError):
+        return f"HTTP {answer.status_code}"

@@ -1,0 +1,116 @@
+"""Whether a runner could work from here: what is looked at before one is started."""
+
+from __future__ import annotations
+
+import json
+import threading
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+from buildarena_pipeline.catalog.simulators import BESIEGE
+from buildarena_pipeline.errors import StartupError
+from buildarena_pipeline.runtime.settings import Settings
+from buildarena_simworker.remote.api import RunnerApi, check_url, tls_context
+from buildarena_simworker.remote.errors import RefusedError, RemoteError
+from buildarena_simworker.remote.process import KEY_VARIABLE, read_key
+
+PATIENCE_S: Final = 5.0
+
+Check = dict[str, Any]
+
+
+def examined(
+    url: str,
+    simulator: str,
+    *,
+    key_file: Path | None = None,
+    ca_file: Path | None = None,
+    allow_http: bool = False,
+) -> list[Check]:
+    """What a runner needs, each with name, whether it is ok, detail and advice.
+
+    Args:
+        url: Where the API is.
+        simulator: What the runner is to run.
+        key_file: File with the runner key; BUILDARENA_KEY by default.
+        ca_file: Certificates to trust besides the system's.
+        allow_http: Whether the key may go unencrypted to another machine.
+    """
+    return [*_simulator(simulator), *_service(url, simulator, key_file, ca_file, allow_http)]
+
+
+def printed(checks: Sequence[Check], *, as_json: bool = False) -> str:
+    """Checks for people, a line each, or as JSON for programs."""
+    if as_json:
+        return json.dumps({"ok": all(c["ok"] for c in checks), "checks": checks}, indent=2) + "\n"
+    lines = []
+    for check in checks:
+        lines.append(f"{check['name']:<10} {'ok' if check['ok'] else 'WRONG':<6} {check['detail']}")
+        if check["advice"]:
+            lines.append(f"{'':<17} {check['advice']}")
+    return "\n".join(lines) + "\n"
+
+
+def _service(
+    url: str, simulator: str, key_file: Path | None, ca_file: Path | None, allow_http: bool
+) -> Iterator[Check]:
+    try:
+        key = read_key(key_file)
+        api = RunnerApi(
+            check_url(url, allow_http=allow_http),
+            key,
+            tls=tls_context(ca_file),
+            stopping=threading.Event(),
+        )
+    except (StartupError, ValueError) as error:
+        yield _check("settings", str(error), "correct --api, --key-file or --ca-file")
+        return
+    try:
+        facts = api.facts(patience_s=PATIENCE_S)
+    except RefusedError as error:
+        command = f"buildarena key create NAME --scope runner --simulator {simulator}"
+        advice = f"have an admin make one: {command}; set {KEY_VARIABLE} or --key-file"
+        yield _check("key", str(error), advice)
+        return
+    except RemoteError as error:
+        yield _check("api", str(error), "is the address right, and does a firewall let it pass?")
+        return
+    finally:
+        api.close()
+    yield _check("api", f"{url} answers")
+    allowed = facts["simulators"]
+    detail = f"may lease jobs of {', '.join(allowed) or 'nothing'}"
+    yield _check("key", detail, "" if simulator in allowed else f"it needs one for {simulator}")
+    wanted, here = facts["versions"].get(simulator), _version(simulator)
+    if here is not None:
+        advice = "" if wanted == here else "install the version that the service has"
+        yield _check("version", f"{here} here, {wanted or 'none'} at the service", advice)
+
+
+def _simulator(name: str) -> Iterator[Check]:
+    if name == BESIEGE:
+        version = _version(name)
+        advice = "" if version else "see `python -m buildarena_simworker.simulators.besiege doctor`"
+        yield _check("simulator", f"{name} {version or 'is not set up'}", advice)
+        return
+    from buildarena_simworker.simulators.engines import EngineSimulator
+
+    try:
+        versions = EngineSimulator(name).versions
+    except Exception as error:  # noqa: BLE001 - whatever keeps it from being loaded
+        yield _check("simulator", f"{name}: {error}", f"install {name}")
+    else:
+        yield _check("simulator", f"{name} {versions['engine_version']}")
+
+
+def _version(name: str) -> str | None:
+    if name == BESIEGE:
+        return Settings().besiege_version
+    from buildarena_simulation import SIMULATION_VERSION
+
+    return SIMULATION_VERSION
+
+
+def _check(name: str, detail: str, advice: str = "") -> Check:
+    return {"name": name, "ok": not advice, "detail": detail, "advice": advice}

@@ -1,0 +1,282 @@
+"""A runner's slots: each leases a trial, runs it and hands over what came of it."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+import structlog
+
+from buildarena_benchmark.tasks.document import TaskDocument
+from buildarena_benchmark.tasks.task import task_of
+from buildarena_geometry import KeyPress, Machine
+from buildarena_pipeline.errors import PermanentError, TransientError
+from buildarena_pipeline.periodic import Periodic
+from buildarena_pipeline.runtime.trial_outcomes import File, TrialOutcome
+from buildarena_simulation import write_trajectory
+from buildarena_simworker.remote.api import HeldLease, RunnerApi
+from buildarena_simworker.remote.errors import (
+    LeaseLostError,
+    RefusedError,
+    RemoteError,
+    UnreachableError,
+)
+from buildarena_simworker.simulators.simulator import Simulator, Trial
+from buildarena_simworker.trials import do_trial
+
+BEATS_PER_LEASE: Final = 4
+HAND_BACK_S: Final = 3.0
+"""How long handing back may take at shutdown; a lease that is not handed back runs out."""
+WAIT_S: Final = 20.0
+"""How long the API may keep a request for a trial."""
+PAUSE_S: Final = 1.0
+"""After what nobody foresaw a slot pauses, so that it does not meet it again and again."""
+LONGEST_DETAIL: Final = 2000
+
+log = structlog.get_logger(__name__)
+
+
+@dataclass(slots=True)
+class _Active:
+    """A lease that is worked under."""
+
+    lease: HeldLease
+    lost: threading.Event = field(default_factory=threading.Event)
+
+    def require(self) -> None:
+        if self.lost.is_set():
+            raise LeaseLostError(f"lease {self.lease.token} on {self.lease.job_id} is over")
+
+
+class Heartbeats:
+    """Keeps a runner's leases alive from one thread.
+
+    Args:
+        api: Where they are.
+        about: What the runner says of itself, at each beat.
+        lease_s: How long a lease lives without.
+    """
+
+    def __init__(
+        self, api: RunnerApi, about: Callable[[], Mapping[str, Any]], *, lease_s: float
+    ) -> None:
+        self._api = api
+        self._about = about
+        self._period_s = lease_s / BEATS_PER_LEASE
+        self._lock = threading.Lock()
+        self._active: dict[HeldLease, _Active] = {}
+        self._thread = Periodic(self._beat, name="heartbeats", period_s=self._period_s)
+
+    def start(self) -> None:
+        """Reports once and starts the thread."""
+        self._beat()
+        self._thread.start()
+
+    def stop(self) -> list[HeldLease]:
+        """Stops the thread and breaks off what is worked on; returns the leases."""
+        self._thread.stop()
+        with self._lock:
+            active, self._active = list(self._active.values()), {}
+        for one in active:
+            one.lost.set()
+        return [one.lease for one in active]
+
+    @contextmanager
+    def keeping(self, lease: HeldLease) -> Iterator[_Active]:
+        """Keeps a lease alive inside the block."""
+        active = _Active(lease)
+        with self._lock:
+            self._active[lease] = active
+        try:
+            yield active
+        finally:
+            with self._lock:
+                self._active.pop(lease, None)
+
+    def _beat(self) -> None:
+        with self._lock:
+            leases = list(self._active)
+        try:
+            lost = self._api.heartbeat(self._about(), leases, within_s=max(1.0, self._period_s))
+        except RemoteError as error:
+            # The next one may get through; whether the leases live is the API's to say.
+            log.warning("heartbeat_failed", error=str(error))
+            return
+        except Exception:
+            log.exception("heartbeat_failed")
+            return
+        with self._lock:
+            for lease in lost:
+                if lease in self._active:
+                    log.warning("lease_lost", job=lease.job_id, token=lease.token)
+                    self._active[lease].lost.set()
+
+
+class LeasedOverHttp:
+    """A `LeasedTrial` that came from the API.
+
+    Args:
+        api: Where it came from.
+        active: Its lease.
+        document: The trial, as the API describes it.
+    """
+
+    def __init__(self, api: RunnerApi, active: _Active, document: Mapping[str, Any]) -> None:
+        self._api = api
+        self._active = active
+        self._document = document
+        self.evidence: list[dict[str, Any]] = []
+
+    def take(self) -> Trial:
+        """What is to be run; see `LeasedTrial`."""
+        given = self._document
+        try:
+            controls = given["controls"]
+            return Trial(
+                job_id=self._active.lease.job_id,
+                number=int(given["number"]),
+                token=self._active.lease.token,
+                version=str(given["version"]),
+                task=task_of(TaskDocument.model_validate(given["task"])),
+                machine=Machine.from_document(given["machine"]),
+                controls=None if controls is None else tuple(KeyPress(**one) for one in controls),
+                require_held=self._active.require,
+            )
+        except Exception as error:
+            raise TransientError(
+                f"this runner can't read the trial, it may be older than the service: {error}",
+                reason="unreadable_trial",
+                delay_s=5.0,
+            ) from error
+
+    def complete(self, outcome: TrialOutcome) -> None:
+        """Uploads the trajectory and hands it over; see `LeasedTrial`."""
+        lease, trajectory = self._active.lease, outcome.trajectory
+        sent = None if trajectory is None else write_trajectory(trajectory)
+        body = {
+            "trajectory": None if sent is None else self._api.upload(lease, sent),
+            "versions": dict(outcome.versions),
+            "wall_s": outcome.wall_s,
+            "files": self._uploaded(outcome.files),
+            "annotations": None if outcome.annotations is None else dict(outcome.annotations),
+        }
+        try:
+            self._api.end(lease, "outcome", body)
+        except RefusedError as error:
+            if error.is_of_the_key:
+                raise
+            raise TransientError(str(error), reason="outcome_refused", delay_s=5.0) from error
+
+    def keep_evidence(self, files: Mapping[str, File]) -> None:
+        """Uploads what shows a fault, which is then named in its report; see `LeasedTrial`."""
+        self.evidence = self._uploaded(files)
+
+    def _uploaded(self, files: Mapping[str, File]) -> list[dict[str, Any]]:
+        lease = self._active.lease
+        return [{"name": name, **self._api.upload(lease, f.data)} for name, f in files.items()]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Slot:
+    """One lease at a time, with a simulator of its own.
+
+    Attributes:
+        api: Where trials come from.
+        beats: Keeps its leases alive.
+        simulator: What runs trials.
+        about: What the runner says of itself when it asks for one.
+        stopping: Whether it is to take no more.
+        stop_all: Ends the whole runner for a reason that will not change.
+    """
+
+    api: RunnerApi
+    beats: Heartbeats
+    simulator: Simulator
+    about: Mapping[str, Any]
+    stopping: threading.Event
+    stop_all: Callable[[str], None]
+
+    def work(self) -> None:
+        """Does trials until the runner stops."""
+        while not self.stopping.is_set():
+            try:
+                self.do_next(WAIT_S)
+            except UnreachableError as error:
+                log.warning("gave_up", error=str(error))
+            except RefusedError as error:
+                log.warning("refused", error=str(error))
+                if error.is_of_the_key:
+                    self.stop_all(str(error))
+                self.stopping.wait(PAUSE_S)
+            except Exception:
+                log.exception("slot_failed")
+                self.stopping.wait(PAUSE_S)
+
+    def do_next(self, wait_s: float) -> bool:
+        """Leases and does one trial.
+
+        Returns:
+            Whether there was one.
+        """
+        document = self.api.lease(self.about, wait_s)
+        if document is None:
+            return False
+        lease = HeldLease(job_id=str(document["job_id"]), token=int(document["token"]))
+        if self.stopping.is_set():
+            self._hand_back(lease)
+            return False
+        with self.beats.keeping(lease) as active:
+            self._do(active, document)
+        return True
+
+    def _do(self, active: _Active, document: Mapping[str, Any]) -> None:
+        lease, started = active.lease, time.perf_counter()
+        leased = LeasedOverHttp(self.api, active, document)
+        with structlog.contextvars.bound_contextvars(job=lease.job_id, token=lease.token):
+            try:
+                do_trial(self.simulator, leased)
+            except LeaseLostError:
+                log.warning("lease_over")
+            except TransientError as error:
+                self._fault(active, leased, error)
+            except PermanentError as error:
+                self._fault(active, leased, error)
+            except RemoteError:
+                raise
+            except Exception as error:
+                log.exception("trial_failed")
+                text = f"{type(error).__name__}: {error}"
+                fault = TransientError(text, reason="internal_error", delay_s=2.0)
+                self._fault(active, leased, fault)
+            else:
+                log.info("trial_done", seconds=round(time.perf_counter() - started, 3))
+
+    def _fault(
+        self, active: _Active, leased: LeasedOverHttp, error: TransientError | PermanentError
+    ) -> None:
+        if active.lost.is_set():
+            return  # it was broken off, and is nobody's fault
+        log.warning("fault", reason=error.reason, detail=str(error))
+        detail = str(error)[:LONGEST_DETAIL] or error.reason
+        body: dict[str, Any] = {"reason": error.reason, "detail": detail}
+        if isinstance(error, TransientError):
+            body |= {"delay_s": error.delay_s, "endless": error.endless}
+        else:
+            body["permanent"] = True
+        with suppress(LeaseLostError):
+            self.api.end(active.lease, "fault", {**body, "files": leased.evidence})
+
+    def _hand_back(self, lease: HeldLease) -> None:
+        hand_back(self.api, lease)
+
+
+def hand_back(api: RunnerApi, lease: HeldLease) -> None:
+    """Gives a lease back at shutdown, if the API answers soon."""
+    try:
+        api.end(lease, "hand-back", patience_s=HAND_BACK_S, although_stopping=True)
+    except RemoteError as error:
+        log.info("not_handed_back", job=lease.job_id, error=str(error))

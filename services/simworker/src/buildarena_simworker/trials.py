@@ -1,0 +1,86 @@
+"""Running one trial: the simulators' side of the simulate stage, wherever trials come from."""
+
+from __future__ import annotations
+
+import time
+from typing import Protocol
+
+from buildarena_pipeline.errors import TransientError
+from buildarena_pipeline.runtime.trial_outcomes import File, TrialOutcome
+from buildarena_simworker.simulators.simulator import (
+    MachineRefusedError,
+    Simulator,
+    SimulatorFaultError,
+    Trial,
+)
+
+
+class LeasedTrial(Protocol):
+    """A trial that somebody leased: where it comes from and where its outcome goes.
+
+    Workers beside the database have one implementation, those that reach only the API another.
+    """
+
+    def take(self) -> Trial | None:
+        """What is to be run; None when an earlier trial with the same input told its outcome.
+
+        Raises:
+            PermanentError: The job can't be done.
+        """
+
+    def complete(self, outcome: TrialOutcome) -> None:
+        """Hands the outcome over, to be scored.
+
+        Raises:
+            StaleLeaseError: The job is somebody else's by now; nothing was written.
+        """
+
+    def keep_evidence(self, files: dict[str, File]) -> None:
+        """Keeps what shows a fault with the job."""
+
+
+def run_trial(simulator: Simulator, trial: Trial) -> TrialOutcome:
+    """Runs a trial to its outcome; a machine that the simulator refuses is an outcome too.
+
+    Raises:
+        SimulatorFaultError: The simulator failed.
+        PermanentError: It never will be able to run this job.
+        StaleLeaseError: The job is somebody else's by now.
+    """
+    started = time.perf_counter()
+    try:
+        simulated = simulator.run(trial)
+    except MachineRefusedError:
+        return TrialOutcome(
+            trajectory=None,
+            versions=dict(simulator.versions),
+            wall_s=time.perf_counter() - started,
+        )
+    return TrialOutcome(
+        trajectory=simulated.trajectory,
+        versions=dict(simulated.versions),
+        wall_s=time.perf_counter() - started,
+        files=simulated.files,
+        annotations=simulated.annotations,
+    )
+
+
+def do_trial(simulator: Simulator, leased: LeasedTrial) -> None:
+    """Takes, runs and hands over a trial; what shows a fault is kept before it is reported.
+
+    Raises:
+        TransientError: The simulator failed; the trial is to be run again.
+        PermanentError: The job can't be done.
+        StaleLeaseError: The job is somebody else's by now.
+    """
+    trial = leased.take()
+    if trial is None:
+        return
+    try:
+        outcome = run_trial(simulator, trial)
+    except SimulatorFaultError as fault:
+        leased.keep_evidence(fault.files)
+        raise TransientError(
+            str(fault), reason="simulator_fault", delay_s=fault.delay_s, endless=fault.endless
+        ) from fault
+    leased.complete(outcome)

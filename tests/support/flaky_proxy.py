@@ -1,0 +1,102 @@
+"""A proxy between a runner and the API that breaks connections off in the middle."""
+
+from __future__ import annotations
+
+import socket
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+
+
+@dataclass
+class FlakyProxy:
+    """Passes bytes on, and cuts connections.
+
+    Attributes:
+        target: Port of the server.
+        cut_after: Bytes from the client after which each of the next connections is cut; each
+            number is used once.
+        swallow_answers: How many answers are lost, although their requests arrived.
+        away: Whether every connection is refused.
+        cuts: Connections that were cut.
+    """
+
+    target: int
+    cut_after: list[int] = field(default_factory=list)
+    swallow_answers: int = 0
+    away: bool = False
+    cuts: int = 0
+    url: str = ""
+    _lock: threading.Lock = field(default_factory=threading.Lock)
+
+    def serve(self, client: socket.socket) -> None:
+        if self.away:
+            client.close()
+            return
+        with client, socket.create_connection(("127.0.0.1", self.target)) as server:
+            back = threading.Thread(target=self._answers, args=(server, client), daemon=True)
+            back.start()
+            with suppress(OSError):
+                self._requests(client, server)
+            for end in (client, server):
+                with suppress(OSError):
+                    end.shutdown(socket.SHUT_RDWR)
+            back.join(5)
+
+    def _requests(self, client: socket.socket, server: socket.socket) -> None:
+        passed = 0
+        while data := client.recv(4096):
+            passed += len(data)
+            with self._lock:
+                if self.away:
+                    return
+                # Only uploads are as long as that.
+                if self.cut_after and passed > self.cut_after[0]:
+                    self.cut_after.pop(0)
+                    self.cuts += 1
+                    return
+            server.sendall(data)
+
+    def _answers(self, server: socket.socket, client: socket.socket) -> None:
+        with suppress(OSError):
+            while data := server.recv(65536):
+                with self._lock:
+                    if self.swallow_answers and data.startswith(b"HTTP/1.1 2"):
+                        self.swallow_answers -= 1
+                        self.cuts += 1
+                        client.shutdown(socket.SHUT_RDWR)
+                        return
+                client.sendall(data)
+
+
+@contextmanager
+def flaky_proxy(url: str) -> Iterator[FlakyProxy]:
+    """A proxy in front of a server."""
+    listener = socket.create_server(("127.0.0.1", 0))
+    proxy = FlakyProxy(int(url.rpartition(":")[2]))
+    proxy.url = f"http://127.0.0.1:{listener.getsockname()[1]}"
+    threads: list[threading.Thread] = []
+
+    def accept() -> None:
+        while True:
+            try:
+                client, _ = listener.accept()
+            except OSError:
+                return
+            threads.append(threading.Thread(target=proxy.serve, args=(client,), daemon=True))
+            threads[-1].start()
+
+    accepting = threading.Thread(target=accept, daemon=True)
+    accepting.start()
+    try:
+        yield proxy
+    finally:
+        proxy.away = True
+        # Closing alone does not wake a thread that accepts.
+        with suppress(OSError):
+            listener.shutdown(socket.SHUT_RDWR)
+        listener.close()
+        accepting.join(5)
+        for thread in threads:
+            thread.join(5)
