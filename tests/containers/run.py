@@ -54,6 +54,7 @@ class Run:
         self.engine = Engine(stack)
         self.folder = Path(tempfile.mkdtemp(prefix="buildarena-containers-"))
         self.folder.chmod(0o711)
+        stack.callback(subprocess.run, ["git", "worktree", "prune"], cwd=ROOT, check=False)
         stack.callback(shutil.rmtree, self.folder, ignore_errors=True)
         self.figures: dict[str, Any] = {}
         self.random = random.Random(18)
@@ -116,7 +117,6 @@ def build(run: Run) -> None:
             cwd=ROOT,
             check=True,
         )
-        run.stack.callback(subprocess.run, ["git", "worktree", "prune"], cwd=ROOT, check=False)
         run.engine.build(previous, "previous", "test")
     with run.step("images of this commit"):
         run.engine.build(ROOT, "current", "test")
