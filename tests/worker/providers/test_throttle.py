@@ -94,19 +94,24 @@ def open_slots(broker_url: str) -> int:
         return store.zcard("buildarena:throttle:p:open")
 
 
-def test_a_free_slot_waits_for_the_next_request_and_then_goes_back(context, broker_url) -> None:
-    async def main() -> tuple[list[int], int]:
+def test_a_free_slot_waits_for_the_next_request_and_then_goes_back(
+    context, broker_url, monkeypatch
+) -> None:
+    monkeypatch.setattr(throttle_module, "SPARE_S", 1.0)
+
+    async def main() -> list[int]:
         throttle, seen = Throttle(broker_url, "p"), []
         for _ in range(5):
             async with throttle.slot():
                 seen.append(open_slots(broker_url))
-            await asyncio.sleep(throttle_module.SPARE_S / 5)
-        await asyncio.sleep(throttle_module.SPARE_S * 2)
-        left = open_slots(broker_url)
+            while not any(throttle._spare.values()):  # the store has answered that it is free
+                await asyncio.sleep(0.01)
+        while open_slots(broker_url):
+            await asyncio.sleep(0.05)
         await throttle.close()
-        return seen, left
+        return seen
 
-    assert asyncio.run(main()) == ([1, 1, 1, 1, 1], 0)
+    assert asyncio.run(asyncio.wait_for(main(), 30)) == [1, 1, 1, 1, 1]
     del context
 
 
