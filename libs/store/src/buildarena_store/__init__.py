@@ -7,7 +7,7 @@ Rows leave this package as frozen dataclasses, never as database objects.
 from buildarena_store.accounts.budgets import Budget, BudgetLimits, Budgets, Need, Shortage
 from buildarena_store.accounts.keys import ApiKey, ApiKeys, KeyCheck
 from buildarena_store.artifacts import ArtifactInfo, ArtifactStore
-from buildarena_store.boards import BoardChange, BoardFeed, Boards, Round
+from buildarena_store.boards import BoardChange, Boards, CellId, CellRecord, Round, TrialFilter
 from buildarena_store.database import Database
 from buildarena_store.errors import (
     ArtifactDamagedError,
@@ -54,11 +54,12 @@ __all__ = [
     "ArtifactStore",
     "ArtifactStoreError",
     "BoardChange",
-    "BoardFeed",
     "Boards",
     "Budget",
     "BudgetLimits",
     "Budgets",
+    "CellId",
+    "CellRecord",
     "Database",
     "Event",
     "Events",

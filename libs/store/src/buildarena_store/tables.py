@@ -12,6 +12,7 @@ from sqlalchemy import (
     Identity,
     Index,
     Integer,
+    LargeBinary,
     MetaData,
     Numeric,
     Table,
@@ -332,6 +333,9 @@ board_changes = Table(
     Column("job_id", Text, nullable=False),
     Column("track", Text, nullable=False),
     Column("task", Text, nullable=False),
+    # With track and task the cell; null when no cell changed, or before there were these columns.
+    Column("task_version", Text),
+    Column("configuration", Text),
     Column("model", Text, nullable=False),
     Column("kind", Text, nullable=False),
     Column("before", JSONB),
@@ -341,6 +345,45 @@ board_changes = Table(
 )
 Index("ix_board_changes_transaction", board_changes.c.transaction)
 Index("ix_board_changes_track", board_changes.c.track, board_changes.c.id)
+
+
+def _snapshot() -> tuple[Column[str], Column[int], Column[int]]:
+    """What had been committed; the later of two has the greater end, or fewer open before it."""
+    return (
+        Column("snapshot", Text, nullable=False),
+        Column("snapshot_end", BigInteger, nullable=False),
+        Column("snapshot_open", Integer, nullable=False),
+    )
+
+
+# What leaderboards are made of: made from jobs by whoever finds a cell changed, used by all.
+board_cells = Table(
+    "board_cells",
+    metadata,
+    # Programs of two releases may be at work: each has cells of its own format.
+    Column("format", Integer, primary_key=True, autoincrement=False),
+    Column("track", Text, primary_key=True),
+    Column("task", Text, primary_key=True),
+    Column("task_version", Text, primary_key=True),
+    Column("configuration", Text, primary_key=True),
+    Column("model", Text, nullable=False),
+    Column("decoding", JSON, nullable=False),
+    # None are left of a cell whose jobs all left; its row says so.
+    Column("jobs", BigInteger, nullable=False),
+    Column("newest", DateTime(timezone=True)),
+    Column("tallies", JSON, nullable=False),
+    Column("figures", LargeBinary, nullable=False),
+    *_snapshot(),
+)
+
+# Up to when no cell of a format is missing or out of date.
+board_state = Table(
+    "board_state",
+    metadata,
+    Column("format", Integer, primary_key=True, autoincrement=False),
+    Column("server", Text, nullable=False),
+    *_snapshot(),
+)
 
 events = Table(
     "events",
