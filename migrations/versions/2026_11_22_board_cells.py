@@ -45,8 +45,8 @@ BEGIN
         WHEN was AND is_now THEN 'corrected'
         ELSE 'unscored' END;
     INSERT INTO board_changes
-        (transaction, job_id, track, task, %(columns)smodel, kind, before, after, why)
-    VALUES (pg_current_xact_id()::text::bigint, job.id, job.track, job.task, %(values)s
+        (transaction, job_id, track, task, {columns}model, kind, before, after, why)
+    VALUES (pg_current_xact_id()::text::bigint, job.id, job.track, job.task, {values}
             job.model, kind, old_score, new_score,
             NULLIF(current_setting('buildarena.why', true), ''));
     RETURN NULL;
@@ -93,12 +93,16 @@ def upgrade() -> None:
         sa.Column("snapshot_open", sa.Integer(), nullable=False),
         sa.PrimaryKeyConstraint("format", name=op.f("pk_board_state")),
     )
-    op.execute(LOG % {"columns": CELL, "values": VALUES})
+    op.execute(_log(columns=CELL, values=VALUES))
 
 
 def downgrade() -> None:
-    op.execute(LOG % {"columns": "", "values": ""})
+    op.execute(_log(columns="", values=""))
     op.drop_table("board_state")
     op.drop_table("board_cells")
     op.drop_column("board_changes", "configuration")
     op.drop_column("board_changes", "task_version")
+
+
+def _log(*, columns: str, values: str) -> str:
+    return LOG.replace("{columns}", columns).replace("{values}", values)

@@ -7,7 +7,16 @@ Rows leave this package as frozen dataclasses, never as database objects.
 from buildarena_store.accounts.budgets import Budget, BudgetLimits, Budgets, Need, Shortage
 from buildarena_store.accounts.keys import ApiKey, ApiKeys, KeyCheck
 from buildarena_store.artifacts import ArtifactInfo, ArtifactStore
-from buildarena_store.boards import BoardChange, Boards, CellId, CellRecord, Round, TrialFilter
+from buildarena_store.boards import (
+    BoardCells,
+    BoardChange,
+    Boards,
+    CellId,
+    CellRecord,
+    Mark,
+    Round,
+    TrialFilter,
+)
 from buildarena_store.database import Database
 from buildarena_store.errors import (
     ArtifactDamagedError,
@@ -53,6 +62,7 @@ __all__ = [
     "ArtifactMissingError",
     "ArtifactStore",
     "ArtifactStoreError",
+    "BoardCells",
     "BoardChange",
     "Boards",
     "Budget",
@@ -76,6 +86,7 @@ __all__ = [
     "KeyCheck",
     "Lease",
     "Leases",
+    "Mark",
     "NameTakenError",
     "Need",
     "NewJob",
@@ -101,6 +112,7 @@ __all__ = [
     "Sweeps",
     "Tasks",
     "TransitionError",
+    "TrialFilter",
     "TurnRecord",
     "TurnResult",
     "Turns",

@@ -23,7 +23,6 @@ class BoardQuery:
     Attributes:
         tasks: Task names.
         models: Model names.
-        jobs: Ids of jobs.
         since: Only jobs that ended then or later.
         until: Only jobs that ended before.
         reading: How flags are read.
@@ -32,16 +31,13 @@ class BoardQuery:
 
     tasks: frozenset[str] | None = None
     models: frozenset[str] | None = None
-    jobs: frozenset[str] | None = None
     since: datetime | None = None
     until: datetime | None = None
     reading: Reading = Reading.OURS
     overall: frozenset[str] | None = None
 
     def holds(self, trial: EndedJob) -> bool:
-        """Whether a trial is among the jobs, and ended in the time, that were asked for."""
-        if self.jobs is not None and trial.job_id not in self.jobs:
-            return False
+        """Whether a trial ended in the time that was asked for."""
         if self.since is None and self.until is None:
             return True
         ended = trial.finished_at

@@ -121,11 +121,13 @@ class KeptTests:
     def of(self, cells: Sequence[Cell]) -> PairTests:
         """The tests of all pairs of cells, in the order of `itertools.combinations`."""
         key = tuple(cell.figures_hash for cell in cells)
-        if key not in self._rows:
+        found = self._rows.get(key)
+        if found is None:
+            found = self._tested(cells)
             if len(self._rows) >= KEPT_TESTS:
                 self._rows.clear()
-            self._rows[key] = self._tested(cells)
-        return self._rows[key]
+            self._rows[key] = found
+        return found
 
     def _tested(self, cells: Sequence[Cell]) -> PairTests:
         pairs = list(combinations(cells, 2))

@@ -1,7 +1,8 @@
 """What leaderboards are made of: cells with their tallies, single trials, and why they changed."""
 
-from buildarena_store.boards.cells import BoardCells, CellFeed, CellRecord
+from buildarena_store.boards.cells import BoardCells, CellFeed, Mark
 from buildarena_store.boards.reading import Annotated, BoardChange, Boards, Round
+from buildarena_store.boards.tallying import CellRecord
 from buildarena_store.boards.trials import CellId, TrialFilter
 
 __all__ = [
@@ -12,6 +13,7 @@ __all__ = [
     "CellFeed",
     "CellId",
     "CellRecord",
+    "Mark",
     "Round",
     "TrialFilter",
 ]

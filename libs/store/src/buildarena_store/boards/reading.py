@@ -90,9 +90,9 @@ class Boards:
 
     def trials(self, wanted: TrialFilter) -> list[EndedJob]:
         """Single ended jobs, in no order; a million of them take a gigabyte."""
-        query = select(*TRIALTRIAL_COLUMNS).where(*wanted.conditions())
+        query = select(*TRIAL_COLUMNS).where(*wanted.conditions())
         with self._database.transaction() as connection:
-            return list(readread_trials(connection, query))
+            return list(read_trials(connection, query))
 
     def scored_ids(self, wanted: TrialFilter) -> list[str]:
         """Ids of scored jobs, in their order; imported ones that wait to be verified too."""
@@ -103,6 +103,12 @@ class Boards:
         )
         with self._database.statement() as connection:
             return [row.id for row in connection.execute(query)]
+
+    def any_of(self, wanted: TrialFilter) -> bool:
+        """Whether there is such a job."""
+        query = select(jobs.c.id).where(*wanted.conditions()).limit(1)
+        with self._database.statement() as connection:
+            return connection.execute(query).first() is not None
 
     def of_sweep(self, sweep_id: str) -> list[tuple[EndedJob, list[Round]]]:
         """A sweep's ended jobs with their rounds, in a fixed order."""

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from datetime import datetime
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 from sqlalchemy import (
-    JSON,
     BigInteger,
     Column,
     Connection,
@@ -24,9 +23,9 @@ from sqlalchemy import (
     column,
     func,
     literal,
+    literal_column,
     select,
 )
-from sqlalchemy.dialects.postgresql import JSONB
 
 from buildarena_benchmark.leaderboard import UNKNOWN_TOKENS, Tally, Total
 from buildarena_store.boards.trials import CellId, TrialFilter, decoding_of
@@ -58,6 +57,10 @@ class CellRecord:
     jobs: int
     newest: datetime | None
     tallies: Sequence[Tally]
+
+    def without_tallies(self) -> CellRecord:
+        """The same without what takes memory."""
+        return replace(self, tallies=())
 
 
 def tally_jobs(connection: Connection, wanted: TrialFilter) -> list[CellRecord]:
@@ -156,7 +159,9 @@ _GROUPS: Final = [
     jobs.c.outcome,
     jobs.c.reason,
     func.coalesce(jobs.c.success, False).label("success"),
-    func.coalesce(func.nullif(jobs.c.flags, JSON.NULL), cast([], JSONB)).label("flags"),
+    func.coalesce(
+        func.nullif(jobs.c.flags, literal_column("'null'::jsonb")), literal_column("'[]'::jsonb")
+    ).label("flags"),
     _IMPORTED.label("imported"),
     and_(_IMPORTED, jobs.c.verified_at.is_(None)).label("unverified"),
     _EXTERNAL.label("external"),
@@ -200,7 +205,7 @@ def _refusals(connection: Connection, conditions: Sequence[Any]) -> dict[Any, di
     return found
 
 
-def _group_of(row: Row[Any]) -> tuple[Any, ...]:
+def _group_of(row: Any) -> tuple[Any, ...]:
     return (
         *_id_of(row), row.outcome, row.reason, row.success, tuple(row.flags),
         row.imported, row.unverified, row.external,

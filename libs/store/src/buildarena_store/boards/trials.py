@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import Any, Final, NamedTuple
 
@@ -49,6 +49,10 @@ class TrialFilter:
     sweeps: Collection[str] | None = None
     since: datetime | None = None
     until: datetime | None = None
+
+    def within(self, cells: Collection[CellId]) -> TrialFilter:
+        """The same, of some cells alone."""
+        return replace(self, cells=cells)
 
     def conditions(self) -> list[ColumnElement[bool]]:
         """The same for a query of jobs; files that were tried are in no ranking."""
