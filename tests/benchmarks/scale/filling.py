@@ -46,7 +46,7 @@ def fill(database: Database, amount: Amount) -> None:
             _jobs(connection, "queued", amount.queued, amount.models)
             _ended(connection)
         connection.execute(text("SET session_replication_role = origin"))
-        # RECOUNT
+        connection.execute(text("SELECT recount_jobs()"))
         connection.execute(text("VACUUM ANALYZE"))
 
 
@@ -58,7 +58,9 @@ def _name_tasks(connection: Connection) -> None:
         {"number": number, "name": task.name, "version": task.version, "level": task.level}
         for number, task in enumerate(builtin_tasks().values())
     ]
-    connection.execute(text("INSERT INTO made_up_tasks VALUES (:number, :name, :version, :level)"), rows)
+    connection.execute(
+        text("INSERT INTO made_up_tasks VALUES (:number, :name, :version, :level)"), rows
+    )
 
 
 @contextmanager

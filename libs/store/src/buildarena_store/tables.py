@@ -117,7 +117,40 @@ Index(
 )
 Index("ix_jobs_leased", jobs.c.lease_expires_at, postgresql_where=jobs.c.state == JobState.RUNNING)
 Index("ix_jobs_board", jobs.c.track, jobs.c.task, jobs.c.model)
-Index("ix_jobs_newest", jobs.c.created_at.desc(), jobs.c.id)
+# One for each order of lists, and for what lists are narrowed down by.
+COST_OR_NULL = text(
+    "(CASE WHEN model_config->>'provider' = 'external' THEN NULL ELSE cost_usd END)"
+)
+Index("ix_jobs_created", jobs.c.created_at, jobs.c.id)
+Index("ix_jobs_finished", jobs.c.finished_at, jobs.c.id)
+Index("ix_jobs_indicator", jobs.c.indicator, jobs.c.id)
+Index("ix_jobs_cost", COST_OR_NULL, jobs.c.id)
+Index("ix_jobs_task", jobs.c.task, jobs.c.id)
+Index("ix_jobs_model", jobs.c.model, jobs.c.id)
+Index("ix_jobs_seed", jobs.c.seed, jobs.c.id)
+Index("ix_jobs_outcome", jobs.c.outcome, jobs.c.id, postgresql_where=jobs.c.outcome.is_not(None))
+Index("ix_jobs_reason", jobs.c.reason, jobs.c.id, postgresql_where=jobs.c.reason.is_not(None))
+Index("ix_jobs_detail", jobs.c.id, postgresql_where=jobs.c.detail.is_not(None))
+Index(
+    "ix_jobs_flags",
+    jobs.c.flags,
+    postgresql_using="gin",
+    postgresql_ops={"flags": "jsonb_path_ops"},
+    postgresql_where=jobs.c.flags.is_not(None),
+)
+Index(
+    "ix_jobs_oldest",
+    jobs.c.queue,
+    jobs.c.created_at,
+    jobs.c.id,
+    postgresql_where=jobs.c.state == JobState.QUEUED,
+)
+Index(
+    "ix_jobs_available",
+    jobs.c.queue,
+    jobs.c.available_at,
+    postgresql_where=jobs.c.state == JobState.QUEUED,
+)
 Index("ix_jobs_payer", jobs.c.payer, postgresql_where=jobs.c.state != JobState.DONE)
 Index("ix_jobs_owner", jobs.c.owner, postgresql_where=jobs.c.state != JobState.DONE)
 
@@ -397,6 +430,28 @@ events = Table(
 )
 Index("ix_events_job", events.c.job_id, events.c.id)
 Index("ix_events_sweep", events.c.sweep_id, events.c.id)
+
+
+def _amounts() -> list[Column[object]]:
+    return [Column(name, Numeric, nullable=False) for name in "abcd"]
+
+
+# Counts of the whole service, and what triggers would add to them: rows that are only added need
+# not wait for each other as one counter would make them.
+figures = Table(
+    "figures",
+    metadata,
+    Column("kind", Text, primary_key=True),
+    Column("key", JSONB, primary_key=True),
+    *_amounts(),
+)
+figure_changes = Table(
+    "figure_changes",
+    metadata,
+    Column("kind", Text, nullable=False),
+    Column("key", JSONB, nullable=False),
+    *_amounts(),
+)
 
 workers = Table(
     "workers",

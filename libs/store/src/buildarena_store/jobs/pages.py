@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
@@ -9,36 +10,53 @@ from decimal import Decimal
 from types import MappingProxyType
 from typing import Any, Final, Literal
 
-from sqlalchemy import ColumnElement, Select, and_, case, or_, select
+from sqlalchemy import (
+    ColumnElement,
+    Connection,
+    Numeric,
+    Row,
+    Select,
+    TextClause,
+    and_,
+    func,
+    literal_column,
+    or_,
+    select,
+    text,
+)
 
 from buildarena_store.ids import begins_with
 from buildarena_store.jobs.job import JOB_COLUMNS, Job
-from buildarena_store.states import EXTERNAL_PROVIDER
-from buildarena_store.tables import jobs, sweep_jobs
+from buildarena_store.rows import bound_texts
+from buildarena_store.states import JobState
+from buildarena_store.tables import COST_OR_NULL, jobs, sweep_jobs
 
 Sort = Literal["created", "finished", "indicator", "cost", "task", "model", "seed"]
 SortValue = datetime | float | Decimal | str | int | None
 
-_UNKNOWN_COST: Final = jobs.c.model_config["provider"].astext == EXTERNAL_PROVIDER
 _COLUMNS: Final[Mapping[Sort, ColumnElement[Any]]] = MappingProxyType(
     {
         "created": jobs.c.created_at,
         "finished": jobs.c.finished_at,
         "indicator": jobs.c.indicator,
-        # What nobody counted is no cost of 0.
-        "cost": case((_UNKNOWN_COST, None), else_=jobs.c.cost_usd),
+        # What nobody counted is no cost of 0. As the index has it, word for word.
+        "cost": literal_column(COST_OR_NULL.text, Numeric(14, 6)),
         "task": jobs.c.task,
         "model": jobs.c.model,
         "seed": jobs.c.seed,
     }
 )
+MAX_NAMED: Final = 20_000
+"""Jobs of a sweep that are looked at one by one; of a larger one, those that an order finds."""
+_ID_PART: Final = re.compile(r"[job_0-9a-f]+", re.IGNORECASE)
+"""What can stand in an id."""
 NULLABLE: Final[frozenset[Sort]] = frozenset({"finished", "indicator", "cost"})
 """What a job may lack; those that do come last, in both directions."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Order:
-    """An order of jobs; equal ones are in the order of their ids.
+    """An order of jobs; equal ones are in the order of their ids, in the same direction.
 
     Attributes:
         by: What they are sorted by.
@@ -90,33 +108,69 @@ def sort_value(job: Job, by: Sort) -> SortValue:
     return values[by]
 
 
-def page_query(
-    wanted: JobFilter, order: Order, after: tuple[SortValue, str] | None, limit: int
-) -> Select[Any]:
-    """The query for a page.
+def read_page(
+    connection: Connection,
+    wanted: JobFilter,
+    order: Order,
+    after: tuple[SortValue, str] | None,
+    limit: int,
+) -> list[Row[Any]]:
+    """The rows of a page.
+
+    Those that have no such figure come last, by a query of their own: so both can go along the
+    one index of the order, in either direction.
 
     Args:
+        connection: Where to read.
         wanted: Which jobs.
         order: In which order.
         after: What the last job of the page before is sorted by, and its id.
         limit: Rows at most.
     """
-    query = select(*JOB_COLUMNS).where(*_conditions(wanted))
-    if wanted.sweep_id is not None:
-        query = query.join(sweep_jobs, sweep_jobs.c.job_id == jobs.c.id).where(
-            sweep_jobs.c.sweep_id == wanted.sweep_id
+    column, found = _COLUMNS[order.by], []
+    conditions = _conditions(connection, wanted)
+    query = select(*JOB_COLUMNS).where(*conditions)
+    if after is None or after[0] is not None:
+        some = query if after is None else query.where(_behind(order, *after))
+        if order.by in NULLABLE:
+            some = some.where(column.is_not(None))
+        if order.by == "finished":
+            # It is said so that nobody looks for ended ones among jobs that wait.
+            some = some.where(jobs.c.state == JobState.DONE)
+        found = list(connection.execute(_sorted(some, order).limit(limit)))
+    if order.by in NULLABLE and len(found) < limit:
+        rest = query.where(column.is_(None))
+        if after is not None and after[0] is None:
+            rest = rest.where(_further(order, jobs.c.id, after[1]))
+        found += connection.execute(_sorted(rest, order).limit(limit - len(found)))
+    return found
+
+
+def distinct_values(column: ColumnElement[Any]) -> TextClause:
+    """The query for a column's values in their order: one probe of its index for each."""
+    name = column.name
+    return text(
+        f"""
+        WITH RECURSIVE found (value) AS (
+            (SELECT {name} FROM jobs WHERE {name} IS NOT NULL ORDER BY {name} LIMIT 1)
+            UNION ALL
+            SELECT (SELECT {name} FROM jobs WHERE {name} > found.value ORDER BY {name} LIMIT 1)
+            FROM found WHERE found.value IS NOT NULL
         )
-    if after is not None:
-        query = query.where(_behind(order, *after))
-    column = _COLUMNS[order.by]
-    sorted_ = column.desc() if order.descending else column.asc()
-    if order.by in NULLABLE:
-        sorted_ = sorted_.nulls_last()
-    return query.order_by(sorted_, jobs.c.id).limit(limit)
+        SELECT value FROM found WHERE value IS NOT NULL
+        """  # noqa: S608 - made of our own column names
+    )
 
 
-def _conditions(wanted: JobFilter) -> list[ColumnElement[bool]]:
+def _sorted(query: Select[Any], order: Order) -> Select[Any]:
+    columns = (_COLUMNS[order.by], jobs.c.id)
+    return query.order_by(*(c.desc() if order.descending else c.asc() for c in columns))
+
+
+def _conditions(connection: Connection, wanted: JobFilter) -> list[ColumnElement[bool]]:
     found = [jobs.c[name] == value for name, value in wanted.equals.items() if value is not None]
+    if wanted.sweep_id is not None:
+        found.append(_of_sweep(connection, wanted.sweep_id))
     if wanted.flag is not None:
         found.append(jobs.c.flags.contains([wanted.flag]))
     if wanted.id_prefix is not None:
@@ -128,17 +182,46 @@ def _conditions(wanted: JobFilter) -> list[ColumnElement[bool]]:
     if wanted.since is not None:
         found.append(jobs.c.finished_at >= wanted.since)
     if wanted.until is not None:
-        found.append(jobs.c.finished_at < wanted.until)
+        # No job ends before it was made: a list by that time can begin there.
+        found += [jobs.c.finished_at < wanted.until, jobs.c.created_at < wanted.until]
     if wanted.text is not None:
-        columns = (jobs.c[name] for name in ("id", "task", "model", "reason", "detail"))
-        found.append(or_(*(column.icontains(wanted.text, autoescape=True) for column in columns)))
+        found.append(_holds_text(connection, wanted.text))
     return found
+
+
+def _of_sweep(connection: Connection, sweep_id: str) -> ColumnElement[bool]:
+    """Jobs of a sweep: of a small one, its ids are given, so that it is gone through alone."""
+    members = select(sweep_jobs.c.job_id).where(sweep_jobs.c.sweep_id == sweep_id)
+    few = connection.execute(members.limit(MAX_NAMED + 1)).scalars().all()
+    if len(few) > MAX_NAMED:
+        return jobs.c.id.in_(members)
+    given = func.unnest(bound_texts(few)).column_valued("member")
+    return jobs.c.id.in_(select(given).offset(0))
+
+
+def _holds_text(connection: Connection, wanted: str) -> ColumnElement[bool]:
+    """Whether a text stands in id, task, model, reason or detail, in any case.
+
+    Tasks, models and reasons are few: those with the text are found first.
+    """
+    ways = [jobs.c.detail.icontains(wanted, autoescape=True)]
+    for column in (jobs.c.task, jobs.c.model, jobs.c.reason):
+        values = connection.execute(distinct_values(column)).scalars()
+        held = [value for value in values if wanted.lower() in value.lower()]
+        if held:
+            ways.append(column == func.any(bound_texts(held)))
+    if _ID_PART.fullmatch(wanted):
+        ways.append(jobs.c.id.icontains(wanted, autoescape=True))
+    return or_(*ways)
 
 
 def _behind(order: Order, value: SortValue, id_: str) -> ColumnElement[bool]:
     column = _COLUMNS[order.by]
-    if value is None:
-        return and_(column.is_(None), jobs.c.id > id_)
-    further = column < value if order.descending else column > value
-    behind = or_(further, and_(column == value, jobs.c.id > id_))
-    return or_(behind, column.is_(None)) if order.by in NULLABLE else behind
+    return or_(
+        _further(order, column, value), and_(column == value, _further(order, jobs.c.id, id_))
+    )
+
+
+def _further(order: Order, column: ColumnElement[Any], value: Any) -> ColumnElement[bool]:
+    further: ColumnElement[bool] = column < value if order.descending else column > value
+    return further
