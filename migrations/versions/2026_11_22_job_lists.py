@@ -17,6 +17,7 @@ INDEXES = (
     "ix_jobs_finished ON jobs (finished_at, id)",
     "ix_jobs_indicator ON jobs (indicator, id)",
     f"ix_jobs_cost ON jobs ({COST}, id)",
+    f"ix_jobs_ended_cost ON jobs ({COST}, id) WHERE state = 'done'",
     "ix_jobs_task ON jobs (task, id)",
     "ix_jobs_model ON jobs (model, id)",
     "ix_jobs_seed ON jobs (seed, id)",

@@ -92,7 +92,7 @@ def _jobs(connection: Connection, kind: str, count: int, models: int) -> None:
             "tracks": list(TRACKS),
             "owners": OWNERS,
             "sweep_size": SWEEP_SIZE,
-            "first_seed": 0 if kind == "ended" else 10**9,
+            "first_seed": 0 if kind == "ended" else 1,
         },
     )
     connection.execute(text(SWEEPS), {"kind": kind})
@@ -108,7 +108,7 @@ def _ended(connection: Connection) -> None:
 JOBS = """
 WITH numbers AS (
     SELECT n, n % 9 AS task, n / 9 % :models AS model, n / 9 / :models % 2 AS track,
-        n / 9 / :models / 2 + :first_seed AS seed,
+        n / 9 / :models / 2 * 2 + :first_seed AS seed,
         (hashint8(n) & 65535) / 65536.0 AS luck, (hashint8(n * 7 + 1) & 65535) / 65536.0 AS other,
         :kind = 'ended' AS ended
     FROM generate_series(0, :count - 1) AS n

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from decimal import Decimal
@@ -16,6 +16,7 @@ from sqlalchemy import (
     Numeric,
     Row,
     Select,
+    Text,
     TextClause,
     and_,
     func,
@@ -46,8 +47,10 @@ _COLUMNS: Final[Mapping[Sort, ColumnElement[Any]]] = MappingProxyType(
         "seed": jobs.c.seed,
     }
 )
-MAX_NAMED: Final = 20_000
-"""Jobs of a sweep that are looked at one by one; of a larger one, those that an order finds."""
+ENDED_ONLY: Final[frozenset[Sort]] = frozenset({"finished", "indicator"})
+"""What only jobs that have ended have."""
+MAX_SORTED: Final = 40_000
+"""Jobs that are sorted for a page; of more, the first are found along the order's index."""
 _ID_PART: Final = re.compile(r"[job_0-9a-f]+", re.IGNORECASE)
 """What can stand in an id."""
 NULLABLE: Final[frozenset[Sort]] = frozenset({"finished", "indicator", "cost"})
@@ -127,16 +130,25 @@ def read_page(
         after: What the last job of the page before is sorted by, and its id.
         limit: Rows at most.
     """
-    column, found = _COLUMNS[order.by], []
     conditions = _conditions(connection, wanted)
+    if order.by in ENDED_ONLY and wanted.equals.get("state", JobState.DONE) not in {
+        JobState.DONE,
+        None,
+    }:
+        # None of them has such a figure.
+        by_id = select(*JOB_COLUMNS).where(*conditions)
+        if after is not None:
+            by_id = by_id.where(_further(order, jobs.c.id, after[1]))
+        in_order = jobs.c.id.desc() if order.descending else jobs.c.id.asc()
+        return list(connection.execute(by_id.order_by(in_order).limit(limit)))
+    if conditions and _are_few(connection, conditions):
+        return _read_few(connection, conditions, order, after, limit)
+    column, found = _COLUMNS[order.by], []
     query = select(*JOB_COLUMNS).where(*conditions)
     if after is None or after[0] is not None:
         some = query if after is None else query.where(_behind(order, *after))
         if order.by in NULLABLE:
             some = some.where(column.is_not(None))
-        if order.by == "finished":
-            # It is said so that nobody looks for ended ones among jobs that wait.
-            some = some.where(jobs.c.state == JobState.DONE)
         found = list(connection.execute(_sorted(some, order).limit(limit)))
     if order.by in NULLABLE and len(found) < limit:
         rest = query.where(column.is_(None))
@@ -144,6 +156,43 @@ def read_page(
             rest = rest.where(_further(order, jobs.c.id, after[1]))
         found += connection.execute(_sorted(rest, order).limit(limit - len(found)))
     return found
+
+
+def _are_few(connection: Connection, conditions: Sequence[ColumnElement[bool]]) -> bool:
+    """Whether jobs are so few that they can all be sorted.
+
+    Along an order's index they might be the very last; the database expects them anywhere.
+    """
+    some = select(jobs.c.id).where(*conditions).limit(MAX_SORTED + 1).subquery()
+    number = connection.execute(select(func.count()).select_from(some)).scalar_one()
+    return int(number) <= MAX_SORTED
+
+
+def _read_few(
+    connection: Connection,
+    conditions: Sequence[ColumnElement[bool]],
+    order: Order,
+    after: tuple[SortValue, str] | None,
+    limit: int,
+) -> list[Row[Any]]:
+    column = _COLUMNS[order.by]
+    chosen = select(jobs.c.id, column.label("place")).where(*conditions)
+    if after is not None:
+        value, id_ = after
+        behind = [and_(column.is_(None), _further(order, jobs.c.id, id_))]
+        if value is not None:
+            behind = [_behind(order, value, id_), column.is_(None)]
+        chosen = chosen.where(or_(*behind))
+    # Were it not made first, the order's index might be gone along after all.
+    some = chosen.offset(0).subquery("some")
+    place = some.c.place.desc() if order.descending else some.c.place.asc()
+    id_order = some.c.id.desc() if order.descending else some.c.id.asc()
+    first = select(some.c.id, some.c.place).order_by(place.nulls_last(), id_order).limit(limit)
+    page = first.subquery("page")
+    place = page.c.place.desc() if order.descending else page.c.place.asc()
+    id_order = page.c.id.desc() if order.descending else page.c.id.asc()
+    query = select(*JOB_COLUMNS).join(page, page.c.id == jobs.c.id)
+    return list(connection.execute(query.order_by(place.nulls_last(), id_order)))
 
 
 def distinct_values(column: ColumnElement[Any]) -> TextClause:
@@ -170,7 +219,8 @@ def _sorted(query: Select[Any], order: Order) -> Select[Any]:
 def _conditions(connection: Connection, wanted: JobFilter) -> list[ColumnElement[bool]]:
     found = [jobs.c[name] == value for name, value in wanted.equals.items() if value is not None]
     if wanted.sweep_id is not None:
-        found.append(_of_sweep(connection, wanted.sweep_id))
+        members = select(sweep_jobs.c.job_id).where(sweep_jobs.c.sweep_id == wanted.sweep_id)
+        found.append(jobs.c.id.in_(members))
     if wanted.flag is not None:
         found.append(jobs.c.flags.contains([wanted.flag]))
     if wanted.id_prefix is not None:
@@ -184,19 +234,20 @@ def _conditions(connection: Connection, wanted: JobFilter) -> list[ColumnElement
     if wanted.until is not None:
         # No job ends before it was made: a list by that time can begin there.
         found += [jobs.c.finished_at < wanted.until, jobs.c.created_at < wanted.until]
+    if _means_ended(wanted):
+        # Said so that an order's index of ended jobs alone can serve.
+        found.append(jobs.c.state == literal_column(f"'{JobState.DONE}'", Text))
     if wanted.text is not None:
         found.append(_holds_text(connection, wanted.text))
     return found
 
 
-def _of_sweep(connection: Connection, sweep_id: str) -> ColumnElement[bool]:
-    """Jobs of a sweep: of a small one, its ids are given, so that it is gone through alone."""
-    members = select(sweep_jobs.c.job_id).where(sweep_jobs.c.sweep_id == sweep_id)
-    few = connection.execute(members.limit(MAX_NAMED + 1)).scalars().all()
-    if len(few) > MAX_NAMED:
-        return jobs.c.id.in_(members)
-    given = func.unnest(bound_texts(few)).column_valued("member")
-    return jobs.c.id.in_(select(given).offset(0))
+def _means_ended(wanted: JobFilter) -> bool:
+    """Whether only jobs that have ended can be meant."""
+    ended = wanted.since, wanted.until, wanted.equals.get("outcome")
+    return any(value is not None for value in ended) or (
+        wanted.equals.get("state") == JobState.DONE
+    )
 
 
 def _holds_text(connection: Connection, wanted: str) -> ColumnElement[bool]:
@@ -211,7 +262,11 @@ def _holds_text(connection: Connection, wanted: str) -> ColumnElement[bool]:
         if held:
             ways.append(column == func.any(bound_texts(held)))
     if _ID_PART.fullmatch(wanted):
-        ways.append(jobs.c.id.icontains(wanted, autoescape=True))
+        held_in = jobs.c.id.contains(wanted.lower(), autoescape=True)
+        ids = select(jobs.c.id).where(held_in).limit(MAX_SORTED + 1)
+        some = connection.execute(ids).scalars().all()
+        few = len(some) <= MAX_SORTED
+        ways.append(jobs.c.id == func.any(bound_texts(some)) if few else held_in)
     return or_(*ways)
 
 
