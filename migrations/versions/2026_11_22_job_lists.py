@@ -11,7 +11,7 @@ down_revision = "2026_11_22_board_cells"
 branch_labels = None
 depends_on = None
 
-COST = "(CASE WHEN model_config->>'provider' = 'external' THEN NULL ELSE cost_usd END)"
+COST = "(CASE WHEN model_config->>'provider' = 'external' THEN NULL::numeric ELSE cost_usd END)"
 INDEXES = (
     "ix_jobs_created ON jobs (created_at, id)",
     "ix_jobs_finished ON jobs (finished_at, id)",

@@ -118,8 +118,10 @@ Index(
 Index("ix_jobs_leased", jobs.c.lease_expires_at, postgresql_where=jobs.c.state == JobState.RUNNING)
 Index("ix_jobs_board", jobs.c.track, jobs.c.task, jobs.c.model)
 # One for each order of lists, and for what lists are narrowed down by.
+# As the server writes it back, blanks and all: the check of the migrations compares texts.
 COST_OR_NULL = text(
-    "(CASE WHEN model_config->>'provider' = 'external' THEN NULL ELSE cost_usd END)"
+    "(\nCASE\n    WHEN (model_config ->> 'provider'::text) = 'external'::text THEN NULL::numeric\n"
+    "    ELSE cost_usd\nEND)"
 )
 Index("ix_jobs_created", jobs.c.created_at, jobs.c.id)
 Index("ix_jobs_finished", jobs.c.finished_at, jobs.c.id)
