@@ -126,9 +126,9 @@ COST_OR_NULL = text(
 Index("ix_jobs_created", jobs.c.created_at, jobs.c.id)
 Index("ix_jobs_finished", jobs.c.finished_at, jobs.c.id)
 Index("ix_jobs_indicator", jobs.c.indicator, jobs.c.id)
-Index("ix_jobs_cost", COST_OR_NULL, jobs.c.id)
 # What waits has cost nothing yet, and would all come before the cheapest that ended.
 Index("ix_jobs_ended_cost", COST_OR_NULL, jobs.c.id, postgresql_where=jobs.c.state == JobState.DONE)
+Index("ix_jobs_open_cost", COST_OR_NULL, jobs.c.id, postgresql_where=jobs.c.state != JobState.DONE)
 Index("ix_jobs_task", jobs.c.task, jobs.c.id)
 Index("ix_jobs_model", jobs.c.model, jobs.c.id)
 Index("ix_jobs_seed", jobs.c.seed, jobs.c.id)

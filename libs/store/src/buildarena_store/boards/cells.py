@@ -132,6 +132,8 @@ class BoardCells:
     def _reading(self) -> Iterator[Connection]:
         with self._database.transaction() as connection:
             connection.execute(text("SET TRANSACTION ISOLATION LEVEL REPEATABLE READ, READ ONLY"))
+            # One plan for any number of cells would be a bad one for few or for many.
+            connection.execute(text("SET LOCAL plan_cache_mode = force_custom_plan"))
             yield connection
 
     def _settled(self) -> Mark:

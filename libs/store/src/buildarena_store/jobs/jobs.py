@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from sqlalchemy import ColumnElement, Connection, any_, exists, select, update
+from sqlalchemy import ColumnElement, Connection, any_, exists, select, text, update
 from sqlalchemy.dialects.postgresql import insert
 
 from buildarena_store import events
@@ -93,7 +93,9 @@ class Jobs:
             equals: Column values to match, in the place of ``wanted``; None means any.
         """
         chosen = wanted or JobFilter(sweep_id=sweep_id, equals=equals)
-        with self._database.statement() as connection:
+        with self._database.transaction() as connection:
+            # One plan for all values would be a bad one for the rare ones.
+            connection.execute(text("SET LOCAL plan_cache_mode = force_custom_plan"))
             rows = read_page(connection, chosen, order or Order(), after, limit)
             return [value_of(Job, row) for row in rows]
 

@@ -15,7 +15,6 @@ from sqlalchemy import (
     Connection,
     Numeric,
     Row,
-    Select,
     Text,
     TextClause,
     and_,
@@ -141,30 +140,58 @@ def read_page(
             by_id = by_id.where(_further(order, jobs.c.id, after[1]))
         in_order = jobs.c.id.desc() if order.descending else jobs.c.id.asc()
         return list(connection.execute(by_id.order_by(in_order).limit(limit)))
-    if conditions and _are_few(connection, conditions):
+    if conditions and _are_few(connection, wanted, conditions):
         return _read_few(connection, conditions, order, after, limit)
-    column, found = _COLUMNS[order.by], []
-    query = select(*JOB_COLUMNS).where(*conditions)
+    found: list[Row[Any]] = []
     if after is None or after[0] is not None:
-        some = query if after is None else query.where(_behind(order, *after))
+        some: list[ColumnElement[bool]] = []
+        if after is not None:
+            some.append(_behind(order, *after))
         if order.by in NULLABLE:
-            some = some.where(column.is_not(None))
-        found = list(connection.execute(_sorted(some, order).limit(limit)))
+            some.append(_COLUMNS[order.by].is_not(None))
+        found = _read_along(connection, wanted, [*conditions, *some], order, limit)
     if order.by in NULLABLE and len(found) < limit:
-        rest = query.where(column.is_(None))
+        rest: list[ColumnElement[bool]] = [_COLUMNS[order.by].is_(None)]
         if after is not None and after[0] is None:
-            rest = rest.where(_further(order, jobs.c.id, after[1]))
-        found += connection.execute(_sorted(rest, order).limit(limit - len(found)))
+            rest.append(_further(order, jobs.c.id, after[1]))
+        found += _read_along(connection, wanted, [*conditions, *rest], order, limit - len(found))
     return found
 
 
-def _are_few(connection: Connection, conditions: Sequence[ColumnElement[bool]]) -> bool:
+def _read_along(
+    connection: Connection,
+    wanted: JobFilter,
+    conditions: Sequence[ColumnElement[bool]],
+    order: Order,
+    limit: int,
+) -> list[Any]:
+    """The first jobs along an order's index."""
+    place = _COLUMNS[order.by]
+    query = select(*JOB_COLUMNS, place.label("place")).where(*conditions).limit(limit)
+    columns = (c.desc() if order.descending else c.asc() for c in (place, jobs.c.id))
+    query = query.order_by(*columns)
+    if order.by != "cost":
+        return list(connection.execute(query))
+    # What waits has cost nothing yet: in one index, ended jobs would all lie behind it.
+    ended = jobs.c.state == literal_column(f"'{JobState.DONE}'", Text)
+    state = wanted.equals.get("state")
+    parts = [ended, ~ended] if state is None else [ended if state == JobState.DONE else ~ended]
+    rows = [row for part in parts for row in connection.execute(query.where(part))]
+    return sorted(rows, key=lambda row: (row.place or 0, row.id), reverse=order.descending)[:limit]
+
+
+def _are_few(
+    connection: Connection, wanted: JobFilter, conditions: Sequence[ColumnElement[bool]]
+) -> bool:
     """Whether jobs are so few that they can all be sorted.
 
     Along an order's index they might be the very last; the database expects them anywhere.
     """
-    some = select(jobs.c.id).where(*conditions).limit(MAX_SORTED + 1).subquery()
-    number = connection.execute(select(func.count()).select_from(some)).scalar_one()
+    some = select(jobs.c.id).where(*conditions)
+    if wanted.sweep_id is not None:
+        some = select(sweep_jobs.c.job_id).where(sweep_jobs.c.sweep_id == wanted.sweep_id)
+    counted = some.limit(MAX_SORTED + 1).subquery()
+    number = connection.execute(select(func.count()).select_from(counted)).scalar_one()
     return int(number) <= MAX_SORTED
 
 
@@ -209,11 +236,6 @@ def distinct_values(column: ColumnElement[Any]) -> TextClause:
         SELECT value FROM found WHERE value IS NOT NULL
         """  # noqa: S608 - made of our own column names
     )
-
-
-def _sorted(query: Select[Any], order: Order) -> Select[Any]:
-    columns = (_COLUMNS[order.by], jobs.c.id)
-    return query.order_by(*(c.desc() if order.descending else c.asc() for c in columns))
 
 
 def _conditions(connection: Connection, wanted: JobFilter) -> list[ColumnElement[bool]]:
