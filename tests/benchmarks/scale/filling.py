@@ -48,6 +48,8 @@ def fill(database: Database, amount: Amount) -> None:
         connection.execute(text("SET session_replication_role = origin"))
         connection.execute(text("SELECT recount_jobs()"))
         connection.execute(text("VACUUM ANALYZE"))
+        connection.execute(text("DROP TABLE made_up_tasks"))
+        connection.execute(text("RESET ALL"))
 
 
 def _name_tasks(connection: Connection) -> None:
