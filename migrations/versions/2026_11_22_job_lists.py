@@ -167,16 +167,17 @@ def _triggers() -> list[str]:
             "FOR EACH STATEMENT EXECUTE FUNCTION count_jobs_added()"
         ),
         (
-            "CREATE TRIGGER count_jobs_removed AFTER DELETE ON jobs REFERENCING OLD TABLE AS removed "
+            "CREATE TRIGGER count_jobs_removed AFTER DELETE ON jobs "
+            "REFERENCING OLD TABLE AS removed "
             "FOR EACH STATEMENT EXECUTE FUNCTION count_jobs_removed()"
         ),
         (
-            f"CREATE TRIGGER count_jobs_moved AFTER UPDATE ON jobs FOR EACH ROW WHEN ({_differ(PLACE)})"
-            " EXECUTE FUNCTION count_job_moved()"
+            "CREATE TRIGGER count_jobs_moved AFTER UPDATE ON jobs FOR EACH ROW "
+            f"WHEN ({_differ(PLACE)}) EXECUTE FUNCTION count_job_moved()"
         ),
         (
-            f"CREATE TRIGGER count_jobs_used AFTER UPDATE ON jobs FOR EACH ROW WHEN ({_differ(USE)})"
-            " EXECUTE FUNCTION count_job_use()"
+            "CREATE TRIGGER count_jobs_used AFTER UPDATE ON jobs FOR EACH ROW "
+            f"WHEN ({_differ(USE)}) EXECUTE FUNCTION count_job_use()"
         ),
         (
             "CREATE TRIGGER count_attempts_added AFTER INSERT ON attempts FOR EACH ROW "

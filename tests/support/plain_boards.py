@@ -62,9 +62,7 @@ def plain_board(
         for key, found in cells.items()
     ]
     chosen = choose_cells(heads, versions, query)
-    held = {
-        key: [t for t in found if query.holds(t) and inside(t)] for key, found in cells.items()
-    }
+    held = {key: [t for t in found if query.holds(t) and inside(t)] for key, found in cells.items()}
     return ranked_board(
         chosen,
         lambda key: plain_summary(held[key], reading=query.reading) if held[key] else None,

@@ -149,53 +149,51 @@ class _Weights:
 
     @staticmethod
     def of(pairs: Sequence[tuple[_Sample, _Sample]], width: int) -> _Weights:
-        weight, gap = np.zeros((len(pairs), width)), np.zeros(len(pairs))
-        first, second = np.zeros_like(weight), np.zeros_like(weight)
+        figures = np.zeros((2, len(pairs), width))
+        first, second = np.zeros((len(pairs), width)), np.zeros((len(pairs), width))
         for number, (one, other) in enumerate(pairs):
-            times = np.concatenate([one.times, other.times])
-            own = _weights(np.concatenate([one.figures, other.figures]), times)
-            weight[number, : len(own)] = own
-            first[number, : len(one.times)] = one.times
-            second[number, len(one.times) : len(own)] = other.times
-            gap[number] = _gap(own, times)
+            middle, end = len(one.times), len(one.times) + len(other.times)
+            figures[:, number, :middle] = one.figures.T
+            figures[:, number, middle:end] = other.figures.T
+            first[number, :middle] = one.times
+            second[number, middle:end] = other.times
+        times = first + second
+        weight = _standardised(sum(_standardised(figure, times) for figure in figures), times)
         return _Weights(
             weight=weight,
             first=first,
             second=second,
-            gap=gap,
+            gap=_gaps(weight, times),
             varies=np.any(weight != 0.0, axis=1),
         )
 
 
-def _weights(pooled: Floats, times: Floats) -> Floats:
-    """The sum of the standardised figures of (D, F) trials, standardised again."""
-    total = np.zeros(len(pooled))
-    for figure in pooled.T:
-        total += _standardised(figure, times)
-    return _standardised(total, times)
-
-
 def _standardised(values: Floats, times: Floats) -> Floats:
-    if len(values) == 0 or np.ptp(values) == 0.0:
-        return np.zeros_like(values)
-    number = times.sum()
-    away = values - (values * times).sum() / number
-    spread = float(np.sqrt((away**2 * times).sum() / number))
+    """Each row with mean 0 and standard deviation 1; zeros where a row does not vary."""
+    there = times > 0
+    number = np.maximum(times.sum(axis=1), 1.0)
+    away = np.where(there, values - (_sums(values, times) / number)[:, None], 0.0)
+    spread = np.sqrt(_sums(away**2, times) / number)
+    greatest = np.where(there, values, -np.inf).max(axis=1)
+    least = np.where(there, values, np.inf).min(axis=1)
     # Rounding alone is no difference.
-    if spread <= 1e-12 * float(np.abs(values).max()):
-        return np.zeros_like(values)
-    standard: Floats = away / spread
+    rounding = 1e-12 * np.maximum(np.abs(greatest), np.abs(least))
+    varies = (greatest > least) & (spread > rounding)
+    standard: Floats = np.where(varies[:, None], away / np.where(varies, spread, 1.0)[:, None], 0.0)
     return standard
 
 
-def _gap(weights: Floats, times: Floats) -> float:
-    order = np.argsort(weights, kind="stable")
-    steps = np.diff(weights[order])
-    below = np.cumsum(times[order])[:-1]
-    inner = steps[(below >= FEW) & (times.sum() - below >= FEW)]
-    if not np.any(inner):
-        inner = steps
-    return float(inner.max(initial=0.0))
+def _gaps(weight: Floats, times: Floats) -> Floats:
+    """The widest gap between each row's weights."""
+    there = times > 0
+    order = np.argsort(np.where(there, weight, np.inf), axis=1, kind="stable")
+    ordered = np.take_along_axis(weight, order, axis=1)
+    below = np.cumsum(np.take_along_axis(times, order, axis=1), axis=1)[:, :-1]
+    above = times.sum(axis=1)[:, None] - below
+    steps = np.where(above > 0, np.diff(ordered, axis=1), 0.0)
+    inner = np.where((below >= FEW) & (above >= FEW), steps, 0.0).max(axis=1, initial=0.0)
+    widest: Floats = np.where(inner > 0, inner, steps.max(axis=1, initial=0.0))
+    return widest
 
 
 def _tail(table: _Weights, reached: Floats, sign: Floats) -> Floats:
