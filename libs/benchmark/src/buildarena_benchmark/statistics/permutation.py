@@ -158,7 +158,8 @@ class _Weights:
             first[number, :middle] = one.times
             second[number, middle:end] = other.times
         times = first + second
-        weight = _standardised(sum(_standardised(figure, times) for figure in figures), times)
+        success, indicator = (_standardised(figure, times) for figure in figures)
+        weight = _standardised(success + indicator, times)
         return _Weights(
             weight=weight,
             first=first,
