@@ -20,14 +20,8 @@ from buildarena_benchmark.flags import Reading
 from buildarena_benchmark.leaderboard import BoardQuery, cost_bins, failure_rows
 from buildarena_pipeline.catalog.models import load_registry
 from buildarena_store import TrialFilter
-from buildarena_store.tables import (
-    board_cells,
-    board_changes,
-    board_state,
-    jobs,
-    sweep_jobs,
-    sweeps,
-)
+from buildarena_store.made_tables import board_cells, board_state
+from buildarena_store.tables import board_changes, jobs, sweep_jobs, sweeps
 
 TRACKS = ("first/track-1", "second/track-1")
 START = datetime(2026, 1, 1, tzinfo=UTC)

@@ -11,7 +11,8 @@ from sqlalchemy import delete, func, select, text, update
 
 from buildarena_store import STAGE_SECONDS, TrialFilter
 from buildarena_store.jobs.pages import JobFilter, Order
-from buildarena_store.tables import attempts, figure_changes, jobs, sweep_jobs
+from buildarena_store.made_tables import figure_changes
+from buildarena_store.tables import attempts, jobs, sweep_jobs
 
 sys.path.append(str(Path(__file__).parents[1] / "benchmarks" / "scale"))
 from filling import TRACKS, Amount, fill

@@ -35,9 +35,10 @@ from sqlalchemy.types import UserDefinedType
 from buildarena_store.boards.tallying import CellRecord, kept_tallies, tallies_of, tally_jobs
 from buildarena_store.boards.trials import RANKED, CellId, TrialFilter
 from buildarena_store.database import Database
+from buildarena_store.made_tables import board_cells, board_state
 from buildarena_store.rows import bound_texts
 from buildarena_store.states import JobState
-from buildarena_store.tables import board_cells, board_changes, board_state, jobs, tasks
+from buildarena_store.tables import board_changes, jobs, tasks
 
 FORMAT: Final = 1
 """Of rows; programs of different formats may use one database at once."""
