@@ -7,7 +7,7 @@ from sqlalchemy import text
 
 from buildarena_benchmark.flags import Reading
 from buildarena_benchmark.leaderboard import EndedJob, cost_bins, failure_rows
-from buildarena_store import JobScore, JournalEntry, Usage
+from buildarena_store import JobScore, JournalEntry, TrialFilter, Usage
 
 
 def end_next(context, outcome: str, indicator: float, tokens: int, **more: object) -> None:
@@ -44,8 +44,7 @@ def test_figures_without_jobs_are_empty(api) -> None:
 def test_figures_are_those_of_the_report(api, context, reading) -> None:
     answer = api.get("/v1/leaderboard/figures", params={"reading": reading})
     found = answer.json()
-    feed = context.store.results.boards.feed(None)
-    trials: list[EndedJob] = list(feed.put)
+    trials: list[EndedJob] = context.store.results.boards.trials(TrialFilter())
     wanted = {
         row.model: (dict(row.outcomes), dict(row.refusals), row.actions, row.refused_actions)
         for row in failure_rows(trials)

@@ -18,7 +18,14 @@ from buildarena_benchmark import parse_custom_task
 from buildarena_benchmark.leaderboard import summarise
 from buildarena_pipeline.catalog.specs import SweepSpec
 from buildarena_pipeline.runtime.context import Context
-from buildarena_store import ArtifactStore, JobKey, NameTakenError, UnknownIdError, archives
+from buildarena_store import (
+    ArtifactStore,
+    JobKey,
+    NameTakenError,
+    TrialFilter,
+    UnknownIdError,
+    archives,
+)
 from buildarena_store.archives import ArchiveError, Imported, members, rows, write_archive
 from buildarena_store.jobs.job import configuration_hash
 from buildarena_store.tables import metadata
@@ -353,13 +360,14 @@ def test_imported_scores_count_when_they_were_verified(archive, elsewhere) -> No
         other.store.verifications.get(id_) for id_ in other.store.verifications.to_notify(10)
     ]
     assert {check.job_id for check in waiting} == {j.id for j in other.store.jobs.page(limit=9)}
-    feed = other.store.results.boards.feed(None)
-    assert [(t.imported, t.unverified, t.scored) for t in feed.put] == [(True, True, False)] * 2
+    boards = other.store.results.boards
+    feed, trials = boards.cells.feed(None), boards.trials(TrialFilter())
+    assert [(t.imported, t.unverified, t.scored) for t in trials] == [(True, True, False)] * 2
     runner = verification_runner(other)
     assert runner.process_one()
-    changed_since = other.store.results.boards.feed(feed.mark)
-    assert sorted(t.unverified for t in changed_since.put if t.scored) == [False]
-    board = summarise(other.store.results.boards.feed(None).put)
+    (changed,) = boards.cells.feed(feed.mark).cells
+    assert sorted(t.unverified for t in changed.tallies if t.scored) == [False]
+    board = summarise(boards.trials(TrialFilter()))
     assert (board.trials, board.ended, board.imported, board.unverified) == (1, 1, 2, 1)
 
 
@@ -370,7 +378,7 @@ def test_a_forged_score_never_counts(archive, elsewhere) -> None:
     read_archive(other, forge(better, "rollouts", lambda row: row.update(indicator=1e6)))
     while verification_runner(other).process_one():
         pass
-    counted = [t.indicator for t in other.store.results.boards.feed(None).put if t.scored]
+    counted = [t.indicator for t in other.store.results.boards.trials(TrialFilter()) if t.scored]
     assert len(counted) == 1
     assert max(counted) < 1e6
     # Asking again does not help.

@@ -7,7 +7,16 @@ Rows leave this package as frozen dataclasses, never as database objects.
 from buildarena_store.accounts.budgets import Budget, BudgetLimits, Budgets, Need, Shortage
 from buildarena_store.accounts.keys import ApiKey, ApiKeys, KeyCheck
 from buildarena_store.artifacts import ArtifactInfo, ArtifactStore
-from buildarena_store.boards import BoardChange, BoardFeed, Boards, Round
+from buildarena_store.boards import (
+    BoardCells,
+    BoardChange,
+    Boards,
+    CellId,
+    CellRecord,
+    Mark,
+    Round,
+    TrialFilter,
+)
 from buildarena_store.database import Database
 from buildarena_store.errors import (
     ArtifactDamagedError,
@@ -57,12 +66,14 @@ __all__ = [
     "ArtifactMissingError",
     "ArtifactStore",
     "ArtifactStoreError",
+    "BoardCells",
     "BoardChange",
-    "BoardFeed",
     "Boards",
     "Budget",
     "BudgetLimits",
     "Budgets",
+    "CellId",
+    "CellRecord",
     "Database",
     "EndedKeyError",
     "Event",
@@ -80,6 +91,7 @@ __all__ = [
     "KeyCheck",
     "Lease",
     "Leases",
+    "Mark",
     "NameTakenError",
     "Need",
     "NewJob",
@@ -106,6 +118,7 @@ __all__ = [
     "Sweeps",
     "Tasks",
     "TransitionError",
+    "TrialFilter",
     "TurnRecord",
     "TurnResult",
     "Turns",

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any, Final
 
-from sqlalchemy import ARRAY, Connection, Double, case, cast, func, select, text
+from sqlalchemy import Connection, func, select, text
 
 from buildarena_store import events
 from buildarena_store.database import Database
-from buildarena_store.states import JobState, Outcome
-from buildarena_store.tables import attempts, jobs, sweeps
+from buildarena_store.states import JobState
+from buildarena_store.tables import jobs, sweeps
 
+GATHER_LOCK: Final = 0x636F756E74  # "count": one process at a time adds changes to the counts
 STAGE_SECONDS = (0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 30, 60, 120, 300, 600, 1800, 3600)
 """Bounds of the classes of stage durations, in seconds; each class has its lower bound in it."""
 
@@ -82,85 +85,118 @@ class ServiceFigures:
 
 
 class Figures:
-    """Reads the service's figures."""
+    """Reads the service's figures, which triggers keep: nothing is counted over all jobs."""
 
     def __init__(self, database: Database) -> None:
         self._database = database
 
     def read(self) -> ServiceFigures:
-        """All figures, consistent with each other."""
+        """All figures."""
+        self.gather()
         with self._database.transaction() as connection:
             connection.execute(text("SET TRANSACTION ISOLATION LEVEL REPEATABLE READ READ ONLY"))
+            kept = _Kept.read(connection)
             return ServiceFigures(
-                jobs=_jobs(connection),
-                queues=_queues(connection),
-                models=_models(connection),
-                stages=_stages(connection),
+                jobs=_jobs(kept),
+                queues=_queues(connection, kept),
+                models=_models(kept),
+                stages=_stages(kept),
                 sweeps=_sweeps(connection),
                 running=_running(connection),
             )
 
-
-def _jobs(connection: Connection) -> list[JobCount]:
-    errored = case((jobs.c.outcome == Outcome.ERRORED, func.coalesce(jobs.c.reason, "")), else_="")
-    where = [
-        jobs.c.state,
-        jobs.c.stage,
-        func.coalesce(jobs.c.outcome, "").label("outcome"),
-        errored.label("reason"),
-    ]
-    rows = connection.execute(select(*where, func.count().label("jobs")).group_by(*where))
-    return [JobCount(**row) for row in rows.mappings()]
+    def gather(self) -> None:
+        """Adds what changed to the counts; when another process is about it, that one does."""
+        with self._database.transaction() as connection:
+            if connection.execute(select(func.pg_try_advisory_xact_lock(GATHER_LOCK))).scalar():
+                connection.execute(_GATHER)
 
 
-def _queues(connection: Connection) -> list[QueueDepth]:
-    waits = func.extract("epoch", events.now - func.min(jobs.c.available_at))
-    query = (
-        select(jobs.c.queue, func.count().label("jobs"), func.greatest(waits, 0).label("oldest_s"))
-        .where(jobs.c.state == JobState.QUEUED)
-        .group_by(jobs.c.queue)
-    )
+_GATHER: Final = text(
+    """
+    WITH gone AS (DELETE FROM figure_changes RETURNING *)
+    INSERT INTO figures (kind, key, a, b, c, d)
+    SELECT kind, key, sum(a), sum(b), sum(c), sum(d) FROM gone GROUP BY kind, key
+    ON CONFLICT (kind, key) DO UPDATE SET a = figures.a + excluded.a, b = figures.b + excluded.b,
+        c = figures.c + excluded.c, d = figures.d + excluded.d
+    """
+)
+_KEPT: Final = text(
+    """
+    SELECT kind, key, sum(a) AS a, sum(b) AS b, sum(c) AS c, sum(d) AS d
+    FROM (SELECT * FROM figures UNION ALL SELECT * FROM figure_changes) AS both_kinds
+    GROUP BY kind, key ORDER BY kind, key
+    """
+)
+
+Amounts = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class _Kept:
+    """Kept figures by what they are of."""
+
+    by_kind: Mapping[str, Sequence[tuple[Sequence[Any], Amounts]]]
+
+    @staticmethod
+    def read(connection: Connection) -> _Kept:
+        found: dict[str, list[tuple[Sequence[Any], Amounts]]] = {}
+        for row in connection.execute(_KEPT):
+            amounts = float(row.a), float(row.b), float(row.c), float(row.d)
+            found.setdefault(row.kind, []).append((row.key, amounts))
+        return _Kept(found)
+
+    def of(self, kind: str) -> Sequence[tuple[Sequence[Any], Amounts]]:
+        return self.by_kind.get(kind, ())
+
+
+def _jobs(kept: _Kept) -> list[JobCount]:
+    counts: Counter[tuple[str, str, str, str]] = Counter()
+    for (state, stage, outcome, reason, _), amounts in kept.of("jobs"):
+        counts[state, stage, outcome, reason] += int(amounts[0])
     return [
-        QueueDepth(queue=row.queue, jobs=row.jobs, oldest_s=float(row.oldest_s))
-        for row in connection.execute(query)
+        JobCount(state=state, stage=stage, outcome=outcome, reason=reason, jobs=number)
+        for (state, stage, outcome, reason), number in counts.items()
+        if number
     ]
 
 
-def _models(connection: Connection) -> list[ModelUse]:
-    query = select(
-        jobs.c.model,
-        func.sum(jobs.c.requests).label("requests"),
-        func.sum(jobs.c.input_tokens).label("input_tokens"),
-        func.sum(jobs.c.output_tokens).label("output_tokens"),
-        func.sum(jobs.c.cost_usd).label("cost_usd"),
-    ).group_by(jobs.c.model)
+def _queues(connection: Connection, kept: _Kept) -> list[QueueDepth]:
+    depths: Counter[str] = Counter()
+    for (state, _, _, _, queue), amounts in kept.of("jobs"):
+        if state == JobState.QUEUED:
+            depths[queue] += int(amounts[0])
+    found = []
+    for queue, number in sorted(depths.items()):
+        oldest = select(func.min(jobs.c.available_at)).where(
+            jobs.c.state == JobState.QUEUED, jobs.c.queue == queue
+        )
+        waited = func.greatest(func.extract("epoch", events.now - oldest.scalar_subquery()), 0)
+        oldest_s = connection.execute(select(waited)).scalar()
+        if number:
+            found.append(QueueDepth(queue=queue, jobs=number, oldest_s=float(oldest_s or 0.0)))
+    return found
+
+
+def _models(kept: _Kept) -> list[ModelUse]:
     return [
         ModelUse(
-            model=row.model,
-            requests=int(row.requests),
-            input_tokens=int(row.input_tokens),
-            output_tokens=int(row.output_tokens),
-            cost_usd=float(row.cost_usd),
+            model=model,
+            requests=int(requests),
+            input_tokens=int(input_tokens),
+            output_tokens=int(output_tokens),
+            cost_usd=cost_usd,
         )
-        for row in connection.execute(query)
+        for (model,), (requests, input_tokens, output_tokens, cost_usd) in kept.of("models")
     ]
 
 
-def _stages(connection: Connection) -> list[StageTimes]:
-    took = cast(func.extract("epoch", attempts.c.ended_at - attempts.c.started_at), Double)
-    bounds = cast([float(bound) for bound in STAGE_SECONDS], ARRAY(Double))
-    number = func.width_bucket(took, bounds).label("number")
-    key = [attempts.c.stage, attempts.c.result]
-    query = (
-        select(*key, number, func.count().label("attempts"), func.sum(took).label("total_s"))
-        .where(attempts.c.ended_at.is_not(None))
-        .group_by(*key, number)
-    )
+def _stages(kept: _Kept) -> list[StageTimes]:
     found: dict[tuple[str, str], tuple[list[int], float]] = {}
-    for row in connection.execute(query):
-        counts, total = found.get((row.stage, row.result), ([0] * (len(STAGE_SECONDS) + 1), 0.0))
-        counts[row.number] = row.attempts
-        found[row.stage, row.result] = (counts, total + row.total_s)
+    for (stage, result, number), (attempts, seconds, _, _) in kept.of("stages"):
+        counts, total = found.get((stage, result), ([0] * (len(STAGE_SECONDS) + 1), 0.0))
+        counts[number] += int(attempts)
+        found[stage, result] = (counts, total + seconds)
     return [
         StageTimes(stage=stage, result=result, counts=counts, total_s=total)
         for (stage, result), (counts, total) in sorted(found.items())

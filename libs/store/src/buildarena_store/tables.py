@@ -116,7 +116,44 @@ Index(
 )
 Index("ix_jobs_leased", jobs.c.lease_expires_at, postgresql_where=jobs.c.state == JobState.RUNNING)
 Index("ix_jobs_board", jobs.c.track, jobs.c.task, jobs.c.model)
-Index("ix_jobs_newest", jobs.c.created_at.desc(), jobs.c.id)
+# One for each order of lists, and for what lists are narrowed down by.
+# As the server writes it back, blanks and all: the check of the migrations compares texts.
+COST_OR_NULL = text(
+    "(\nCASE\n    WHEN (model_config ->> 'provider'::text) = 'external'::text THEN NULL::numeric\n"
+    "    ELSE cost_usd\nEND)"
+)
+Index("ix_jobs_created", jobs.c.created_at, jobs.c.id)
+Index("ix_jobs_finished", jobs.c.finished_at, jobs.c.id)
+Index("ix_jobs_indicator", jobs.c.indicator, jobs.c.id)
+# What waits has cost nothing yet, and would all come before the cheapest that ended.
+Index("ix_jobs_ended_cost", COST_OR_NULL, jobs.c.id, postgresql_where=jobs.c.state == JobState.DONE)
+Index("ix_jobs_open_cost", COST_OR_NULL, jobs.c.id, postgresql_where=jobs.c.state != JobState.DONE)
+Index("ix_jobs_task", jobs.c.task, jobs.c.id)
+Index("ix_jobs_model", jobs.c.model, jobs.c.id)
+Index("ix_jobs_seed", jobs.c.seed, jobs.c.id)
+Index("ix_jobs_outcome", jobs.c.outcome, jobs.c.id, postgresql_where=jobs.c.outcome.is_not(None))
+Index("ix_jobs_reason", jobs.c.reason, jobs.c.id, postgresql_where=jobs.c.reason.is_not(None))
+Index("ix_jobs_detail", jobs.c.id, postgresql_where=jobs.c.detail.is_not(None))
+Index(
+    "ix_jobs_flags",
+    jobs.c.flags,
+    postgresql_using="gin",
+    postgresql_ops={"flags": "jsonb_path_ops"},
+    postgresql_where=jobs.c.flags.is_not(None),
+)
+Index(
+    "ix_jobs_oldest",
+    jobs.c.queue,
+    jobs.c.created_at,
+    jobs.c.id,
+    postgresql_where=jobs.c.state == JobState.QUEUED,
+)
+Index(
+    "ix_jobs_available",
+    jobs.c.queue,
+    jobs.c.available_at,
+    postgresql_where=jobs.c.state == JobState.QUEUED,
+)
 Index("ix_jobs_payer", jobs.c.payer, postgresql_where=jobs.c.state != JobState.DONE)
 Index("ix_jobs_owner", jobs.c.owner, postgresql_where=jobs.c.state != JobState.DONE)
 
@@ -337,6 +374,9 @@ board_changes = Table(
     Column("job_id", Text, nullable=False),
     Column("track", Text, nullable=False),
     Column("task", Text, nullable=False),
+    # With track and task the cell; null when no cell changed, or before there were these columns.
+    Column("task_version", Text),
+    Column("configuration", Text),
     Column("model", Text, nullable=False),
     Column("kind", Text, nullable=False),
     Column("before", JSONB),
@@ -346,6 +386,7 @@ board_changes = Table(
 )
 Index("ix_board_changes_transaction", board_changes.c.transaction)
 Index("ix_board_changes_track", board_changes.c.track, board_changes.c.id)
+
 
 events = Table(
     "events",
@@ -359,6 +400,7 @@ events = Table(
 )
 Index("ix_events_job", events.c.job_id, events.c.id)
 Index("ix_events_sweep", events.c.sweep_id, events.c.id)
+
 
 workers = Table(
     "workers",

@@ -1,10 +1,32 @@
 """Leaderboard mathematics: from ended jobs to ranks, with what is not known about them."""
 
-from buildarena_benchmark.leaderboard.board import Board, BoardQuery, TaskBoard, TrackBoard
-from buildarena_benchmark.leaderboard.cells import Cell, counted_trials, summarise
+from buildarena_benchmark.leaderboard.board import (
+    Board,
+    BoardQuery,
+    CellHead,
+    CellKey,
+    ChosenCells,
+    TaskBoard,
+    TrackBoard,
+    choose_cells,
+    ranked_board,
+)
+from buildarena_benchmark.leaderboard.cells import (
+    Cell,
+    CellName,
+    counted_trials,
+    summarise,
+    summarise_tallies,
+)
 from buildarena_benchmark.leaderboard.comparisons import Comparison, TaskComparison, compare_models
 from buildarena_benchmark.leaderboard.ended_jobs import EndedJob
-from buildarena_benchmark.leaderboard.figures import FailureRow, cost_bins, failure_rows
+from buildarena_benchmark.leaderboard.figures import (
+    FailureRow,
+    cost_bins,
+    cost_bins_of,
+    failure_row,
+    failure_rows,
+)
 from buildarena_benchmark.leaderboard.latex import cost_table, performance_table, plain_table
 from buildarena_benchmark.leaderboard.overall import OverallRow
 from buildarena_benchmark.leaderboard.published import (
@@ -12,29 +34,45 @@ from buildarena_benchmark.leaderboard.published import (
     published_overall,
     published_rows,
 )
+from buildarena_benchmark.leaderboard.standings import KeptTests
+from buildarena_benchmark.leaderboard.tallies import UNKNOWN_TOKENS, Tally, Total, tallied
 from buildarena_benchmark.outcomes import SCORED
 
 __all__ = [
     "SCORED",
+    "UNKNOWN_TOKENS",
     "Board",
     "BoardQuery",
     "Cell",
+    "CellHead",
+    "CellKey",
+    "CellName",
+    "ChosenCells",
     "Comparison",
     "EndedJob",
     "FailureRow",
+    "KeptTests",
     "OverallRow",
     "PublishedRow",
+    "Tally",
     "TaskBoard",
     "TaskComparison",
+    "Total",
     "TrackBoard",
+    "choose_cells",
     "compare_models",
     "cost_bins",
+    "cost_bins_of",
     "cost_table",
     "counted_trials",
+    "failure_row",
     "failure_rows",
     "performance_table",
     "plain_table",
     "published_overall",
     "published_rows",
+    "ranked_board",
     "summarise",
+    "summarise_tallies",
+    "tallied",
 ]

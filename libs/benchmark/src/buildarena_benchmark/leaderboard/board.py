@@ -1,8 +1,8 @@
-"""The board of one track: kept up to date trial by trial, summarised when it is asked for."""
+"""The board of one track: which cells it has, and how they rank."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 
@@ -23,7 +23,6 @@ class BoardQuery:
     Attributes:
         tasks: Task names.
         models: Model names.
-        jobs: Ids of jobs.
         since: Only jobs that ended then or later.
         until: Only jobs that ended before.
         reading: How flags are read.
@@ -32,16 +31,13 @@ class BoardQuery:
 
     tasks: frozenset[str] | None = None
     models: frozenset[str] | None = None
-    jobs: frozenset[str] | None = None
     since: datetime | None = None
     until: datetime | None = None
     reading: Reading = Reading.OURS
     overall: frozenset[str] | None = None
 
     def holds(self, trial: EndedJob) -> bool:
-        """Whether a trial is among the jobs, and ended in the time, that were asked for."""
-        if self.jobs is not None and trial.job_id not in self.jobs:
-            return False
+        """Whether a trial ended in the time that was asked for."""
         if self.since is None and self.until is None:
             return True
         ended = trial.finished_at
@@ -84,10 +80,108 @@ class Board:
     overall: Sequence[OverallRow]
 
 
-class TrackBoard:
-    """The trials of one track. Summaries of cells are kept until one of their trials changes.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CellHead:
+    """What says whether a cell is on a board.
 
-    Not safe for use from several threads at once.
+    Attributes:
+        key: Task, task version, configuration.
+        model: Its model's name.
+        newest: When the last of its jobs ended.
+    """
+
+    key: CellKey
+    model: str
+    newest: datetime | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ChosenCells:
+    """The cells of a board.
+
+    Attributes:
+        shown: Cells by task and version, in the board's order.
+        outdated: Cells of other versions, by task.
+    """
+
+    shown: Mapping[tuple[str, str], Sequence[CellKey]]
+    outdated: Mapping[str, Sequence[CellKey]]
+
+
+def choose_cells(
+    heads: Iterable[CellHead], versions: Mapping[str, str], query: BoardQuery
+) -> ChosenCells:
+    """The cells that a query is about; each task is shown in one version.
+
+    Args:
+        heads: All cells of the track.
+        versions: Current version of each known task; of another task the newest one counts.
+        query: Which tasks and models are asked for.
+    """
+    by_task: dict[str, dict[str, list[CellHead]]] = {}
+    for head in heads:
+        if query.tasks is not None and head.key[0] not in query.tasks:
+            continue
+        if query.models is not None and head.model not in query.models:
+            continue
+        by_task.setdefault(head.key[0], {}).setdefault(head.key[1], []).append(head)
+    shown: dict[tuple[str, str], list[CellKey]] = {}
+    outdated: dict[str, list[CellKey]] = {}
+    known = list(versions)
+    for task in sorted(by_task, key=lambda t: (_place(known, t), t)):
+        found = by_task[task]
+        version = versions.get(task, "")
+        if version not in found:
+            version = max(found, key=lambda v: (_newest(found[v]), v))
+        shown[task, version] = sorted(head.key for head in found[version])
+        outdated[task] = [head.key for v in found if v != version for head in found[v]]
+    return ChosenCells(shown=shown, outdated=outdated)
+
+
+def ranked_board(
+    chosen: ChosenCells,
+    cell_of: Callable[[CellKey], Cell | None],
+    outdated: Mapping[str, int],
+    *,
+    overall: frozenset[str] | None,
+    weights: Weights,
+    tests: KeptTests,
+) -> Board:
+    """Ranks chosen cells.
+
+    Args:
+        chosen: Which cells.
+        cell_of: A cell's summary; None when nothing of it was asked for.
+        outdated: Ended jobs of other versions, by task.
+        overall: Tasks that the overall ranking is over; None means all.
+        weights: Difficulty weights by task.
+        tests: What was tested before.
+    """
+    cells: dict[str, dict[str, Cell]] = {}
+    for (task, _), keys in chosen.shown.items():
+        row = {key[2]: cell_of(key) for key in keys}
+        cells[task] = {name: cell for name, cell in row.items() if cell is not None}
+
+    def ranked(task: str) -> bool:
+        return overall is None or task in overall
+
+    found = standings(cells, ranked, tests)
+    boards = [
+        TaskBoard(
+            task=task,
+            version=version,
+            outdated=outdated.get(task, 0),
+            rows=_ranked(cells[task], found.tasks.get(task)),
+        )
+        for task, version in chosen.shown
+        if cells[task]
+    ]
+    filled = {task: row for task, row in cells.items() if row and ranked(task)}
+    return Board(tasks=boards, overall=overall_rows(filled, found.overall, weights))
+
+
+class TrackBoard:
+    """The board of trials that are all in memory, as a report's are. Not safe for threads.
 
     Args:
         versions: Current version of each known task; of another task the newest one counts.
@@ -99,12 +193,7 @@ class TrackBoard:
         self._weights = weights
         self._cells: dict[CellKey, dict[str, EndedJob]] = {}
         self._places: dict[str, CellKey] = {}
-        self._summaries: dict[tuple[CellKey, Reading], Cell] = {}
         self._tests = KeptTests()
-
-    def use(self, versions: Mapping[str, str], weights: Weights) -> None:
-        """Takes other tasks for known from now on; arguments as for the constructor."""
-        self._versions, self._weights = versions, weights
 
     def put(self, trial: EndedJob) -> bool:
         """Adds or replaces a trial; returns whether anything changed."""
@@ -112,11 +201,9 @@ class TrackBoard:
         place = self._places.get(trial.job_id)
         if place is not None and self._cells[place][trial.job_id] == trial:
             return False
-        if place is not None and place != key:
-            self.remove(trial.job_id)
+        self.remove(trial.job_id)
         self._places[trial.job_id] = key
         self._cells.setdefault(key, {})[trial.job_id] = trial
-        self._forget(key)
         return True
 
     def remove(self, job_id: str) -> bool:
@@ -127,94 +214,44 @@ class TrackBoard:
         del self._cells[key][job_id]
         if not self._cells[key]:
             del self._cells[key]
-        self._forget(key)
         return True
 
     def __len__(self) -> int:
         return len(self._places)
 
-    def trials(self, query: BoardQuery) -> Iterable[EndedJob]:
-        """The trials that a query's board is made of, flagged ones included."""
-        for keys in self._chosen(query)[0].values():
-            for key in keys:
-                yield from filter(query.holds, self._cells[key].values())
-
     def board(self, query: BoardQuery) -> Board:
         """Summarises and ranks what the query asks for."""
-        chosen, outdated = self._chosen(query)
-        cells: dict[str, dict[str, Cell]] = {}
-        for (task, _), keys in chosen.items():
-            row = {key[2]: self._summary(key, query) for key in keys}
-            cells[task] = {name: cell for name, cell in row.items() if cell is not None}
+        heads = [self._head(key, trials.values()) for key, trials in self._cells.items()]
+        chosen = choose_cells(heads, self._versions, query)
 
-        def ranked(task: str) -> bool:
-            return query.overall is None or task in query.overall
+        def summary(key: CellKey) -> Cell | None:
+            inside = self._inside(key, query)
+            return summarise(inside, reading=query.reading) if inside else None
 
-        found = standings(cells, ranked, self._tests)
-        boards = [
-            TaskBoard(
-                task=task,
-                version=version,
-                outdated=outdated.get(task, 0),
-                rows=_ranked(cells[task], found.tasks.get(task)),
-            )
-            for task, version in chosen
-            if cells[task]
-        ]
-        filled = {task: row for task, row in cells.items() if row and ranked(task)}
-        return Board(tasks=boards, overall=overall_rows(filled, found.overall, self._weights))
-
-    def _chosen(
-        self, query: BoardQuery
-    ) -> tuple[dict[tuple[str, str], list[CellKey]], dict[str, int]]:
-        """Cells by task and version, and how many trials other versions have."""
-        by_task: dict[str, dict[str, list[CellKey]]] = {}
-        for key, trials in self._cells.items():
-            model = next(iter(trials.values())).model
-            if query.tasks is not None and key[0] not in query.tasks:
-                continue
-            if query.models is not None and model not in query.models:
-                continue
-            by_task.setdefault(key[0], {}).setdefault(key[1], []).append(key)
-        chosen: dict[tuple[str, str], list[CellKey]] = {}
-        outdated: dict[str, int] = {}
-        known = list(self._versions)
-        for task in sorted(by_task, key=lambda t: (_place(known, t), t)):
-            versions = by_task[task]
-            version = self._versions.get(task, "")
-            if version not in versions:
-                version = max(versions, key=lambda v: (self._newest(versions[v]), v))
-            chosen[task, version] = sorted(versions[version])
-            outdated[task] = sum(
-                sum(map(query.holds, self._cells[key].values()))
-                for v in versions
-                if v != version
-                for key in versions[v]
-            )
-        return chosen, outdated
-
-    def _newest(self, keys: Sequence[CellKey]) -> float:
-        return max(
-            trial.finished_at.timestamp() if trial.finished_at else 0.0
-            for key in keys
-            for trial in self._cells[key].values()
+        outdated = {
+            task: sum(len(self._inside(key, query)) for key in keys)
+            for task, keys in chosen.outdated.items()
+        }
+        return ranked_board(
+            chosen,
+            summary,
+            outdated,
+            overall=query.overall,
+            weights=self._weights,
+            tests=self._tests,
         )
 
-    def _summary(self, key: CellKey, query: BoardQuery) -> Cell | None:
-        trials = list(self._cells[key].values())
-        inside = [trial for trial in trials if query.holds(trial)]
-        if not inside:
-            return None
-        if len(inside) < len(trials):
-            return summarise(inside, reading=query.reading)
-        place = (key, query.reading)
-        if place not in self._summaries:
-            self._summaries[place] = summarise(trials, reading=query.reading)
-        return self._summaries[place]
+    def _inside(self, key: CellKey, query: BoardQuery) -> list[EndedJob]:
+        return [trial for trial in self._cells[key].values() if query.holds(trial)]
 
-    def _forget(self, key: CellKey) -> None:
-        for reading in Reading:
-            self._summaries.pop((key, reading), None)
+    @staticmethod
+    def _head(key: CellKey, trials: Collection[EndedJob]) -> CellHead:
+        newest = max((t.finished_at for t in trials if t.finished_at), default=None)
+        return CellHead(key=key, model=next(iter(trials)).model, newest=newest)
+
+
+def _newest(heads: Sequence[CellHead]) -> float:
+    return max(head.newest.timestamp() if head.newest else 0.0 for head in heads)
 
 
 def _ranked(cells: Mapping[str, Cell], standing: Standing | None) -> list[RankedCell]:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
+from hashlib import blake2b
 from typing import Any, Final
 
 import numpy as np
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from buildarena_benchmark.flags import Reading, is_censored, is_disqualified, is_left_out
 from buildarena_benchmark.leaderboard.ended_jobs import EndedJob
+from buildarena_benchmark.leaderboard.tallies import UNKNOWN_TOKENS, Tally, Total, tallied
 from buildarena_benchmark.outcomes import SIMULATED, Outcome
 from buildarena_benchmark.statistics import (
     cost_per_success,
@@ -59,7 +60,8 @@ class Cell:
         reasons: Counted trials that failed, by reason.
         refusals: Refused actions by refusal class.
         newest: When the last of its jobs ended.
-        figures: (N, 2) float64, success and indicator of each counted trial.
+        figures: (N, 2) float64, success and indicator of each counted trial, sorted.
+        figures_hash: Hash of them: cells with the same one are the same to all tests of pairs.
     """
 
     task: str
@@ -100,16 +102,13 @@ class Cell:
     refusals: Mapping[str, int]
     newest: datetime | None
     figures: NDArray[np.float64] = field(repr=False, compare=False)
+    figures_hash: bytes = field(repr=False, compare=False)
 
 
 def counted_trials(
     trials: Iterable[EndedJob], *, reading: Reading = Reading.OURS
 ) -> list[EndedJob]:
-    """The trials that averages are made of, as a reading of flags has them.
-
-    In ours a disqualified trial stays, as a failure with an indicator of 0: were it left out, a
-    model would lose nothing by trying to cheat, and one whose machines blow up would gain.
-    """
+    """The trials that averages are made of: the same that `counted_tallies` counts."""
     counted = []
     for trial in trials:
         if not trial.scored or is_left_out(trial.flags, reading):
@@ -121,82 +120,158 @@ def counted_trials(
     return counted
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CellName:
+    """Whose trials a cell summarises."""
+
+    task: str
+    model: str
+    configuration: str
+    decoding: Mapping[str, Any]
+
+
 def summarise(trials: Sequence[EndedJob], *, reading: Reading = Reading.OURS) -> Cell:
     """Summarises the trials of one model configuration on one task; at least one.
 
     The order of the trials does not matter.
     """
-    first, imported = trials[0], sum(trial.imported for trial in trials)
-    given, trials = len(trials), [trial for trial in trials if not trial.unverified]
-    counted = counted_trials(trials, reading=reading)
-    number = len(counted)
-    successes = sum(trial.success for trial in counted)
-    outcomes = Counter(trial.outcome for trial in trials)
-    low_high = exact_interval(successes, number) if counted else (None, None)
-    figures = np.array([(t.success, t.indicator) for t in counted], float).reshape(-1, 2)
-    indicator_ends = mean_interval(figures[:, 1], figures[:, 0] > 0) if counted else None
-    scored = [trial for trial in trials if trial.scored]
-    actions = sum(trial.actions for trial in counted)
-    refused = sum(trial.refused_actions for trial in counted)
-    mean = _Means(counted)
-    return Cell(
+    first = trials[0]
+    name = CellName(
         task=first.task,
         model=first.model,
         configuration=first.configuration,
         decoding=first.decoding,
+    )
+    return summarise_tallies(name, tallied(trials), reading=reading)
+
+
+def summarise_tallies(
+    name: CellName, given: Sequence[Tally], *, reading: Reading = Reading.OURS
+) -> Cell:
+    """Summarises a cell's tallies, whose order does not matter."""
+    tallies = [tally for tally in given if not tally.unverified]
+    scored = [tally for tally in tallies if tally.scored]
+    counted = counted_tallies(tallies, reading=reading)
+    number, ended = _number(counted), _number(tallies)
+    successes = _number(tally for tally in counted if tally.success)
+    outcomes = _counts((tally.outcome, tally.number) for tally in tallies)
+    low_high = exact_interval(successes, number) if counted else (None, None)
+    figures = _figures(counted)
+    indicator_ends = mean_interval(figures[:, 1], figures[:, 0] > 0) if counted else None
+    actions = sum(tally.actions for tally in counted)
+    refused = sum(tally.refused_actions for tally in counted)
+    costs = _known_costs(counted)
+    return Cell(
+        task=name.task,
+        model=name.model,
+        configuration=name.configuration,
+        decoding=name.decoding,
         trials=number,
-        ended=len(trials),
-        errored=outcomes[Outcome.ERRORED],
-        cancelled=outcomes[Outcome.CANCELLED],
-        flagged=sum(_is_flagged(trial, reading) for trial in scored),
-        flags=dict(sorted(Counter(flag for t in scored for flag in set(t.flags)).items())),
-        imported=imported,
-        unverified=given - len(trials),
-        simulated=sum(trial.outcome in SIMULATED for trial in counted),
+        ended=ended,
+        errored=outcomes.get(Outcome.ERRORED, 0),
+        cancelled=outcomes.get(Outcome.CANCELLED, 0),
+        flagged=_number(tally for tally in scored if _is_flagged(tally, reading)),
+        flags=_counts((flag, tally.number) for tally in scored for flag in set(tally.flags)),
+        imported=_number(tally for tally in given if tally.imported),
+        unverified=_number(given) - ended,
+        simulated=_number(tally for tally in counted if tally.outcome in SIMULATED),
         successes=successes,
         success_rate=successes / number if number else None,
         success_low=low_high[0],
         success_high=low_high[1],
-        success_rate_of_ended=successes / len(trials) if trials else None,
-        indicator_mean=mean.of(lambda t: t.indicator),
+        success_rate_of_ended=successes / ended if ended else None,
+        indicator_mean=_mean(figures[:, 1]),
         indicator_low=indicator_ends[0] if indicator_ends else None,
         indicator_high=indicator_ends[1] if indicator_ends else None,
         too_few_data=bool(counted) and indicator_ends is None,
-        indicator_best=max((t.indicator for t in counted), default=None),
-        censored=sum(t.success and is_censored(t.flags) for t in counted),
-        parts_mean=mean.of(lambda t: t.parts),
-        requests_mean=mean.of(lambda t: t.requests),
-        input_tokens_mean=mean.of(lambda t: t.input_tokens),
-        output_tokens_mean=mean.of(lambda t: t.output_tokens),
-        cost_usd_mean=mean.of(lambda t: t.cost_usd),
-        cost_per_success_usd=cost_per_success([t.cost_usd for t in counted], successes),
+        indicator_best=float(figures[:, 1].max()) if number else None,
+        censored=_number(t for t in counted if t.success and is_censored(t.flags)),
+        parts_mean=_mean_total(tally.parts for tally in counted),
+        requests_mean=_mean_total(tally.requests for tally in counted),
+        input_tokens_mean=_mean_total(tally.input_tokens for tally in counted),
+        output_tokens_mean=_mean_total(_output_tokens(tally) for tally in counted),
+        cost_usd_mean=_mean(costs),
+        cost_per_success_usd=cost_per_success(
+            [*costs.tolist(), *[None] * (number - len(costs))], successes
+        ),
         invalid_action_rate=refused / actions if actions else None,
         pass_at=_tries(pass_at_k, successes, number),
         pass_all=_tries(pass_hat_k, successes, number),
-        outcomes=dict(sorted(outcomes.items())),
-        reasons=dict(sorted(Counter(t.reason for t in counted if t.reason).items())),
-        refusals=_refusals(counted),
-        newest=max((t.finished_at for t in trials if t.finished_at), default=None),
-        figures=figures[np.lexsort(figures.T)],
+        outcomes=outcomes,
+        reasons=_counts((tally.reason, tally.number) for tally in counted if tally.reason),
+        refusals=_counts(item for tally in counted for item in tally.refusals.items()),
+        newest=max((tally.newest for tally in tallies if tally.newest), default=None),
+        figures=figures,
+        figures_hash=blake2b(figures.tobytes(), digest_size=16).digest(),
     )
 
 
-def _is_flagged(trial: EndedJob, reading: Reading) -> bool:
+def counted_tallies(tallies: Iterable[Tally], *, reading: Reading = Reading.OURS) -> list[Tally]:
+    """The tallies that averages are made of, as a reading of flags has them.
+
+    In ours a disqualified trial stays, as a failure with an indicator of 0: were it left out, a
+    model would lose nothing by trying to cheat, and one whose machines blow up would gain.
+    """
+    counted = []
+    for tally in tallies:
+        if not tally.scored or is_left_out(tally.flags, reading):
+            continue
+        if reading == Reading.OURS and is_disqualified(tally.flags):
+            nothing = np.zeros(tally.number)
+            counted.append(replace(tally, success=False, indicators=nothing))
+        else:
+            counted.append(tally)
+    return counted
+
+
+def _is_flagged(tally: Tally, reading: Reading) -> bool:
     if reading == Reading.OURS:
-        return is_disqualified(trial.flags)
-    return is_left_out(trial.flags, reading)
+        return is_disqualified(tally.flags)
+    return is_left_out(tally.flags, reading)
 
 
-class _Means:
-    """Means over the trials that have a value."""
+def _number(tallies: Iterable[Tally]) -> int:
+    return sum(tally.number for tally in tallies)
 
-    def __init__(self, trials: Sequence[EndedJob]) -> None:
-        self._trials = trials
 
-    def of(self, value: Callable[[EndedJob], float | None]) -> float | None:
-        # fsum is exact, so the order of the trials cannot show in the last digit.
-        values = [v for v in map(value, self._trials) if v is not None]
-        return math.fsum(values) / len(values) if values else None
+def _counts(items: Iterable[tuple[str, int]]) -> dict[str, int]:
+    found: dict[str, int] = {}
+    for name, number in items:
+        found[name] = found.get(name, 0) + number
+    return dict(sorted(found.items()))
+
+
+def _figures(counted: Sequence[Tally]) -> NDArray[np.float64]:
+    """Success and indicator of each counted trial, sorted by the indicator."""
+    figures = np.zeros((_number(counted), 2))
+    if counted:
+        figures[:, 0] = np.repeat(
+            [float(tally.success) for tally in counted], [tally.number for tally in counted]
+        )
+        figures[:, 1] = np.concatenate([tally.indicators for tally in counted])
+    return figures[np.lexsort(figures.T)]
+
+
+def _known_costs(counted: Sequence[Tally]) -> NDArray[np.float64]:
+    costs = np.concatenate([np.zeros(0), *(tally.costs_usd for tally in counted)])
+    known: NDArray[np.float64] = costs[~np.isnan(costs)]
+    return known
+
+
+def _output_tokens(tally: Tally) -> Total:
+    known = tally.output_tokens[tally.output_tokens != UNKNOWN_TOKENS]
+    return Total(known=len(known), sum=int(known.sum()))
+
+
+def _mean(values: NDArray[np.float64]) -> float | None:
+    # fsum is exact, so the order of the trials cannot show in the last digit.
+    return math.fsum(values.tolist()) / len(values) if len(values) else None
+
+
+def _mean_total(totals: Iterable[Total]) -> float | None:
+    found = list(totals)
+    known = sum(total.known for total in found)
+    return float(sum(total.sum for total in found)) / known if known else None
 
 
 def _tries(
@@ -204,10 +279,3 @@ def _tries(
 ) -> dict[str, float]:
     found = {str(k): estimate(successes, trials, k) for k in TRIES}
     return {k: chance for k, chance in found.items() if chance is not None}
-
-
-def _refusals(trials: Iterable[EndedJob]) -> dict[str, int]:
-    total: Counter[str] = Counter()
-    for trial in trials:
-        total.update(trial.refusals)
-    return dict(sorted(total.items()))

@@ -7,10 +7,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from buildarena_benchmark.flags import Reading
-from buildarena_benchmark.leaderboard.cells import counted_trials
+from buildarena_benchmark.leaderboard.cells import counted_tallies
 from buildarena_benchmark.leaderboard.ended_jobs import EndedJob
+from buildarena_benchmark.leaderboard.tallies import Tally, tallied
 from buildarena_benchmark.statistics import TokenBin, token_bins
 
 
@@ -35,15 +37,22 @@ class FailureRow:
 
 def failure_rows(trials: Iterable[EndedJob]) -> list[FailureRow]:
     """A row for each model configuration, in the order of their first jobs."""
-    rows: dict[tuple[str, str], FailureRow] = {}
+    rows: dict[tuple[str, str], list[EndedJob]] = {}
     for trial in trials:
-        key = (trial.model, trial.configuration)
-        row = rows.setdefault(key, FailureRow(model=key[0], configuration=key[1]))
-        row.outcomes[f"{trial.outcome}: {trial.reason}" if trial.reason else trial.outcome] += 1
-        row.refusals.update(trial.refusals)
-        row.actions += trial.actions
-        row.refused_actions += trial.refused_actions
-    return list(rows.values())
+        rows.setdefault((trial.model, trial.configuration), []).append(trial)
+    return [failure_row(*key, tallied(found)) for key, found in rows.items()]
+
+
+def failure_row(model: str, configuration: str, tallies: Iterable[Tally]) -> FailureRow:
+    """The row of one model configuration, from the tallies of all its cells."""
+    row = FailureRow(model=model, configuration=configuration)
+    for tally in tallies:
+        ended = f"{tally.outcome}: {tally.reason}" if tally.reason else tally.outcome
+        row.outcomes[ended] += tally.number
+        row.refusals.update(tally.refusals)
+        row.actions += tally.actions
+        row.refused_actions += tally.refused_actions
+    return row
 
 
 def cost_bins(
@@ -56,18 +65,34 @@ def cost_bins(
         reading: How flags are read.
         categories: The category of each task; one without is a category by itself.
     """
-    counted = counted_trials(trials, reading=reading)
-    best: dict[str, float] = {}
-    for trial in counted:
-        best[trial.task] = max(best.get(trial.task, 0.0), trial.indicator)
-    found: dict[str, list[tuple[float, float]]] = {}
-    for trial in counted:
-        if trial.output_tokens:
-            top = best[trial.task]
-            relative = trial.indicator / top if top > 0 else 0.0
-            category = categories.get(trial.task, trial.task)
-            found.setdefault(category, []).append((float(trial.output_tokens), relative))
-    return {
-        category: token_bins(np.array([t for t, _ in pairs]), np.array([p for _, p in pairs]))
-        for category, pairs in found.items()
-    }
+    by_task: dict[str, list[EndedJob]] = {}
+    for trial in trials:
+        by_task.setdefault(trial.task, []).append(trial)
+    tallies = {task: tallied(found) for task, found in by_task.items()}
+    return cost_bins_of(tallies, reading=reading, categories=categories)
+
+
+def cost_bins_of(
+    tallies: Mapping[str, Iterable[Tally]], *, reading: Reading, categories: Mapping[str, str]
+) -> dict[str, list[TokenBin]]:
+    """The same from the tallies of each task."""
+    found: dict[str, list[NDArray[np.float64]]] = {}
+    for task, given in tallies.items():
+        counted = counted_tallies(given, reading=reading)
+        if not counted:
+            continue
+        indicators = np.concatenate([tally.indicators for tally in counted])
+        tokens = np.concatenate([tally.output_tokens for tally in counted]).astype(np.float64)
+        top = max(0.0, float(indicators.max(initial=0.0)))
+        relative = indicators / top if top > 0 else np.zeros_like(indicators)
+        used = tokens > 0
+        pairs = np.stack([tokens[used], relative[used]], axis=1)
+        found.setdefault(categories.get(task, task), []).append(pairs)
+    return {category: _bins(parts) for category, parts in found.items() if any(map(len, parts))}
+
+
+def _bins(parts: Sequence[NDArray[np.float64]]) -> list[TokenBin]:
+    pairs = np.concatenate(parts)
+    # Means depend on the order in their last digits; sorted, equal data give equal bins.
+    pairs = pairs[np.lexsort(pairs.T)]
+    return token_bins(pairs[:, 0], pairs[:, 1])

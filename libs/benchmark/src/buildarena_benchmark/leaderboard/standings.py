@@ -7,7 +7,7 @@ show some pair apart on most boards if each were tested for itself.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import combinations
 from typing import Final
 
@@ -25,6 +25,11 @@ from buildarena_benchmark.statistics import (
 
 KEPT_TESTS: Final = 256
 """Tasks whose tests are kept: the present ones, and those of recent filters."""
+KEPT_PAIRS: Final = 100_000
+"""Tests of single pairs that are kept, and as many of before: some 200 bytes each."""
+
+PairTest = tuple[float, float, bool]
+"""Evidence, p-value, and whether anything varies, as in `PairTests`."""
 
 Row = Mapping[str, Cell]
 """Cells by configuration."""
@@ -101,22 +106,59 @@ def standings(
     )
 
 
-@dataclass(slots=True)
 class KeptTests:
-    """Tests of all pairs of cells, kept as long as none of the cells changes."""
+    """Tests of all pairs of cells; one of cells with equal figures is not made twice.
 
-    _kept: dict[tuple[int, ...], tuple[Sequence[Cell], PairTests]] = field(default_factory=dict)
+    Memory is bounded, and no cell is kept alive: tests are found by the hashes of the figures.
+    """
+
+    def __init__(self) -> None:
+        self._rows: dict[tuple[bytes, ...], PairTests] = {}
+        # Tests that were not asked for while as many others were are forgotten.
+        self._pairs: dict[tuple[bytes, bytes], PairTest] = {}
+        self._older: dict[tuple[bytes, bytes], PairTest] = {}
 
     def of(self, cells: Sequence[Cell]) -> PairTests:
         """The tests of all pairs of cells, in the order of `itertools.combinations`."""
-        # The kept cells stay alive, so no other cell can have their identity.
-        key = tuple(id(cell) for cell in cells)
-        if key not in self._kept:
-            if len(self._kept) >= KEPT_TESTS:
-                self._kept.clear()
-            pairs = [(a.figures, b.figures) for a, b in combinations(cells, 2)]
-            self._kept[key] = (cells, pair_tests(pairs))
-        return self._kept[key][1]
+        key = tuple(cell.figures_hash for cell in cells)
+        found = self._rows.get(key)
+        if found is None:
+            found = self._tested(cells)
+            if len(self._rows) >= KEPT_TESTS:
+                self._rows.clear()
+            self._rows[key] = found
+        return found
+
+    def _tested(self, cells: Sequence[Cell]) -> PairTests:
+        pairs = list(combinations(cells, 2))
+        names = [(a.figures_hash, b.figures_hash) for a, b in pairs]
+        found = [self._known(name) for name in names]
+        missing = [place for place, test in enumerate(found) if test is None]
+        made = pair_tests([(pairs[i][0].figures, pairs[i][1].figures) for i in missing])
+        for place, *test in zip(
+            missing,
+            made.z.tolist(),
+            made.p_value.tolist(),
+            made.informative.tolist(),
+            strict=True,
+        ):
+            found[place] = (test[0], test[1], test[2])
+            self._keep(names[place], (test[0], test[1], test[2]))
+        columns = np.array(found, float).reshape(-1, 3)
+        return PairTests(
+            z=columns[:, 0], p_value=columns[:, 1], informative=columns[:, 2].astype(bool)
+        )
+
+    def _known(self, name: tuple[bytes, bytes]) -> PairTest | None:
+        test = self._pairs.get(name)
+        if test is None and (test := self._older.get(name)) is not None:
+            self._keep(name, test)
+        return test
+
+    def _keep(self, name: tuple[bytes, bytes], test: PairTest) -> None:
+        if len(self._pairs) >= KEPT_PAIRS:
+            self._older, self._pairs = self._pairs, {}
+        self._pairs[name] = test
 
 
 def _names(counted: Mapping[str, Row], tasks: Sequence[str]) -> list[str]:

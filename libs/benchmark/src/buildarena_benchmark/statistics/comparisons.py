@@ -89,13 +89,12 @@ def holm(p_values: Sequence[float]) -> list[float]:
     Source:
         S. Holm, Scand. J. Stat. 6 (1979) 65.
     """
-    count = len(p_values)
-    adjusted = [0.0] * count
-    largest = 0.0
-    for place, index in enumerate(sorted(range(count), key=lambda i: p_values[i])):
-        largest = max(largest, min(1.0, (count - place) * p_values[index]))
-        adjusted[index] = largest
-    return adjusted
+    given = np.asarray(p_values, float)
+    order = np.argsort(given, kind="stable")
+    steps = np.minimum(1.0, np.arange(len(given), 0, -1) * given[order])
+    adjusted = np.empty_like(given)
+    adjusted[order] = np.maximum.accumulate(steps) if len(steps) else steps
+    return [float(p) for p in adjusted]
 
 
 def _has_no_ties(difference: NDArray[np.float64]) -> bool:

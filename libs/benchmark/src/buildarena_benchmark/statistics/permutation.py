@@ -17,8 +17,10 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-MAX_TABLE: Final = 500_000
-"""Trials of pairs that are worked on at once: enough to be fast, and a few megabytes."""
+MAX_TABLE: Final = 16_384
+"""Trials of pairs that are worked on at once: enough to be fast, and they fit into a cache."""
+MIN_STEP: Final = 16
+"""Tables have widths in such steps, and of about an eighth of themselves: few are padded much."""
 MAX_STEPS: Final = 60
 """Newton's steps at most; ten are usual."""
 PRECISE: Final = 1e-9
@@ -52,6 +54,8 @@ def pair_tests(pairs: Sequence[tuple[Floats, Floats]]) -> PairTests:
     of half the widest gap between weights. As the test is of models that are alike in everything,
     and models may differ in spread alone, the means must differ by Welch's statistic too.
 
+    What is found of a pair does not depend on the other pairs.
+
     Args:
         pairs: For each pair the trials of both, each (n, 2) float64: success and indicator.
 
@@ -59,101 +63,138 @@ def pair_tests(pairs: Sequence[tuple[Floats, Floats]]) -> PairTests:
         J. Robinson, J. R. Stat. Soc. B 44 (1982) 91; I. M. Skovgaard, J. Appl. Probab. 24 (1987)
         875; B. L. Welch, Biometrika 34 (1947) 28.
     """
-    if not pairs:
-        nothing = np.zeros(0)
-        return PairTests(z=nothing, p_value=nothing, informative=nothing.astype(bool))
-    longest = max(len(first) + len(second) for first, second in pairs)
-    step = max(1, MAX_TABLE // longest)
-    found = [_tested(pairs[start : start + step]) for start in range(0, len(pairs), step)]
-    return PairTests(
-        z=np.concatenate([tests.z for tests in found]),
-        p_value=np.concatenate([tests.p_value for tests in found]),
-        informative=np.concatenate([tests.informative for tests in found]),
-    )
+    found = np.zeros((3, len(pairs)))
+    distinct: dict[int, _Sample] = {}
+    samples = [tuple(_sample(side, distinct) for side in pair) for pair in pairs]
+    for width, places in _by_width(samples).items():
+        step = max(1, MAX_TABLE // width)
+        for start in range(0, len(places), step):
+            some = places[start : start + step]
+            found[:, some] = _tested([(samples[i][0], samples[i][1]) for i in some], width)
+    return PairTests(z=found[0], p_value=found[1], informative=found[2].astype(bool))
 
 
-def _tested(pairs: Sequence[tuple[Floats, Floats]]) -> PairTests:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Sample:
+    """One model's trials, equal ones together.
+
+    Attributes:
+        figures: (D, 2) float64: distinct trials.
+        times: (D,) float64: how many trials are like each.
+    """
+
+    figures: Floats
+    times: Floats
+
+
+def _sample(trials: Floats, known: dict[int, _Sample]) -> _Sample:
+    # A model's trials are in many pairs; the caller keeps them, so that no other has their id.
+    if id(trials) not in known:
+        ordered = trials[np.lexsort(trials.T)]
+        first = np.ones(len(ordered), bool)
+        first[1:] = np.any(ordered[1:] != ordered[:-1], axis=1)
+        times = np.diff(np.append(np.flatnonzero(first), len(ordered))).astype(np.float64)
+        known[id(trials)] = _Sample(figures=ordered[first], times=times)
+    return known[id(trials)]
+
+
+def _by_width(samples: Sequence[tuple[_Sample, ...]]) -> dict[int, list[int]]:
+    """Places of pairs by the width of their table; a width follows from the pair alone."""
+    found: dict[int, list[int]] = {}
+    for place, pair in enumerate(samples):
+        length = max(1, sum(len(side.times) for side in pair))
+        step = max(MIN_STEP, 1 << max(0, length.bit_length() - 4))
+        found.setdefault(-(-length // step) * step, []).append(place)
+    return found
+
+
+def _tested(pairs: Sequence[tuple[_Sample, _Sample]], width: int) -> Floats:
+    """Evidence, p-value and whether anything varies: (3, P) float64."""
     from scipy.special import ndtr, ndtri
 
-    table = _Weights.of(pairs)
-    total = (table.weight * table.first).sum(axis=1)
+    table = _Weights.of(pairs, width)
+    total = _sums(table.weight, table.first)
     moved = np.maximum(0.0, np.abs(total) - table.gap / 2)
     sign = np.sign(total)
     one_sided = _tail(table, moved, sign)
     one_sided = np.maximum(one_sided, ndtr(-_welch(table, total)))
     informative = table.varies
     one_sided = np.where(informative & (moved > 0), np.minimum(one_sided, 0.5), 0.5)
-    return PairTests(
-        z=sign * -ndtri(np.maximum(one_sided, np.finfo(float).tiny)),
-        p_value=np.minimum(1.0, 2 * one_sided),
-        informative=informative,
-    )
+    z = sign * -ndtri(np.maximum(one_sided, np.finfo(float).tiny))
+    return np.stack([z, np.minimum(1.0, 2 * one_sided), informative.astype(float)])
+
+
+def _sums(weight: Floats, times: Floats) -> Floats:
+    """Each row's sum of products."""
+    return np.asarray(np.einsum("pn,pn->p", weight, times), float)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Weights:
-    """Pooled trials of P pairs, padded to N: weight 0 and belonging to nobody.
+    """Pooled distinct trials of P pairs, padded to N: weight 0, and there no times.
 
     Attributes:
         weight: (P, N) float64 with mean 0 and, where it varies, standard deviation 1.
-        first: (P, N) bool: trials of the first model.
-        there: (P, N) bool: trials.
+        first: (P, N) float64: how many trials of the first model have each weight.
+        second: (P, N) float64: how many of the second have.
         gap: (P,) float64, widest gap between weights.
         varies: (P,) bool.
     """
 
     weight: Floats
-    first: NDArray[np.bool_]
-    there: NDArray[np.bool_]
+    first: Floats
+    second: Floats
     gap: Floats
     varies: NDArray[np.bool_]
 
     @staticmethod
-    def of(pairs: Sequence[tuple[Floats, Floats]]) -> _Weights:
-        sizes = np.array([(len(first), len(second)) for first, second in pairs])
-        longest = int(sizes.sum(axis=1).max())
-        place = np.arange(longest)
-        there = place < sizes.sum(axis=1)[:, None]
-        weight, gap = np.zeros((len(pairs), longest)), np.zeros(len(pairs))
-        for number, pair in enumerate(pairs):
-            own = _weights(np.concatenate(pair))
-            weight[number, : len(own)] = own
-            gap[number] = _gap(own)
+    def of(pairs: Sequence[tuple[_Sample, _Sample]], width: int) -> _Weights:
+        figures = np.zeros((2, len(pairs), width))
+        first, second = np.zeros((len(pairs), width)), np.zeros((len(pairs), width))
+        for number, (one, other) in enumerate(pairs):
+            middle, end = len(one.times), len(one.times) + len(other.times)
+            figures[:, number, :middle] = one.figures.T
+            figures[:, number, middle:end] = other.figures.T
+            first[number, :middle] = one.times
+            second[number, middle:end] = other.times
+        times = first + second
+        success, indicator = (_standardised(figure, times) for figure in figures)
+        weight = _standardised(success + indicator, times)
         return _Weights(
             weight=weight,
-            first=place < sizes[:, :1],
-            there=there,
-            gap=gap,
+            first=first,
+            second=second,
+            gap=_gaps(weight, times),
             varies=np.any(weight != 0.0, axis=1),
         )
 
 
-def _weights(pooled: Floats) -> Floats:
-    """The sum of the standardised figures of (n, F) trials, standardised again."""
-    total = np.zeros(len(pooled))
-    for figure in pooled.T:
-        total += _standardised(figure)
-    return _standardised(total)
-
-
-def _standardised(values: Floats) -> Floats:
-    if np.ptp(values) == 0.0:
-        return np.zeros_like(values)
-    away = values - values.mean()
-    spread = float(np.sqrt(np.mean(away**2)))
+def _standardised(values: Floats, times: Floats) -> Floats:
+    """Each row with mean 0 and standard deviation 1; zeros where a row does not vary."""
+    there = times > 0
+    number = np.maximum(times.sum(axis=1), 1.0)
+    away = np.where(there, values - (_sums(values, times) / number)[:, None], 0.0)
+    spread = np.sqrt(_sums(away**2, times) / number)
+    greatest = np.where(there, values, -np.inf).max(axis=1)
+    least = np.where(there, values, np.inf).min(axis=1)
     # Rounding alone is no difference.
-    if spread <= 1e-12 * float(np.abs(values).max()):
-        return np.zeros_like(values)
-    standard: Floats = away / spread
+    rounding = 1e-12 * np.maximum(np.abs(greatest), np.abs(least))
+    varies = (greatest > least) & (spread > rounding)
+    standard: Floats = np.where(varies[:, None], away / np.where(varies, spread, 1.0)[:, None], 0.0)
     return standard
 
 
-def _gap(weights: Floats) -> float:
-    steps = np.diff(np.sort(weights))
-    inner = steps[FEW - 1 : len(steps) - FEW + 1]
-    if not np.any(inner):
-        inner = steps
-    return float(inner.max(initial=0.0))
+def _gaps(weight: Floats, times: Floats) -> Floats:
+    """The widest gap between each row's weights."""
+    there = times > 0
+    order = np.argsort(np.where(there, weight, np.inf), axis=1, kind="stable")
+    ordered = np.take_along_axis(weight, order, axis=1)
+    below = np.cumsum(np.take_along_axis(times, order, axis=1), axis=1)[:, :-1]
+    above = times.sum(axis=1)[:, None] - below
+    steps = np.where(above > 0, np.diff(ordered, axis=1), 0.0)
+    inner = np.where((below >= FEW) & (above >= FEW), steps, 0.0).max(axis=1, initial=0.0)
+    widest: Floats = np.where(inner > 0, inner, steps.max(axis=1, initial=0.0))
+    return widest
 
 
 def _tail(table: _Weights, reached: Floats, sign: Floats) -> Floats:
@@ -165,17 +206,18 @@ def _tail(table: _Weights, reached: Floats, sign: Floats) -> Floats:
     from scipy.special import ndtr
 
     weight = table.weight * np.where(sign < 0, -1.0, 1.0)[:, None]
-    number, size = table.first.sum(axis=1), table.there.sum(axis=1)
+    times = table.first + table.second
+    number, size = table.first.sum(axis=1), times.sum(axis=1)
     level = np.log(number / (size - number))
     spread = np.sqrt(number * (size - number) / np.maximum(size - 1, 1))
-    shift, tilt = _saddlepoint(weight, table.there, reached, number, level)
+    shift, tilt = _saddlepoint(weight, times, reached, number, level)
     odds = shift[:, None] + tilt[:, None] * weight
-    curvature = _curvature(odds, weight, table.there)
-    determinant = curvature[0] * curvature[2] - curvature[1] ** 2
+    sums = _dealt(shift, tilt, weight, times)
+    determinant = sums.variance * sums.squares - sums.products**2
     gained = (
         (shift - level) * number
         + tilt * reached
-        - np.where(table.there, np.logaddexp(0, odds), 0).sum(axis=1)
+        - _sums(np.logaddexp(0, odds), times)
         + size * np.logaddexp(0, level)
     )
     root = np.sqrt(2 * np.maximum(gained, 0.0))
@@ -189,14 +231,15 @@ def _tail(table: _Weights, reached: Floats, sign: Floats) -> Floats:
 
 
 def _saddlepoint(
-    weight: Floats, there: NDArray[np.bool_], reached: Floats, number: Floats, level: Floats
+    weight: Floats, times: Floats, reached: Floats, number: Floats, level: Floats
 ) -> tuple[Floats, Floats]:
     shift, tilt = level.astype(float), np.zeros(len(weight))
+    open_ = np.arange(len(weight))
     for _ in range(MAX_STEPS):
-        odds = shift[:, None] + tilt[:, None] * weight
-        chance = np.where(there, 1 / (1 + np.exp(-odds)), 0.0)
-        missing = number - chance.sum(axis=1), reached - (weight * chance).sum(axis=1)
-        a, b, c = _curvature(odds, weight, there)
+        own = shift[open_], tilt[open_]
+        found = _dealt(*own, weight, times)
+        missing = number[open_] - found.number, reached[open_] - found.reached
+        a, b, c = found.variance, found.products, found.squares
         determinant = np.maximum(a * c - b * b, np.finfo(float).tiny)
         steps = (
             (c * missing[0] - b * missing[1]) / determinant,
@@ -204,30 +247,66 @@ def _saddlepoint(
         )
         # Far from the solution whole steps may overshoot; the function is concave.
         damped = 1 / np.maximum(1.0, np.maximum(np.abs(steps[0]) / 2, np.abs(steps[1])))
-        shift = np.clip(shift + damped * steps[0], -MAX_TILT, MAX_TILT)
-        tilt = np.clip(tilt + damped * steps[1], 0.0, MAX_TILT)
-        if np.all(np.abs(steps[1]) <= PRECISE * (1 + tilt)):
+        shift[open_] = np.clip(own[0] + damped * steps[0], -MAX_TILT, MAX_TILT)
+        tilt[open_] = np.clip(own[1] + damped * steps[1], 0.0, MAX_TILT)
+        # Each pair stops by itself, so that no other pair can show in its last digit.
+        further = np.abs(steps[1]) > PRECISE * (1 + tilt[open_])
+        if not np.all(further):
+            open_, weight, times = open_[further], weight[further], times[further]
+        if not len(open_):
             break
     return shift, tilt
 
 
-def _curvature(
-    odds: Floats, weight: Floats, there: NDArray[np.bool_]
-) -> tuple[Floats, Floats, Floats]:
-    chance = 1 / (1 + np.exp(-odds))
-    variance = np.where(there, chance * (1 - chance), 0.0)
-    weighted = variance * weight
-    return variance.sum(axis=1), weighted.sum(axis=1), (weighted * weight).sum(axis=1)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Dealt:
+    """What labels dealt with given odds come to, each (P,) float64.
+
+    Attributes:
+        number: Trials that fall to the first model.
+        reached: Sum of their weights.
+        variance: Of the number.
+        products: Covariance of number and sum.
+        squares: Variance of the sum.
+    """
+
+    number: Floats
+    reached: Floats
+    variance: Floats
+    products: Floats
+    squares: Floats
+
+
+def _dealt(shift: Floats, tilt: Floats, weight: Floats, times: Floats) -> _Dealt:
+    # In place: most of a board's time is spent here, and memory is slower than arithmetic.
+    chance = weight * -tilt[:, None]
+    chance -= shift[:, None]
+    np.exp(chance, out=chance)
+    chance += 1.0
+    np.reciprocal(chance, out=chance)
+    expected = chance * times
+    number, reached = expected.sum(axis=1), _sums(expected, weight)
+    np.subtract(1.0, chance, out=chance)
+    expected *= chance
+    variance = expected.sum(axis=1)
+    expected *= weight
+    return _Dealt(
+        number=number,
+        reached=reached,
+        variance=variance,
+        products=expected.sum(axis=1),
+        squares=_sums(expected, weight),
+    )
 
 
 def _welch(table: _Weights, total: Floats) -> Floats:
     """Welch's statistic of the weights, at least 0; infinite where neither side varies."""
-    sides = table.first, table.there & ~table.first
+    sides = table.first, table.second
     counts = [side.sum(axis=1) for side in sides]
-    means = [(table.weight * s).sum(axis=1) / n for s, n in zip(sides, counts, strict=True)]
+    means = [_sums(table.weight, s) / n for s, n in zip(sides, counts, strict=True)]
     error = np.zeros(len(total))
     for side, mean, count in zip(sides, means, counts, strict=True):
-        squares = (side * (table.weight - mean[:, None]) ** 2).sum(axis=1)
+        squares = _sums((table.weight - mean[:, None]) ** 2, side)
         error += np.where(count > 1, squares / (np.maximum(count - 1, 1) * count), np.inf)
     with np.errstate(divide="ignore", invalid="ignore"):
         found = np.abs(means[0] - means[1]) / np.sqrt(error)

@@ -8,10 +8,9 @@ tasks".
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import combinations, pairwise
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -26,6 +25,8 @@ Floats = NDArray[np.float64]
 MAX_EVIDENCE: Final = 4.0
 """Evidence of one task counts in the ranking over tasks up to so many standard deviations: as in
 ranks, being far ahead on one task does not outweigh being behind on many."""
+ROUNDING: Final = 1e-9
+"""Mean ranks that differ by less are equal."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -132,13 +133,13 @@ def rank_models(
     mean_rank = mean_ranks(*figures)
     models = len(mean_rank)
     better = np.zeros((models, models), bool)
-    for (first, second), z, p_value in zip(
-        combinations(range(models), 2), tests.z, p_values, strict=True
-    ):
-        ahead = mean_rank[second] - mean_rank[first]
-        # Rounding must not say who is ahead.
-        if p_value <= 1 - level and ahead * z > 0 and not math.isclose(ahead, 0, abs_tol=1e-9):
-            better[(first, second) if z > 0 else (second, first)] = True
+    first, second = np.triu_indices(models, 1)
+    ahead = mean_rank[second] - mean_rank[first]
+    # Rounding must not say who is ahead.
+    claimed = (p_values <= 1 - level) & (ahead * tests.z > 0) & (np.abs(ahead) > ROUNDING)
+    won = tests.z > 0
+    better[first[claimed & won], second[claimed & won]] = True
+    better[second[claimed & ~won], first[claimed & ~won]] = True
     low = 1 + better.sum(axis=0)
     return Ranking(
         mean_rank=mean_rank,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from sqlalchemy import ColumnElement, Connection, any_, func, select, update
+from sqlalchemy import ColumnElement, Connection, any_, exists, select, text, update
 from sqlalchemy.dialects.postgresql import insert
 
 from buildarena_store import events
@@ -13,7 +13,7 @@ from buildarena_store.database import Database
 from buildarena_store.errors import UnknownIdError
 from buildarena_store.jobs.attempts import Attempt, Ending, end_attempts
 from buildarena_store.jobs.job import JOB_COLUMNS, Job, JobFile, NewJob
-from buildarena_store.jobs.pages import JobFilter, Order, SortValue, page_query
+from buildarena_store.jobs.pages import JobFilter, Order, SortValue, distinct_values, read_page
 from buildarena_store.jobs.transitions import REOPENED, transition
 from buildarena_store.rows import bound_texts, columns_of, rows_of, value_of
 from buildarena_store.states import CONSTRUCT_QUEUE, AttemptResult, JobState, Outcome, Stage
@@ -93,9 +93,11 @@ class Jobs:
             equals: Column values to match, in the place of ``wanted``; None means any.
         """
         chosen = wanted or JobFilter(sweep_id=sweep_id, equals=equals)
-        query = page_query(chosen, order or Order(), after, limit)
-        with self._database.statement() as connection:
-            return [value_of(Job, row) for row in connection.execute(query)]
+        with self._database.transaction() as connection:
+            # One plan for all values would be a bad one for the rare ones.
+            connection.execute(text("SET LOCAL plan_cache_mode = force_custom_plan"))
+            rows = read_page(connection, chosen, order or Order(), after, limit)
+            return [value_of(Job, row) for row in rows]
 
     def attempts(self, job_id: str) -> list[Attempt]:
         """Every attempt at the job, oldest first."""
@@ -111,14 +113,21 @@ class Jobs:
         """The values that jobs have in a column, in their order.
 
         Args:
-            column: ``task``, ``model``, ``reason``, or ``flags``, whose elements are meant.
+            column: ``task``, ``model``, ``track`` or ``reason``.
         """
-        value = (
-            func.jsonb_array_elements_text(jobs.c.flags) if column == "flags" else jobs.c[column]
-        )
         with self._database.statement() as connection:
-            found = connection.execute(select(value).distinct()).scalars()
-            return sorted(text for text in found if text is not None)
+            return list(connection.execute(distinct_values(jobs.c[column])).scalars())
+
+    def used_flags(self, flags: Sequence[str]) -> list[str]:
+        """Those of some flags that a job has, in their order."""
+        with self._database.statement() as connection:
+            return [
+                flag
+                for flag in sorted(set(flags))
+                if connection.execute(
+                    select(exists().where(jobs.c.flags.contains([flag])))
+                ).scalar()
+            ]
 
     def files(self, job_id: str) -> list[JobFile]:
         """The job's artifacts, with what is known of their bytes, by name."""

@@ -2,43 +2,63 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from decimal import Decimal
 from types import MappingProxyType
 from typing import Any, Final, Literal
 
-from sqlalchemy import ColumnElement, Select, and_, case, or_, select
+from sqlalchemy import (
+    ColumnElement,
+    Connection,
+    Numeric,
+    Row,
+    Text,
+    TextClause,
+    and_,
+    func,
+    literal_column,
+    or_,
+    select,
+    text,
+)
 
 from buildarena_store.ids import begins_with
 from buildarena_store.jobs.job import JOB_COLUMNS, Job
-from buildarena_store.states import EXTERNAL_PROVIDER
-from buildarena_store.tables import jobs, sweep_jobs
+from buildarena_store.rows import bound_texts
+from buildarena_store.states import JobState
+from buildarena_store.tables import COST_OR_NULL, jobs, sweep_jobs
 
 Sort = Literal["created", "finished", "indicator", "cost", "task", "model", "seed"]
 SortValue = datetime | float | Decimal | str | int | None
 
-_UNKNOWN_COST: Final = jobs.c.model_config["provider"].astext == EXTERNAL_PROVIDER
 _COLUMNS: Final[Mapping[Sort, ColumnElement[Any]]] = MappingProxyType(
     {
         "created": jobs.c.created_at,
         "finished": jobs.c.finished_at,
         "indicator": jobs.c.indicator,
-        # What nobody counted is no cost of 0.
-        "cost": case((_UNKNOWN_COST, None), else_=jobs.c.cost_usd),
+        # What nobody counted is no cost of 0. As the index has it, word for word.
+        "cost": literal_column(COST_OR_NULL.text, Numeric(14, 6)),
         "task": jobs.c.task,
         "model": jobs.c.model,
         "seed": jobs.c.seed,
     }
 )
+ENDED_ONLY: Final[frozenset[Sort]] = frozenset({"finished", "indicator"})
+"""What only jobs that have ended have."""
+MAX_SORTED: Final = 40_000
+"""Jobs that are sorted for a page; of more, the first are found along the order's index."""
+_ID_PART: Final = re.compile(r"[job_0-9a-f]+", re.IGNORECASE)
+"""What can stand in an id."""
 NULLABLE: Final[frozenset[Sort]] = frozenset({"finished", "indicator", "cost"})
 """What a job may lack; those that do come last, in both directions."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Order:
-    """An order of jobs; equal ones are in the order of their ids.
+    """An order of jobs; equal ones are in the order of their ids, in the same direction.
 
     Attributes:
         by: What they are sorted by.
@@ -90,33 +110,139 @@ def sort_value(job: Job, by: Sort) -> SortValue:
     return values[by]
 
 
-def page_query(
-    wanted: JobFilter, order: Order, after: tuple[SortValue, str] | None, limit: int
-) -> Select[Any]:
-    """The query for a page.
+def read_page(
+    connection: Connection,
+    wanted: JobFilter,
+    order: Order,
+    after: tuple[SortValue, str] | None,
+    limit: int,
+) -> list[Row[Any]]:
+    """The rows of a page.
+
+    Those that have no such figure come last, by a query of their own: so both can go along the
+    one index of the order, in either direction.
 
     Args:
+        connection: Where to read.
         wanted: Which jobs.
         order: In which order.
         after: What the last job of the page before is sorted by, and its id.
         limit: Rows at most.
     """
-    query = select(*JOB_COLUMNS).where(*_conditions(wanted))
+    conditions = _conditions(connection, wanted)
+    if order.by in ENDED_ONLY and wanted.equals.get("state", JobState.DONE) not in {
+        JobState.DONE,
+        None,
+    }:
+        # None of them has such a figure.
+        by_id = select(*JOB_COLUMNS).where(*conditions)
+        if after is not None:
+            by_id = by_id.where(_further(order, jobs.c.id, after[1]))
+        in_order = jobs.c.id.desc() if order.descending else jobs.c.id.asc()
+        return list(connection.execute(by_id.order_by(in_order).limit(limit)))
+    if conditions and _are_few(connection, wanted, conditions):
+        return _read_few(connection, conditions, order, after, limit)
+    found: list[Row[Any]] = []
+    if after is None or after[0] is not None:
+        some: list[ColumnElement[bool]] = []
+        if after is not None:
+            some.append(_behind(order, *after))
+        if order.by in NULLABLE:
+            some.append(_COLUMNS[order.by].is_not(None))
+        found = _read_along(connection, wanted, [*conditions, *some], order, limit)
+    if order.by in NULLABLE and len(found) < limit:
+        rest: list[ColumnElement[bool]] = [_COLUMNS[order.by].is_(None)]
+        if after is not None and after[0] is None:
+            rest.append(_further(order, jobs.c.id, after[1]))
+        found += _read_along(connection, wanted, [*conditions, *rest], order, limit - len(found))
+    return found
+
+
+def _read_along(
+    connection: Connection,
+    wanted: JobFilter,
+    conditions: Sequence[ColumnElement[bool]],
+    order: Order,
+    limit: int,
+) -> list[Any]:
+    """The first jobs along an order's index."""
+    place = _COLUMNS[order.by]
+    query = select(*JOB_COLUMNS, place.label("place")).where(*conditions).limit(limit)
+    columns = (c.desc() if order.descending else c.asc() for c in (place, jobs.c.id))
+    query = query.order_by(*columns)
+    if order.by != "cost":
+        return list(connection.execute(query))
+    # What waits has cost nothing yet: in one index, ended jobs would all lie behind it.
+    ended = jobs.c.state == literal_column(f"'{JobState.DONE}'", Text)
+    state = wanted.equals.get("state")
+    parts = [ended, ~ended] if state is None else [ended if state == JobState.DONE else ~ended]
+    rows = [row for part in parts for row in connection.execute(query.where(part))]
+    return sorted(rows, key=lambda row: (row.place or 0, row.id), reverse=order.descending)[:limit]
+
+
+def _are_few(
+    connection: Connection, wanted: JobFilter, conditions: Sequence[ColumnElement[bool]]
+) -> bool:
+    """Whether jobs are so few that they can all be sorted.
+
+    Along an order's index they might be the very last; the database expects them anywhere.
+    """
+    some = select(jobs.c.id).where(*conditions)
     if wanted.sweep_id is not None:
-        query = query.join(sweep_jobs, sweep_jobs.c.job_id == jobs.c.id).where(
-            sweep_jobs.c.sweep_id == wanted.sweep_id
-        )
-    if after is not None:
-        query = query.where(_behind(order, *after))
+        some = select(sweep_jobs.c.job_id).where(sweep_jobs.c.sweep_id == wanted.sweep_id)
+    counted = some.limit(MAX_SORTED + 1).subquery()
+    number = connection.execute(select(func.count()).select_from(counted)).scalar_one()
+    return int(number) <= MAX_SORTED
+
+
+def _read_few(
+    connection: Connection,
+    conditions: Sequence[ColumnElement[bool]],
+    order: Order,
+    after: tuple[SortValue, str] | None,
+    limit: int,
+) -> list[Row[Any]]:
     column = _COLUMNS[order.by]
-    sorted_ = column.desc() if order.descending else column.asc()
-    if order.by in NULLABLE:
-        sorted_ = sorted_.nulls_last()
-    return query.order_by(sorted_, jobs.c.id).limit(limit)
+    chosen = select(jobs.c.id, column.label("place")).where(*conditions)
+    if after is not None:
+        value, id_ = after
+        behind = [and_(column.is_(None), _further(order, jobs.c.id, id_))]
+        if value is not None:
+            behind = [_behind(order, value, id_), column.is_(None)]
+        chosen = chosen.where(or_(*behind))
+    # Were it not made first, the order's index might be gone along after all.
+    some = chosen.offset(0).subquery("some")
+    place = some.c.place.desc() if order.descending else some.c.place.asc()
+    id_order = some.c.id.desc() if order.descending else some.c.id.asc()
+    first = select(some.c.id, some.c.place).order_by(place.nulls_last(), id_order).limit(limit)
+    page = first.subquery("page")
+    place = page.c.place.desc() if order.descending else page.c.place.asc()
+    id_order = page.c.id.desc() if order.descending else page.c.id.asc()
+    query = select(*JOB_COLUMNS).join(page, page.c.id == jobs.c.id)
+    return list(connection.execute(query.order_by(place.nulls_last(), id_order)))
 
 
-def _conditions(wanted: JobFilter) -> list[ColumnElement[bool]]:
+def distinct_values(column: ColumnElement[Any]) -> TextClause:
+    """The query for a column's values in their order: one probe of its index for each."""
+    name = column.name
+    return text(
+        f"""
+        WITH RECURSIVE found (value) AS (
+            (SELECT {name} FROM jobs WHERE {name} IS NOT NULL ORDER BY {name} LIMIT 1)
+            UNION ALL
+            SELECT (SELECT {name} FROM jobs WHERE {name} > found.value ORDER BY {name} LIMIT 1)
+            FROM found WHERE found.value IS NOT NULL
+        )
+        SELECT value FROM found WHERE value IS NOT NULL
+        """  # noqa: S608 - made of our own column names
+    )
+
+
+def _conditions(connection: Connection, wanted: JobFilter) -> list[ColumnElement[bool]]:
     found = [jobs.c[name] == value for name, value in wanted.equals.items() if value is not None]
+    if wanted.sweep_id is not None:
+        members = select(sweep_jobs.c.job_id).where(sweep_jobs.c.sweep_id == wanted.sweep_id)
+        found.append(jobs.c.id.in_(members))
     if wanted.flag is not None:
         found.append(jobs.c.flags.contains([wanted.flag]))
     if wanted.id_prefix is not None:
@@ -128,17 +254,51 @@ def _conditions(wanted: JobFilter) -> list[ColumnElement[bool]]:
     if wanted.since is not None:
         found.append(jobs.c.finished_at >= wanted.since)
     if wanted.until is not None:
-        found.append(jobs.c.finished_at < wanted.until)
+        # No job ends before it was made: a list by that time can begin there.
+        found += [jobs.c.finished_at < wanted.until, jobs.c.created_at < wanted.until]
+    if _means_ended(wanted):
+        # Said so that an order's index of ended jobs alone can serve.
+        found.append(jobs.c.state == literal_column(f"'{JobState.DONE}'", Text))
     if wanted.text is not None:
-        columns = (jobs.c[name] for name in ("id", "task", "model", "reason", "detail"))
-        found.append(or_(*(column.icontains(wanted.text, autoescape=True) for column in columns)))
+        found.append(_holds_text(connection, wanted.text))
     return found
+
+
+def _means_ended(wanted: JobFilter) -> bool:
+    """Whether only jobs that have ended can be meant."""
+    ended = wanted.since, wanted.until, wanted.equals.get("outcome")
+    return any(value is not None for value in ended) or (
+        wanted.equals.get("state") == JobState.DONE
+    )
+
+
+def _holds_text(connection: Connection, wanted: str) -> ColumnElement[bool]:
+    """Whether a text stands in id, task, model, reason or detail, in any case.
+
+    Tasks, models and reasons are few: those with the text are found first.
+    """
+    ways = [jobs.c.detail.icontains(wanted, autoescape=True)]
+    for column in (jobs.c.task, jobs.c.model, jobs.c.reason):
+        values = connection.execute(distinct_values(column)).scalars()
+        held = [value for value in values if wanted.lower() in value.lower()]
+        if held:
+            ways.append(column == func.any(bound_texts(held)))
+    if _ID_PART.fullmatch(wanted):
+        held_in = jobs.c.id.contains(wanted.lower(), autoescape=True)
+        ids = select(jobs.c.id).where(held_in).limit(MAX_SORTED + 1)
+        some = connection.execute(ids).scalars().all()
+        few = len(some) <= MAX_SORTED
+        ways.append(jobs.c.id == func.any(bound_texts(some)) if few else held_in)
+    return or_(*ways)
 
 
 def _behind(order: Order, value: SortValue, id_: str) -> ColumnElement[bool]:
     column = _COLUMNS[order.by]
-    if value is None:
-        return and_(column.is_(None), jobs.c.id > id_)
-    further = column < value if order.descending else column > value
-    behind = or_(further, and_(column == value, jobs.c.id > id_))
-    return or_(behind, column.is_(None)) if order.by in NULLABLE else behind
+    return or_(
+        _further(order, column, value), and_(column == value, _further(order, jobs.c.id, id_))
+    )
+
+
+def _further(order: Order, column: ColumnElement[Any], value: Any) -> ColumnElement[bool]:
+    further: ColumnElement[bool] = column < value if order.descending else column > value
+    return further

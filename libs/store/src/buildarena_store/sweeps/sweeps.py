@@ -256,6 +256,19 @@ class Sweeps:
         with self._database.transaction() as connection:
             return [value_of(Trouble, row) for row in connection.execute(query)]
 
+    def size(self, sweep_id: str) -> int:
+        """How many jobs the sweep has.
+
+        Raises:
+            UnknownIdError: Nobody has it.
+        """
+        self.get(sweep_id)
+        query = (
+            select(func.count()).select_from(sweep_jobs).where(sweep_jobs.c.sweep_id == sweep_id)
+        )
+        with self._database.statement() as connection:
+            return int(connection.execute(query).scalar_one())
+
     def job_ids(self, sweep_id: str) -> list[str]:
         """Ids of all the sweep's jobs."""
         query = select(sweep_jobs.c.job_id).where(sweep_jobs.c.sweep_id == sweep_id)

@@ -1,30 +1,65 @@
-"""The boards of this process: fed with what changed, answered from memory."""
+"""The boards of this process: summaries of cells, and answers as long as they are true."""
 
 from __future__ import annotations
 
 import threading
 from collections import OrderedDict
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Final
 
 from buildarena_api.http.etags import Answer
+from buildarena_api.leaderboard.cells import Cells, Shown
 from buildarena_benchmark import Task
-from buildarena_benchmark.leaderboard import Board, BoardQuery, EndedJob, TrackBoard
+from buildarena_benchmark.leaderboard import Board, BoardQuery, EndedJob, Tally
 from buildarena_pipeline.catalog.tasks import TaskCatalog
-from buildarena_store import Boards
+from buildarena_store import Boards, CellId, TrialFilter
 
 KEPT_ANSWERS: Final = 256
 """Answers in memory at most; one of a full board is about 200 kB."""
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Question:
+    """What a board is asked for.
+
+    Attributes:
+        track: The track.
+        query: Which tasks, models and times.
+        sweeps: Ids of sweeps, if only jobs of these count.
+        members: How many jobs these sweeps have: answers from before one had more are not true.
+    """
+
+    track: str
+    query: BoardQuery
+    sweeps: frozenset[str] | None = None
+    members: int = 0
+
+    @property
+    def is_partial(self) -> bool:
+        """Whether only some jobs of a cell may count, so that no kept summary tells."""
+        return (self.sweeps, self.query.since, self.query.until) != (None, None, None)
+
+    def filter(self) -> TrialFilter:
+        """The same for a query of jobs."""
+        return TrialFilter(
+            track=self.track,
+            tasks=self.query.tasks,
+            models=self.query.models,
+            sweeps=self.sweeps,
+            since=self.query.since,
+            until=self.query.until,
+        )
+
+
 class BoardCache:
-    """Keeps every track's board up to date and its answers as long as they are true.
+    """Keeps summaries of every cell up to date, and answers as long as they are true.
 
     Each question first asks the database what changed since the last one, which is one indexed
     look-up; nothing that a question is answered with is older than the question.
 
     Args:
-        boards: Where ended jobs and their changes are read.
+        boards: Where cells, ended jobs and their changes are read.
         catalogue: Where tasks are read, when one was uploaded.
     """
 
@@ -34,23 +69,23 @@ class BoardCache:
         self._task_versions: int | None = None
         self._tasks: Mapping[str, Task] = {}
         self._lock = threading.Lock()
-        self._mark: int | None = None
-        self._tracks: dict[str, TrackBoard] = {}
-        self._track_of: dict[str, str] = {}
-        self._generations: dict[str, int] = {}
-        self._answers: OrderedDict[tuple[str, BoardQuery, str], tuple[int, Answer]] = OrderedDict()
+        self._cells = Cells(boards.cells)
+        self._answers: OrderedDict[tuple[Question, str], tuple[int, Answer]] = OrderedDict()
 
-    def tracks(self, jobs: Collection[str] | None = None) -> list[str]:
+    def tracks(self, sweeps: frozenset[str] | None = None) -> list[str]:
         """Tracks with ended jobs.
 
         Args:
-            jobs: Only tracks with one of these; all by default.
+            sweeps: Only tracks with a job of one of these; all by default.
         """
         with self._lock:
             self._refresh()
-            if jobs is not None:
-                return sorted({self._track_of[job] for job in jobs if job in self._track_of})
-            return sorted(track for track, board in self._tracks.items() if len(board))
+            found = self._cells.tracks()
+        if sweeps is None:
+            return found
+        return [
+            track for track in found if self._boards.any_of(TrialFilter(track=track, sweeps=sweeps))
+        ]
 
     def tasks(self) -> Mapping[str, Task]:
         """Every task by name in its newest version, as of the last question."""
@@ -59,74 +94,83 @@ class BoardCache:
                 self._refresh()
             return self._tasks
 
-    def answer(
-        self, track: str, query: BoardQuery, kind: str, render: Callable[[Board], bytes]
-    ) -> Answer:
+    def answer(self, question: Question, kind: str, render: Callable[[Board], bytes]) -> Answer:
         """The rendered board of a track.
 
         Args:
-            track: The track.
-            query: What the board is made of.
+            question: What the board is made of.
             kind: Names the rendering: one kind is always rendered alike.
             render: Makes the body; called only when there is no true answer in memory.
         """
-        return self.answer_from(track, query, kind, lambda board: render(board.board(query)))
+        return self._answer(
+            question, kind, lambda shown: render(shown.board()), reads=question.is_partial
+        )
 
-    def answer_from(
-        self, track: str, query: BoardQuery, kind: str, render: Callable[[TrackBoard], bytes]
+    def answer_from_tallies(
+        self,
+        question: Question,
+        kind: str,
+        render: Callable[[Board, Mapping[CellId, tuple[str, Sequence[Tally]]]], bytes],
     ) -> Answer:
-        """The same from all trials of a track; they do not change while it is made."""
+        """The same from the board and its cells, with model and tallies of each."""
+        return self._answer(
+            question, kind, lambda shown: render(shown.board(), shown.tallies()), reads=True
+        )
+
+    def inside(self, question: Question) -> dict[CellId, tuple[str, int]]:
+        """The cells of a board: their models, and how many jobs of each were asked for."""
+        return self._shown(question).inside()
+
+    def trials(self, question: Question, cells: Sequence[CellId]) -> list[EndedJob]:
+        """Single ended jobs of some of a board's cells."""
+        wanted = question.filter()
+        return self._boards.trials(wanted.within(cells))
+
+    def scored_ids(self, question: Question, cells: Sequence[CellId]) -> list[str]:
+        """Ids of scored jobs of some of a board's cells, in their order."""
+        return self._boards.scored_ids(question.filter().within(cells))
+
+    def _answer(
+        self, question: Question, kind: str, render: Callable[[Shown], bytes], *, reads: bool
+    ) -> Answer:
+        """A kept answer, or a new one; when making it reads jobs, others need not wait for it."""
+        key = (question, kind)
         with self._lock:
             self._refresh()
-            generation = self._generations.get(track, 0)
-            key = (track, query, kind)
+            generation = self._cells.generation(question.track)
             kept = self._answers.get(key)
             if kept is not None and kept[0] == generation:
                 self._answers.move_to_end(key)
                 return kept[1]
-            body = render(self._track(track))
-            answer = Answer.of(body)
-            self._answers[key] = (generation, answer)
-            self._answers.move_to_end(key)
-            while len(self._answers) > KEPT_ANSWERS:
-                self._answers.popitem(last=False)
-            return answer
+            shown = self._cells.shown(question)
+            if not question.is_partial:
+                shown.summarise()
+            if not reads:
+                # Whoever asks the same meanwhile gets this answer.
+                return self._keep(key, generation, render(shown))
+        body = render(shown)
+        with self._lock:
+            return self._keep(key, generation, body)
 
-    def trials(self, track: str, query: BoardQuery) -> list[EndedJob]:
-        """The ended jobs that a board is made of."""
+    def _keep(self, key: tuple[Question, str], generation: int, body: bytes) -> Answer:
+        answer = Answer.of(body)
+        self._answers[key] = (generation, answer)
+        self._answers.move_to_end(key)
+        while len(self._answers) > KEPT_ANSWERS:
+            self._answers.popitem(last=False)
+        return answer
+
+    def _shown(self, question: Question) -> Shown:
         with self._lock:
             self._refresh()
-            return list(self._track(track).trials(query))
+            return self._cells.shown(question)
 
     def _refresh(self) -> None:
-        feed = self._boards.feed(self._mark)
-        changed: set[str] = set()
-        if feed.task_versions != self._task_versions:
-            self._tasks, self._task_versions = self._catalogue.newest(), feed.task_versions
-            changed.update(self._tracks)
-            for board in self._tracks.values():
-                board.use(*self._known())
-        for trial in feed.put:
-            if self._track(trial.track).put(trial):
-                changed.add(trial.track)
-            self._track_of[trial.job_id] = trial.track
-        for job_id in feed.gone:
-            track = self._track_of.pop(job_id, None)
-            if track is not None and self._track(track).remove(job_id):
-                changed.add(track)
-        for track in changed:
-            self._generations[track] = self._generations.get(track, 0) + 1
-        self._mark = feed.mark
-
-    def _track(self, track: str) -> TrackBoard:
-        if track not in self._tracks:
-            self._tracks[track] = TrackBoard(*self._known())
-        return self._tracks[track]
-
-    def _known(self) -> tuple[dict[str, str], dict[str, Mapping[str, int]]]:
-        """Versions and difficulty weights of the tasks."""
-        tasks = self._tasks.values()
-        return (
-            {task.name: task.version for task in tasks},
-            {task.name: task.difficulty for task in tasks if task.difficulty},
-        )
+        task_versions = self._cells.refresh()
+        if task_versions != self._task_versions:
+            self._tasks, self._task_versions = self._catalogue.newest(), task_versions
+            tasks = self._tasks.values()
+            self._cells.use(
+                {task.name: task.version for task in tasks},
+                {task.name: task.difficulty for task in tasks if task.difficulty},
+            )

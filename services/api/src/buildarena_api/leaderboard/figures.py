@@ -8,7 +8,8 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from buildarena_benchmark import Task
 from buildarena_benchmark.flags import Reading
-from buildarena_benchmark.leaderboard import Board, EndedJob, OverallRow, cost_bins, failure_rows
+from buildarena_benchmark.leaderboard import Board, OverallRow, Tally, cost_bins_of, failure_row
+from buildarena_store import CellId
 
 
 class _View(BaseModel):
@@ -82,7 +83,7 @@ class Figures(BaseModel):
 def figures_view(
     track: str,
     board: Board,
-    trials: Sequence[EndedJob],
+    cells: Mapping[CellId, tuple[str, Sequence[Tally]]],
     *,
     reading: Reading,
     tasks: Mapping[str, Task],
@@ -92,18 +93,23 @@ def figures_view(
     Args:
         track: Its track.
         board: The board.
-        trials: The ended jobs that it is made of.
+        cells: Its cells: model and tallies of each.
         reading: How flags were read.
         tasks: Every task by name.
     """
+    by_task: dict[str, list[Tally]] = {}
+    by_row: dict[tuple[str, str], list[Tally]] = {}
+    for id_, (model, tallies) in sorted(cells.items()):
+        by_task.setdefault(id_.task, []).extend(tallies)
+        by_row.setdefault((model, id_.configuration), []).extend(tallies)
     categories = {name: task.category for name, task in tasks.items()}
-    found = cost_bins(trials, reading=reading, categories=categories)
-    in_order = sorted(trials, key=lambda trial: (trial.model, trial.configuration))
+    found = cost_bins_of(by_task, reading=reading, categories=categories)
+    failures = [failure_row(*row, tallies) for row, tallies in sorted(by_row.items())]
     return Figures(
         track=track,
         reading=reading,
         dimensions=[DimensionsView.model_validate(row) for row in _with_dimensions(board)],
-        failures=[FailureView.model_validate(row) for row in failure_rows(in_order)],
+        failures=[FailureView.model_validate(row) for row in failures],
         cost=[
             CostView(category=name, bins=[BinView.model_validate(one) for one in bins])
             for name, bins in sorted(found.items())

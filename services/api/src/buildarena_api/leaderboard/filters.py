@@ -10,11 +10,10 @@ from fastapi import Depends, Query, Request
 
 from buildarena_api.dependencies import ContextDep
 from buildarena_api.http.problems import ProblemError
-from buildarena_api.leaderboard.cache import BoardCache
+from buildarena_api.leaderboard.cache import BoardCache, Question
 from buildarena_benchmark import ValidationIssue, builtin_tasks
 from buildarena_benchmark.flags import Reading
 from buildarena_benchmark.leaderboard import BoardQuery
-from buildarena_pipeline.runtime.context import Context
 
 MAX_SWEEPS = 50
 """Sweeps that one board is made of at most."""
@@ -30,11 +29,19 @@ BoardsDep = Annotated[BoardCache, Depends(_boards)]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Selection:
-    """A track and what of it; the track is None when no job has ended."""
+    """A track and what of it; the track is None when no job has ended.
+
+    Attributes:
+        track: The track.
+        tracks: All that could have been asked for.
+        query: Which tasks, models and times.
+        question: The same with the track and the sweeps.
+    """
 
     track: str | None
     tracks: list[str]
     query: BoardQuery
+    question: Question
 
 
 def select_board(
@@ -65,8 +72,9 @@ def select_board(
         ProblemError: A track, task or level is unknown, or a time has no zone.
         NotFoundError: A sweep is unknown.
     """
-    jobs = _jobs_of(context, sweep) if sweep else None
-    tracks = boards.tracks(jobs)
+    sweeps = frozenset(sweep) if sweep else None
+    members = sum(context.store.sweeps.size(id_) for id_ in sorted(sweeps or ()))
+    tracks = boards.tracks(sweeps)
     if track is not None and track not in tracks:
         raise unknown("track", track, tracks)
     tasks = boards.tasks()
@@ -85,29 +93,19 @@ def select_board(
             for name, entry in tasks.items()
             if (not task or name in task) and (not level or entry.level in level)
         )
-    return Selection(
-        track=track or (tracks[0] if tracks else None),
-        tracks=tracks,
-        query=BoardQuery(
-            tasks=chosen,
-            models=frozenset(model) if model else None,
-            jobs=jobs,
-            since=since,
-            until=until,
-            reading=reading,
-            # A task of somebody's own does not take from the others that are ranked over all
-            # tasks, unless it is asked for.
-            overall=None if task else frozenset(builtin_tasks()),
-        ),
+    query = BoardQuery(
+        tasks=chosen,
+        models=frozenset(model) if model else None,
+        since=since,
+        until=until,
+        reading=reading,
+        # A task of somebody's own does not take from the others that are ranked over all
+        # tasks, unless it is asked for.
+        overall=None if task else frozenset(builtin_tasks()),
     )
-
-
-def _jobs_of(context: Context, sweeps: list[str]) -> frozenset[str]:
-    found: set[str] = set()
-    for id_ in sweeps:
-        context.store.sweeps.get(id_)
-        found.update(context.store.sweeps.job_ids(id_))
-    return frozenset(found)
+    track = track or (tracks[0] if tracks else None)
+    question = Question(track=track or "", query=query, sweeps=sweeps, members=members)
+    return Selection(track=track, tracks=tracks, query=query, question=question)
 
 
 def require_zones(**times: datetime | None) -> None:

@@ -123,7 +123,7 @@ async def export(
         body = await exporting.run(render, RankedBoard(tasks=(), overall=()))
     else:
         kind = f"{format} {' '.join(tracks)}"
-        body = (await exporting.run(boards.answer, track, selection.query, kind, render)).body
+        body = (await exporting.run(boards.answer, selection.question, kind, render)).body
     name = f"leaderboard.{'tex' if format == 'latex' else format}"
     headers = {"Content-Disposition": f'attachment; filename="{name}"'}
     return Response(body, media_type=MEDIA_TYPES[format], headers=headers)

@@ -25,6 +25,7 @@ from buildarena_api.schemas import (
     JobView,
 )
 from buildarena_benchmark import ValidationIssue
+from buildarena_benchmark.flags import DISQUALIFYING, INFORMATIVE
 from buildarena_pipeline.catalog.models import ModelRegistry
 from buildarena_pipeline.catalog.specs import JobSpec
 from buildarena_pipeline.runtime.context import Context
@@ -161,7 +162,10 @@ def _require_known(
         choices = known.get(name, list)()
         if value in choices:
             continue
-        used = context.store.jobs.distinct("flags" if name == "flag" else name)
+        if name == "flag":
+            used = context.store.jobs.used_flags([*DISQUALIFYING, *INFORMATIVE, value])
+        else:
+            used = context.store.jobs.distinct(name)
         if value in used or not (choices or used):
             continue
         if choices:

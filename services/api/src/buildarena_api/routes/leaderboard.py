@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import random
+from collections import Counter
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Query, Request
@@ -13,18 +15,14 @@ from buildarena_api.http.access import CallerDep
 from buildarena_api.http.etags import conditional
 from buildarena_api.http.problems import problem_responses
 from buildarena_api.leaderboard.agreement import AgreementTable, agreement_rows
+from buildarena_api.leaderboard.cache import Question
 from buildarena_api.leaderboard.figures import Figures, figures_view
 from buildarena_api.leaderboard.filters import BoardsDep, SelectionDep, unknown
 from buildarena_api.leaderboard.views import Board, ChangePage, ChangeView, board_view
 from buildarena_api.routes.verifications import request_verifications
 from buildarena_benchmark.flags import Reading
-from buildarena_benchmark.leaderboard import (
-    SCORED,
-    BoardQuery,
-    TaskComparison,
-    TrackBoard,
-    compare_models,
-)
+from buildarena_benchmark.leaderboard import BoardQuery, TaskComparison, compare_models
+from buildarena_store import CellId
 
 router = APIRouter(prefix="/v1", tags=["leaderboard"])
 MAX_DISTINCT = 20
@@ -117,8 +115,7 @@ def leaderboard(
     if track is None:
         return Board(track=None, tracks=[], tasks=[], reading=selection.query.reading)
     answer = boards.answer(
-        track,
-        selection.query,
+        selection.question,
         "json " + " ".join(tracks),
         lambda board: (
             board_view(
@@ -144,17 +141,16 @@ def figures(boards: BoardsDep, selection: SelectionDep, request: Request) -> Any
     track, reading = selection.track, selection.query.reading
     if track is None:
         return Figures(track=None, reading=reading, dimensions=[], failures=[], cost=[], front=[])
-    tasks, query = boards.tasks(), selection.query
-
-    def render(kept: TrackBoard) -> bytes:
-        board, trials = kept.board(query), list(kept.trials(query))
-        return (
-            figures_view(track, board, trials, reading=reading, tasks=tasks)
+    tasks = boards.tasks()
+    answer = boards.answer_from_tallies(
+        selection.question,
+        "figures",
+        lambda board, cells: (
+            figures_view(track, board, cells, reading=reading, tasks=tasks)
             .model_dump_json()
             .encode()
-        )
-
-    answer = boards.answer_from(track, query, "figures", render)
+        ),
+    )
     return conditional(request, answer, "application/json")
 
 
@@ -168,21 +164,11 @@ def compare(
     """Compares two models, task by task."""
     tasks: list[TaskComparison] = []
     if selection.track is not None:
-        every = boards.trials(selection.track, selection.query)
-        sides = []
-        for field, name in (("first", first), ("second", second)):
-            model, _, wanted = name.partition("@")
-            side = [
-                trial
-                for trial in every
-                if trial.model == model and trial.configuration.startswith(wanted)
-            ]
-            if not side:
-                choices = sorted({f"{t.model}@{t.configuration[:8]}" for t in every})
-                raise unknown(field, name, choices)
-            configurations = [trial.configuration for trial in side]
-            usual = max(sorted(set(configurations)), key=configurations.count)
-            sides.append([trial for trial in side if trial.configuration == usual])
+        every = boards.inside(selection.question)
+        sides = [
+            boards.trials(selection.question, _usual(every, field, name))
+            for field, name in (("first", first), ("second", second))
+        ]
         found = compare_models(*sides, reading=selection.query.reading)
         tasks = list(found.tasks) if found else []
     return Comparison(
@@ -192,6 +178,20 @@ def compare(
         second=second,
         tasks=[TaskDuelView.model_validate(task) for task in tasks],
     )
+
+
+def _usual(every: Mapping[CellId, tuple[str, int]], field: str, name: str) -> list[CellId]:
+    """The cells of a model's configuration with the most jobs, of those that are meant."""
+    model, _, wanted = name.partition("@")
+    jobs: Counter[str] = Counter()
+    for id_, (of, number) in every.items():
+        if of == model and id_.configuration.startswith(wanted):
+            jobs[id_.configuration] += number
+    if not jobs:
+        choices = sorted({f"{of}@{id_.configuration[:8]}" for id_, (of, _) in every.items()})
+        raise unknown(field, name, choices)
+    usual = max(sorted(jobs), key=jobs.__getitem__)
+    return [id_ for id_ in every if id_.configuration == usual]
 
 
 @router.get("/leaderboard/agreement", responses=problem_responses(404, 422, 503))
@@ -232,9 +232,11 @@ def manifest(
     """The versions behind an entry (name task and model): what its jobs' manifests say."""
     if selection.track is None:
         return []
-    trials = boards.trials(selection.track, selection.query)
+    inside = boards.inside(selection.question)
     entries: dict[str, list[dict[str, Any]]] = {}
-    for task, version, model in sorted({(t.task, t.task_version, t.model) for t in trials}):
+    for task, version, model in sorted(
+        {(i.task, i.task_version, m) for i, (m, _) in inside.items()}
+    ):
         for name, value, jobs in context.store.results.boards.manifest_values(
             selection.track, task, version, model
         ):
@@ -262,10 +264,12 @@ def verify(
         raise unknown("track", body.track, tracks)
     track = body.track or (tracks[0] if tracks else None)
     query = BoardQuery(tasks=frozenset(body.tasks) if body.tasks else None)
-    every = [] if track is None else boards.trials(track, query)
-    scored = sorted(t.job_id for t in every if t.model == body.model and t.outcome in SCORED)
+    question = Question(track=track or "", query=query)
+    every = boards.inside(question)
+    own = [id_ for id_, (model, _) in every.items() if model == body.model]
+    scored = boards.scored_ids(question, own)
     if not scored:
-        raise unknown("model", body.model, sorted({trial.model for trial in every}))
+        raise unknown("model", body.model, sorted({model for model, _ in every.values()}))
     chosen = scored
     if body.sample is not None and body.sample < len(scored):
         # Whoever names the seed gets the same sample again; nothing secret hangs on it.

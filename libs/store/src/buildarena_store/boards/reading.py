@@ -1,41 +1,22 @@
-"""What leaderboards are made of: ended jobs in bulk, what changed since, and why."""
+"""Ended jobs in bulk, and the log of what changed on boards, and why."""
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import Connection, Integer, Row, and_, cast, func, or_, select, text
+from sqlalchemy import Row, func, or_, select, text
 
 from buildarena_benchmark.flags import is_disqualified
-from buildarena_benchmark.leaderboard import EndedJob
+from buildarena_benchmark.leaderboard import SCORED, EndedJob
+from buildarena_store.boards.cells import BoardCells
+from buildarena_store.boards.trials import RANKED, TRIAL_COLUMNS, TrialFilter, read_trials
 from buildarena_store.database import Database
 from buildarena_store.rows import columns_of, value_of
-from buildarena_store.states import EXTERNAL_PROVIDER, FILE_PROVIDER, JobState
-from buildarena_store.tables import board_changes, jobs, rollouts, sweep_jobs, tasks
-
-CHUNK = 5000
-"""Rows that are in memory twice at a time while all are read."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class BoardFeed:
-    """Changes of ended jobs since a mark.
-
-    Attributes:
-        mark: Give it to read on from here.
-        put: Trials that are new or may have changed.
-        gone: Ids of jobs that are no longer ended.
-        task_versions: How many versions of tasks were ever uploaded.
-    """
-
-    mark: int
-    put: Sequence[EndedJob]
-    gone: Sequence[str]
-    task_versions: int
+from buildarena_store.states import JobState
+from buildarena_store.tables import board_changes, jobs, rollouts, sweep_jobs
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,43 +78,43 @@ class Annotated:
 
 
 class Boards:
-    """Reads ended jobs and their changes."""
+    """Reads ended jobs and their changes.
+
+    Attributes:
+        cells: The same by cell, as boards are made of them.
+    """
 
     def __init__(self, database: Database) -> None:
         self._database = database
+        self.cells = BoardCells(database)
 
-    def feed(self, mark: int | None) -> BoardFeed:
-        """Everything that has ended, or what changed since a mark.
-
-        A transaction that was open when the mark was taken may have become visible since: the
-        mark is the oldest such transaction, and changes from it on are read again.
-        """
+    def trials(self, wanted: TrialFilter) -> list[EndedJob]:
+        """Single ended jobs, in no order; a million of them take a gigabyte."""
+        query = select(*TRIAL_COLUMNS).where(*wanted.conditions())
         with self._database.transaction() as connection:
-            connection.execute(text("SET TRANSACTION ISOLATION LEVEL REPEATABLE READ, READ ONLY"))
-            oldest = func.pg_snapshot_xmin(func.pg_current_snapshot())
-            uploaded = select(func.count()).select_from(tasks).scalar_subquery()
-            marks = connection.execute(select(oldest.op("::")(text("text")), uploaded)).one()
-            new_mark, task_versions = int(marks[0]), int(marks[1])
-            if mark is None:
-                query = select(*_COLUMNS).where(jobs.c.state == JobState.DONE, _RANKED)
-                put = list(_trials(connection, query))
-                return BoardFeed(mark=new_mark, put=put, gone=(), task_versions=task_versions)
-            changed = select(board_changes.c.job_id).where(board_changes.c.transaction >= mark)
-            ids = {row.job_id for row in connection.execute(changed.distinct())}
-            put = []
-            if ids:
-                query = select(*_COLUMNS).where(
-                    jobs.c.state == JobState.DONE, jobs.c.id.in_(ids), _RANKED
-                )
-                put = list(_trials(connection, query))
-        gone = sorted(ids - {trial.job_id for trial in put})
-        return BoardFeed(mark=new_mark, put=put, gone=gone, task_versions=task_versions)
+            return list(read_trials(connection, query))
+
+    def scored_ids(self, wanted: TrialFilter) -> list[str]:
+        """Ids of scored jobs, in their order; imported ones that wait to be verified too."""
+        query = (
+            select(jobs.c.id)
+            .where(*wanted.conditions(), jobs.c.outcome.in_(sorted(SCORED)))
+            .order_by(jobs.c.id)
+        )
+        with self._database.statement() as connection:
+            return [row.id for row in connection.execute(query)]
+
+    def any_of(self, wanted: TrialFilter) -> bool:
+        """Whether there is such a job."""
+        query = select(jobs.c.id).where(*wanted.conditions()).limit(1)
+        with self._database.statement() as connection:
+            return connection.execute(query).first() is not None
 
     def of_sweep(self, sweep_id: str) -> list[tuple[EndedJob, list[Round]]]:
         """A sweep's ended jobs with their rounds, in a fixed order."""
         members = select(sweep_jobs.c.job_id).where(sweep_jobs.c.sweep_id == sweep_id)
         query = (
-            select(*_COLUMNS)
+            select(*TRIAL_COLUMNS)
             .where(jobs.c.state == JobState.DONE, jobs.c.id.in_(members))
             .order_by(jobs.c.task, jobs.c.model, jobs.c.seed, jobs.c.id)
         )
@@ -143,7 +124,7 @@ class Boards:
             .order_by(rollouts.c.job_id, rollouts.c.number)
         )
         with self._database.transaction() as connection:
-            found = list(_trials(connection, query))
+            found = list(read_trials(connection, query))
             rounds: dict[str, list[Round]] = {}
             for row in connection.execute(simulated):
                 _add_rollout(rounds.setdefault(row.job_id, []), row)
@@ -151,7 +132,7 @@ class Boards:
 
     def tracks(self) -> list[str]:
         """Every track that has jobs, ended or not; files that were tried have no leaderboard."""
-        query = select(jobs.c.track).where(_RANKED).distinct().order_by(jobs.c.track)
+        query = select(jobs.c.track).where(RANKED).distinct().order_by(jobs.c.track)
         with self._database.transaction() as connection:
             return [row.track for row in connection.execute(query)]
 
@@ -224,76 +205,6 @@ class Boards:
         )
         with self._database.transaction() as connection:
             return [(row.key, row.value, row.jobs) for row in connection.execute(query)]
-
-
-_RANKED = func.coalesce(jobs.c.model_config["provider"].as_string(), "") != FILE_PROVIDER
-_COLUMNS = [
-    jobs.c.track,
-    jobs.c.task,
-    jobs.c.task_version,
-    jobs.c.model,
-    jobs.c.seed,
-    jobs.c.outcome,
-    jobs.c.reason,
-    jobs.c.success,
-    jobs.c.indicator,
-    jobs.c.flags,
-    jobs.c.refusals,
-    jobs.c.requests,
-    jobs.c.input_tokens,
-    jobs.c.output_tokens,
-    jobs.c.cost_usd,
-    jobs.c.actions,
-    jobs.c.refused_actions,
-    jobs.c.finished_at,
-    jobs.c.imported_from.is_not(None).label("imported"),
-    and_(jobs.c.imported_from.is_not(None), jobs.c.verified_at.is_(None)).label("unverified"),
-    jobs.c.id.label("job_id"),
-    jobs.c.model_hash.label("configuration"),
-    jobs.c.model_config["decoding"].label("decoding"),
-    (jobs.c.model_config["provider"].as_string() == EXTERNAL_PROVIDER).label("external"),
-    jobs.c.limits,
-    cast(jobs.c.metrics["parts"], Integer).label("parts"),
-]
-
-
-def _trials(connection: Connection, query: Any) -> Iterator[EndedJob]:
-    # A hundred thousand rows repeat a few dozen words and settings: one object serves them all.
-    decodings: dict[str, Mapping[str, Any]] = {}
-    result = connection.execution_options(stream_results=True).execute(query)
-    for row in result.yield_per(CHUNK):
-        # What an external agent used is unknown, which is not nothing.
-        known = not row.external
-        yield EndedJob(
-            job_id=row.job_id,
-            track=sys.intern(row.track),
-            task=sys.intern(row.task),
-            task_version=sys.intern(row.task_version),
-            model=sys.intern(row.model),
-            configuration=sys.intern(row.configuration),
-            decoding=decodings.setdefault(row.configuration, _decoding(row.decoding, row.limits)),
-            seed=row.seed,
-            outcome=sys.intern(row.outcome),
-            reason=None if row.reason is None else sys.intern(row.reason),
-            success=bool(row.success),
-            indicator=row.indicator or 0.0,
-            parts=row.parts,
-            flags=tuple(row.flags or ()),
-            refusals=row.refusals or {},
-            requests=row.requests if known else None,
-            input_tokens=row.input_tokens if known else None,
-            output_tokens=row.output_tokens if known else None,
-            cost_usd=float(row.cost_usd) if known else None,
-            actions=row.actions,
-            refused_actions=row.refused_actions,
-            finished_at=row.finished_at,
-            imported=row.imported,
-            unverified=row.unverified,
-        )
-
-
-def _decoding(decoding: Mapping[str, Any] | None, limits: Mapping[str, Any]) -> dict[str, Any]:
-    return {**(decoding or {}), **({"limits": limits} if limits else {})}
 
 
 def _add_rollout(rounds: list[Round], row: Row[Any]) -> None:

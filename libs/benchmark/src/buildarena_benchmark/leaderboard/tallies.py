@@ -1,0 +1,143 @@
+"""Tallies: the trials of one cell, without their names, as far as figures are made of them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from buildarena_benchmark.leaderboard.ended_jobs import EndedJob
+from buildarena_benchmark.outcomes import SCORED
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+UNKNOWN_TOKENS: Final = -1
+"""Stands in arrays for a number of tokens that nobody knows."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Total:
+    """A sum over the trials that have a value.
+
+    Attributes:
+        known: How many have one.
+        sum: Their sum.
+    """
+
+    known: int = 0
+    sum: int = 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Tally:
+    """Trials of one cell that ended alike. A cell of thousands of trials has a few of these.
+
+    Attributes:
+        outcome: How they ended.
+        reason: Class of their failure, if any.
+        success: Whether they met the task's criterion.
+        flags: Remarks on their scores.
+        imported: Whether they came from another service's archive.
+        unverified: Whether their figures were not found again here since.
+        indicators: (N,) float64, of each trial.
+        costs_usd: (N,) float64, of each trial; not a number where nobody knows it.
+        output_tokens: (N,) int64, of each trial; -1 where nobody knows it.
+        requests: Model requests.
+        input_tokens: Tokens sent.
+        parts: Parts of their machines.
+        actions: Actions, refused ones included.
+        refused_actions: Refused actions.
+        refusals: Refused actions by refusal class.
+        newest: When the last of them ended.
+    """
+
+    outcome: str
+    reason: str | None
+    success: bool
+    flags: tuple[str, ...]
+    imported: bool
+    unverified: bool
+    indicators: Floats
+    costs_usd: Floats
+    output_tokens: Integers
+    requests: Total
+    input_tokens: Total
+    parts: Total
+    actions: int
+    refused_actions: int
+    refusals: Mapping[str, int]
+    newest: datetime | None
+
+    @property
+    def number(self) -> int:
+        """How many trials it holds."""
+        return len(self.indicators)
+
+    @property
+    def scored(self) -> bool:
+        """Whether its trials count in averages."""
+        return self.outcome in SCORED and not self.unverified
+
+
+Kind = tuple[str, str | None, bool, tuple[str, ...], bool, bool]
+"""Outcome, reason, success, flags, imported, unverified: what trials of one tally share."""
+
+
+def tallied(trials: Iterable[EndedJob]) -> list[Tally]:
+    """The tallies of one cell's trials; neither their order nor that of the trials matters."""
+    kinds: dict[Kind, list[EndedJob]] = {}
+    for trial in trials:
+        kinds.setdefault(_kind(trial), []).append(trial)
+    return [_tally(kind, found) for kind, found in kinds.items()]
+
+
+def _kind(trial: EndedJob) -> Kind:
+    return (
+        trial.outcome,
+        trial.reason,
+        trial.success,
+        trial.flags,
+        trial.imported,
+        trial.unverified,
+    )
+
+
+def _tally(kind: Kind, trials: list[EndedJob]) -> Tally:
+    outcome, reason, success, flags, imported, unverified = kind
+    refusals: Counter[str] = Counter()
+    for trial in trials:
+        refusals.update(trial.refusals)
+    return Tally(
+        outcome=outcome,
+        reason=reason,
+        success=success,
+        flags=flags,
+        imported=imported,
+        unverified=unverified,
+        indicators=np.array([trial.indicator for trial in trials], np.float64),
+        costs_usd=np.array(
+            [np.nan if t.cost_usd is None else t.cost_usd for t in trials], np.float64
+        ),
+        output_tokens=np.array(
+            [UNKNOWN_TOKENS if t.output_tokens is None else t.output_tokens for t in trials],
+            np.int64,
+        ),
+        requests=_total(trial.requests for trial in trials),
+        input_tokens=_total(trial.input_tokens for trial in trials),
+        parts=_total(trial.parts for trial in trials),
+        actions=sum(trial.actions for trial in trials),
+        refused_actions=sum(trial.refused_actions for trial in trials),
+        refusals=dict(refusals),
+        newest=max((t.finished_at for t in trials if t.finished_at), default=None),
+    )
+
+
+def _total(values: Iterable[int | None]) -> Total:
+    known = [value for value in values if value is not None]
+    return Total(known=len(known), sum=sum(known))

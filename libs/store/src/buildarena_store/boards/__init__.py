@@ -1,0 +1,19 @@
+"""What leaderboards are made of: cells with their tallies, single trials, and why they changed."""
+
+from buildarena_store.boards.cells import BoardCells, CellFeed, Mark
+from buildarena_store.boards.reading import Annotated, BoardChange, Boards, Round
+from buildarena_store.boards.tallying import CellRecord
+from buildarena_store.boards.trials import CellId, TrialFilter
+
+__all__ = [
+    "Annotated",
+    "BoardCells",
+    "BoardChange",
+    "Boards",
+    "CellFeed",
+    "CellId",
+    "CellRecord",
+    "Mark",
+    "Round",
+    "TrialFilter",
+]

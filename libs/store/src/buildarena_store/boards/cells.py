@@ -1,0 +1,329 @@
+"""Cells that processes share: found changed by the log, made anew by one, read by all.
+
+A row of `board_cells` says what its cell was in one snapshot of the database. The row of
+`board_state` says up to which snapshot no cell is missing or out of date; the log of changes says
+which cells changed since. Snapshots rather than ids or times, as transactions become visible out
+of order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any, Final, NamedTuple
+
+from sqlalchemy import (
+    BigInteger,
+    ColumnElement,
+    Connection,
+    Text,
+    and_,
+    cast,
+    delete,
+    distinct,
+    exists,
+    func,
+    select,
+    text,
+    tuple_,
+    update,
+)
+from sqlalchemy.dialects.postgresql import insert
+from sqlalchemy.types import UserDefinedType
+
+from buildarena_store.boards.tallying import CellRecord, kept_tallies, tallies_of, tally_jobs
+from buildarena_store.boards.trials import RANKED, CellId, TrialFilter
+from buildarena_store.database import Database
+from buildarena_store.made_tables import board_cells, board_state
+from buildarena_store.rows import bound_texts
+from buildarena_store.states import JobState
+from buildarena_store.tables import board_changes, jobs, tasks
+
+FORMAT: Final = 1
+"""Of rows; programs of different formats may use one database at once."""
+FILL_LOCK: Final = 0x63656C6C73  # "cells": of processes that find none, one makes them
+MAX_KEPT_AT_ONCE: Final = 50
+"""Cells that are made or read before the next ones, so that memory stays small."""
+
+
+class Mark(NamedTuple):
+    """A snapshot: what had been committed when something was read. Later ones are greater."""
+
+    end: int
+    closed: int
+    snapshot: str
+
+    @staticmethod
+    def of(snapshot: str) -> Mark:
+        """The mark of a snapshot as the database writes it."""
+        _, end, open_ = snapshot.split(":")
+        return Mark(int(end), -len(open_.split(",")) if open_ else 0, snapshot)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CellFeed:
+    """What changed since a mark, or all there is.
+
+    Attributes:
+        mark: Give it to read on from here.
+        cells: Cells that changed, or all without their tallies; those with no jobs are gone.
+        whole: Whether it is all there is.
+        task_versions: How many versions of tasks were ever uploaded.
+    """
+
+    mark: Mark
+    cells: Sequence[CellRecord]
+    whole: bool
+    task_versions: int
+
+
+class BoardCells:
+    """Reads cells, and makes those anew that changed."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def feed(self, mark: Mark | None) -> CellFeed:
+        """All cells, or those that changed since a mark.
+
+        Args:
+            mark: Of the last feed; None for all.
+        """
+        if mark is not None:
+            with self._database.statement() as connection:
+                now, task_versions, changed = _look(connection, mark)
+            if now.end < mark.end:
+                # The database is an older one than it was: a backup was restored.
+                mark = None
+            elif not changed:
+                return CellFeed(mark=now, cells=(), whole=False, task_versions=task_versions)
+        state = mark or self._settled()
+        with self._reading() as connection:
+            now, task_versions, changed = _look(connection, state)
+            fresh = _kept(connection, changed, with_tallies=True)
+            made = _made(connection, sorted(changed - {record.id for record in fresh}))
+            kept = [] if mark else _kept(connection, None, with_tallies=False)
+        if made:
+            self._keep(made, now, settled=True)
+        known = {record.id for record in (*fresh, *made)}
+        whole = [record for record in kept if record.id not in known and record.jobs]
+        return CellFeed(
+            mark=now,
+            cells=[*whole, *fresh, *made],
+            whole=mark is None,
+            task_versions=task_versions,
+        )
+
+    def read(self, ids: Collection[CellId]) -> Iterator[CellRecord]:
+        """Cells with their tallies, as of the last feed or later."""
+        ordered = sorted(ids)
+        for start in range(0, len(ordered), MAX_KEPT_AT_ONCE):
+            with self._database.statement() as connection:
+                some = ordered[start : start + MAX_KEPT_AT_ONCE]
+                found = _kept(connection, some, with_tallies=True, only_fresh=False)
+            yield from found
+
+    def of(self, wanted: TrialFilter) -> list[CellRecord]:
+        """Cells of just the jobs that are meant: they are made for this question alone."""
+        with self._reading() as connection:
+            return tally_jobs(connection, wanted)
+
+    @contextmanager
+    def _reading(self) -> Iterator[Connection]:
+        with self._database.transaction() as connection:
+            connection.execute(text("SET TRANSACTION ISOLATION LEVEL REPEATABLE READ, READ ONLY"))
+            # One plan for any number of cells would be a bad one for few or for many.
+            connection.execute(text("SET LOCAL plan_cache_mode = force_custom_plan"))
+            yield connection
+
+    def _settled(self) -> Mark:
+        """The mark up to which all cells are kept; makes them when nobody has."""
+        with self._database.transaction() as connection:
+            if (state := _state(connection)) is not None:
+                return state
+        with self._database.transaction() as waiting:
+            waiting.execute(select(func.pg_advisory_xact_lock(FILL_LOCK)))
+            # Another process may have made them while this one waited.
+            with self._database.transaction() as connection:
+                state = _state(connection)
+                if state is None:
+                    _forget(connection)
+            return state or self._fill()
+
+    def _fill(self) -> Mark:
+        with self._reading() as connection:
+            mark = Mark.of(str(connection.execute(select(_SNAPSHOT)).scalar_one()))
+            names = select(jobs.c.track, jobs.c.task).where(jobs.c.state == JobState.DONE, RANKED)
+            for track, task in connection.execute(names.distinct()).all():
+                self._keep(tally_jobs(connection, TrialFilter(track=track, tasks=[task])), mark)
+        self._keep([], mark, settled=True)
+        return mark
+
+    def _keep(self, records: Sequence[CellRecord], mark: Mark, *, settled: bool = False) -> None:
+        """Keeps cells as they were at a mark; later ones of another process stay.
+
+        Args:
+            records: The cells.
+            mark: When they were so.
+            settled: Whether all other cells are kept up to then, too.
+        """
+        with self._database.transaction() as connection:
+            # What is lost with the server's memory is made again.
+            connection.execute(text("SET LOCAL synchronous_commit = off"))
+            # In one order, so that no two processes wait for each other.
+            for record in sorted(records, key=lambda one: one.id):
+                connection.execute(_upsert(board_cells, _row(record, mark)))
+            if settled:
+                row = {"format": FORMAT, "server": _server(connection), **_columns(mark)}
+                connection.execute(_upsert(board_state, row))
+
+
+class _PgSnapshot(UserDefinedType[str]):
+    cache_ok = True
+
+    def get_col_spec(self, **_: Any) -> str:
+        return "pg_snapshot"
+
+
+class _Xid8(UserDefinedType[str]):
+    cache_ok = True
+
+    def get_col_spec(self, **_: Any) -> str:
+        return "xid8"
+
+
+_SNAPSHOT: Final = cast(func.pg_current_snapshot(), Text)
+
+
+def _forget(connection: Connection) -> None:
+    """Forgets cells of another server, and its transactions: their numbers mean nothing here."""
+    connection.execute(delete(board_cells).where(board_cells.c.format == FORMAT))
+    connection.execute(delete(board_state).where(board_state.c.format == FORMAT))
+    # No transaction of this server that can be seen has such a number.
+    begun = cast(cast(func.pg_snapshot_xmax(func.pg_current_snapshot()), Text), BigInteger)
+    foreign = update(board_changes).where(board_changes.c.transaction >= begun)
+    connection.execute(foreign.values(transaction=0))
+
+
+def _look(connection: Connection, mark: Mark) -> tuple[Mark, int, set[CellId]]:
+    """What is committed now, how many task versions there are, and which cells changed."""
+    key = [board_changes.c[name] for name in CellId._fields]
+    changed = (
+        select(func.jsonb_agg(distinct(func.jsonb_build_array(*key))))
+        .where(_since(mark.snapshot), board_changes.c.configuration.is_not(None))
+        .scalar_subquery()
+    )
+    uploaded = select(func.count()).select_from(tasks).scalar_subquery()
+    snapshot, task_versions, found = connection.execute(select(_SNAPSHOT, uploaded, changed)).one()
+    return Mark.of(str(snapshot)), int(task_versions), {CellId(*one) for one in found or ()}
+
+
+def _since(snapshot: Any) -> ColumnElement[bool]:
+    """Changes by transactions that a snapshot did not see."""
+    given = cast(snapshot, _PgSnapshot)
+    transaction = cast(cast(board_changes.c.transaction, Text), _Xid8)
+    return and_(
+        board_changes.c.transaction >= cast(cast(func.pg_snapshot_xmin(given), Text), BigInteger),
+        ~func.pg_visible_in_snapshot(transaction, given),
+    )
+
+
+def _kept(
+    connection: Connection,
+    ids: Collection[CellId] | None,
+    *,
+    with_tallies: bool,
+    only_fresh: bool = True,
+) -> list[CellRecord]:
+    """Rows of cells; of some that changed, only those that were made after the change."""
+    key = [board_cells.c[name] for name in CellId._fields]
+    columns = [*key, board_cells.c.model, board_cells.c.decoding, board_cells.c.jobs]
+    columns += [board_cells.c.newest]
+    if with_tallies:
+        columns += [board_cells.c.tallies, board_cells.c.figures]
+    query = select(*columns).where(board_cells.c.format == FORMAT)
+    if ids is not None:
+        if not ids:
+            return []
+        given = [bound_texts(list(values)) for values in zip(*sorted(ids), strict=True)]
+        wanted = func.unnest(*given).table_valued(*CellId._fields).render_derived(name="wanted")
+        query = query.join(wanted, and_(*(a == b for a, b in zip(key, wanted.c, strict=True))))
+        if only_fresh:
+            log = [board_changes.c[name] for name in CellId._fields]
+            same = and_(*(a == b for a, b in zip(log, key, strict=True)))
+            query = query.where(~exists().where(same, _since(board_cells.c.snapshot)))
+    return [
+        CellRecord(
+            id=CellId(row.track, row.task, row.task_version, row.configuration),
+            model=row.model,
+            decoding=row.decoding,
+            jobs=row.jobs,
+            newest=row.newest,
+            tallies=tallies_of(row.tallies, row.figures) if with_tallies else (),
+        )
+        for row in connection.execute(query)
+    ]
+
+
+def _made(connection: Connection, ids: Sequence[CellId]) -> list[CellRecord]:
+    """Cells made from their jobs; those that have none left are without jobs."""
+    made: list[CellRecord] = []
+    for start in range(0, len(ids), MAX_KEPT_AT_ONCE):
+        some = ids[start : start + MAX_KEPT_AT_ONCE]
+        made += tally_jobs(connection, TrialFilter(cells=some))
+    gone = set(ids) - {record.id for record in made}
+    return made + [
+        CellRecord(id=id_, model="", decoding={}, jobs=0, newest=None, tallies=())
+        for id_ in sorted(gone)
+    ]
+
+
+def _state(connection: Connection) -> Mark | None:
+    query = select(board_state.c.snapshot).where(
+        board_state.c.format == FORMAT, board_state.c.server == _server(connection)
+    )
+    found = connection.execute(query).scalar()
+    return None if found is None else Mark.of(found)
+
+
+def _server(connection: Connection) -> str:
+    """Which server's transactions the marks count."""
+    query = text("SELECT system_identifier::text FROM pg_control_system()")
+    return str(connection.execute(query).scalar_one())
+
+
+def _row(record: CellRecord, mark: Mark) -> dict[str, Any]:
+    tallies, figures = kept_tallies(record.tallies)
+    return {
+        "format": FORMAT,
+        **record.id._asdict(),
+        "model": record.model,
+        "decoding": dict(record.decoding),
+        "jobs": record.jobs,
+        "newest": record.newest,
+        "tallies": tallies,
+        "figures": figures,
+        **_columns(mark),
+    }
+
+
+def _columns(mark: Mark) -> dict[str, Any]:
+    return {
+        "snapshot": mark.snapshot,
+        "snapshot_end": mark.end,
+        "snapshot_open": -mark.closed,
+    }
+
+
+def _upsert(table: Any, row: dict[str, Any]) -> Any:
+    """Writes a row unless there is one of a later snapshot."""
+    statement = insert(table).values(row)
+    key = [column.name for column in table.primary_key]
+    new = statement.excluded
+    return statement.on_conflict_do_update(
+        index_elements=key,
+        set_={name: new[name] for name in row if name not in key},
+        where=tuple_(table.c.snapshot_end, -table.c.snapshot_open)
+        <= tuple_(new.snapshot_end, -new.snapshot_open),
+    )

@@ -1,0 +1,79 @@
+"""Tables that are made of others: whatever is in them can be made again."""
+
+from __future__ import annotations
+
+from sqlalchemy import (
+    JSON,
+    BigInteger,
+    Column,
+    DateTime,
+    Integer,
+    LargeBinary,
+    Numeric,
+    Table,
+    Text,
+)
+from sqlalchemy.dialects.postgresql import JSONB
+
+from buildarena_store.tables import metadata
+
+
+def _snapshot() -> tuple[Column[str], Column[int], Column[int]]:
+    """What had been committed; the later of two has the greater end, or fewer open before it."""
+    return (
+        Column("snapshot", Text, nullable=False),
+        Column("snapshot_end", BigInteger, nullable=False),
+        Column("snapshot_open", Integer, nullable=False),
+    )
+
+
+# What leaderboards are made of: made from jobs by whoever finds a cell changed, used by all.
+board_cells = Table(
+    "board_cells",
+    metadata,
+    # Programs of two releases may be at work: each has cells of its own format.
+    Column("format", Integer, primary_key=True, autoincrement=False),
+    Column("track", Text, primary_key=True),
+    Column("task", Text, primary_key=True),
+    Column("task_version", Text, primary_key=True),
+    Column("configuration", Text, primary_key=True),
+    Column("model", Text, nullable=False),
+    Column("decoding", JSON, nullable=False),
+    # None are left of a cell whose jobs all left; its row says so.
+    Column("jobs", BigInteger, nullable=False),
+    Column("newest", DateTime(timezone=True)),
+    Column("tallies", JSON, nullable=False),
+    Column("figures", LargeBinary, nullable=False),
+    *_snapshot(),
+)
+
+# Up to when no cell of a format is missing or out of date.
+board_state = Table(
+    "board_state",
+    metadata,
+    Column("format", Integer, primary_key=True, autoincrement=False),
+    Column("server", Text, nullable=False),
+    *_snapshot(),
+)
+
+
+def _amounts() -> list[Column[object]]:
+    return [Column(name, Numeric, nullable=False) for name in "abcd"]
+
+
+# Counts of the whole service, and what triggers would add to them: rows that are only added need
+# not wait for each other as one counter would make them.
+figures = Table(
+    "figures",
+    metadata,
+    Column("kind", Text, primary_key=True),
+    Column("key", JSONB, primary_key=True),
+    *_amounts(),
+)
+figure_changes = Table(
+    "figure_changes",
+    metadata,
+    Column("kind", Text, nullable=False),
+    Column("key", JSONB, nullable=False),
+    *_amounts(),
+)

@@ -1,0 +1,343 @@
+"""Boards that processes share equal boards that are made from every ended job in the plain way."""
+
+from __future__ import annotations
+
+import json
+import random
+from contextlib import ExitStack
+from datetime import UTC, datetime, timedelta
+
+import pytest
+from live_api import LOOPBACK
+from plain_boards import plain_board
+from sqlalchemy import delete, func, insert, select, text, update
+from starlette.testclient import TestClient
+
+from buildarena_api.app import create_app
+from buildarena_api.leaderboard.views import board_view
+from buildarena_benchmark import builtin_tasks
+from buildarena_benchmark.flags import Reading
+from buildarena_benchmark.leaderboard import BoardQuery, cost_bins, failure_rows
+from buildarena_pipeline.catalog.models import load_registry
+from buildarena_store import TrialFilter
+from buildarena_store.made_tables import board_cells, board_state
+from buildarena_store.tables import board_changes, jobs, sweep_jobs, sweeps
+
+TRACKS = ("first/track-1", "second/track-1")
+START = datetime(2026, 1, 1, tzinfo=UTC)
+FLAGS = (None, [], ["unstable"], ["never_fell"], ["no_wheels", "never_fell"], ["of tomorrow"])
+TASKS = ("lift-1", "support-1", "somebodys-own")
+
+
+def random_job(rng: random.Random, number: int) -> dict[str, object]:
+    """An ended job with every oddity that jobs may have."""
+    task, provider = rng.choice(TASKS), rng.choice(("made-up", "made-up", "external", "file"))
+    version = builtin_tasks()[task].version if task in builtin_tasks() else "v1"
+    model = f"{provider}/{rng.randrange(3)}"
+    outcome = rng.choice(
+        ["success"] * 4 + ["unsuccessful", "construction_failed", "limit", "errored", "cancelled"]
+    )
+    imported = rng.random() < 0.2
+    return {
+        "id": f"job_{number:020d}",
+        "task": task,
+        "task_version": rng.choice((version, version, version, "old")),
+        "model": model,
+        "model_hash": f"{model} {rng.randrange(2)}",
+        "model_config": {"provider": provider, "decoding": {"temperature": 0.1}},
+        "limits": rng.choice(({}, {"requests": 5})) if provider == "x" else {},
+        "track": rng.choice(TRACKS),
+        "track_config": {},
+        "seed": number,
+        "stage": "simulate",
+        "queue": "simulate.pybullet",
+        "state": "done",
+        "outcome": outcome,
+        "reason": rng.choice(("objection", None)) if outcome != "success" else None,
+        "success": outcome == "success" if rng.random() < 0.9 else None,
+        "indicator": rng.choice((None, 0.0, 5.0, rng.expovariate(0.01), -rng.random())),
+        "metrics": rng.choice((None, {}, {"parts": rng.randrange(90)})),
+        "flags": rng.choice(FLAGS),
+        "refusals": rng.choice((None, {}, {"overlap": 3}, {"overlap": 1, "full": 0})),
+        "requests": rng.randrange(100),
+        "input_tokens": rng.randrange(10**9),
+        "output_tokens": rng.choice((0, rng.randrange(10**6))),
+        "cost_usd": round(rng.random(), 6),
+        "actions": rng.randrange(9),
+        "refused_actions": rng.randrange(3),
+        "finished_at": START + timedelta(hours=rng.randrange(1000)),
+        "imported_from": "elsewhere" if imported else None,
+        "verified_at": START if imported and rng.random() < 0.5 else None,
+    }
+
+
+def disturb(context, rng: random.Random, number: int) -> None:
+    """What happens to jobs: they end, leave, are scored again, verified, deleted."""
+    kinds = ("end", "end", "rescore", "leave", "delete", "verify", "refusals", "empty a cell")
+    with context.store.database.transaction() as connection:
+        ids = connection.execute(select(jobs.c.id).order_by(jobs.c.id)).scalars().all()
+        some = [id_ for id_ in ids if rng.random() < 0.1]
+        kind = rng.choice(kinds) if ids else "end"
+        here = jobs.c.id.in_(some)
+        if kind == "end":
+            rows = [random_job(rng, number * 100 + place) for place in range(rng.randrange(1, 12))]
+            connection.execute(insert(jobs), rows)
+        elif kind == "rescore":
+            values = {"indicator": rng.random() * 100, "flags": rng.choice(FLAGS[1:])}
+            connection.execute(update(jobs).where(here).values(**values))
+        elif kind == "leave":
+            connection.execute(update(jobs).where(here).values(state="queued", outcome=None))
+        elif kind == "verify":
+            imported = jobs.c.imported_from.is_not(None)
+            connection.execute(update(jobs).where(imported).values(verified_at=START))
+        elif kind == "refusals":
+            connection.execute(update(jobs).where(here).values(refusals={"overlap": number}))
+        elif kind == "delete":
+            connection.execute(delete(sweep_jobs).where(sweep_jobs.c.job_id.in_(some)))
+            connection.execute(delete(jobs).where(here))
+        else:
+            cell = jobs.c.task == rng.choice(TASKS), jobs.c.model == "made-up/0"
+            connection.execute(update(jobs).where(*cell).values(state="queued"))
+
+
+def random_query(rng: random.Random) -> dict[str, object]:
+    """Parameters of a board, as readers choose them."""
+    found: dict[str, object] = {"track": rng.choice(TRACKS), "reading": rng.choice([*Reading])}
+    if rng.random() < 0.3:
+        found["task"] = rng.sample(sorted(builtin_tasks()), 8)
+    if rng.random() < 0.3:
+        found["model"] = ["made-up/0", "external/1"]
+    if rng.random() < 0.3:
+        found["since"] = START + timedelta(hours=rng.randrange(1000))
+    if rng.random() < 0.3:
+        found["until"] = START + timedelta(hours=rng.randrange(1000))
+    if rng.random() < 0.3:
+        found["sweep"] = "sweep_some"
+    return found
+
+
+def expected(context, params: dict[str, object]) -> tuple[bytes, dict[str, object]] | None:
+    """The board and the figures in the plain way; None when the track has no such job."""
+    boards, registry = context.store.results.boards, load_registry()
+    every = boards.trials(TrialFilter())
+    members = None
+    if "sweep" in params:
+        members = {*context.store.sweeps.job_ids("sweep_some")}
+    tracks = sorted({t.track for t in every if members is None or t.job_id in members})
+    if params["track"] not in tracks:
+        return None
+    tasks = context.tasks.newest().values()
+    query = BoardQuery(
+        tasks=frozenset(params["task"]) if "task" in params else None,
+        models=frozenset(params["model"]) if "model" in params else None,
+        since=params.get("since"),
+        until=params.get("until"),
+        reading=params["reading"],
+        overall=None if "task" in params else frozenset(builtin_tasks()),
+    )
+    own = [trial for trial in every if trial.track == params["track"]]
+    board = plain_board(
+        own,
+        query,
+        {task.name: task.version for task in tasks},
+        {task.name: task.difficulty for task in tasks if task.difficulty},
+        inside=lambda t: members is None or t.job_id in members,
+    )
+    view = board_view(
+        board,
+        track=params["track"],
+        tracks=tracks,
+        reading=query.reading,
+        registry=registry,
+        catalogue=context.tasks,
+    )
+    shown = {(found.task, found.version) for found in board.tasks}
+    trials = [
+        trial
+        for trial in own
+        if (trial.task, trial.task_version) in shown
+        and query.holds(trial)
+        and (members is None or trial.job_id in members)
+        and (query.models is None or trial.model in query.models)
+    ]
+    bins = cost_bins(
+        trials, reading=query.reading, categories={task.name: task.category for task in tasks}
+    )
+    figures = {
+        "failures": sorted(
+            [row.model, row.configuration, dict(row.outcomes), dict(row.refusals), row.actions]
+            for row in failure_rows(trials)
+        ),
+        "cost": {
+            category: [[one.trials, one.mean, one.median] for one in found]
+            for category, found in bins.items()
+        },
+    }
+    return view.model_dump_json().encode(), figures
+
+
+def asked(api, params: dict[str, object]) -> tuple[bytes, dict[str, object]] | None:
+    """The same from the API."""
+    found = api.get("/v1/leaderboard", params=params)
+    if found.status_code == 422:
+        return None
+    figures = api.get("/v1/leaderboard/figures", params=params).json()
+    return found.content, {
+        "failures": sorted(
+            [row["model"], row["configuration"], row["outcomes"], row["refusals"], row["actions"]]
+            for row in figures["failures"]
+        ),
+        "cost": {
+            found["category"]: [
+                [one["trials"], one["mean"], one["median"]] for one in found["bins"]
+            ]
+            for found in figures["cost"]
+        },
+    }
+
+
+@pytest.fixture
+def process(context):
+    """Starts what further API processes would have in memory, on the same database."""
+    with ExitStack() as stack:
+
+        def start() -> TestClient:
+            app = create_app(context, load_registry())
+            return stack.enter_context(TestClient(app, base_url=LOOPBACK))
+
+        yield start
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_boards_equal_boards_made_from_every_job(context, process, seed) -> None:
+    rng = random.Random(seed)
+    first, second = process(), process()
+    with context.store.database.transaction() as connection:
+        connection.execute(insert(jobs), [random_job(rng, number) for number in range(60)])
+        connection.execute(
+            insert(sweeps).values(id="sweep_some", name="some", spec={}, state="active")
+        )
+        connection.execute(
+            insert(sweep_jobs),
+            [{"sweep_id": "sweep_some", "job_id": f"job_{n:020d}"} for n in range(0, 60, 2)],
+        )
+    for step in range(12):
+        for api in rng.sample([first, second, process()], 2):
+            params = random_query(rng)
+            assert asked(api, params) == expected(context, params), params
+        disturb(context, rng, step + 1)
+
+
+def fill(context, count: int = 30) -> None:
+    rng = random.Random(7)
+    with context.store.database.transaction() as connection:
+        connection.execute(insert(jobs), [random_job(rng, number) for number in range(count)])
+
+
+def rows(context, table) -> int:
+    with context.store.database.statement() as connection:
+        return int(connection.execute(select(func.count()).select_from(table)).scalar_one())
+
+
+def test_a_process_that_starts_reads_cells_that_another_made(context, process, monkeypatch) -> None:
+    fill(context)
+    kept = process().get("/v1/leaderboard").content
+    assert rows(context, board_cells) > 0
+    # Nothing is left to make: a process that read jobs would fail here.
+    monkeypatch.setattr("buildarena_store.boards.cells.tally_jobs", None)
+    assert process().get("/v1/leaderboard").content == kept
+
+
+def test_a_change_that_nobody_took_in_is_found_by_the_next_process(context, process) -> None:
+    fill(context)
+    process().get("/v1/leaderboard")
+    with context.store.database.transaction() as connection:
+        connection.execute(update(jobs).values(indicator=77.0))
+    params = {"track": TRACKS[0], "reading": Reading.OURS}
+    assert asked(process(), params) == expected(context, params)
+
+
+def test_a_change_in_an_open_transaction_is_found_once_it_ends(context, process) -> None:
+    fill(context)
+    api, params = process(), {"track": TRACKS[0], "reading": Reading.OURS}
+    with context.store.database.transaction() as slow:
+        slow.execute(update(jobs).where(jobs.c.id == f"job_{0:020d}").values(indicator=999.0))
+        # A later change is taken in, and kept, while the earlier one can't be seen.
+        with context.store.database.transaction() as connection:
+            later = update(jobs).where(jobs.c.id != f"job_{0:020d}")
+            connection.execute(later.values(indicator=1.0))
+        assert asked(api, params) == expected(context, params)
+    wanted = expected(context, params)
+    assert asked(api, params) == asked(process(), params) == wanted
+
+
+def test_cells_of_another_server_are_not_believed(context, process) -> None:
+    """A database that was dumped here and loaded elsewhere has numbers that mean nothing there."""
+    fill(context)
+    process().get("/v1/leaderboard")
+    with context.store.database.transaction() as connection:
+        connection.execute(update(board_state).values(server="another", snapshot_end=2**60))
+        connection.execute(update(board_cells).values(tallies=[], figures=b"", snapshot_end=2**60))
+        connection.execute(update(board_changes).values(transaction=2**60))
+    params = {"track": TRACKS[0], "reading": Reading.OURS}
+    api = process()
+    assert asked(api, params) == expected(context, params)
+    with context.store.database.transaction() as connection:
+        assert connection.execute(select(func.max(board_changes.c.transaction))).scalar() == 0
+        connection.execute(update(jobs).values(indicator=78.0))
+    assert asked(api, params) == asked(process(), params) == expected(context, params)
+
+
+def test_a_database_that_went_back_in_time_is_read_anew(context, process) -> None:
+    fill(context)
+    api, params = process(), {"track": TRACKS[0], "reading": Reading.OURS}
+    asked(api, params)
+    cells = api.app.state.boards._cells
+    cells._mark = cells._mark._replace(end=10**9, snapshot=f"{10**9}:{10**9}:")
+    with context.store.database.transaction() as connection:
+        connection.execute(update(jobs).values(indicator=79.0))
+    assert asked(api, params) == expected(context, params)
+
+
+def test_a_cell_of_an_earlier_snapshot_never_replaces_a_later_one(context) -> None:
+    fill(context)
+    cells = context.store.results.boards.cells
+    before = cells.feed(None)
+    old = list(cells.read([r.id for r in before.cells]))
+    with context.store.database.transaction() as connection:
+        connection.execute(update(jobs).values(indicator=80.0))
+    after = cells.feed(before.mark)
+    cells._keep(old, before.mark, settled=True)
+    (found,) = cells.read([after.cells[0].id])
+    assert {*found.tallies[0].indicators} == {80.0}
+    with context.store.database.statement() as connection:
+        assert connection.execute(select(board_state.c.snapshot)).scalar() == after.mark.snapshot
+
+
+def test_a_rest_costs_one_statement(context, process) -> None:
+    fill(context)
+    api = process()
+    api.get("/v1/leaderboard")
+    boards, statements = api.app.state.boards, []
+    from sqlalchemy import event
+
+    engine = context.store.database.engine
+    listen = ("before_cursor_execute", lambda *args: statements.append(args[2]))
+    event.listen(engine, *listen)
+    boards.tracks()
+    event.remove(engine, *listen)
+    assert len(statements) == 1
+    assert "board_changes" in statements[0]
+
+
+def test_a_file_that_was_tried_is_no_cell(context, process) -> None:
+    job = random_job(random.Random(1), 1)
+    job |= {"model_config": {"provider": "file"}}
+    with context.store.database.transaction() as connection:
+        connection.execute(insert(jobs).values(**job))
+        connection.execute(text("SELECT 1"))
+    assert json.loads(process().get("/v1/leaderboard").content)["tracks"] == []
+    with context.store.database.transaction() as connection:
+        connection.execute(update(jobs).values(indicator=3.0))
+    assert json.loads(process().get("/v1/leaderboard").content)["tracks"] == []
+    assert rows(context, board_cells) == 0
