@@ -54,6 +54,7 @@ from buildarena_store import (
     Usage,
     Verifications,
 )
+from buildarena_store.jobs.histories import Histories
 from buildarena_worker.game_trials import annotations_again, logged_trajectory
 from buildarena_worker.jobs import loop_of, pack_of
 from buildarena_worker.session.host import ReplayHost
@@ -119,6 +120,7 @@ class Verifier:
         """
         job = self._store.jobs.get(job_id)
         try:
+            Histories(self._store.database, self._artifacts).unpack([job_id])
             made_again = self._checks(job)
         except (ArtifactMissingError, ArtifactDamagedError) as error:
             made_again = [_broken_off(str(error))]

@@ -51,5 +51,6 @@ COMMANDS: Final[Mapping[str, Entry]] = {
     "backup": Entry("backups", "backup", "Back up the database and its artifacts."),
     "restore": Entry("backups", "restore", "Restore a backup into an empty database."),
     "artifacts": Entry("artifacts", "app", "Look after the store of artifacts."),
+    "history": Entry("histories", "app", "Pack what old jobs left in the database."),
     "migrate": Entry("worker", "migrate", "Bring the database to this program's schema."),
 }

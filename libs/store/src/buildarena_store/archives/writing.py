@@ -14,6 +14,7 @@ from sqlalchemy import Connection, Table, func, select, text
 
 from buildarena_store.artifacts import ArtifactStore
 from buildarena_store.database import Database, expected_schema
+from buildarena_store.jobs.histories import Histories
 from buildarena_store.sweeps.sweeps import Sweeps
 from buildarena_store.tables import (
     artifacts,
@@ -43,13 +44,16 @@ def write_archive(database: Database, store: ArtifactStore, sweep_id: str, targe
         ArtifactMissingError: The artifact store has lost something of it.
     """
     Sweeps(database).get(sweep_id)
+    members = select(sweep_jobs.c.job_id).where(sweep_jobs.c.sweep_id == sweep_id)
+    with database.transaction() as connection:
+        job_ids = list(connection.execute(members).scalars())
+    Histories(database, store).unpack(job_ids)
     with (
         database.transaction() as connection,
         zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive,
     ):
         connection.execute(text("SET TRANSACTION ISOLATION LEVEL REPEATABLE READ READ ONLY"))
         _write_rows(archive, connection, sweep_id)
-        members = select(sweep_jobs.c.job_id).where(sweep_jobs.c.sweep_id == sweep_id)
         hashes = select(job_artifacts.c.hash).where(job_artifacts.c.job_id.in_(members)).distinct()
         for digest in connection.execute(hashes.order_by(job_artifacts.c.hash)).scalars():
             archive.writestr(f"artifacts/{digest}", store.get(digest))

@@ -1,0 +1,187 @@
+"""Histories: what the session of a job left in rows, packed into an artifact once it is old.
+
+Journals, calls and events are most of what a database holds after years, and hardly anybody reads
+them again. Packed, they are one artifact of their job; whoever needs them (a verification, an
+export) unpacks them first, and the rows are again what they were, to the byte.
+"""
+
+from __future__ import annotations
+
+import gzip
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from datetime import timedelta
+from typing import Any, Final
+
+from sqlalchemy import Connection, Table, any_, delete, exists, func, select, text
+from sqlalchemy.dialects.postgresql import insert
+
+from buildarena_benchmark.outcomes import SCORED
+from buildarena_store.artifacts import ArtifactInfo, ArtifactStore
+from buildarena_store.database import Database
+from buildarena_store.rows import bound_texts
+from buildarena_store.states import JobState, VerificationState
+from buildarena_store.tables import (
+    artifacts,
+    events,
+    external_calls,
+    job_artifacts,
+    jobs,
+    journal,
+    verifications,
+)
+
+NAME: Final = "history"
+"""The artifact's name among its job's."""
+GZIP: Final = "application/gzip"
+PACKED: Final[tuple[Table, ...]] = (journal, external_calls, events)
+PAGE: Final = 500
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Packing:
+    """What packing did.
+
+    Attributes:
+        jobs: Jobs whose histories were packed.
+        rows: Rows that left their tables.
+        bytes: Lengths of the artifacts together.
+    """
+
+    jobs: int
+    rows: int
+    bytes: int
+
+
+class Histories:
+    """Packs and unpacks.
+
+    Args:
+        database: Where rows are.
+        store: Where artifacts are.
+    """
+
+    def __init__(self, database: Database, store: ArtifactStore) -> None:
+        self._database = database
+        self._store = store
+
+    def waiting(self, older_than: timedelta) -> int:
+        """How many jobs `pack_all` would pack."""
+        query = select(func.count()).select_from(jobs).where(*_packable(older_than))
+        with self._database.transaction() as connection:
+            return int(connection.execute(query).scalar_one())
+
+    def pack_all(self, older_than: timedelta) -> Iterator[Packing]:
+        """Packs the histories of all jobs that were scored so long ago, one after the other.
+
+        Each job is a transaction of its own: broken off anywhere, nothing is lost, and the next
+        call goes on. Jobs that errored keep their rows, as they may be tried again.
+
+        Yields:
+            What was done for one job.
+
+        Raises:
+            ArtifactStoreError: The store can't be written; the job's rows are untouched.
+        """
+        last = ""
+        while True:
+            query = select(jobs.c.id).where(*_packable(older_than), jobs.c.id > last)
+            with self._database.transaction() as connection:
+                ids = list(connection.execute(query.order_by(jobs.c.id).limit(PAGE)).scalars())
+            if not ids:
+                return
+            for job_id in ids:
+                done = self._pack(job_id, older_than)
+                if done is not None:
+                    yield done
+            last = ids[-1]
+
+    def _pack(self, job_id: str, older_than: timedelta) -> Packing | None:
+        with self._database.transaction() as connection:
+            # Verified or retried meanwhile, it is left alone.
+            mine = select(jobs.c.id).where(jobs.c.id == job_id, *_packable(older_than))
+            if connection.execute(mine.with_for_update()).first() is None:
+                return None
+            parts, rows = [], 0
+            for table in PACKED:
+                found = connection.execute(_AS_JSON[table], {"job": job_id}).one()
+                parts.append(f'"{table.name}":{found.rows}')
+                rows += found.number
+            data = gzip.compress(f"{{{','.join(parts)}}}".encode(), mtime=0)
+            kept = self._store.put(data, GZIP)
+            _tie(connection, job_id, kept)
+            for table in PACKED:
+                connection.execute(delete(table).where(table.c.job_id == job_id))
+        return Packing(jobs=1, rows=rows, bytes=kept.size)
+
+    def unpack(self, job_ids: Sequence[str]) -> int:
+        """Puts the rows of packed jobs back; of others nothing changes.
+
+        Returns:
+            How many jobs were packed.
+
+        Raises:
+            ArtifactMissingError: The store has lost a history; nothing of that job was changed.
+            ArtifactDamagedError: It is not what was stored.
+            ArtifactStoreError: The store can't be read now.
+        """
+        packed = select(job_artifacts.c.job_id).where(
+            job_artifacts.c.name == NAME, job_artifacts.c.job_id == any_(bound_texts(job_ids))
+        )
+        with self._database.transaction() as connection:
+            found = list(connection.execute(packed).scalars())
+        return sum(self._unpack(job_id) for job_id in found)
+
+    def _unpack(self, job_id: str) -> bool:
+        own = (job_artifacts.c.job_id == job_id, job_artifacts.c.name == NAME)
+        with self._database.transaction() as connection:
+            # Two that unpack at once take turns, and the second finds nothing to do.
+            locked = select(job_artifacts.c.hash).where(*own).with_for_update()
+            digest = connection.execute(locked).scalar()
+            if digest is None:
+                return False
+            packed = gzip.decompress(self._store.get(digest)).decode()
+            for table in PACKED:
+                connection.execute(_AS_ROWS[table], {"packed": packed})
+            connection.execute(delete(job_artifacts).where(*own))
+        return True
+
+
+def _packable(older_than: timedelta) -> tuple[Any, ...]:
+    """Conditions on jobs: scored, old, nothing under way, and something to pack."""
+    verified = exists().where(
+        verifications.c.job_id == jobs.c.id, verifications.c.state != VerificationState.DONE
+    )
+    return (
+        jobs.c.state == JobState.DONE,
+        jobs.c.outcome == any_(bound_texts(sorted(SCORED))),
+        jobs.c.finished_at < func.clock_timestamp() - older_than,
+        ~verified,
+        exists().where(events.c.job_id == jobs.c.id),
+    )
+
+
+def _tie(connection: Connection, job_id: str, kept: ArtifactInfo) -> None:
+    known = insert(artifacts).values(hash=kept.hash, media_type=kept.media_type, size=kept.size)
+    connection.execute(known.on_conflict_do_nothing())
+    tie = insert(job_artifacts).values(job_id=job_id, name=NAME, hash=kept.hash)
+    key = [job_artifacts.c.job_id, job_artifacts.c.name]
+    connection.execute(tie.on_conflict_do_update(index_elements=key, set_={"hash": kept.hash}))
+
+
+# As `json`, and not `jsonb`: journals keep the order of keys, which replies are replayed with.
+_AS_JSON = {
+    table: text(
+        f"SELECT COALESCE(json_agg(row_to_json(t)), '[]')::text AS rows, count(*) AS number "  # noqa: S608 - our own tables' names
+        f"FROM (SELECT * FROM {table.name} WHERE job_id = :job "
+        f"ORDER BY {', '.join(column.name for column in table.primary_key.columns)}) t"
+    )
+    for table in PACKED
+}
+_AS_ROWS = {
+    table: text(
+        f"INSERT INTO {table.name} OVERRIDING SYSTEM VALUE SELECT * FROM json_populate_recordset("  # noqa: S608 - our own tables' names
+        f"NULL::{table.name}, CAST(:packed AS json)->'{table.name}')"
+    )
+    for table in PACKED
+}
