@@ -9,6 +9,9 @@ PACKAGES := libs/geometry libs/simulation libs/besiege libs/benchmark libs/store
 CODE := $(addsuffix /src,$(PACKAGES)) tests
 NOT_OURS := $(foreach p,$(PACKAGES),--no-emit-package $(patsubst buildarena-buildarena,buildarena,buildarena-$(notdir $(p))))
 STAMP := $(VENV)/.installed
+# The dashboard as it is served; mk/web.mk builds it.
+WEB_OUT := services/api/src/buildarena_api/pages
+WEB_STAMP := $(WEB_OUT)/.built
 WORKERS ?= $(shell getconf _NPROCESSORS_ONLN)
 
 .PHONY: help install demo up test test-long check lock clean openapi

@@ -1,8 +1,6 @@
 .PHONY: web test-web check-web check-web-if-it-can-be bench-web screenshots
 
 WEB := clients/web
-WEB_OUT := services/api/src/buildarena_api/pages
-WEB_STAMP := $(WEB_OUT)/.built
 WEB_PARTS := $(WEB)/node_modules/.installed
 WEB_SOURCES := $(shell find $(WEB)/src $(WEB)/public $(WEB)/scripts -type f -not -name contract.ts 2>/dev/null) \
 	$(addprefix $(WEB)/,index.html vite.config.ts tsconfig.json postcss.config.cjs) \
