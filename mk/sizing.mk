@@ -4,4 +4,4 @@ bench-costs: $(STAMP) ## Measures what a turn and a job cost each part of the se
 	@PYTHONPATH=tests/support $(BIN)/python tests/benchmarks/sizing/costs.py --json .buildarena/costs.json
 
 sizing: $(STAMP) ## What 10, 1,000 and 100,000 sessions at once need, by the measured costs
-	@$(BIN)/python tests/benchmarks/sizing/model.py $(if $(wildcard .buildarena/costs.json),--costs .buildarena/costs.json)
+	@$(BIN)/python tests/benchmarks/sizing/sizing_model.py $(if $(wildcard .buildarena/costs.json),--costs .buildarena/costs.json)

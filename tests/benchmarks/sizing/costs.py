@@ -1,7 +1,7 @@
 """What turns and seconds of sessions cost each part: processor time, transactions, log, bytes.
 
 Runs a whole service whose models answer after a while, and counts what its processes, Postgres and
-Valkey used for the jobs of one sweep. The sizing model (model.py) multiplies these costs.
+Valkey used for the jobs of one sweep. The sizing model (sizing_model.py) multiplies these costs.
 """
 
 from __future__ import annotations
