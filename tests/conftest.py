@@ -13,6 +13,7 @@ from typing import Any
 
 import blas_kernels  # noqa: F401 - before numpy is imported
 import pytest
+from emptying import empty
 from fastapi.dependencies import models as dependencies
 from long_tests import LONG
 from player import Player
@@ -25,7 +26,6 @@ from buildarena_pipeline.runtime.context import Context, open_context
 from buildarena_pipeline.runtime.settings import Settings
 from buildarena_pipeline.submission.submission import Submissions
 from buildarena_store import Database
-from buildarena_store.tables import metadata, schema_compatibility
 
 TEMPLATE = "buildarena_template"
 SERVERS = pytest.StashKey[ExitStack]()
@@ -130,10 +130,7 @@ def settings(database_url: str, broker_url: str, tmp_path: Path) -> Settings:
 def context(settings: Settings) -> Iterator[Context]:
     """Connections to an empty database and an empty broker."""
     context = open_context(settings)
-    emptied = [table.name for table in metadata.sorted_tables if table is not schema_compatibility]
-    names = ", ".join(emptied)
-    with context.store.database.transaction() as connection:
-        connection.execute(text(f"TRUNCATE {names} RESTART IDENTITY CASCADE"))
+    empty(context.store.database)
     with Redis.from_url(settings.required_broker_url()) as valkey:
         valkey.flushdb()
     yield context

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from emptying import MADE_OF_OTHERS
 from sqlalchemy import create_engine, text
 from working import work
 
@@ -76,7 +77,7 @@ def rows(context: Context) -> dict[str, list[str]]:
                 str(row[0]) for row in connection.execute(text(f"SELECT t::text FROM {table} t"))
             )
             for table in metadata.sorted_tables
-            if not table.name.startswith("board_")  # boards are made of the others, by each server
+            if table.name not in MADE_OF_OTHERS
         }
 
 

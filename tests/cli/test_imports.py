@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import pytest
 from commands import printed
+from emptying import empty
 from live_api import live_api
-from sqlalchemy import text
 from working import work
 
 from buildarena_pipeline.catalog.specs import Limits, SweepSpec
 from buildarena_store.archives import write_archive
-from buildarena_store.tables import metadata
 from buildarena_worker.wiring import verification_runner
 
 SPEC = SweepSpec(tasks=["lift-1"], models=["builtin/expert"], seeds=[0, 1], simulator="mujoco")
@@ -29,9 +28,7 @@ def test_imported_results_are_marked_until_and_after_they_count(
     work(context)
     file = tmp_path / "sweep.zip"
     write_archive(context.store.database, context.artifacts, sweep_id, file)
-    names = ", ".join(table.name for table in metadata.sorted_tables)
-    with context.store.database.transaction() as connection:
-        connection.execute(text(f"TRUNCATE {names} RESTART IDENTITY CASCADE"))
+    empty(context.store.database)
     said = printed(url, "sweep", "import", str(file))
     assert "2 jobs, 2 of them new" in said
     assert "2 scores count when" in said

@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from emptying import empty
 from sqlalchemy import text
 from working import work
 
@@ -52,9 +53,7 @@ def elsewhere(context, tmp_path) -> Callable[[], Context]:
     """Another service: an empty database and an empty artifact folder."""
 
     def move() -> Context:
-        names = ", ".join(table.name for table in metadata.sorted_tables)
-        with context.store.database.transaction() as connection:
-            connection.execute(text(f"TRUNCATE {names} RESTART IDENTITY CASCADE"))
+        empty(context.store.database)
         return replace(context, artifacts=ArtifactStore(tmp_path / "other"))
 
     return move
