@@ -154,7 +154,7 @@ def test_a_base_path_is_kept_without_its_last_slash(given: str, kept: str) -> No
     [
         *("arena", "//arena", "/a//b", "/a b", "/a?b", "/a#b", "/../a", "/a/..", "/.", "/a%2f"),
         *("/ä", '/"', "https://host/arena", "/a\n", "/v1/x"),
-        *(f"/{name}" for name in OWN_PATHS),
+        *(f"/{name}" for name in sorted(OWN_PATHS)),
     ],
 )
 def test_what_is_no_base_path_is_refused(bad: str) -> None:
