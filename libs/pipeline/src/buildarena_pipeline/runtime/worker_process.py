@@ -155,7 +155,7 @@ def run_worker(spec: WorkerSpec, settings: Settings) -> None:
         elif spec.pool == THREADS:
             runtime.runner.process_all(queue, job_id)
         else:
-            runtime.runner.process_next(queue, job_id)
+            runtime.runner.process_some(queue, job_id)
 
     callbacks = Callbacks(
         process_next=process_next,
