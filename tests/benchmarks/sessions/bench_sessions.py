@@ -113,11 +113,7 @@ def _measure(service: Service, provider: int, sessions: int, latency_s: float) -
     requests = [job.requests for job in jobs]
     starts = [job.started_at for job in jobs if job.started_at is not None]
     turns, ideal_s = sum(requests), max(requests) * latency_s
-    waits = [
-        entry.latency_s
-        for job in jobs[:20]
-        for entry in context.store.journal.read(job.id)
-    ]
+    waits = [entry.latency_s for job in jobs[:20] for entry in context.store.journal.read(job.id)]
     return {
         "sessions": sessions,
         "latency_s": latency_s,

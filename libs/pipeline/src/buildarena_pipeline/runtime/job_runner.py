@@ -95,8 +95,9 @@ class JobRunner:
             pass
 
     def process_some(self, queue: str, job_id: str) -> None:
-        """Does a waiting job of the queue, the named one if possible, and others while they are
-        short: a message costs as much as the books of a job.
+        """Does waiting jobs of the queue, the named one first if possible, until SLICE_S are over.
+
+        A message costs as much as a job's books do, so that short jobs share one.
         """
         until = time.monotonic() + SLICE_S
         while self.process_next(queue, job_id) and time.monotonic() < until:

@@ -166,6 +166,5 @@ def _moving(plain: tuple[str, ...], expressions: tuple[tuple[str, str], ...]) ->
 
 @lru_cache(maxsize=64)
 def _sql(expression: ClauseElement) -> str:
-    return str(
-        expression.compile(dialect=postgresql.dialect(), compile_kwargs={"literal_binds": True})
-    )
+    dialect = postgresql.dialect()  # type: ignore[no-untyped-call]
+    return str(expression.compile(dialect=dialect, compile_kwargs={"literal_binds": True}))

@@ -25,7 +25,6 @@ from sqlalchemy import (
 
 from buildarena_store import events
 from buildarena_store.database import Database
-from buildarena_store.errors import StaleLeaseError
 from buildarena_store.jobs.attempts import Ending, end_attempts, move_on
 from buildarena_store.jobs.claiming import CLAIM
 from buildarena_store.jobs.job import Job
@@ -346,4 +345,3 @@ _BUDGETED = (
 def _among(leases: Sequence[Lease]) -> ColumnElement[bool]:
     pairs = [(lease.job.id, lease.token) for lease in leases]
     return and_(jobs.c.state == JobState.RUNNING, tuple_(jobs.c.id, jobs.c.lease_token).in_(pairs))
-
