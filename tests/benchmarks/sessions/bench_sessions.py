@@ -48,6 +48,7 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--sessions", type=int, default=200)
     parser.add_argument("--latency", type=float, default=1.0)
+    parser.add_argument("--warm-up", type=int, help="sessions before those that count")
     parser.add_argument("--json", type=Path, help="also write the figures to this file")
     given = parser.parse_args()
     with ExitStack() as stack:
@@ -60,7 +61,11 @@ def main() -> None:
         assert provider.stdout is not None
         url = provider.stdout.readline().decode().strip()
         service = Service(stack, folder, url, given.sessions)
+        warm_up = given.warm_up or max(WARM_UP, math.ceil(given.sessions / ANSWERS))
+        _, warm_up_s = service.run([given.sessions + number for number in range(warm_up)])
+        os.kill(provider.pid, signal.SIGUSR1)
         figures = _measure(service, provider.pid, given.sessions, given.latency)
+        figures["warm_up_s"] = round(warm_up_s, 2)
     text = json.dumps(figures, indent=2) + "\n"
     sys.stdout.write(text)
     if given.json is not None:
@@ -101,9 +106,6 @@ class Service:
 
 
 def _measure(service: Service, provider: int, sessions: int, latency_s: float) -> dict[str, object]:
-    warm_up = max(WARM_UP, math.ceil(sessions / ANSWERS))
-    _, warm_up_s = service.run([sessions + number for number in range(warm_up)])
-    os.kill(provider, signal.SIGUSR1)
     worker = service.worker.pid
     before = _cpu_s(worker), _cpu_s(provider)
     sweep_id, wall_s = service.run(list(range(sessions)))
@@ -118,7 +120,6 @@ def _measure(service: Service, provider: int, sessions: int, latency_s: float) -
         "sessions": sessions,
         "latency_s": latency_s,
         "turns": turns,
-        "warm_up_s": round(warm_up_s, 2),
         "wall_s": round(wall_s, 2),
         "ideal_s": round(ideal_s, 2),
         "all_started_s": round((max(starts) - min(starts)).total_seconds(), 2),

@@ -10,7 +10,7 @@ import structlog
 from sqlalchemy import text
 from sqlalchemy.exc import SQLAlchemyError
 
-from buildarena_pipeline.broker.queues import MAX_WAITING, MOST_WAITING
+from buildarena_pipeline.broker.queues import MAX_WAITING, MAX_SENT
 from buildarena_pipeline.periodic import Periodic
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.notify import notify_waiting
@@ -72,4 +72,4 @@ class Reaper:
         """Notifies a queue's workers; of twice as many jobs each time they have taken all."""
         most = self._most.get(queue, MAX_WAITING)
         waiting = notify_waiting(self._context, queue, most=most)
-        self._most[queue] = MAX_WAITING if waiting != 0 else min(2 * most, MOST_WAITING)
+        self._most[queue] = MAX_WAITING if waiting != 0 else min(2 * most, MAX_SENT)
