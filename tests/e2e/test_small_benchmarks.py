@@ -26,7 +26,7 @@ def test_sessions_are_counted_turn_by_turn(tmp_path) -> None:
     assert figures["peak_rss_mib"] > 50
 
 
-def test_what_a_job_costs_is_shared_among_all_processes(tmp_path, monkeypatch) -> None:
+def test_what_a_job_costs_is_shared_among_all_processes(monkeypatch) -> None:
     monkeypatch.syspath_prepend(str(BENCHMARKS / "api"))
     import overhead
 

@@ -86,6 +86,7 @@ def test_a_queue_that_was_not_emptied_is_sent_as_many_as_ever(context, submissio
     reaper.reap()
     assert context.queues.settle()
     reaper.reap()  # its workers left some
+    assert context.queues.settle()
     drain(context)
     reaper.reap()
     assert context.queues.settle()

@@ -1,4 +1,4 @@
-"""The service's own time per job: processor time of all its processes beside session and simulation.
+"""The service's own time per job: all its processes' processor time beside session and simulation.
 
 Prints its figures as JSON. How it is measured: `tests/benchmarks/api/overhead.py`.
 """
@@ -11,7 +11,8 @@ import os
 import sys
 from pathlib import Path
 
-sys.path[:0] = [str(Path(__file__).parents[2] / "support"), str(Path(__file__).parents[1] / "api")]
+sys.path.insert(0, str(Path(__file__).parents[2] / "support"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "api"))
 from overhead import measure_overhead
 
 
