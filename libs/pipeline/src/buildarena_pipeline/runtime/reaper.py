@@ -10,7 +10,7 @@ import structlog
 from sqlalchemy import text
 from sqlalchemy.exc import SQLAlchemyError
 
-from buildarena_pipeline.broker.queues import MAX_WAITING, MAX_SENT
+from buildarena_pipeline.broker.queues import MAX_SENT, MAX_WAITING
 from buildarena_pipeline.periodic import Periodic
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.notify import notify_waiting
