@@ -8,7 +8,7 @@ import pytest
 from buildarena_pipeline.catalog.specs import JobSpec, SweepSpec
 from buildarena_pipeline.errors import PermanentError, TransientError
 from buildarena_pipeline.runtime.active_lease import ActiveLease, LeaseKeeper
-from buildarena_pipeline.runtime.job_runner import JobRunner
+from buildarena_pipeline.runtime.job_runner import SLICE_S, JobRunner
 from buildarena_store import BudgetLimits, JobScore
 
 SCORE = JobScore(outcome="unsuccessful", success=False, indicator=1.0)
@@ -118,3 +118,27 @@ def test_what_is_held_at_shutdown_is_handed_back(context, submissions) -> None:
         assert active.lost
     assert context.store.jobs.get(job.id).state == "queued"
     assert [a.result for a in context.store.jobs.attempts(job.id)] == ["handed_back"]
+
+
+def runner_of(context, handler: Callable[..., None]) -> JobRunner:
+    keeper = LeaseKeeper(context.store.leases, lambda: None)
+    return JobRunner(context.store.leases, handler, keeper, "worker")
+
+
+def test_one_message_has_several_short_jobs_done(context, submissions) -> None:
+    spec = SweepSpec(tasks=["support-1"], models=["builtin/idle"], samples=3)
+    sweep = submissions.submit_sweep(spec).sweep
+    runner_of(context, finisher(context)).process_some("construct", "")
+    assert context.store.sweeps.progress(sweep.id).done == 3
+
+
+def test_a_message_has_no_further_job_done_after_a_long_one(context, submissions) -> None:
+    spec = SweepSpec(tasks=["support-1"], models=["builtin/idle"], samples=3)
+    sweep = submissions.submit_sweep(spec).sweep
+
+    def slow(active: ActiveLease) -> None:
+        time.sleep(SLICE_S)
+        finisher(context)(active)
+
+    runner_of(context, slow).process_some("construct", "")
+    assert context.store.sweeps.progress(sweep.id).done == 1

@@ -66,3 +66,28 @@ def test_one_reaper_works_at_a_time(context, submissions) -> None:
         # The lock is held here; the update above is not visible to others until the end.
         reap(context)
         assert context.queues.waiting("construct") == 0
+
+
+def test_a_queue_that_is_always_empty_is_sent_more_each_time(context, submissions) -> None:
+    submit(context, submissions, 1700)
+    reaper, sent = Reaper(context), []
+    for _ in range(4):
+        drain(context)
+        reaper.reap()
+        assert context.queues.settle()
+        sent.append(context.queues.waiting("construct"))
+    assert sent == [200, 400, 800, 100]  # 200 were sent when they were submitted
+
+
+def test_a_queue_that_was_not_emptied_is_sent_as_many_as_ever(context, submissions) -> None:
+    submit(context, submissions, 900)
+    reaper = Reaper(context)
+    drain(context)
+    reaper.reap()
+    assert context.queues.settle()
+    reaper.reap()  # its workers left some
+    assert context.queues.settle()
+    drain(context)
+    reaper.reap()
+    assert context.queues.settle()
+    assert context.queues.waiting("construct") == 200

@@ -1,7 +1,7 @@
 """What the API carries on this machine, over real HTTP on loopback. Prints medians as JSON.
 
 The bars: a sweep of 10,000 jobs accepted in less than 5 s; single jobs at 50 a second with a 99th
-percentile below 100 ms; 500 listeners of one sweep's events; less than 25 ms of processor time a
+percentile below 100 ms; 500 listeners of one sweep's events; at most 15 ms of processor time a
 job for everything but session and simulation.
 """
 

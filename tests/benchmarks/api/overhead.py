@@ -25,7 +25,7 @@ HERE = Path(__file__).parent
 TASK, WORKFLOW, MODEL, ENGINE = HERE / "one-block.yaml", "one-block", "builtin/idle", "mujoco"
 WORKFLOWS = {WORKFLOW: f"{HERE / 'one_block.py'}:OneBlock"}
 ALONE = 50
-BAR_MS = 25
+BAR_MS = 15
 POLL_S = 2.0
 IDLE_S = 5.0
 

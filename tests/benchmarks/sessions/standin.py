@@ -3,12 +3,15 @@
 A reply is worked out when its request arrives and sent when its time has come, so that this
 process adds nothing to the latency as long as it has processor time left. It costs a third of a
 millisecond a request, which leaves the machine to the service that is measured.
+
+Until it is sent SIGUSR1 it answers soon, so that nobody waits long while a service warms up.
 """
 
 from __future__ import annotations
 
 import asyncio
 import json
+import signal
 import sys
 from pathlib import Path
 
@@ -25,9 +28,9 @@ class Connection(asyncio.Protocol):
     """One client's connection, one request after the other."""
 
     answered = 0
+    latency_s = 0.05
 
-    def __init__(self, latency_s: float) -> None:
-        self._latency_s = latency_s
+    def __init__(self) -> None:
         self._loop = asyncio.get_running_loop()
         self._received = bytearray()
 
@@ -38,7 +41,7 @@ class Connection(asyncio.Protocol):
 
     def data_received(self, data: bytes) -> None:
         """Answers when the request is whole."""
-        due = self._loop.time() + self._latency_s
+        due = self._loop.time() + self.latency_s
         self._received += data
         end = self._received.find(b"\r\n\r\n") + 4
         if end < 4:
@@ -62,10 +65,11 @@ def _answer(body: bytes) -> bytes:
 
 async def main() -> None:
     """Serves until the process is ended; the first line printed is the address."""
-    latency_s = float(sys.argv[1])
-    server = await asyncio.get_running_loop().create_server(
-        lambda: Connection(latency_s), "127.0.0.1", 0, backlog=1000
+    loop = asyncio.get_running_loop()
+    loop.add_signal_handler(
+        signal.SIGUSR1, lambda: setattr(Connection, "latency_s", float(sys.argv[1]))
     )
+    server = await loop.create_server(Connection, "127.0.0.1", 0, backlog=2000)
     sys.stdout.write(f"http://127.0.0.1:{server.sockets[0].getsockname()[1]}\n")
     sys.stdout.flush()
     await server.serve_forever()

@@ -72,16 +72,24 @@ class Database:
 
     Args:
         url: ``postgresql://user:password@host:port/name``.
-        pool_size: Connections kept open; as many again may open for a moment.
+        pool_size: Connections kept open.
         pool_timeout_s: How long one waits for a connection before it is refused.
+        overflow: Further connections that may open for a moment; by default as many again.
     """
 
-    def __init__(self, url: str, *, pool_size: int = 5, pool_timeout_s: float = 30.0) -> None:
+    def __init__(
+        self,
+        url: str,
+        *,
+        pool_size: int = 5,
+        pool_timeout_s: float = 30.0,
+        overflow: int | None = None,
+    ) -> None:
         self.url = url.replace("postgresql://", "postgresql+psycopg://", 1)
         self.engine: Engine = create_engine(
             self.url,
             pool_size=pool_size,
-            max_overflow=pool_size,
+            max_overflow=pool_size if overflow is None else overflow,
             pool_timeout=pool_timeout_s,
             pool_recycle=1800,
             connect_args={"connect_timeout": 5, "application_name": "buildarena"},

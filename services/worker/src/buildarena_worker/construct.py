@@ -98,7 +98,7 @@ class ConstructHandler:
             model_config=job.model_config,
             pack=pack_of(job, self._packs),
             host=self._host(active),
-            on_turn=TurnKeeper(self._store.turns, lease),
+            on_turn=TurnKeeper(self._store.turns, lease, self._gate),
         )
         workflow = self._workflows.find(str(job.track_config["workflow"]))
         with self._gate.acquired():

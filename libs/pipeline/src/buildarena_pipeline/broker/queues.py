@@ -25,6 +25,8 @@ PROCESS_NEXT = "buildarena.process_next"
 """Name of the one message kind; its arguments are the queue's name and a job id."""
 MAX_WAITING = 200
 """Messages kept waiting per queue; more are sent as workers take them."""
+MAX_SENT = 1000
+"""Messages sent at a time to a queue whose workers take them faster than anybody looks."""
 TIMEOUT_S = 0.8
 """How long the broker may take for an answer: it has what it is asked for in memory."""
 ENOUGH_WAITING = 50
@@ -56,7 +58,7 @@ class Queues:
             retry=Retry(NoBackoff(), 0),
         )
         self._breaker = CircuitBreaker(self._answers)
-        self._announcer = Announcer(self.notify, most=MAX_WAITING)
+        self._announcer = Announcer(self.notify, most=MAX_SENT)
         self._topper = Announcer(self._top_up, most=ENOUGH_WAITING)
 
     def notify(self, queue: str, job_ids: Sequence[str]) -> bool:

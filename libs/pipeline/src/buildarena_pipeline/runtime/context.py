@@ -27,11 +27,21 @@ class Context:
 
 
 def open_context(
-    settings: Settings, *, pool_size: int = 5, pool_timeout_s: float = 30.0
+    settings: Settings,
+    *,
+    pool_size: int = 5,
+    pool_timeout_s: float = 30.0,
+    overflow: int | None = None,
 ) -> Context:
-    """Connects to what the settings name; nothing is contacted before it is used."""
+    """Connects to what the settings name; nothing is contacted before it is used.
+
+    The connections to the database are those of `Database`.
+    """
     database = Database(
-        settings.required_database_url(), pool_size=pool_size, pool_timeout_s=pool_timeout_s
+        settings.required_database_url(),
+        pool_size=pool_size,
+        pool_timeout_s=pool_timeout_s,
+        overflow=overflow,
     )
     store = open_store(database, lease_s=settings.lease_s, max_faults=settings.max_faults)
     return Context(

@@ -31,6 +31,9 @@ INTERNAL_DELAY_S = 2.0
 again, until the job is given up."""
 STORE_DELAY_S = 2.0
 """How long a job waits after the artifact store failed for the first time."""
+SLICE_S = 0.25
+"""How long a process that does one job at a time goes on taking jobs for one message: it does not
+hear that it is to stop before it is done with the message."""
 LONGEST_DETAIL = 2000
 """Characters of what is kept of a fault; some of them quote what strangers sent."""
 
@@ -89,6 +92,15 @@ class JobRunner:
         A slot that comes free is so taken at once, although messages that found no slot are gone.
         """
         while self.process_next(queue, job_id):
+            pass
+
+    def process_some(self, queue: str, job_id: str) -> None:
+        """Does waiting jobs of the queue, the named one first if possible, until SLICE_S are over.
+
+        A message costs as much as a job's books do, so that short jobs share one.
+        """
+        until = time.monotonic() + SLICE_S
+        while self.process_next(queue, job_id) and time.monotonic() < until:
             pass
 
     def process_next(self, queue: str, job_id: str) -> bool:

@@ -15,14 +15,23 @@ class Notifier(Protocol):
         """Sends a queue's workers a message for one more job, unless enough wait."""
 
 
-def notify_waiting(context: Context, queue: str) -> None:
-    """Keeps up to MAX_WAITING messages in a queue, for the jobs that no message names.
+def notify_waiting(context: Context, queue: str, *, most: int = MAX_WAITING) -> int | None:
+    """Keeps messages in a queue, for the jobs that no message names.
 
     The messages are sent in the background.
+
+    Args:
+        context: The process' connections.
+        queue: The queue's name.
+        most: Messages that wait then, if so many jobs do.
+
+    Returns:
+        The messages that waited before; None when the broker can't be reached.
     """
     waiting = context.queues.waiting(queue)
-    if waiting is None or waiting >= MAX_WAITING:
-        return
-    job_ids = context.store.leases.to_notify(queue, MAX_WAITING - waiting)
+    if waiting is None or waiting >= most:
+        return waiting
+    job_ids = context.store.leases.to_notify(queue, most - waiting)
     if job_ids:
         context.queues.announce(queue, job_ids)
+    return waiting

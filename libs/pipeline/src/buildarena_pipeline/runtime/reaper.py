@@ -10,7 +10,7 @@ import structlog
 from sqlalchemy import text
 from sqlalchemy.exc import SQLAlchemyError
 
-from buildarena_pipeline.broker.queues import MAX_WAITING
+from buildarena_pipeline.broker.queues import MAX_SENT, MAX_WAITING
 from buildarena_pipeline.periodic import Periodic
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.notify import notify_waiting
@@ -32,6 +32,7 @@ class Reaper:
 
     def __init__(self, context: Context, *, period_s: float = PERIOD_S) -> None:
         self._context = context
+        self._most: dict[str, int] = {}
         self._thread = Periodic(self._reap_safely, name="reaper", period_s=period_s)
 
     def start(self) -> None:
@@ -61,10 +62,16 @@ class Reaper:
             if recovered:
                 log.info("recovered", jobs=recovered)
             for queue in self._context.store.leases.waiting_queues():
-                notify_waiting(self._context, queue)
+                self._notify(queue)
             self._context.store.external_calls.abandon_idle()
             checks = self._context.store.verifications.to_notify(MAX_WAITING)
             if checks:
                 self._context.queues.announce(VERIFY_QUEUE, checks)
             # So that whoever reads the counts first after a year finds little to add.
             self._context.store.figures.gather()
+
+    def _notify(self, queue: str) -> None:
+        """Notifies a queue's workers; of twice as many jobs each time they have taken all."""
+        most = self._most.get(queue, MAX_WAITING)
+        waiting = notify_waiting(self._context, queue, most=most)
+        self._most[queue] = MAX_WAITING if waiting != 0 else min(2 * most, MAX_SENT)

@@ -30,6 +30,11 @@ from buildarena_store import SchemaVersionError
 
 log = structlog.get_logger(__name__)
 
+CONNECTIONS_OF_THREADS = 16
+"""Connections of a process of many threads: its sessions keep their replies at the same time, and
+Postgres writes what comes together to its disk at once. All stay open, because a crowd that opens
+and closes further ones pays more for these than for what it writes."""
+
 
 class SideWork(Protocol):
     """What a worker does besides jobs, in threads of its own: it takes no job's slot."""
@@ -68,8 +73,10 @@ class _Runtime:
     """The connections, threads and handler of one process that does stages."""
 
     def __init__(self, spec: WorkerSpec, settings: Settings) -> None:
-        pool_size = 5 if spec.pool != "threads" else 8
-        self.context = open_context(settings, pool_size=pool_size)
+        if spec.pool == THREADS:
+            self.context = open_context(settings, pool_size=CONNECTIONS_OF_THREADS, overflow=0)
+        else:
+            self.context = open_context(settings)
         self.tracing = Tracing(f"{spec.kind}-worker", settings.otlp_endpoint)
         self.id = f"{spec.kind}@{socket.gethostname()}:{os.getpid()}"
         self._spec = spec
@@ -155,7 +162,7 @@ def run_worker(spec: WorkerSpec, settings: Settings) -> None:
         elif spec.pool == THREADS:
             runtime.runner.process_all(queue, job_id)
         else:
-            runtime.runner.process_next(queue, job_id)
+            runtime.runner.process_some(queue, job_id)
 
     callbacks = Callbacks(
         process_next=process_next,

@@ -6,11 +6,15 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
+from functools import lru_cache
 from typing import Any
 
-from sqlalchemy import Connection, text
+from sqlalchemy import ClauseElement, Connection, TextClause, bindparam, text
+from sqlalchemy.dialects import postgresql
 
+from buildarena_store.errors import StaleLeaseError
 from buildarena_store.states import AttemptResult, JobState
+from buildarena_store.tables import jobs
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -91,3 +95,76 @@ def end_attempts(
         "detail": detail,
     }
     connection.execute(_END, given)
+
+
+# One statement with the end of the attempt, for the same reason. The clauses that a job's row is
+# found by are those of every write under a lease.
+_MOVE = f"""
+    WITH moved AS (
+        UPDATE jobs SET
+            state = :to_state, lease_owner = NULL, lease_expires_at = NULL{{settings}}
+        WHERE id = :of_job AND lease_token = :of_token AND state = '{JobState.RUNNING}'
+        RETURNING id
+    ), released AS (
+        DELETE FROM reservations USING moved WHERE reservations.job_id = moved.id
+    ), ended AS (
+        UPDATE attempts SET ended_at = clock_timestamp(), result = :how, detail = :note
+        FROM moved
+        WHERE attempts.job_id = moved.id AND attempts.token = :of_token
+            AND attempts.ended_at IS NULL
+    )
+    INSERT INTO events (job_id, kind, data)
+    SELECT id, :to_state, CAST(:event AS jsonb) FROM moved
+"""  # noqa: S608 - the state is our own constant
+
+
+def move_on(
+    ending: Ending,
+    result: AttemptResult,
+    detail: str | None,
+    values: Mapping[str, Any],
+    *,
+    connection: Connection,
+) -> None:
+    """Ends an attempt as `end_attempts` does, and writes its job's next place with it.
+
+    Args:
+        ending: The attempt, whose lease must hold.
+        result: How it ended.
+        detail: A sentence for people.
+        values: Further columns of the job, plain values or expressions.
+        connection: The transaction that also holds what belongs to this step.
+
+    Raises:
+        StaleLeaseError: The lease is over; the transaction must be undone.
+    """
+    expressions = {
+        name: _sql(value) for name, value in values.items() if isinstance(value, ClauseElement)
+    }
+    plain = {name: value for name, value in values.items() if name not in expressions}
+    given = {
+        "of_job": ending.job_id,
+        "of_token": ending.token,
+        "to_state": str(ending.state),
+        "how": str(result),
+        "note": detail,
+        "event": json.dumps(dict(ending.data)),
+    }
+    statement = _moving(tuple(plain), tuple(expressions.items()))
+    if connection.execute(statement, {**plain, **given}).rowcount != 1:
+        raise StaleLeaseError(ending.job_id, ending.token)
+
+
+# Made once for each way a job goes on, because making a statement takes longer than running it.
+@lru_cache(maxsize=64)
+def _moving(plain: tuple[str, ...], expressions: tuple[tuple[str, str], ...]) -> TextClause:
+    settings = [f"{name} = :{name}" for name in plain]
+    settings += [f"{name} = {sql}" for name, sql in expressions]
+    statement = text(_MOVE.format(settings="".join(f", {setting}" for setting in settings)))
+    return statement.bindparams(*(bindparam(name, type_=jobs.c[name].type) for name in plain))
+
+
+@lru_cache(maxsize=64)
+def _sql(expression: ClauseElement) -> str:
+    dialect = postgresql.dialect()  # type: ignore[no-untyped-call]
+    return str(expression.compile(dialect=dialect, compile_kwargs={"literal_binds": True}))

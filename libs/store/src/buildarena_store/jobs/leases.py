@@ -26,8 +26,7 @@ from sqlalchemy import (
 
 from buildarena_store import events
 from buildarena_store.database import Database
-from buildarena_store.errors import StaleLeaseError
-from buildarena_store.jobs.attempts import Ending, end_attempts
+from buildarena_store.jobs.attempts import Ending, end_attempts, move_on
 from buildarena_store.jobs.claiming import CLAIM
 from buildarena_store.jobs.job import Job
 from buildarena_store.rows import value_of
@@ -172,16 +171,14 @@ class Leases:
         Raises:
             StaleLeaseError: The lease is over; the transaction must be undone.
         """
-        changed = connection.execute(
-            update(jobs)
-            .where(*_valid(lease))
-            .values(state=to, lease_owner=None, lease_expires_at=None, **values)
-        )
-        if changed.rowcount != 1:
-            raise StaleLeaseError(lease.job.id, lease.token)
         data = {name: values[name] for name in ("stage", "outcome", "reason") if values.get(name)}
-        ending = Ending(job_id=lease.job.id, token=lease.token, state=to, data=data)
-        end_attempts([ending], result, note, connection=connection)
+        move_on(
+            Ending(job_id=lease.job.id, token=lease.token, state=to, data=data),
+            result,
+            note,
+            values,
+            connection=connection,
+        )
 
     def queue_again(
         self, lease: Lease, *, stage: Stage, queue: str, connection: Connection, **values: Any
@@ -379,11 +376,3 @@ _BUDGETED = (
 def _among(leases: Sequence[Lease]) -> ColumnElement[bool]:
     pairs = [(lease.job.id, lease.token) for lease in leases]
     return and_(jobs.c.state == JobState.RUNNING, tuple_(jobs.c.id, jobs.c.lease_token).in_(pairs))
-
-
-def _valid(lease: Lease) -> tuple[ColumnElement[bool], ...]:
-    return (
-        jobs.c.id == lease.job.id,
-        jobs.c.lease_token == lease.token,
-        jobs.c.state == JobState.RUNNING,
-    )

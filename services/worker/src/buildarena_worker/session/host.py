@@ -232,6 +232,7 @@ class LiveHost:
     def _asked(self, request: Request, failures: int, *, phase: str, role: str) -> JournalEntry:
         """What the model answered, kept; after answers that can't be read, a wait comes first."""
         sequence = self._kept.sequence
+        request_hash = request.hash  # a walk through the whole conversation, which wants a place
         with (
             span("model request", stage=phase, role=role, sequence=sequence),
             self._gate.released(),
@@ -240,21 +241,21 @@ class LiveHost:
             self._require_held()
             self._budget.reserve(request)
             answer = self._answer(request, waited_s)
-        latency_s = waited_s + answer.latency_s
-        if answer.reply.finish == OUT_OF_TIME:
-            latency_s = self._kept.spending.to_the_end(latency_s)
-        entry = JournalEntry(
-            sequence=sequence,
-            stage=phase,
-            role=role,
-            request_hash=request.hash,
-            reply=clean(answer.reply.to_json()),
-            usage=answer.usage,
-            latency_s=latency_s,
-            tries=answer.tries,
-            provider_request_id=clean(answer.provider_request_id),
-        )
-        self._keep(entry)
+            latency_s = waited_s + answer.latency_s
+            if answer.reply.finish == OUT_OF_TIME:
+                latency_s = self._kept.spending.to_the_end(latency_s)
+            entry = JournalEntry(
+                sequence=sequence,
+                stage=phase,
+                role=role,
+                request_hash=request_hash,
+                reply=clean(answer.reply.to_json()),
+                usage=answer.usage,
+                latency_s=latency_s,
+                tries=answer.tries,
+                provider_request_id=clean(answer.provider_request_id),
+            )
+            self._keep(entry)
         self._kept.count(entry)
         return entry
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from buildarena_pipeline.transcript import ModelTurn
 from buildarena_store import JournalEntry, Lease, TurnResult, Turns
+from buildarena_worker.session.concurrency_gate import ConcurrencyGate
 
 
 class TurnKeeper:
@@ -12,10 +13,12 @@ class TurnKeeper:
     Args:
         turns: Where turns are kept.
         lease: The lease that the session runs under.
+        gate: Where the session gives up its place while the database writes.
     """
 
-    def __init__(self, turns: Turns, lease: Lease) -> None:
+    def __init__(self, turns: Turns, lease: Lease, gate: ConcurrencyGate) -> None:
         self._turns = turns
+        self._gate = gate
         self._lease = lease
         self._kept = 0 if lease.first else turns.count(lease.job.id)
 
@@ -24,12 +27,11 @@ class TurnKeeper:
         if turn.index < self._kept:
             return
         results = [(action.ok, action.reason, action.feedback) for action in turn.actions]
-        self._turns.append(
-            self._lease,
-            TurnResult(
-                index=turn.index,
-                sequence=entry.sequence,
-                sub_structure=turn.sub_structure,
-                results=results,
-            ),
+        taken = TurnResult(
+            index=turn.index,
+            sequence=entry.sequence,
+            sub_structure=turn.sub_structure,
+            results=results,
         )
+        with self._gate.released():
+            self._turns.append(self._lease, taken)
