@@ -64,8 +64,8 @@ def test_modules_exist(document) -> None:
 
 def test_make_targets_exist(document) -> None:
     makefiles = "\n".join(f.read_text() for f in [ROOT / "Makefile", *ROOT.glob("mk/*.mk")])
-    targets = set(re.findall(r"^([a-z-]+):", makefiles, re.MULTILINE))
-    assert set(re.findall(r"`make ([a-z-]+)", document.read_text())) <= targets
+    targets = set(re.findall(r"^([a-z0-9-]+):", makefiles, re.MULTILINE))
+    assert set(re.findall(r"`make ([a-z0-9-]+)", document.read_text())) <= targets
 
 
 def test_commands_exist(document) -> None:
