@@ -17,7 +17,7 @@ WORKERS ?= $(shell getconf _NPROCESSORS_ONLN)
 .PHONY: help install demo up test test-long check lock clean openapi
 
 help: ## Lists the targets
-	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 20
+	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 20
 
 install: $(STAMP) ## Makes the environment in .venv
 
