@@ -8,6 +8,7 @@ import subprocess
 import sys
 from contextlib import ExitStack
 from pathlib import Path
+from typing import Self
 from unittest.mock import patch
 
 import boto3
@@ -74,7 +75,7 @@ class Service:
             if not name.startswith(("BUILDARENA", "AWS_"))
         }
 
-    def __enter__(self) -> Service:
+    def __enter__(self) -> Self:
         try:
             self._start()
         except BaseException:

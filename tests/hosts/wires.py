@@ -1,8 +1,8 @@
 """Wires between hosts and the switch: every frame arrives a while after it was sent.
 
-`netem`, which does this in kernels that have it, is not in all of them. A proxy of connections would
-not do: it ends every connection at itself, so that a link which is taken down would be noticed by
-one side only. Frames leave both ends' TCP to themselves. Runs as a program:
+`netem`, which does this in kernels that have it, is not in all of them. A proxy of connections
+would not do: it ends every connection at itself, so that a link which is taken down would be
+noticed by one side only. Frames leave both ends' TCP to themselves. Runs as a program:
 ``python wires.py DELAY_S FD:FD …`` with two open TAP devices for each wire.
 """
 

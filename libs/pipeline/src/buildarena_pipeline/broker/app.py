@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from celery import Celery
 
+from buildarena_pipeline.dead_links import tcp_options
+
 
 def celery_app(broker_url: str, *, timeout_s: float = 10.0) -> Celery:
     """The Celery application of every process, without a result backend.
@@ -27,6 +29,9 @@ def celery_app(broker_url: str, *, timeout_s: float = 10.0) -> Celery:
         broker_transport_options={
             "socket_connect_timeout": min(2.0, timeout_s),
             "socket_timeout": timeout_s,
+            # A consumer waits for messages for hours, by no time-out.
+            "socket_keepalive": True,
+            "socket_keepalive_options": dict(tcp_options()),
             "max_retries": 1,
             "interval_start": 0,
             "interval_max": 0.2,

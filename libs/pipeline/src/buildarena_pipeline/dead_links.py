@@ -1,0 +1,38 @@
+"""Dead links: how soon a connection is given up whose other end is gone without a word.
+
+A cable that was cut or a machine that lost power closes no connection. Whoever waits for an answer
+then waits for hours, by the defaults of TCP, and whoever sent something for a quarter of an hour.
+"""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+IDLE_S: Final = 5
+"""After so long without a word the other end is asked for a sign of life."""
+EVERY_S: Final = 3
+PROBES: Final = 3
+UNANSWERED_S: Final = 10
+"""So long after it was sent, what was not received ends the connection."""
+_VALUES: Final = {
+    "TCP_KEEPIDLE": IDLE_S,
+    "TCP_KEEPALIVE": IDLE_S,  # its name on macOS
+    "TCP_KEEPINTVL": EVERY_S,
+    "TCP_KEEPCNT": PROBES,
+    "TCP_USER_TIMEOUT": UNANSWERED_S * 1000,
+}
+
+
+def tcp_options() -> Mapping[int, int]:
+    """Options of a TCP socket, those that this system has, beside SO_KEEPALIVE."""
+    return {
+        getattr(socket, name): value for name, value in _VALUES.items() if hasattr(socket, name)
+    }
+
+
+def socket_options() -> Sequence[tuple[int, int, int]]:
+    """All of them with their levels, as HTTP clients take them."""
+    tcp = [(socket.IPPROTO_TCP, option, value) for option, value in tcp_options().items()]
+    return [(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1), *tcp]
