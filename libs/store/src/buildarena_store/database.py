@@ -13,7 +13,8 @@ from alembic.config import Config
 from alembic.script import ScriptDirectory
 from sqlalchemy import Connection, Engine, create_engine, event, inspect, make_url, text
 from sqlalchemy.engine.interfaces import DBAPIConnection
-from sqlalchemy.exc import DisconnectionError
+from sqlalchemy.exc import DisconnectionError, OperationalError
+from sqlalchemy.exc import TimeoutError as PoolTimeoutError
 from sqlalchemy.pool import ConnectionPoolEntry
 
 from buildarena_store.errors import SchemaVersionError
@@ -94,6 +95,13 @@ def _connect_args(url: str) -> dict[str, str | int]:
     return {name: value for name, value in ours.items() if name not in asked}
 
 
+class NoConnectionError(PoolTimeoutError, OperationalError):
+    """No connection came free in time, as those there are wait for a server that does not answer.
+
+    To whoever works through outages it is one, although SQLAlchemy tells the two apart.
+    """
+
+
 class Database:
     """A pool of connections to one Postgres database.
 
@@ -119,7 +127,7 @@ class Database:
     @contextmanager
     def transaction(self) -> Iterator[Connection]:
         """A connection whose work is committed at the end, or undone when an error leaves it."""
-        with self.engine.begin() as connection:
+        with self._connected(self.engine) as connection, connection.begin():
             yield connection
 
     @contextmanager
@@ -128,8 +136,15 @@ class Database:
 
         It saves the round trips of BEGIN and COMMIT where one statement is all there is.
         """
-        with self._autocommit.connect() as connection:
+        with self._connected(self._autocommit) as connection:
             yield connection
+
+    @staticmethod
+    def _connected(engine: Engine) -> Connection:
+        try:
+            return engine.connect()
+        except PoolTimeoutError as error:
+            raise NoConnectionError(None, None, error) from error
 
     def migrate(self) -> str:
         """Brings the schema to the newest revision; safe to run from several processes at once.
