@@ -25,6 +25,7 @@ sys.path += [str(HERE), str(HERE.parent / "support"), str(HERE.parent / "chaos")
 import httpx  # noqa: E402
 from books import PAID_MODEL, differences, figures, paid_twice, tracebacks, wrongs  # noqa: E402
 from cuts import Cuts  # noqa: E402
+from listening import Listener  # noqa: E402
 from network import PLACE, Network, enter_private_namespaces, inside  # noqa: E402
 from running import wait_until  # noqa: E402
 from service import ENGINE, Service  # noqa: E402
@@ -46,9 +47,9 @@ def say(words: str) -> None:
     sys.stdout.flush()
 
 
-def submit(client: httpx.Client, number: int) -> list[str]:
-    """Submits a sweep for each model, again and again until it is accepted; their ids."""
-    ids = []
+def submit(client: httpx.Client, number: int) -> list[Listener]:
+    """Submits a sweep for each model, again and again until it is accepted; who listens to them."""
+    listeners = []
     for model, jobs in MIX.items():
         wish = {
             "name": f"hosts {number}",
@@ -68,13 +69,15 @@ def submit(client: httpx.Client, number: int) -> list[str]:
                 assert answer.status_code in {429, 500, 502, 503, 504}, answer.text
             return None
 
-        ids.append(str(wait_until(ask, 200, f"sweep {number} of {model} is accepted")))
-    return ids
+        sweep = wait_until(ask, 200, f"sweep {number} of {model} is accepted")
+        listeners.append(Listener(str(sweep), jobs))
+        listeners[-1].start()
+    return listeners
 
 
-def keep_busy(service: Service, network: Network, watch: Watch, seconds: float) -> list[str]:
-    """Submits sweeps for so long; their ids."""
-    sweeps: list[str] = []
+def keep_busy(service: Service, network: Network, watch: Watch, seconds: float) -> list[Listener]:
+    """Submits sweeps for so long; who listens to them."""
+    sweeps: list[Listener] = []
     ends, number = time.monotonic() + seconds, 0
     while time.monotonic() < ends:
         service.require_running()
@@ -86,12 +89,12 @@ def keep_busy(service: Service, network: Network, watch: Watch, seconds: float) 
     return sweeps
 
 
-def all_done(service: Service, sweeps: list[str]) -> bool:
+def all_done(service: Service, sweeps: list[Listener]) -> bool:
     """Whether the API says so of every sweep."""
     service.require_running()
     for sweep in sweeps:
         with suppress(httpx.TransportError):
-            answer = service.client.get(f"/v1/sweeps/{sweep}")
+            answer = service.client.get(f"/v1/sweeps/{sweep.sweep}")
             if answer.status_code == 200 and answer.json()["state"] == "done":
                 continue
         time.sleep(0.5)
@@ -99,7 +102,9 @@ def all_done(service: Service, sweeps: list[str]) -> bool:
     return True
 
 
-def examined(service: Service, cuts: Cuts, sweeps: list[str], ended_s: float) -> dict[str, Any]:
+def examined(
+    service: Service, cuts: Cuts, sweeps: list[Listener], ended_s: float
+) -> dict[str, Any]:
     """What was found; `wrong` is empty when all is well."""
     with inside("database"):
         found = figures(service.database, service.logs)
@@ -115,6 +120,10 @@ def examined(service: Service, cuts: Cuts, sweeps: list[str], ended_s: float) ->
     for host in ("simulator", "runner"):
         if not any(host in name and name.endswith("done") for name in found["attempts"]):
             wrong[f"trials of the {host}"] = found["attempts"]
+    if missed := [one.sweep for one in sweeps if not one.heard_all]:
+        wrong["sweeps whose listeners did not hear of every job's end"] = missed
+    if twice := {id_: n for one in sweeps for id_, n in one.heard.items() if n > 1}:
+        wrong["events that were heard twice"] = twice
     if unforeseen := tracebacks(service.logs):
         wrong["tracebacks in logs"] = unforeseen
     recoveries = [cut.recovery_s for cut in cuts.made if cut.recovery_s is not None]
@@ -130,6 +139,11 @@ def examined(service: Service, cuts: Cuts, sweeps: list[str], ended_s: float) ->
             "answered": service.standin.counts.answered,
             "in_no_journal": extra,
             "of_at_most": most,
+        },
+        "event_streams": {
+            "sweeps": len(sweeps),
+            "opened": sum(one.streams for one in sweeps),
+            "events": sum(one.heard.total() for one in sweeps),
         },
         "compared_with_undisturbed": compared,
         **found,
@@ -154,10 +168,13 @@ def run(minutes: float, seed: int, logs: Path) -> dict[str, Any]:
             sweeps += keep_busy(service, network, watch, minutes * 60)
         finally:
             cuts.stop()
+        stack.callback(lambda: [one.stop() for one in sweeps])
         say(f"{len(cuts.made)} cuts, all links are up; {watch.waiting} jobs wait")
         started = time.monotonic()
         wait_until(lambda: all_done(service, sweeps), END_WITHIN_S, "all jobs end")
         ended_s = time.monotonic() - started
+        with suppress(AssertionError):
+            wait_until(lambda: all(one.heard_all for one in sweeps), 60, "listeners hear of all")
         say("all jobs have ended; comparing with undisturbed runs")
         return examined(service, cuts, sweeps, ended_s)
 

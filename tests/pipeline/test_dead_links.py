@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+import os
 import socket
+import threading
 
+import psutil
+import uvicorn
 import uvloop
+from fastapi import FastAPI
 from running import wait_until
 
 from buildarena_api.http.rate_limits import RateLimits
+from buildarena_api.http.serving import UNANSWERED_S, Server
+from buildarena_cli.local import free_port
 from buildarena_pipeline.broker.app import celery_app
 from buildarena_pipeline.dead_links import socket_options, tcp_options
 from buildarena_pipeline.runtime.active_lease import LeaseKeeper
@@ -31,6 +38,29 @@ def test_consumers_give_up_dead_links_to_the_broker(broker_url) -> None:
             assert one._sock.getsockopt(level, name) == value
         pool.release(one)
     app.close()
+
+
+def test_the_api_gives_up_clients_that_are_gone() -> None:
+    port = free_port()
+    server = Server(uvicorn.Config(FastAPI(), port=port, log_config=None, loop="uvloop"))
+    thread = threading.Thread(target=server.run)
+    thread.start()
+    wait_until(lambda: server.started, 10, "it listens")
+    with socket.create_connection(("127.0.0.1", port)) as client:
+        inner = wait_until(lambda: accepted(client.getsockname()[1]), 5, "it is accepted")
+        for level, name, value in socket_options(unanswered_s=UNANSWERED_S):
+            assert inner.getsockopt(level, name) == value
+        inner.close()
+    server.should_exit = True
+    thread.join()
+
+
+def accepted(client_port: int) -> socket.socket | None:
+    """A handle of this process' own end of a client's connection."""
+    for one in psutil.Process().net_connections("tcp"):
+        if one.raddr and one.raddr.port == client_port:
+            return socket.socket(fileno=os.dup(one.fd))
+    return None
 
 
 def test_a_connection_that_ended_unseen_leaves_a_request_to_the_own_count(broker_url) -> None:
