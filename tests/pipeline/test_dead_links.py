@@ -7,15 +7,17 @@ import socket
 import threading
 
 import psutil
+import pytest
 import uvicorn
 import uvloop
 from fastapi import FastAPI
+from kombu.exceptions import OperationalError
 from running import wait_until
 
 from buildarena_api.http.rate_limits import RateLimits
 from buildarena_api.http.serving import UNANSWERED_S, Server
 from buildarena_cli.local import free_port
-from buildarena_pipeline.broker.app import celery_app
+from buildarena_pipeline.broker.app import LONGEST_PAUSE_S, celery_app
 from buildarena_pipeline.dead_links import socket_options, tcp_options
 from buildarena_pipeline.runtime.active_lease import LeaseKeeper
 
@@ -27,6 +29,16 @@ def test_options_are_those_that_the_system_has() -> None:
         for level, name, value in socket_options():
             sock.setsockopt(level, name, value)
             assert sock.getsockopt(level, name) == value
+
+
+def test_consumers_try_a_broker_that_is_away_every_few_seconds(monkeypatch) -> None:
+    app = celery_app(f"redis://127.0.0.1:{free_port()}/0")
+    pauses = []
+    monkeypatch.setattr("kombu.utils.functional.sleep", lambda _: None)
+    with app.connection_for_read() as connection, pytest.raises(OperationalError):
+        connection.ensure_connection(lambda _, pause: pauses.append(pause), 9)
+    assert pauses == [1, 2, 3, 4, *[LONGEST_PAUSE_S] * 5]
+    app.close()
 
 
 def test_consumers_give_up_dead_links_to_the_broker(broker_url) -> None:
