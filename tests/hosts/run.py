@@ -158,9 +158,11 @@ def run(minutes: float, seed: int, logs: Path) -> dict[str, Any]:
         stack.callback(network.close)
         say(f"five hosts, {DELAY_S * 1000:.0f} ms from any to any, {RATE}")
         service = stack.enter_context(Service(logs))
-        say("all programs run")
         watch = Watch(service)
         stack.callback(watch.close)
+        # A worker that can't reach the database when it starts says so and ends.
+        wait_until(lambda: watch.is_back("database", 0.0), 90, "all programs are at work")
+        say("all programs are at work")
         cuts = Cuts(network=network, watch=watch, rng=random.Random(seed))
         sweeps = submit(service.client, 1_000)
         cuts.start()
