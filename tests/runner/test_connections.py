@@ -8,6 +8,7 @@ import time
 from dataclasses import replace
 
 import httpx
+import httpx2
 import pytest
 from flaky_proxy import flaky_proxy
 from live_api import live_api
@@ -15,10 +16,11 @@ from runner_rig import MUJOCO, ended, runner_key, slot, true_trajectory, waiting
 from sqlalchemy import text
 from tenants import WITH_KEYS
 
+from buildarena_pipeline.dead_links import socket_options
 from buildarena_pipeline.runtime.context import open_context
 from buildarena_simulation import write_trajectory
 from buildarena_simworker.remote import api as remote_api
-from buildarena_simworker.remote.api import HeldLease
+from buildarena_simworker.remote.api import HeldLease, RunnerApi, tls_context
 from buildarena_simworker.simulators.engines import EngineSimulator
 from buildarena_simworker.simulators.simulator import File, Simulated
 
@@ -69,6 +71,37 @@ def test_lost_answers_do_nothing_twice(context, url, lost) -> None:
     with context.store.database.statement() as connection:
         ends = text("SELECT count(*) FROM events WHERE kind = 'done'")
         assert connection.execute(ends).scalar_one() == 1
+
+
+@pytest.mark.parametrize("silent", [1, 3])
+def test_links_that_fall_silent_cost_a_time_out_each(context, url, monkeypatch, silent) -> None:
+    monkeypatch.setattr(remote_api, "TIMEOUT_S", 0.4)
+    job = waiting(context)
+    with (
+        flaky_proxy(url) as proxy,
+        slot(proxy.url, runner_key(context)[1]) as one,
+    ):
+        proxy.silent = silent
+        assert one.do_next(0)
+        assert proxy.cuts >= 1
+    assert ended(context, job).faults == 0
+    assert [one.result for one in context.store.jobs.attempts(job.id)] == ["done"]
+
+
+def test_a_runner_gives_up_dead_links_unless_a_proxy_ends_them(url, monkeypatch) -> None:
+    for name in [name for name in os.environ if name.lower().endswith("_proxy")]:
+        monkeypatch.delenv(name)
+
+    def options() -> object:
+        stopping = threading.Event()
+        api = RunnerApi(url, None, tls=tls_context(None), stopping=stopping)
+        found = api._http._transport_for_url(httpx2.URL(url))._pool._socket_options
+        api.close()
+        return found
+
+    assert options() == socket_options()
+    monkeypatch.setenv("HTTP_PROXY", "http://127.0.0.1:9")
+    assert options() is None
 
 
 def test_an_api_that_is_away_is_waited_for(context) -> None:

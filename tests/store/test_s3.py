@@ -9,7 +9,8 @@ import boto3
 import pytest
 from moto.server import ThreadedMotoServer
 
-from buildarena_store import ArtifactDamagedError, ArtifactMissingError, ArtifactStore
+from buildarena_store import ArtifactDamagedError, ArtifactMissingError, ArtifactStore, Uploads
+from buildarena_store.uploads import UploadedFile
 
 
 @pytest.fixture
@@ -53,3 +54,17 @@ def test_lost_and_damaged_bytes_are_noticed(bucket) -> None:
     bucket.delete_object(Bucket="arena", Key=key)
     with pytest.raises(ArtifactMissingError, match="is not in the store"):
         store.get(kept.hash)
+
+
+@pytest.mark.usefixtures("bucket")
+def test_uploads_take_credentials_that_stand_in_no_variable(monkeypatch) -> None:
+    options = dict.fromkeys(("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY"), "test")
+    for name in options:
+        monkeypatch.delenv(name)
+    # Without credentials the store is asked for some at an address of the cloud, which takes long.
+    monkeypatch.setenv("AWS_METADATA_ENDPOINT", "http://127.0.0.1:9")
+    data = b"a piece"
+    file = UploadedFile(sha256=hashlib.sha256(data).hexdigest(), size=len(data))
+    uploads = Uploads("s3://arena/artifacts", options)
+    assert uploads.append(("job_0a", 1), file, 0, data) == len(data)
+    assert uploads.leases() == {("job_0a", 1)}

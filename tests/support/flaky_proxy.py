@@ -18,16 +18,21 @@ class FlakyProxy:
         cut_after: Bytes from the client after which each of the next connections is cut; each
             number is used once.
         swallow_answers: How many answers are lost, although their requests arrived.
+        silent: How many connections fall silent before their first answer: both ends stay open,
+            as over a link that died, and hear nothing more.
         away: Whether every connection is refused.
         cuts: Connections that were cut.
+        over: Set when the proxy ends.
     """
 
     target: int
     cut_after: list[int] = field(default_factory=list)
     swallow_answers: int = 0
+    silent: int = 0
     away: bool = False
     cuts: int = 0
     url: str = ""
+    over: threading.Event = field(default_factory=threading.Event)
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
     def serve(self, client: socket.socket) -> None:
@@ -62,6 +67,12 @@ class FlakyProxy:
         with suppress(OSError):
             while data := server.recv(65536):
                 with self._lock:
+                    silent, self.silent = bool(self.silent), max(0, self.silent - 1)
+                    self.cuts += silent
+                if silent:
+                    self.over.wait()
+                    return
+                with self._lock:
                     if self.swallow_answers and data.startswith(b"HTTP/1.1 2"):
                         self.swallow_answers -= 1
                         self.cuts += 1
@@ -93,6 +104,7 @@ def flaky_proxy(url: str) -> Iterator[FlakyProxy]:
         yield proxy
     finally:
         proxy.away = True
+        proxy.over.set()
         # Closing alone does not wake a thread that accepts.
         with suppress(OSError):
             listener.shutdown(socket.SHUT_RDWR)

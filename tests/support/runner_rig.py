@@ -85,7 +85,8 @@ def waiting(context: Context, text: str = SHORT, *, seed: int = 0, owner: str | 
     job, _ = try_machine(
         context, machine, task=task.name, simulator="mujoco", seed=seed, owner=owner
     )
-    assert (job.state, job.queue) == ("queued", "simulate.mujoco")
+    # A runner that waits may have it already.
+    assert (job.state, job.queue) in [(at, "simulate.mujoco") for at in ("queued", "running")]
     return job
 
 

@@ -11,14 +11,29 @@ from pathlib import Path
 from alembic import command
 from alembic.config import Config
 from alembic.script import ScriptDirectory
-from sqlalchemy import Connection, Engine, create_engine, event, inspect, text
+from sqlalchemy import Connection, Engine, create_engine, event, inspect, make_url, text
 from sqlalchemy.engine.interfaces import DBAPIConnection
-from sqlalchemy.exc import DisconnectionError
+from sqlalchemy.exc import DisconnectionError, OperationalError
+from sqlalchemy.exc import TimeoutError as PoolTimeoutError
 from sqlalchemy.pool import ConnectionPoolEntry
 
 from buildarena_store.errors import SchemaVersionError
 
 IDLE_S = 2.0
+GIVEN_UP = {
+    "keepalives_idle": 5,
+    "keepalives_interval": 3,
+    "keepalives_count": 3,
+    "tcp_user_timeout": 10_000,
+}
+"""When this end gives up a connection whose other end is gone without a word (libpq's names)."""
+GIVEN_UP_THERE = {
+    "tcp_keepalives_idle": 10,
+    "tcp_keepalives_interval": 5,
+    "tcp_keepalives_count": 3,
+    "tcp_user_timeout": 20_000,
+}
+"""When the server does: a machine that is gone holds the locks of its transactions until then."""
 MIGRATIONS = Path(__file__).parent / "migrations"
 """The Alembic chain."""
 MIGRATION_LOCK = 0x6275696C64  # "build": two processes that migrate at once take turns
@@ -67,6 +82,26 @@ def ping_after_idling(engine: Engine) -> None:
             raise DisconnectionError from error
 
 
+def _connect_args(url: str) -> dict[str, str | int]:
+    """What connections are made with; what the URL itself asks for goes before ours."""
+    asked = make_url(url).query
+    there = " ".join(f"-c {name}={value}" for name, value in GIVEN_UP_THERE.items())
+    ours: dict[str, str | int] = {
+        "connect_timeout": 5,
+        "application_name": "buildarena",
+        "options": there,
+        **GIVEN_UP,
+    }
+    return {name: value for name, value in ours.items() if name not in asked}
+
+
+class NoConnectionError(PoolTimeoutError, OperationalError):
+    """No connection came free in time, as those there are wait for a server that does not answer.
+
+    To whoever works through outages it is one, although SQLAlchemy tells the two apart.
+    """
+
+
 class Database:
     """A pool of connections to one Postgres database.
 
@@ -92,7 +127,7 @@ class Database:
             max_overflow=pool_size if overflow is None else overflow,
             pool_timeout=pool_timeout_s,
             pool_recycle=1800,
-            connect_args={"connect_timeout": 5, "application_name": "buildarena"},
+            connect_args=_connect_args(self.url),
         )
         ping_after_idling(self.engine)
         self._autocommit = self.engine.execution_options(isolation_level="AUTOCOMMIT")
@@ -100,7 +135,7 @@ class Database:
     @contextmanager
     def transaction(self) -> Iterator[Connection]:
         """A connection whose work is committed at the end, or undone when an error leaves it."""
-        with self.engine.begin() as connection:
+        with self._connected(self.engine) as connection, connection.begin():
             yield connection
 
     @contextmanager
@@ -109,8 +144,15 @@ class Database:
 
         It saves the round trips of BEGIN and COMMIT where one statement is all there is.
         """
-        with self._autocommit.connect() as connection:
+        with self._connected(self._autocommit) as connection:
             yield connection
+
+    @staticmethod
+    def _connected(engine: Engine) -> Connection:
+        try:
+            return engine.connect()
+        except PoolTimeoutError as error:
+            raise NoConnectionError(None, None, error) from error
 
     def migrate(self) -> str:
         """Brings the schema to the newest revision; safe to run from several processes at once.

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final, cast
 
 import obstore
 from obstore.exceptions import BaseError
@@ -21,6 +21,9 @@ from obstore.store import LocalStore, ObjectStore, from_url
 
 from buildarena_store.errors import ArtifactStoreError, UploadError
 from buildarena_store.jobs.runner_leases import JobToken
+
+if TYPE_CHECKING:
+    from obstore.store import S3Config
 
 PIECE_BYTES: Final = 1 << 20
 """Every piece has so many bytes, but for the last."""
@@ -57,13 +60,15 @@ class Uploads:
 
     Args:
         location: That of the artifact store.
+        options: Further settings of its store, as the artifact store's.
     """
 
-    def __init__(self, location: str | Path) -> None:
+    def __init__(self, location: str | Path, options: Mapping[str, str] | None = None) -> None:
         text = str(location)
         self._store: ObjectStore
         if "://" in text:
-            self._store, self._prefix = from_url(text), f"{_FOLDER}/"
+            config = cast("S3Config", dict(options)) if options else None
+            self._store, self._prefix = from_url(text, config=config), f"{_FOLDER}/"
         else:
             # In a folder of their own, where emptied folders go by themselves.
             folder = Path(text).absolute() / _FOLDER

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import sys
 
-import uvicorn
 from sqlalchemy.exc import OperationalError
 
 from buildarena_api.app import create_app
 from buildarena_api.http.access import check_binding
 from buildarena_api.http.own_pool import POOL_TIMEOUT_S
+from buildarena_api.http.serving import serve
 from buildarena_pipeline.catalog.models import load_registry
 from buildarena_pipeline.errors import StartupError
 from buildarena_pipeline.runtime.context import open_context
@@ -44,7 +44,7 @@ def main() -> None:
     except OperationalError as error:
         sys.exit(f"api: the database can't be reached: {error.orig}")
     try:
-        uvicorn.run(
+        serve(
             create_app(context, registry),
             host=settings.host,
             port=settings.port,

@@ -2,7 +2,29 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from celery import Celery
+from celery.app.amqp import AMQP
+from kombu.connection import Connection
+
+from buildarena_pipeline.dead_links import tcp_options
+
+LONGEST_PAUSE_S = 5
+"""Between two tries to reach a broker that is away."""
+
+
+class _Connection(Connection):
+    """Tries again soon: Celery's pauses, which no setting changes, grow to half a minute."""
+
+    def ensure_connection(self, *args: Any, **options: Any) -> Any:
+        """Connects, however long it takes."""
+        pauses = {"interval_start": 1, "interval_step": 1, "interval_max": LONGEST_PAUSE_S}
+        return super().ensure_connection(*args, **{**pauses, **options})  # type: ignore[no-untyped-call]
+
+
+class _Amqp(AMQP):  # type: ignore[misc]
+    Connection = _Connection
 
 
 def celery_app(broker_url: str, *, timeout_s: float = 10.0) -> Celery:
@@ -12,7 +34,7 @@ def celery_app(broker_url: str, *, timeout_s: float = 10.0) -> Celery:
         broker_url: ``redis://…``.
         timeout_s: How long the broker may take for an answer.
     """
-    app = Celery("buildarena", broker=broker_url)
+    app = Celery("buildarena", broker=broker_url, amqp=_Amqp)
     app.conf.update(
         task_ignore_result=True,
         task_acks_late=False,
@@ -27,6 +49,9 @@ def celery_app(broker_url: str, *, timeout_s: float = 10.0) -> Celery:
         broker_transport_options={
             "socket_connect_timeout": min(2.0, timeout_s),
             "socket_timeout": timeout_s,
+            # A consumer waits for messages for hours, by no time-out.
+            "socket_keepalive": True,
+            "socket_keepalive_options": dict(tcp_options()),
             "max_retries": 1,
             "interval_start": 0,
             "interval_max": 0.2,

@@ -142,6 +142,9 @@ class LeaseKeeper:
             self._look(self._leases.heartbeat if beats else self._leases.held)
         except OperationalError as error:
             log.warning("heartbeat_failed", error=str(error).splitlines()[0])
+        except Exception:
+            # Without this thread the process would lose every lease from now on.
+            log.exception("heartbeat_failed")
 
     def _look(self, ask: Callable[[Sequence[Lease]], Mapping[str, bool]]) -> None:
         with self._lock:

@@ -64,7 +64,8 @@ class RateLimits:
                 if await self._shared.hit(self._item, GROUP, who):
                     return None
                 stats = await self._shared.get_window_stats(self._item, GROUP, who)
-            except (RedisError, OSError) as error:
+            # What uvloop says of a connection that ended while nobody looked is a RuntimeError.
+            except (RedisError, OSError, RuntimeError) as error:
                 if not self._breaker.is_open:
                     log.warning("rate_limits_unreachable", error=str(error))
                 self._breaker.failed()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 import structlog
+from sqlalchemy.exc import SQLAlchemyError
 
 from buildarena_api.http.own_pool import OwnPool
 from buildarena_api.runners.outcomes import Outcomes, drop_dead_uploads
@@ -12,6 +13,7 @@ from buildarena_api.runners.wishes import Wishes
 from buildarena_pipeline.periodic import Periodic
 from buildarena_pipeline.runtime.context import Context
 from buildarena_store import Uploads
+from buildarena_store.errors import ArtifactStoreError
 
 SCORERS: Final = 3
 """Threads and connections for outcomes: their trajectories are unpacked and scored in them."""
@@ -35,7 +37,8 @@ class RunnerService:
 
     def __init__(self, context: Context) -> None:
         self.pool = OwnPool(context, size=SCORERS, name="outcomes")
-        self.uploads = Uploads(context.settings.artifacts_location)
+        settings = context.settings
+        self.uploads = Uploads(settings.artifacts_location, settings.artifact_options)
         self.wishes = Wishes(context)
         self.outcomes = Outcomes(self.pool.context, self.uploads)
         self._cleaner = Periodic(self._clean, name="uploads", period_s=DROP_EVERY_S)
@@ -52,6 +55,8 @@ class RunnerService:
     def _clean(self) -> None:
         try:
             dropped = drop_dead_uploads(self.pool.context, self.uploads)
+        except (ArtifactStoreError, SQLAlchemyError) as error:
+            log.warning("uploads_not_cleaned", error=str(error).splitlines()[0])
         except Exception:
             # Whatever it was, the next time may do.
             log.exception("uploads_not_cleaned")

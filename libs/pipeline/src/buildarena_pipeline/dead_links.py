@@ -1,0 +1,45 @@
+"""Dead links: how soon a connection is given up whose other end is gone without a word.
+
+A cable that was cut or a machine that lost power closes no connection. Whoever waits for an answer
+then waits for hours, by the defaults of TCP, and whoever sent something for a quarter of an hour.
+"""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+IDLE_S: Final = 5
+"""After so long without a word the other end is asked for a sign of life."""
+EVERY_S: Final = 3
+PROBES: Final = 3
+UNANSWERED_S: Final = 10
+"""So long after it was sent, what was not received ends the connection."""
+
+
+def tcp_options(*, unanswered_s: int = UNANSWERED_S) -> Mapping[int, int]:
+    """Options of a TCP socket, those that this system has, beside SO_KEEPALIVE.
+
+    Args:
+        unanswered_s: As `UNANSWERED_S`.
+    """
+    values = {
+        "TCP_KEEPIDLE": IDLE_S,
+        "TCP_KEEPALIVE": IDLE_S,  # its name on macOS
+        "TCP_KEEPINTVL": EVERY_S,
+        "TCP_KEEPCNT": PROBES,
+        "TCP_USER_TIMEOUT": unanswered_s * 1000,
+    }
+    return {getattr(socket, name): value for name, value in values.items() if hasattr(socket, name)}
+
+
+def socket_options(*, unanswered_s: int = UNANSWERED_S) -> Sequence[tuple[int, int, int]]:
+    """All of them with their levels, as HTTP clients take them.
+
+    Args:
+        unanswered_s: How long the other end may leave unread what it was sent.
+    """
+    options = tcp_options(unanswered_s=unanswered_s).items()
+    tcp = [(socket.IPPROTO_TCP, option, value) for option, value in options]
+    return [(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1), *tcp]
