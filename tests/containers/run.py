@@ -12,6 +12,7 @@ import argparse
 import json
 import random
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -280,6 +281,9 @@ def main() -> None:
     parser.add_argument("--json", type=Path, help="where figures go")
     words = parser.parse_args()
     require_programs()
+    # However it is ended, it takes down what it made; in the background a shell ignores SIGINT.
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.default_int_handler)
     with ExitStack() as stack:
         run = Run(stack, keep=words.keep)
         build(run)
