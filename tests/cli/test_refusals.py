@@ -105,7 +105,7 @@ def test_a_worker_refuses_a_foreign_schema(database_url: str, broker_url: str) -
         with database.transaction() as connection:
             connection.exec_driver_sql(f"UPDATE alembic_version SET version_num = '{revision}'")
 
-    stamp("older")
+    stamp("2026_11_22_annotations")
     try:
         for module in ("buildarena_worker", "buildarena_api"):
             done = subprocess.run(
@@ -121,7 +121,7 @@ def test_a_worker_refuses_a_foreign_schema(database_url: str, broker_url: str) -
                 },
             )
             assert done.returncode == 1
-            assert "schema older" in done.stderr
+            assert "schema 2026_11_22_annotations" in done.stderr
     finally:
         stamp(expected_schema())
         database.close()

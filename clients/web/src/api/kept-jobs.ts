@@ -82,8 +82,8 @@ export function listed(rows: Rows, words: URLSearchParams): JobPage {
     .sort((a, b) => {
       const [one, other] = [value(a), value(b)];
       // Jobs without such a figure come last, in both directions.
-      if (one === null || other === null) return Number(one === null) - Number(other === null) || (a.id < b.id ? -1 : 1);
-      return sign * compare(one, other, by) || (a.id < b.id ? -1 : 1);
+      if (one === null || other === null) return Number(one === null) - Number(other === null) || sign * (a.id < b.id ? -1 : 1);
+      return sign * (compare(one, other, by) || (a.id < b.id ? -1 : 1));
     });
   const begin = Number(words.get("cursor") ?? 0);
   const end = begin + Number(words.get("limit") ?? 100);
