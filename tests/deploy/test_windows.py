@@ -72,9 +72,6 @@ def command(words: list[str]) -> click.Command:
     return group
 
 
-HAS_RUNNERS = any("--api" in option.opts for option in command(["worker", "start"]).params)
-
-
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: path.name)
 def test_scripts_are_powershell(script: Path) -> None:
     text = script.read_text()
@@ -107,7 +104,6 @@ def test_the_scripts_call_the_command() -> None:
     ]
 
 
-@pytest.mark.skipif(not HAS_RUNNERS, reason="workers of this version can't reach an API")
 def test_each_command_and_option_that_is_called_exists() -> None:
     for words, options in called():
         known = {opt for param in command(words).params for opt in param.opts}

@@ -34,7 +34,8 @@ metadata = MetaData(
 )
 
 
-def _time(name: str, *, now: bool = False) -> Column[object]:
+def time_column(name: str, *, now: bool = False) -> Column[object]:
+    """A time with its zone; empty at first, or when the row was made."""
     return Column(
         name,
         DateTime(timezone=True),
@@ -43,7 +44,8 @@ def _time(name: str, *, now: bool = False) -> Column[object]:
     )
 
 
-def _count(name: str) -> Column[int]:
+def count_column(name: str) -> Column[int]:
+    """A number of something, 0 at first."""
     return Column(name, BigInteger, nullable=False, server_default=text("0"))
 
 
@@ -74,9 +76,9 @@ jobs = Table(
     Column("faults", Integer, nullable=False, server_default=text("0")),
     Column("lease_owner", Text),
     Column("lease_token", BigInteger, nullable=False, server_default=text("0")),
-    _time("lease_expires_at"),
-    _time("available_at", now=True),
-    _time("notified_at"),
+    time_column("lease_expires_at"),
+    time_column("available_at", now=True),
+    time_column("notified_at"),
     # What it scored.
     Column("success", Boolean),
     Column("indicator", Double),
@@ -84,21 +86,21 @@ jobs = Table(
     Column("flags", JSONB),
     Column("manifest", JSONB),
     # What it cost.
-    _count("requests"),
-    _count("input_tokens"),
-    _count("output_tokens"),
-    _count("cached_tokens"),
-    _count("reasoning_tokens"),
+    count_column("requests"),
+    count_column("input_tokens"),
+    count_column("output_tokens"),
+    count_column("cached_tokens"),
+    count_column("reasoning_tokens"),
     Column("cost_usd", Numeric(14, 6), nullable=False, server_default=text("0")),
-    _count("actions"),
-    _count("refused_actions"),
+    count_column("actions"),
+    count_column("refused_actions"),
     Column("refusals", JSONB),
     # What it was imported from, if it was, and when its figures were found again here.
     Column("imported_from", Text),
-    _time("verified_at"),
-    _time("created_at", now=True),
-    _time("started_at"),
-    _time("finished_at"),
+    time_column("verified_at"),
+    time_column("created_at", now=True),
+    time_column("started_at"),
+    time_column("finished_at"),
     UniqueConstraint("task", "task_version", "model_hash", "track", "seed"),
 )
 Index(
@@ -168,7 +170,7 @@ sweeps = Table(
     Column("request_key", Text, unique=True),
     Column("request_hash", Text),
     Column("jobs_hash", Text, index=True),
-    _time("created_at", now=True),
+    time_column("created_at", now=True),
 )
 
 sweep_jobs = Table(
@@ -189,15 +191,6 @@ job_wants = Table(
     Column("owner", Text, primary_key=True),
 )
 
-# Names that belong to the key that first used them; the operator's key is null.
-names = Table(
-    "names",
-    metadata,
-    Column("kind", Text, primary_key=True),
-    Column("name", Text, primary_key=True),
-    Column("owner", Text),
-)
-
 tasks = Table(
     "tasks",
     metadata,
@@ -205,50 +198,7 @@ tasks = Table(
     Column("version", Text, primary_key=True),
     Column("document", Text, nullable=False),
     Column("owner", Text),
-    _time("created_at", now=True),
-)
-
-api_keys = Table(
-    "api_keys",
-    metadata,
-    Column("id", Text, primary_key=True),
-    Column("name", Text, nullable=False),
-    Column("secret_hash", Text, nullable=False, unique=True),
-    Column("previous_hash", Text, unique=True),
-    _time("previous_until"),
-    Column("scopes", JSONB, nullable=False),
-    # Of a runner key: whose runners may lease these simulators' jobs, of these keys or of all.
-    Column("simulators", JSONB(none_as_null=True)),
-    Column("job_owners", JSONB(none_as_null=True)),
-    _time("created_at", now=True),
-    _time("expires_at"),
-    _time("revoked_at"),
-    _time("used_at"),
-)
-
-# A row's id is that of the sweep or key whose budget it is.
-budgets = Table(
-    "budgets",
-    metadata,
-    Column("id", Text, primary_key=True),
-    Column("max_cost_usd", Numeric(14, 6)),
-    Column("max_tokens", BigInteger),
-    Column("max_requests", BigInteger),
-    Column("spent_cost_usd", Numeric(14, 6), nullable=False, server_default=text("0")),
-    _count("spent_tokens"),
-    _count("spent_requests"),
-)
-
-# What one open model request may cost: a job has one at a time.
-reservations = Table(
-    "reservations",
-    metadata,
-    Column("job_id", Text, ForeignKey("jobs.id"), primary_key=True),
-    Column("budget_id", Text, ForeignKey("budgets.id", ondelete="CASCADE"), primary_key=True),
-    Column("token", BigInteger, nullable=False),
-    Column("cost_usd", Numeric(14, 6), nullable=False),
-    Column("tokens", BigInteger, nullable=False),
-    Index("ix_reservations_budget", "budget_id"),
+    time_column("created_at", now=True),
 )
 
 attempts = Table(
@@ -258,8 +208,8 @@ attempts = Table(
     Column("token", BigInteger, primary_key=True),
     Column("stage", Text, nullable=False),
     Column("worker", Text, nullable=False),
-    _time("started_at", now=True),
-    _time("ended_at"),
+    time_column("started_at", now=True),
+    time_column("ended_at"),
     Column("result", Text),
     Column("detail", Text),
 )
@@ -275,10 +225,10 @@ journal = Table(
     Column("request_hash", Text, nullable=False),
     # JSON keeps the order of keys, which replies are replayed with; JSONB does not.
     Column("reply", JSON, nullable=False),
-    _count("input_tokens"),
-    _count("output_tokens"),
-    _count("cached_tokens"),
-    _count("reasoning_tokens"),
+    count_column("input_tokens"),
+    count_column("output_tokens"),
+    count_column("cached_tokens"),
+    count_column("reasoning_tokens"),
     Column("cost_usd", Numeric(14, 6), nullable=False, server_default=text("0")),
     Column("latency_s", Double, nullable=False),
     Column("tries", Integer, nullable=False, server_default=text("1")),
@@ -286,7 +236,7 @@ journal = Table(
     # Who paid for it: a job may be handed over to another sweep later.
     Column("payer", Text),
     Column("owner", Text),
-    _time("created_at", now=True),
+    time_column("created_at", now=True),
 )
 Index("ix_journal_owner", journal.c.owner, postgresql_where=journal.c.owner.is_not(None))
 
@@ -301,7 +251,7 @@ external_calls = Table(
     Column("ok", Boolean, nullable=False),
     Column("reason", Text),
     Column("feedback", Text, nullable=False),
-    _time("at", now=True),
+    time_column("at", now=True),
 )
 
 rollouts = Table(
@@ -322,8 +272,8 @@ rollouts = Table(
     Column("versions", JSONB),
     Column("annotations", JSONB(none_as_null=True)),
     Column("wall_s", Double),
-    _time("created_at", now=True),
-    _time("finished_at"),
+    time_column("created_at", now=True),
+    time_column("finished_at"),
 )
 
 artifacts = Table(
@@ -332,7 +282,7 @@ artifacts = Table(
     Column("hash", Text, primary_key=True),
     Column("media_type", Text, nullable=False),
     Column("size", BigInteger, nullable=False),
-    _time("created_at", now=True),
+    time_column("created_at", now=True),
 )
 
 job_artifacts = Table(
@@ -351,10 +301,10 @@ verifications = Table(
     Column("state", Text, nullable=False),
     Column("report", JSONB),
     Column("owner", Text),
-    _time("created_at", now=True),
-    _time("claimed_at"),
-    _time("notified_at"),
-    _time("finished_at"),
+    time_column("created_at", now=True),
+    time_column("claimed_at"),
+    time_column("notified_at"),
+    time_column("finished_at"),
 )
 # Equal verifications are one.
 Index(
@@ -382,7 +332,7 @@ board_changes = Table(
     Column("before", JSONB),
     Column("after", JSONB),
     Column("why", Text),
-    _time("at", now=True),
+    time_column("at", now=True),
 )
 Index("ix_board_changes_transaction", board_changes.c.transaction)
 Index("ix_board_changes_track", board_changes.c.track, board_changes.c.id)
@@ -396,7 +346,7 @@ events = Table(
     Column("sweep_id", Text),
     Column("kind", Text, nullable=False),
     Column("data", JSONB, nullable=False),
-    _time("at", now=True),
+    time_column("at", now=True),
 )
 Index("ix_events_job", events.c.job_id, events.c.id)
 Index("ix_events_sweep", events.c.sweep_id, events.c.id)
@@ -411,8 +361,8 @@ workers = Table(
     Column("host", Text, nullable=False),
     Column("pid", Integer, nullable=False),
     Column("versions", JSONB, nullable=False),
-    _time("started_at", now=True),
-    _time("seen_at", now=True),
+    time_column("started_at", now=True),
+    time_column("seen_at", now=True),
     Column("peak_memory_bytes", BigInteger),
     Column("clock_ahead_s", Double),
 )

@@ -13,17 +13,14 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, cast
+from typing import Final
 
 import obstore
 from obstore.exceptions import BaseError
-from obstore.store import LocalStore, ObjectStore, from_url
 
+from buildarena_store.artifacts.storing import open_objects
 from buildarena_store.errors import ArtifactStoreError, UploadError
 from buildarena_store.jobs.runner_leases import JobToken
-
-if TYPE_CHECKING:
-    from obstore.store import S3Config
 
 PIECE_BYTES: Final = 1 << 20
 """Every piece has so many bytes, but for the last."""
@@ -64,16 +61,12 @@ class Uploads:
     """
 
     def __init__(self, location: str | Path, options: Mapping[str, str] | None = None) -> None:
-        text = str(location)
-        self._store: ObjectStore
-        if "://" in text:
-            config = cast("S3Config", dict(options)) if options else None
-            self._store, self._prefix = from_url(text, config=config), f"{_FOLDER}/"
-        else:
-            # In a folder of their own, where emptied folders go by themselves.
-            folder = Path(text).absolute() / _FOLDER
-            self._store = LocalStore(prefix=folder, mkdir=True, automatic_cleanup=True)
-            self._prefix = ""
+        # In a folder they have one of their own, where emptied folders go by themselves.
+        folder = "://" not in str(location)
+        self._store = open_objects(
+            Path(location) / _FOLDER if folder else location, options, folders_go=True
+        )
+        self._prefix = "" if folder else f"{_FOLDER}/"
 
     def offset(self, lease: JobToken, file: UploadedFile) -> int:
         """How many bytes of a file have been received from its start.

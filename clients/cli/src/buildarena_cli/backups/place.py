@@ -20,10 +20,10 @@ from typing import Any, Final
 
 import obstore
 from obstore.exceptions import BaseError
-from obstore.store import LocalStore, ObjectStore, from_url
 
 from buildarena_cli.errors import CommandError
 from buildarena_store import ArtifactStore
+from buildarena_store.artifacts.storing import open_objects
 
 NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,79}")
 MANIFEST: Final = "manifest.json"
@@ -70,18 +70,13 @@ class BackupPlace:
 
     def __init__(self, location: str, options: Mapping[str, str]) -> None:
         self.location = location
-        self._store: ObjectStore
-        if "://" in location:
-            self._store = from_url(location, config=dict(options) or None)  # type: ignore[arg-type]
+        try:
+            if "://" not in location:
+                Path(location).mkdir(parents=True, exist_ok=True, mode=0o700)
+            self._store = open_objects(location, options)
             self.artifacts = ArtifactStore(f"{location.rstrip('/')}/artifacts", options)
-        else:
-            folder = Path(location).absolute()
-            try:
-                folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-                self._store = LocalStore(prefix=folder)
-                self.artifacts = ArtifactStore(folder / "artifacts")
-            except (OSError, BaseError) as error:
-                raise CommandError(f"{location} can't be used for backups: {error}") from error
+        except (OSError, BaseError) as error:
+            raise CommandError(f"{location} can't be used for backups: {error}") from error
 
     def names(self) -> list[str]:
         """The backups that are whole, the oldest first."""

@@ -5,17 +5,16 @@ from __future__ import annotations
 import hashlib
 import tempfile
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from obstore.exceptions import BaseError
 from sqlalchemy import inspect
 
+from buildarena_cli.backups.copying import copy_artifacts
 from buildarena_cli.backups.place import DUMP, LIST, BackupPlace, Manifest
 from buildarena_cli.backups.programs import run_program
-from buildarena_cli.backups.writing import AT_ONCE
 from buildarena_cli.errors import CommandError
-from buildarena_store import ArtifactDamagedError, ArtifactMissingError, ArtifactStore, Database
+from buildarena_store import ArtifactStore, Database
 from buildarena_store.database import known_schemas
 
 
@@ -66,7 +65,12 @@ def restore_backup(
                 )
         hashes = [line.split()[0] for line in listed.decode().splitlines()]
         tell(f"copying {len(hashes):,} artifacts")
-        _copy(place.artifacts, artifacts, hashes, name)
+        missing = copy_artifacts(place.artifacts, artifacts, hashes).missing
+        if missing:
+            raise CommandError(
+                f"{len(missing):,} of backup {name}'s {len(hashes):,} artifacts are lost or "
+                f"damaged, the first: {next(iter(missing.values()))}. The database was not touched"
+            )
         tell("restoring the database")
         words = ["--no-owner", "--no-privileges", "--exit-on-error", "--single-transaction"]
         run_program(
@@ -74,24 +78,3 @@ def restore_backup(
         )
     database.migrate()
     return manifest
-
-
-def _copy(source: ArtifactStore, target: ArtifactStore, hashes: list[str], name: str) -> None:
-    there = {item.hash for item in target.all()}
-
-    def copy(digest: str) -> str | None:
-        if digest in there:
-            return None
-        try:
-            target.put(source.get(digest), "")
-        except (ArtifactMissingError, ArtifactDamagedError) as error:
-            return str(error)
-        return None
-
-    with ThreadPoolExecutor(AT_ONCE) as pool:
-        wrong = [error for error in pool.map(copy, hashes) if error is not None]
-    if wrong:
-        raise CommandError(
-            f"{len(wrong):,} of backup {name}'s {len(hashes):,} artifacts are lost or damaged, "
-            f"the first: {wrong[0]}. The database was not touched"
-        )

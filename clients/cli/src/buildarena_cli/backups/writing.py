@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import tempfile
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -13,19 +12,14 @@ from typing import Final
 
 from sqlalchemy import text
 
+from buildarena_cli.backups.copying import copy_artifacts
 from buildarena_cli.backups.place import DUMP, FORMAT, LIST, NAME, BackupPlace, Manifest
 from buildarena_cli.backups.programs import run_program
 from buildarena_cli.errors import CommandError
 from buildarena_pipeline import __version__
-from buildarena_store import (
-    ArtifactDamagedError,
-    ArtifactMissingError,
-    ArtifactStore,
-    Database,
-)
+from buildarena_store import ArtifactStore, Database
 from buildarena_store.artifacts.collecting import LOCK, referenced
 
-AT_ONCE: Final = 8
 PIECE: Final = 1024 * 1024
 
 
@@ -96,12 +90,12 @@ def write_backup(
                 connection.rollback()
                 place.send(f"{name}/{DUMP}", dump)
                 tell(f"copying what is new of {len(hashes):,} artifacts")
-                sizes, missing, copied = _copy(artifacts, place.artifacts, hashes)
+                copied = copy_artifacts(artifacts, place.artifacts, hashes)
             finally:
                 connection.rollback()
                 connection.execute(text("SELECT pg_advisory_unlock_shared(:key)"), {"key": LOCK})
                 connection.commit()
-        listed = "".join(f"{digest} {size}\n" for digest, size in sizes).encode()
+        listed = "".join(f"{digest} {size}\n" for digest, size in copied.sizes.items()).encode()
         place.write(f"{name}/{LIST}", listed)
         manifest = Manifest(
             format=FORMAT,
@@ -110,35 +104,12 @@ def write_backup(
             made_at=now.isoformat(timespec="seconds"),
             dump_sha256=_hash_of(dump),
             list_sha256=hashlib.sha256(listed).hexdigest(),
-            artifacts=len(sizes),
-            artifact_bytes=sum(size for _, size in sizes),
-            missing=missing,
+            artifacts=len(copied.sizes),
+            artifact_bytes=sum(copied.sizes.values()),
+            missing=list(copied.missing),
         )
     place.finish(name, manifest)
-    return Written(name=name, manifest=manifest, copied=copied)
-
-
-def _copy(
-    source: ArtifactStore, target: ArtifactStore, hashes: Sequence[str]
-) -> tuple[list[tuple[str, int]], list[str], int]:
-    """Copies what the target lacks: hashes with sizes, those that are missing, and how many."""
-    there = {item.hash: item.size for item in target.all()}
-
-    def size_of(digest: str) -> int | None:
-        if digest in there:
-            return there[digest]
-        try:
-            data = source.get(digest)
-        except (ArtifactMissingError, ArtifactDamagedError):
-            return None
-        target.put(data, "")
-        return len(data)
-
-    with ThreadPoolExecutor(AT_ONCE) as pool:
-        found = list(zip(hashes, pool.map(size_of, hashes), strict=True))
-    missing = [digest for digest, size in found if size is None]
-    sizes = [(digest, size) for digest, size in found if size is not None]
-    return sizes, missing, sum(digest not in there for digest, _ in sizes)
+    return Written(name=name, manifest=manifest, copied=copied.new)
 
 
 def _hash_of(file: Path) -> str:

@@ -41,22 +41,14 @@ def collect(
     """
     from datetime import timedelta
 
-    from sqlalchemy.exc import OperationalError
-
     from buildarena_cli.local.stores import opened_stores
-    from buildarena_store import StoreError
     from buildarena_store.artifacts import GarbageCollector
 
-    try:
-        with opened_stores(data) as stores:
-            stores.database.require_schema()
-            keep = timedelta(days=keep_days)
-            collector = GarbageCollector(stores.database, stores.artifacts, keep=keep)
-            done = collector.collect(dry_run=dry_run)
-    except OperationalError as error:
-        raise CommandError(f"the database can't be reached: {error.orig}") from error
-    except StoreError as error:
-        raise CommandError(str(error)) from error
+    with opened_stores(data) as stores:
+        stores.database.require_schema()
+        keep = timedelta(days=keep_days)
+        collector = GarbageCollector(stores.database, stores.artifacts, keep=keep)
+        done = collector.collect(dry_run=dry_run)
     if done is None:
         raise CommandError("a backup or another collection is under way: try again later")
     if as_json:

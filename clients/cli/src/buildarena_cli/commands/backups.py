@@ -106,24 +106,23 @@ def _tell(quiet: bool) -> Callable[[str], None]:
 
 def _place(location: str) -> BackupPlace:
     from buildarena_cli.backups.place import BackupPlace
-    from buildarena_pipeline.runtime.settings import Settings
+    from buildarena_pipeline.errors import StartupError
+    from buildarena_pipeline.runtime.settings import load_settings
 
-    return BackupPlace(location, Settings().artifact_options)
+    try:
+        return BackupPlace(location, load_settings().artifact_options)
+    except StartupError as error:
+        raise CommandError(str(error)) from error
 
 
 @contextmanager
 def _sayable() -> Iterator[None]:
-    """Turns what stores say into messages of the command."""
+    """Turns what the place of backups says into messages of the command."""
     from obstore.exceptions import BaseError
-    from sqlalchemy.exc import OperationalError
-
-    from buildarena_store import StoreError
 
     try:
         yield
-    except OperationalError as error:
-        raise CommandError(f"the database can't be reached: {error.orig}") from error
-    except (StoreError, BaseError, OSError) as error:
+    except (BaseError, OSError) as error:
         raise CommandError(str(error).splitlines()[0]) from error
 
 

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from buildarena_cli.errors import CommandError
 from buildarena_cli.lazy import new_group
 from buildarena_cli.options import DataOption, JsonOption
 from buildarena_cli.terminal.output import print_json, say
@@ -68,17 +67,9 @@ def unpack(
 
 @contextmanager
 def _histories(data: Path | None) -> Iterator[Histories]:
-    from sqlalchemy.exc import OperationalError
-
     from buildarena_cli.local.stores import opened_stores
-    from buildarena_store import StoreError
     from buildarena_store.jobs.histories import Histories
 
-    try:
-        with opened_stores(data) as stores:
-            stores.database.require_schema()
-            yield Histories(stores.database, stores.artifacts)
-    except OperationalError as error:
-        raise CommandError(f"the database can't be reached: {error.orig}") from error
-    except StoreError as error:
-        raise CommandError(str(error)) from error
+    with opened_stores(data) as stores:
+        stores.database.require_schema()
+        yield Histories(stores.database, stores.artifacts)

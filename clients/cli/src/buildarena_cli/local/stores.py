@@ -8,12 +8,14 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from sqlalchemy.exc import OperationalError
+
 from buildarena_cli.errors import CommandError
 from buildarena_cli.local.postgres import EmbeddedPostgres, url_of_running
 from buildarena_cli.local.service import LOCK, is_running, unwritable
 from buildarena_pipeline.errors import StartupError
-from buildarena_pipeline.runtime.settings import Settings
-from buildarena_store import ArtifactStore, Database
+from buildarena_pipeline.runtime.settings import load_settings
+from buildarena_store import ArtifactStore, Database, StoreError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,17 +44,20 @@ def opened_stores(data: Path | None, *, new: bool = False) -> Iterator[Stores]:
         new: They are about to be filled: nothing may run on the folder.
 
     Raises:
-        CommandError: There is no such folder, or something runs there that must not.
+        CommandError: There is no such folder, or something runs there that must not; or the stores
+            failed inside the block.
     """
     try:
-        settings = Settings() if data is None else Settings(data=data)
+        settings = load_settings() if data is None else load_settings(data=data)
         with ExitStack() as stack:
             url = settings.database_url or _embedded(settings.data.absolute(), stack, new=new)
             database = Database(url)
             stack.callback(database.close)
             artifacts = ArtifactStore(settings.artifacts_location, settings.artifact_options)
             yield Stores(database=database, url=url, artifacts=artifacts)
-    except StartupError as error:
+    except OperationalError as error:
+        raise CommandError(f"the database can't be reached: {error.orig}") from error
+    except (StartupError, StoreError) as error:
         raise CommandError(str(error)) from error
 
 

@@ -16,10 +16,11 @@ from typing import Any
 from sqlalchemy import Connection, and_, func, literal, or_, select, update
 from sqlalchemy.dialects.postgresql import insert
 
+from buildarena_store.accounts.tables import budgets, reservations
 from buildarena_store.database import Database
 from buildarena_store.jobs.journal import MAX_USD, Usage
 from buildarena_store.jobs.leases import Lease
-from buildarena_store.tables import budgets, jobs, journal, reservations, sweep_jobs
+from buildarena_store.tables import jobs, journal, sweep_jobs
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -11,11 +11,11 @@ from datetime import datetime, timedelta
 from sqlalchemy import and_, any_, func, insert, or_, select, update
 
 from buildarena_store import events
+from buildarena_store.accounts.tables import api_keys
 from buildarena_store.database import Database
 from buildarena_store.errors import EndedKeyError, UnknownIdError
 from buildarena_store.ids import new_id
 from buildarena_store.rows import bound_texts, columns_of, value_of
-from buildarena_store.tables import api_keys
 
 SECRET_PREFIX = "ba_"  # noqa: S105 - what secrets begin with, for scanners that look for leaks
 NOTED_EVERY = timedelta(minutes=1)

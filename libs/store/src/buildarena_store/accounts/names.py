@@ -7,8 +7,8 @@ from typing import Final, Literal
 from sqlalchemy import Connection, func, select
 from sqlalchemy.dialects.postgresql import insert
 
+from buildarena_store.accounts.tables import names
 from buildarena_store.errors import NameTakenError
-from buildarena_store.tables import names
 
 NameKind = Literal["agent", "human", "task"]
 PLAYERS: Final[frozenset[NameKind]] = frozenset({"agent", "human"})

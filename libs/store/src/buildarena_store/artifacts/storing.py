@@ -30,6 +30,24 @@ PROBE_BYTES: Final = 64 * 1024
 """About what a session keeps: a store that is full to the last block fails already."""
 
 
+def open_objects(
+    location: str | Path, options: Mapping[str, str] | None = None, *, folders_go: bool = False
+) -> ObjectStore:
+    """Opens what objects are kept in.
+
+    Args:
+        location: A folder, which is made if need be, or a URL that obstore knows, for example
+            ``s3://bucket/prefix``.
+        options: Further settings of such a URL's store, for example ``AWS_SECRET_ACCESS_KEY``;
+            they go before those of the environment.
+        folders_go: Whether folders inside a folder go with what was last in them.
+    """
+    text = str(location)
+    if "://" in text:
+        return from_url(text, config=cast("S3Config", dict(options)) if options else None)
+    return LocalStore(prefix=Path(text).absolute(), mkdir=True, automatic_cleanup=folders_go)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ArtifactInfo:
     """What is known of stored bytes.
@@ -70,14 +88,8 @@ class ArtifactStore:
     """
 
     def __init__(self, location: str | Path, options: Mapping[str, str] | None = None) -> None:
-        text = str(location)
-        self._location = text.partition("?")[0]
-        self._store: ObjectStore
-        if "://" in text:
-            config = cast("S3Config", dict(options)) if options else None
-            self._store = from_url(text, config=config)
-        else:
-            self._store = LocalStore(prefix=Path(text).absolute(), mkdir=True)
+        self._location = str(location).partition("?")[0]
+        self._store = open_objects(location, options)
 
     def put(self, data: bytes, media_type: str) -> ArtifactInfo:
         """Stores bytes; storing the same bytes again changes nothing, or mends them.

@@ -13,16 +13,15 @@ from dataclasses import dataclass
 from datetime import timedelta
 from typing import Any, Final
 
-from sqlalchemy import Connection, Table, any_, delete, exists, func, select, text
-from sqlalchemy.dialects.postgresql import insert
+from sqlalchemy import Table, any_, delete, exists, func, select, text
 
 from buildarena_benchmark.outcomes import SCORED
-from buildarena_store.artifacts import ArtifactInfo, ArtifactStore
+from buildarena_store.artifacts import ArtifactStore
 from buildarena_store.database import Database
+from buildarena_store.jobs.results import attach_artifacts
 from buildarena_store.rows import bound_texts
 from buildarena_store.states import JobState, VerificationState
 from buildarena_store.tables import (
-    artifacts,
     events,
     external_calls,
     job_artifacts,
@@ -109,7 +108,7 @@ class Histories:
                 rows += found.number
             data = gzip.compress(f"{{{','.join(parts)}}}".encode(), mtime=0)
             kept = self._store.put(data, GZIP)
-            _tie(connection, job_id, kept)
+            attach_artifacts(job_id, {NAME: kept}, connection=connection)
             for table in PACKED:
                 connection.execute(delete(table).where(table.c.job_id == job_id))
         return Packing(jobs=1, rows=rows, bytes=kept.size)
@@ -159,14 +158,6 @@ def _packable(older_than: timedelta) -> tuple[Any, ...]:
         ~verified,
         exists().where(events.c.job_id == jobs.c.id),
     )
-
-
-def _tie(connection: Connection, job_id: str, kept: ArtifactInfo) -> None:
-    known = insert(artifacts).values(hash=kept.hash, media_type=kept.media_type, size=kept.size)
-    connection.execute(known.on_conflict_do_nothing())
-    tie = insert(job_artifacts).values(job_id=job_id, name=NAME, hash=kept.hash)
-    key = [job_artifacts.c.job_id, job_artifacts.c.name]
-    connection.execute(tie.on_conflict_do_update(index_elements=key, set_={"hash": kept.hash}))
 
 
 # As `json`, and not `jsonb`: journals keep the order of keys, which replies are replayed with.

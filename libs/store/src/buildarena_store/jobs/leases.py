@@ -25,13 +25,14 @@ from sqlalchemy import (
 )
 
 from buildarena_store import events
+from buildarena_store.accounts.tables import budgets
 from buildarena_store.database import Database
 from buildarena_store.jobs.attempts import Ending, end_attempts, move_on
 from buildarena_store.jobs.claiming import CLAIM
 from buildarena_store.jobs.job import Job
 from buildarena_store.rows import value_of
 from buildarena_store.states import AttemptResult, JobState, Outcome, Stage
-from buildarena_store.tables import budgets, jobs
+from buildarena_store.tables import jobs
 
 LONGEST_DELAY_S = 300.0
 """A job waits no longer than this between two attempts."""

@@ -86,15 +86,22 @@ class Results:
         self, job_id: str, made: Mapping[str, ArtifactInfo], *, connection: Connection
     ) -> None:
         """Ties artifacts that the artifact store holds to a job, by their names."""
-        infos = list(made.values())
-        given = {
-            "job_id": job_id,
-            "names": list(made),
-            "hashes": [info.hash for info in infos],
-            "types": [info.media_type for info in infos],
-            "sizes": [info.size for info in infos],
-        }
-        connection.execute(_ATTACH, given)
+        attach_artifacts(job_id, made, connection=connection)
+
+
+def attach_artifacts(
+    job_id: str, made: Mapping[str, ArtifactInfo], *, connection: Connection
+) -> None:
+    """Ties artifacts that the artifact store holds to a job, by their names."""
+    infos = list(made.values())
+    given = {
+        "job_id": job_id,
+        "names": list(made),
+        "hashes": [info.hash for info in infos],
+        "types": [info.media_type for info in infos],
+        "sizes": [info.size for info in infos],
+    }
+    connection.execute(_ATTACH, given)
 
 
 _ATTACH = text(

@@ -1,0 +1,60 @@
+"""The tables of accounts: whose names are, keys, budgets and what is reserved of them."""
+
+from __future__ import annotations
+
+from sqlalchemy import BigInteger, Column, ForeignKey, Index, Numeric, Table, Text, text
+from sqlalchemy.dialects.postgresql import JSONB
+
+from buildarena_store.tables import count_column, metadata, time_column
+
+# Names that belong to the key that first used them; the operator's key is null.
+names = Table(
+    "names",
+    metadata,
+    Column("kind", Text, primary_key=True),
+    Column("name", Text, primary_key=True),
+    Column("owner", Text),
+)
+
+api_keys = Table(
+    "api_keys",
+    metadata,
+    Column("id", Text, primary_key=True),
+    Column("name", Text, nullable=False),
+    Column("secret_hash", Text, nullable=False, unique=True),
+    Column("previous_hash", Text, unique=True),
+    time_column("previous_until"),
+    Column("scopes", JSONB, nullable=False),
+    # Of a runner key: whose runners may lease these simulators' jobs, of these keys or of all.
+    Column("simulators", JSONB(none_as_null=True)),
+    Column("job_owners", JSONB(none_as_null=True)),
+    time_column("created_at", now=True),
+    time_column("expires_at"),
+    time_column("revoked_at"),
+    time_column("used_at"),
+)
+
+# A row's id is that of the sweep or key whose budget it is.
+budgets = Table(
+    "budgets",
+    metadata,
+    Column("id", Text, primary_key=True),
+    Column("max_cost_usd", Numeric(14, 6)),
+    Column("max_tokens", BigInteger),
+    Column("max_requests", BigInteger),
+    Column("spent_cost_usd", Numeric(14, 6), nullable=False, server_default=text("0")),
+    count_column("spent_tokens"),
+    count_column("spent_requests"),
+)
+
+# What one open model request may cost: a job has one at a time.
+reservations = Table(
+    "reservations",
+    metadata,
+    Column("job_id", Text, ForeignKey("jobs.id"), primary_key=True),
+    Column("budget_id", Text, ForeignKey("budgets.id", ondelete="CASCADE"), primary_key=True),
+    Column("token", BigInteger, nullable=False),
+    Column("cost_usd", Numeric(14, 6), nullable=False),
+    Column("tokens", BigInteger, nullable=False),
+    Index("ix_reservations_budget", "budget_id"),
+)
