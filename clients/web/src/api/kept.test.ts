@@ -28,21 +28,21 @@ describe("listed", () => {
   } as unknown as Rows;
   const ids = (words: string): string => listed(rows, new URLSearchParams(words)).jobs.map((one) => one.id).join("");
 
-  it("has jobs without a figure last, in both directions, and equal ones by their ids", () => {
-    expect(ids("sort=indicator")).toBe("cadb");
+  it("has jobs without a figure last, in both directions, and equal ones by their ids in the direction asked for", () => {
+    expect(ids("sort=indicator")).toBe("cdab");
     expect(ids("sort=indicator&order=asc")).toBe("adcb");
     expect(ids("sort=finished&order=asc")).toBe("bcad");
-    expect(ids("sort=created")).toBe("abcd");
+    expect(ids("sort=created")).toBe("dcba");
   });
 
   it("chooses by what the address says", () => {
-    expect(ids("sweep=s&sort=model")).toBe("ac");
+    expect(ids("sweep=s&sort=model")).toBe("ca");
     expect(ids("sweep=nobody")).toBe("");
     expect(ids("flag=odd")).toBe("c");
     expect(ids("text=fell")).toBe("c");
     expect(ids("indicator_min=2")).toBe("c");
-    expect(ids("indicator_max=1")).toBe("ad");
-    expect(ids("since=2026-01-01T00:00:00.000001Z")).toBe("ac");
+    expect(ids("indicator_max=1")).toBe("da");
+    expect(ids("since=2026-01-01T00:00:00.000001Z")).toBe("ca");
     expect(ids("until=2026-01-01T00:00:00.000001Z")).toBe("b");
     expect(ids("id_prefix=a")).toBe("a");
   });
@@ -51,6 +51,6 @@ describe("listed", () => {
     const first = listed(rows, new URLSearchParams("limit=3"));
     expect(first.next_cursor).toBe("3");
     const last = listed(rows, new URLSearchParams("limit=3&cursor=3"));
-    expect([last.jobs.map((one) => one.id), last.next_cursor]).toEqual([["d"], null]);
+    expect([last.jobs.map((one) => one.id), last.next_cursor]).toEqual([["a"], null]);
   });
 });
