@@ -5,9 +5,9 @@ PYTHON ?=
 export PYTHON
 VENV := .venv
 BIN := $(VENV)/bin
-PACKAGES := libs/geometry libs/simulation libs/besiege libs/benchmark libs/store libs/pipeline services/api services/worker services/simworker clients/cli clients/buildarena
+PACKAGES := libs/geometry libs/simulation libs/besiege libs/benchmark libs/environment libs/store libs/pipeline services/api services/worker services/simworker clients/python clients/cli clients/buildarena
 CODE := $(addsuffix /src,$(PACKAGES)) tests
-NOT_OURS := $(foreach p,$(PACKAGES),--no-emit-package $(patsubst buildarena-buildarena,buildarena,buildarena-$(notdir $(p))))
+NOT_OURS := $(foreach p,$(PACKAGES),--no-emit-package $(patsubst buildarena-buildarena,buildarena,$(patsubst buildarena-python,buildarena-client,buildarena-$(notdir $(p)))))
 STAMP := $(VENV)/.installed
 # The dashboard as it is served; mk/web.mk builds it.
 WEB_OUT := services/api/src/buildarena_api/pages
@@ -60,6 +60,6 @@ lock: ## Compiles requirements.lock again, and the locks of the images from it
 		$(addsuffix /pyproject.toml,$(PACKAGES)) requirements-dev.in
 	bash mk/uv.sh pip compile --quiet --universal --generate-hashes --no-annotate -c requirements.lock \
 		--custom-compile-command "make lock" -o requirements-hunt.lock requirements-hunt.in
-	$(MAKE) --no-print-directory lock-images
+	$(MAKE) --no-print-directory lock-images lock-integrations
 
 -include mk/*.mk

@@ -4,4 +4,4 @@ dist: $(WEB_STAMP) ## Builds wheels and sdists of all distributions, and the ver
 	@bash mk/dist.sh dist
 
 version: ## Gives every distribution a new version: make version V=0.2.0
-	@bash mk/version.sh $(V) $(PACKAGES)
+	@bash mk/version.sh $(V) $(PACKAGES) $(addprefix integrations/,$(INTEGRATIONS))

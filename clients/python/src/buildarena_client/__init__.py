@@ -1,0 +1,1 @@
+"""The Python client of BuildArena's HTTP API, synchronous and asynchronous."""

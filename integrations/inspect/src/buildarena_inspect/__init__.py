@@ -1,0 +1,1 @@
+"""BuildArena's tasks in Inspect."""

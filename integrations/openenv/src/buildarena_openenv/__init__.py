@@ -1,0 +1,1 @@
+"""BuildArena's tasks as an OpenEnv server and client."""

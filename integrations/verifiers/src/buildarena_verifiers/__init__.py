@@ -1,0 +1,1 @@
+"""BuildArena's tasks as an environment of verifiers."""

@@ -1,0 +1,1 @@
+"""Building tasks as environments: steps, rewards, snapshots and trials over processes."""

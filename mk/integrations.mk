@@ -1,0 +1,20 @@
+.PHONY: test-integrations check-integrations lock-integrations
+
+# Adapters to frameworks, each with an environment of its own: the frameworks exclude each other.
+INTEGRATIONS := inspect verifiers openenv gymnasium
+LIBRARIES := libs/geometry libs/simulation libs/benchmark libs/environment
+INTEGRATION_STAMPS := $(foreach name,$(INTEGRATIONS),.venv-integrations/$(name)/.installed)
+
+test-integrations: check-integrations ## Each adapter against its real framework
+	@bash mk/integrations.sh test $(INTEGRATIONS)
+
+check-integrations: $(INTEGRATION_STAMPS)
+	@bash mk/integrations.sh check $(INTEGRATIONS)
+
+.venv-integrations/%/.installed: integrations/%/requirements.lock integrations/%/pyproject.toml $(STAMP)
+	@bash mk/integrations.sh install $* $(LIBRARIES)
+	@touch $@
+
+# Physics comes in the versions of requirements.lock: elsewhere the same trial has other bytes.
+lock-integrations:
+	@bash mk/integrations.sh lock "$(LIBRARIES)" $(INTEGRATIONS)
