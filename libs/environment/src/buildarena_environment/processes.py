@@ -1,0 +1,91 @@
+"""Child processes that never outlive their parent, and the memory of a process tree."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import psutil
+
+PR_SET_PDEATHSIG = 1
+PARENT = "BUILDARENA_PARENT_PID"
+"""Environment variable of a program that is to end with this process."""
+LOOK_EVERY_S = 0.5
+GRACE_S = 4.0
+"""What a program has left to end in good order when its parent is gone."""
+# Looked up at import: between fork and exec only the call itself is safe.
+_prctl = ctypes.CDLL(None).prctl if sys.platform == "linux" else None
+
+
+def die_with_parent(signal_number: int = signal.SIGTERM) -> None:
+    """On Linux, has this process signalled when the thread that started it ends."""
+    if _prctl is not None:
+        _prctl(PR_SET_PDEATHSIG, int(signal_number))
+
+
+def dying_with_me(signal_number: int = signal.SIGTERM) -> Callable[[], None]:
+    """What a child of this process calls before it becomes another program, so as to die with it.
+
+    Unlike `die_with_parent` alone it also ends a child whose parent died before the call.
+    """
+    parent = os.getpid()
+
+    def prepare() -> None:
+        die_with_parent(signal_number)
+        if os.getppid() != parent:
+            os._exit(1)
+
+    return prepare
+
+
+def end_with_parent(parent: int | None = None) -> None:
+    """Has this program end soon after its parent, on all systems and whatever it is busy with.
+
+    Args:
+        parent: The parent's process id; by default the one that the environment names, if any.
+    """
+    named = os.environ.get(PARENT, "") if parent is None else str(parent)
+    if named.isdecimal():
+        threading.Thread(target=_watch, args=(int(named),), name="parent", daemon=True).start()
+
+
+def _watch(parent: int) -> None:
+    while os.getppid() == parent:
+        time.sleep(LOOK_EVERY_S)
+    os.kill(os.getpid(), signal.SIGTERM)
+    time.sleep(GRACE_S)
+    os._exit(1)
+
+
+def tree_memory_bytes(pid: int | None = None) -> int:
+    """Memory of a process and all its children, shared pages counted once.
+
+    Args:
+        pid: The process; this one by default.
+    """
+    try:
+        root = psutil.Process(pid or os.getpid())
+        members = [root, *root.children(recursive=True)]
+    except psutil.NoSuchProcess:
+        return 0
+    return sum(memory_bytes(member) for member in members)
+
+
+def memory_bytes(process: psutil.Process) -> int:
+    """A process' share of memory: pages that several use are divided among them; 0 when gone."""
+    try:
+        for line in Path(f"/proc/{process.pid}/smaps_rollup").read_text().splitlines():
+            if line.startswith("Pss:"):
+                return int(line.split()[1]) * 1024
+    except OSError:
+        pass
+    try:
+        return int(process.memory_info().rss)
+    except psutil.Error:
+        return 0

@@ -1,0 +1,68 @@
+"""Work in a process apart: what ends that process costs one piece of work."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from collections.abc import Iterator
+
+import psutil
+import pytest
+from warm_work import make
+
+from buildarena_environment.warm_process import ProcessEndedError, WarmProcess
+
+SPARE = 200 << 20
+
+
+@pytest.fixture
+def process() -> Iterator[WarmProcess]:
+    made = WarmProcess("work", make, spare_bytes=SPARE)
+    yield made
+    made.close()
+
+
+def test_it_stays_warm_between_questions(process) -> None:
+    pid = process.ask(["pid"])
+    assert pid != os.getpid()
+    assert process.ask(["hello"]) == "hello"
+    assert process.ask(["pid"]) == pid
+
+
+def test_one_that_dies_is_started_again(process) -> None:
+    first = process.ask(["pid"])
+    with pytest.raises(ProcessEndedError, match="of work ended with code -9") as raised:
+        process.ask(["die"])
+    assert raised.value.code == -signal.SIGKILL
+    assert process.ask(["pid"]) != first
+    psutil.Process(process.ask(["pid"])).kill()  # between two questions
+    time.sleep(0.2)
+    assert process.ask(["hello"]) == "hello"
+
+
+def test_memory_is_bounded(process) -> None:
+    assert process.ask(["take", SPARE // 4]) == SPARE // 4
+    with pytest.raises(ProcessEndedError):
+        process.ask(["take", 2 * SPARE])
+    assert process.ask(["hello"]) == "hello"
+
+
+def test_work_that_is_given_up_is_broken_off(process) -> None:
+    pid = process.ask(["pid"])
+
+    def enough() -> None:
+        raise TimeoutError("enough")
+
+    started = time.monotonic()
+    with pytest.raises(TimeoutError, match="enough"):
+        process.ask(["sleep", 60], meanwhile=enough)
+    assert time.monotonic() - started < 5
+    assert not psutil.pid_exists(pid)
+    assert process.ask(["hello"]) == "hello"
+
+
+def test_closing_leaves_no_process(process) -> None:
+    pid = process.ask(["pid"])
+    process.close()
+    assert not psutil.pid_exists(pid)
