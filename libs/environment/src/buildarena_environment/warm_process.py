@@ -13,7 +13,7 @@ from typing import Any, Final
 
 import psutil
 
-from buildarena_environment.errors import EnvironmentFault
+from buildarena_environment.errors import BuildarenaEnvironmentError
 from buildarena_environment.processes import end_with_parent
 
 LOOK_EVERY_S: Final = 0.1
@@ -21,7 +21,7 @@ LOOK_EVERY_S: Final = 0.1
 LONGEST_END_S: Final = 2.0
 
 
-class ProcessEndedError(EnvironmentFault):
+class ProcessEndedError(BuildarenaEnvironmentError):
     """The process ended in the middle of its work.
 
     Attributes:

@@ -27,9 +27,9 @@ from buildarena_cli.local import (
 from buildarena_cli.local.programs import programs
 from buildarena_cli.local.service import LOCK, READY, RUN, log_name, unwritable
 from buildarena_cli.wire import Failure, Wire
+from buildarena_environment.processes import PARENT, dying_with_me, tree_memory_bytes
 from buildarena_pipeline.catalog.simulators import ENGINE_SIMULATORS
 from buildarena_pipeline.errors import StartupError
-from buildarena_pipeline.runtime.processes import PARENT, dying_with_me, tree_memory_bytes
 from buildarena_pipeline.runtime.settings import PREFIX, SECRETS, Settings
 from buildarena_pipeline.secret_files import SUFFIX
 from buildarena_store import Database
