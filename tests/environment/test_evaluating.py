@@ -116,3 +116,21 @@ def test_environments_and_evaluators_agree(short, bridge) -> None:
     environment.restore(replace(environment.state(), machines={"main": bridge.logged}))
     with Evaluator(short, processes=1) as evaluator:
         assert environment.submit().trial.score == evaluator.evaluate(bridge).trial.score
+
+
+def test_a_trial_that_ends_when_it_is_decided_has_the_same_verdict(bridge) -> None:
+    task = builtin_tasks()["support-1"]
+    weak = bridge.copy()
+    for connector in list(weak.connectors):
+        weak.act("remove_block", {"block_id": connector})
+    for machine, decided in ((bridge, False), (weak, True)):
+        whole = try_machine(task, machine)
+        ended = try_machine(task, machine, whole=False)
+        assert ended.score.success == whole.score.success
+        assert ended.score.indicator == whole.score.indicator
+        assert ended.score.flags == whole.score.flags
+        assert whole.score.metrics["fall_time_s"] == ended.score.metrics["fall_time_s"]
+        lengths = [len(trial.trajectory.time_s) for trial in (ended, whole)]
+        assert (lengths[0] < lengths[1]) is (
+            decided or whole.score.metrics["fall_time_s"] is not None
+        )

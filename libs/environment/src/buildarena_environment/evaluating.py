@@ -39,6 +39,18 @@ class Evaluation:
     error: str = ""
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Question:
+    """What a process is asked; see `Evaluator` and `_text_of`."""
+
+    task: str
+    machine: str
+    simulator: str
+    seed: int | None
+    whole: bool
+    trajectory: bool
+
+
 class Evaluator:
     """Tries machines in several processes; results do not depend on their number or order.
 
@@ -52,6 +64,7 @@ class Evaluator:
         processes: How many; by default one for each core that this process may use.
         timeout_s: Seconds after which a trial is broken off.
         trajectories: Whether trials bring their trajectories, which is slower.
+        whole: False ends each trial when it is decided, see `try_machine`.
 
     Raises:
         UnknownChoiceError: Task or simulator does not exist.
@@ -68,6 +81,7 @@ class Evaluator:
         processes: int | None = None,
         timeout_s: float = LONGEST_TRIAL_S,
         trajectories: bool = False,
+        whole: bool = True,
     ) -> None:
         count = len(os.sched_getaffinity(0)) if processes is None else processes
         if count < 1:
@@ -77,7 +91,7 @@ class Evaluator:
         self.task = chosen_task(task)
         self.simulator = checked_simulator(simulator)
         self.seed = seed
-        self._timeout_s, self._trajectories = timeout_s, trajectories
+        self._timeout_s, self._trajectories, self._whole = timeout_s, trajectories, whole
         self._task_text = _text_of(self.task)
         _task_from(self._task_text)
         self._processes = [
@@ -136,9 +150,14 @@ class Evaluator:
             self._free.put(process)
 
     def _asked(self, process: WarmProcess, document: str) -> Evaluation:
-        question = (
-            self._task_text, document, self.simulator, self.seed, self._trajectories
-        )  # fmt: skip
+        question = _Question(
+            task=self._task_text,
+            machine=document,
+            simulator=self.simulator,
+            seed=self.seed,
+            whole=self._whole,
+            trajectory=self._trajectories,
+        )
         until = time.monotonic() + self._timeout_s
         try:
             answer = process.ask(question, meanwhile=partial(_require_before, until))
@@ -184,14 +203,18 @@ def _answering() -> Callable[[Any], Any]:
     return _answered
 
 
-def _answered(question: tuple[str, str, str, int | None, bool]) -> dict[str, Any]:
-    task_text, document, simulator, seed, trajectories = question
+def _answered(question: _Question) -> dict[str, Any]:
     try:
-        machine = Machine.from_document(json.loads(document))
-        trial = try_machine(_task_from(task_text), machine, simulator, seed=seed)
+        trial = try_machine(
+            _task_from(question.task),
+            Machine.from_document(json.loads(question.machine)),
+            question.simulator,
+            seed=question.seed,
+            whole=question.whole,
+        )
     except (SimulationError, DocumentError) as error:
         return {"error": str(error)}
-    kept = trial.trajectory if trajectories else None
+    kept = trial.trajectory if question.trajectory else None
     return {
         "trial": trial.as_document(),
         "trajectory": None if kept is None else write_trajectory(kept),

@@ -10,6 +10,7 @@ from typing import Any, Self
 
 from buildarena_benchmark import Score, Task, broken_constraint, failed_score, score
 from buildarena_benchmark.flags import is_disqualified
+from buildarena_benchmark.scores import decision
 from buildarena_geometry import Machine
 from buildarena_simulation import MachineNotSimulable, Trajectory, simulate
 
@@ -73,7 +74,12 @@ class Trial:
 
 
 def try_machine(
-    task: Task, machine: Machine, simulator: str = "mujoco", *, seed: int | None = None
+    task: Task,
+    machine: Machine,
+    simulator: str = "mujoco",
+    *,
+    seed: int | None = None,
+    whole: bool = True,
 ) -> Trial:
     """Checks a machine by the task's constraints, and simulates and scores it.
 
@@ -83,6 +89,8 @@ def try_machine(
         simulator: Name of the engine, see `buildarena_simulation.ENGINES`.
         seed: Varies the start as a fair repetition would; None for the exact one, which is the
             service's.
+        whole: False ends the trial when it is decided: success, indicator and flags are those of
+            the whole trial, other metrics and the trajectory of what was seen until then.
 
     Raises:
         SimulationError: The simulator failed, which says nothing of the machine.
@@ -97,7 +105,8 @@ def try_machine(
             wall_s=time.perf_counter() - started,
         )
     try:
-        trajectory = simulate(machine, task.scenario, simulator, seed=seed)
+        until = None if whole else decision(task)
+        trajectory = simulate(machine, task.scenario, simulator, seed=seed, until=until)
     except MachineNotSimulable as refusal:
         return Trial(
             score=failed_score(task, machine),
