@@ -192,6 +192,14 @@ class Environment:
         """What was built so far, by name."""
         return self._bench.machines
 
+    def submitted(self) -> Machine:
+        """What a submission would try now.
+
+        Raises:
+            NothingToSubmitError: There is no machine, or there are several without an assembly.
+        """
+        return self._bench.submitted()
+
     @property
     def trials(self) -> tuple[Trial, ...]:
         """The trials of this episode, in order."""
@@ -265,7 +273,7 @@ class Environment:
         """
         if self._done:
             raise EpisodeOverError("the episode has ended: reset begins another")
-        trial = self._tries(self.task, self._bench.submitted(), self.simulator, seed=self.seed)
+        trial = self._tries(self.task, self.submitted(), self.simulator, seed=self.seed)
         self._trials = (*self._trials, trial)
         self._done = trial.counts or len(self._trials) >= self.rounds
         self._reward = self._worth()
