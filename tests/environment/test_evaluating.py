@@ -76,7 +76,7 @@ def test_a_process_that_dies_costs_one_trial_and_is_replaced(bridge) -> None:
 
 def test_a_trial_that_takes_too_long_is_broken_off(bridge) -> None:
     with Evaluator("support-1", processes=1, timeout_s=0.2) as evaluator:
-        evaluator._processes[0].start()
+        evaluator._pool.processes[0].start()
         started = time.monotonic()
         assert evaluator.evaluate(bridge).error == "the trial took longer than 0.2 s"
         assert time.monotonic() - started < 60

@@ -23,9 +23,9 @@ from buildarena_environment.rewards import (
     weighed,
 )
 from buildarena_environment.snapshots import Snapshot
-from buildarena_environment.trials import Trial, best_trial, told, try_machine
+from buildarena_environment.trials import Trial, Tries, best_trial, told, try_machine
 from buildarena_environment.workbench import MAIN, Workbench, tools_of_models
-from buildarena_geometry import Accepted, Machine, ToolDefinition
+from buildarena_geometry import Accepted, Cause, Machine, Refused, ToolDefinition
 
 if TYPE_CHECKING:
     from buildarena_geometry import Outcome
@@ -124,6 +124,7 @@ class Environment:
         limits: How long an episode may be.
         rewards: Weights by the names of `buildarena_environment.rewards`; success alone by default.
         reference: The indicator that is worth 1; the task's reference where there is one.
+        tries: What tries machines, such as a `TrialPool`'s `try_machine`; by default this process.
 
     Raises:
         UnknownChoiceError: Task, simulator or a reward does not exist.
@@ -140,6 +141,7 @@ class Environment:
         limits: Limits | None = None,
         rewards: Mapping[str, float] | None = None,
         reference: float | None = None,
+        tries: Tries = try_machine,
     ) -> None:
         if rounds < 1:
             raise ValueError(f"rounds is {rounds}: a builder submits at least once")
@@ -150,6 +152,7 @@ class Environment:
         self.limits = limits or Limits()
         self.weights = checked_weights(DEFAULT_WEIGHTS if rewards is None else rewards)
         self.reference = reference_of(self.task, reference, needed="indicator" in self.weights)
+        self._tries = tries
         self._shaped = bool(self.weights.keys() - TERMINAL)
         self._bench = Workbench()
         self._steps = self._changes = self._refused = 0
@@ -189,6 +192,14 @@ class Environment:
         """What was built so far, by name."""
         return self._bench.machines
 
+    def submitted(self) -> Machine:
+        """What a submission would try now.
+
+        Raises:
+            NothingToSubmitError: There is no machine, or there are several without an assembly.
+        """
+        return self._bench.submitted()
+
     @property
     def trials(self) -> tuple[Trial, ...]:
         """The trials of this episode, in order."""
@@ -220,11 +231,28 @@ class Environment:
         Raises:
             EpisodeOverError: The episode has ended, or has no steps left.
         """
+        self._require_a_step()
+        return self._stepped(self._bench.act(machine, tool, arguments))
+
+    def refuse(self, reason: str) -> Step:
+        """Counts a step that names no action, as a refused one.
+
+        Args:
+            reason: What was wrong, for who made it.
+
+        Raises:
+            EpisodeOverError: The episode has ended, or has no steps left.
+        """
+        self._require_a_step()
+        return self._stepped(Refused(cause=Cause.MALFORMED_ARGUMENTS, text=reason))
+
+    def _require_a_step(self) -> None:
         if self._done:
             raise EpisodeOverError("the episode has ended: reset begins another")
         if self._steps >= self.limits.steps:
             raise EpisodeOverError(f"all {self.limits.steps:,} steps are used up: submit")
-        outcome = self._bench.act(machine, tool, arguments)
+
+    def _stepped(self, outcome: Outcome) -> Step:
         self._steps += 1
         if not isinstance(outcome, Accepted):
             self._refused += 1
@@ -245,7 +273,7 @@ class Environment:
         """
         if self._done:
             raise EpisodeOverError("the episode has ended: reset begins another")
-        trial = try_machine(self.task, self._bench.submitted(), self.simulator, seed=self.seed)
+        trial = self._tries(self.task, self.submitted(), self.simulator, seed=self.seed)
         self._trials = (*self._trials, trial)
         self._done = trial.counts or len(self._trials) >= self.rounds
         self._reward = self._worth()

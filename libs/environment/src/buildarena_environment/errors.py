@@ -23,3 +23,7 @@ class NothingToSubmitError(BuildarenaEnvironmentError):
 
 class SnapshotError(BuildarenaEnvironmentError, ValueError):
     """A document is not a state of this environment."""
+
+
+class CallError(BuildarenaEnvironmentError, ValueError):
+    """Text or arguments that are not a call of a tool."""

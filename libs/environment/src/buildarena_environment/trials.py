@@ -6,7 +6,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, Self
+from typing import Any, Protocol, Self
 
 from buildarena_benchmark import Score, Task, broken_constraint, failed_score, score
 from buildarena_benchmark.flags import is_disqualified
@@ -71,6 +71,16 @@ class Trial:
             wall_s=float(document["wall_s"]),
             trajectory=trajectory,
         )
+
+
+class Tries(Protocol):
+    """What tries machines: `try_machine`, or something that has it done elsewhere."""
+
+    def __call__(
+        self, task: Task, machine: Machine, simulator: str, /, *, seed: int | None
+    ) -> Trial:
+        """As `try_machine`."""
+        ...
 
 
 def try_machine(
