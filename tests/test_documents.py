@@ -17,7 +17,13 @@ SOURCES = [
 RENAMES = "CHANGELOG.md"
 DOCUMENTS = [
     file
-    for pattern in ("*.md", "docs/**/*.md", "libs/*/README.md", "libs/*/src/**/README.md")
+    for pattern in (
+        "*.md",
+        "docs/**/*.md",
+        "libs/*/README.md",
+        "clients/python/README.md",
+        "libs/*/src/**/README.md",
+    )
     for file in sorted(ROOT.glob(pattern))
     if file.name != RENAMES
 ]
