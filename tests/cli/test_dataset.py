@@ -19,6 +19,7 @@ from working import work
 from buildarena_cli.dataset import writing
 from buildarena_cli.dataset.card import card
 from buildarena_cli.dataset.columns import ACTIONS, JOBS
+from buildarena_cli.dataset.counts import Counts
 from buildarena_cli.dataset.messages import tools
 from buildarena_cli.dataset.reading import Fetched
 from buildarena_cli.dataset.replaying import parts_hash
@@ -422,7 +423,7 @@ def test_rows_are_written_as_they_come(tmp_path, monkeypatch):
 
 
 def test_a_name_is_no_markup_in_the_card():
-    counts = writing.Counts(jobs=1)
+    counts = Counts(jobs=1)
     counts.cells["support-1", "agent/<img src=x>|[a](http://b)\n# c"] += 1
     counts.licences["mit"] += 1
     _, front, text = card(counts).split("---\n", 2)

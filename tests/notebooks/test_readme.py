@@ -9,7 +9,9 @@ from pathlib import Path
 import pytest
 from commands import run
 
-README = Path(__file__).parents[2] / "clients" / "buildarena" / "README.md"
+ROOT = Path(__file__).parents[2]
+README = ROOT / "clients" / "buildarena" / "README.md"
+PAGE = ROOT / "docs" / "notebooks.md"
 
 
 def failures(text: str) -> int:
@@ -17,6 +19,10 @@ def failures(text: str) -> int:
     test = doctest.DocTestParser().get_doctest(text, {}, README.name, str(README), 0)
     assert len(test.examples) > 5
     return doctest.DocTestRunner(verbose=False).run(test).failed
+
+
+def test_the_page_of_the_documentation_runs_as_it_stands():
+    assert failures(PAGE.read_text(encoding="utf-8")) == 0
 
 
 def test_its_python_runs_as_it_stands(tmp_path, monkeypatch):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import yaml
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -11,10 +11,8 @@ from markupsafe import Markup
 
 from buildarena_benchmark.flags import DISQUALIFYING, INFORMATIVE
 from buildarena_cli.dataset.columns import ACTIONS, JOBS, Column
+from buildarena_cli.dataset.counts import Counts
 from buildarena_cli.report.escaping import markdown_cell
-
-if TYPE_CHECKING:
-    from buildarena_cli.dataset.writing import Counts
 
 CARD: Final = "README.md"
 FILES: Final = {"jobs": "jobs.parquet", "actions": "actions.parquet"}

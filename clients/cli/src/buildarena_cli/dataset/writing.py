@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import shutil
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import mkdtemp
 from typing import Any, Final, Self
@@ -16,6 +14,7 @@ import pyarrow.parquet as pq
 
 from buildarena_cli.dataset.card import CARD, FILES, card
 from buildarena_cli.dataset.columns import ACTIONS, JOBS, Column, schema
+from buildarena_cli.dataset.counts import Counts
 from buildarena_cli.dataset.messages import tools
 from buildarena_cli.dataset.reading import Fetched
 from buildarena_cli.dataset.rows import rows_of
@@ -25,42 +24,6 @@ GROUP_ROWS: Final = 256
 GROUP_BYTES: Final = 16 << 20
 """Texts of a row group; at most so much and one row more is in memory."""
 MAX_NAMED: Final = 3
-
-
-@dataclass(slots=True)
-class Counts:
-    """What a dataset holds.
-
-    Attributes:
-        jobs: Its jobs.
-        actions: Their actions.
-        refused: Those of them that were refused.
-        successes: Jobs with the outcome `success`.
-        machines: Jobs with a machine.
-        outcomes: Jobs by how they ended.
-        cells: Jobs by task and model.
-        licences: Licences of the rows.
-    """
-
-    jobs: int = 0
-    actions: int = 0
-    refused: int = 0
-    successes: int = 0
-    machines: int = 0
-    outcomes: Counter[str] = field(default_factory=Counter)
-    cells: Counter[tuple[str, str]] = field(default_factory=Counter)
-    licences: Counter[str] = field(default_factory=Counter)
-
-    def add(self, job: Mapping[str, Any], actions: Sequence[Mapping[str, Any]]) -> None:
-        """Counts a job."""
-        self.jobs += 1
-        self.actions += len(actions)
-        self.refused += sum(not action["accepted"] for action in actions)
-        self.successes += job["outcome"] == "success"
-        self.machines += job["machine"] is not None
-        self.outcomes[job["outcome"]] += 1
-        self.cells[job["task"], job["model"]] += 1
-        self.licences[job["license"]] += 1
 
 
 def write_dataset(fetched: Iterable[Fetched], out: Path, *, licence: str) -> Counts:
