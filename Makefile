@@ -6,7 +6,7 @@ export PYTHON
 VENV := .venv
 BIN := $(VENV)/bin
 PACKAGES := libs/geometry libs/simulation libs/besiege libs/benchmark libs/environment libs/store libs/pipeline services/api services/worker services/simworker clients/python clients/cli clients/buildarena
-CODE := $(addsuffix /src,$(PACKAGES)) tests
+CODE := $(addsuffix /src,$(PACKAGES)) clients/python/generate tests
 NOT_OURS := $(foreach p,$(PACKAGES),--no-emit-package $(patsubst buildarena-buildarena,buildarena,$(patsubst buildarena-python,buildarena-client,buildarena-$(notdir $(p)))))
 STAMP := $(VENV)/.installed
 # The dashboard as it is served; mk/web.mk builds it.
@@ -51,8 +51,9 @@ check: $(STAMP) ## Lints, types and import rules alone
 clean: ## Removes the environment, caches and local data
 	rm -rf $(VENV) $(VENV)-uv .buildarena .mypy_cache .ruff_cache .pytest_cache .hypothesis
 
-openapi: $(STAMP) ## Writes the API's contract again, after an intended change
+openapi: $(STAMP) ## Writes the API's contract again, and the Python client's types, after an intended change
 	@$(BIN)/python -m buildarena_api.contract > tests/data/openapi.json
+	@$(MAKE) --no-print-directory client-modules
 
 lock: ## Compiles requirements.lock again, and the locks of the images from it
 	bash mk/uv.sh pip compile --quiet --universal --generate-hashes --all-extras --no-annotate \

@@ -9,7 +9,8 @@ from terminals import on_terminal, piped
 
 from buildarena_cli.commands.job_lists import COLUMNS
 from buildarena_cli.terminal.output import columns, print_table
-from buildarena_cli.terminal.progress import FAULTS, STOPPED
+from buildarena_cli.terminal.progress import FAULTS
+from buildarena_client.waiting import STOPPED
 from buildarena_pipeline.catalog.specs import SweepSpec
 from buildarena_store import Outcome, SweepState
 

@@ -10,11 +10,10 @@ import os
 from pathlib import Path
 from typing import Final
 
+from buildarena_client.places import DEFAULT_URL, KEY_VARIABLE
+
 DEFAULT_PORT: Final = 8321
-DEFAULT_URL: Final = f"http://127.0.0.1:{DEFAULT_PORT}"
 DEFAULT_DATA: Final = ".buildarena"
-KEY_VARIABLE: Final = "BUILDARENA_KEY"
-"""The environment variable of the API key: on a command line, others could read it."""
 
 
 def data_folder(given: Path | None) -> Path:
@@ -22,14 +21,4 @@ def data_folder(given: Path | None) -> Path:
     return given or Path(os.environ.get("BUILDARENA_DATA") or DEFAULT_DATA)
 
 
-def kept_key() -> str | None:
-    """The API key of BUILDARENA_KEY, or of the file that BUILDARENA_KEY_FILE names; None for none.
-
-    Raises:
-        SecretFileError: Both are set, or the file can't be read.
-    """
-    if not os.environ.get(f"{KEY_VARIABLE}_FILE"):
-        return os.environ.get(KEY_VARIABLE)
-    from buildarena_pipeline.secret_files import read_secret
-
-    return read_secret(KEY_VARIABLE, os.environ)
+__all__ = ["DEFAULT_DATA", "DEFAULT_PORT", "DEFAULT_URL", "KEY_VARIABLE", "data_folder"]

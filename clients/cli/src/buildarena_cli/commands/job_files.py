@@ -14,6 +14,8 @@ from buildarena_cli.ids import whole_id
 from buildarena_cli.near import did_you_mean
 from buildarena_cli.options import DEFAULT_URL, JobId, JsonOption, UrlOption
 from buildarena_cli.terminal.output import columns, print_json, print_table, say
+from buildarena_client.errors import DamagedError
+from buildarena_client.files import require_hash
 
 COLUMNS = columns(
     "file", "type", "bytes", "sha256", figures=("bytes",), leaving=("sha256", "type", "bytes")
@@ -72,11 +74,11 @@ def _chosen(
 
 
 def _fetched(client: Client, job_id: str, file: dict[str, Any], folder: Path) -> Path:
-    from hashlib import sha256
-
     body = client.get_bytes(at("jobs", job_id, "artifacts", file["name"]))
-    if sha256(body).hexdigest() != file["hash"]:
-        raise CommandError(f"{file['name']} of {job_id} arrived damaged: its hash differs")
+    try:
+        require_hash(body, file["hash"], f"{file['name']} of {job_id}")
+    except DamagedError as error:
+        raise CommandError(str(error)) from error
     target = folder / file_name(file["name"], file["media_type"])
     partial = target.with_name(target.name + ".partial")
     try:

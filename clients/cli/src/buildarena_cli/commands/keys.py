@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from typing import Annotated, Any
 
 import typer
@@ -143,7 +144,7 @@ def _hours(text: str) -> float:
     return int(found[1]) * {"m": 1 / 60, "h": 1, "d": 24, "": 0}[found[2]]
 
 
-def spent(budget: dict[str, Any] | None) -> str:
+def spent(budget: Mapping[str, Any] | None) -> str:
     """What was spent of a budget, for people."""
     if budget is None:
         return "-"

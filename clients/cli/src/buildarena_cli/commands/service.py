@@ -88,7 +88,7 @@ def demo(
     _tell_simulators()
     with Stack(settings, tell=_tell) as stack:
         client = Client(stack.url, key=stack.admin_key)
-        sweep_id = client.post("/v1/sweeps", sweep_file)["id"]
+        sweep_id = client.submit_sweep(sweep_file)["id"]
         sweep = watch_sweep(client, sweep_id)
         stack.require_running()
         say()

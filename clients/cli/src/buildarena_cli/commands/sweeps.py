@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -28,7 +27,10 @@ from buildarena_cli.options import (
 )
 from buildarena_cli.terminal.completion import complete_model, complete_task
 from buildarena_cli.terminal.output import columns, minute_of, number, print_json, print_table, say
-from buildarena_cli.terminal.progress import ended, exit_code, watch_sweep
+from buildarena_cli.terminal.progress import exit_code, watch_sweep
+
+if TYPE_CHECKING:
+    from buildarena_client.schemas import SweepEstimate, SweepView
 
 app = new_group("Submit and watch sweeps.")
 
@@ -92,9 +94,9 @@ def run_sweep(
     client, sweep = Client(url), read_sweep(file, flags)
     try:
         if dry_run:
-            _show_estimate(client.post("/v1/sweeps/estimate", sweep.content), as_json=as_json)
+            _show_estimate(client.estimate_sweep(sweep.content), as_json=as_json)
             return
-        accepted = client.post("/v1/sweeps?resume=true", sweep.content)
+        accepted = client.submit_sweep(sweep.content, resume=True)
     except RefusedError as error:
         raise sweep.refused(error) from error
     if not as_json:
@@ -261,7 +263,7 @@ def _change(
     _show(client.post(path, body or {}), as_json=as_json)
 
 
-def _show(sweep: dict[str, Any], *, as_json: bool) -> None:
+def _show(sweep: SweepView, *, as_json: bool) -> None:
     if as_json:
         print_json(sweep)
         return
@@ -276,7 +278,7 @@ def _show(sweep: dict[str, Any], *, as_json: bool) -> None:
     _show_limit(sweep)
 
 
-def _show_estimate(estimate: dict[str, Any], *, as_json: bool) -> None:
+def _show_estimate(estimate: SweepEstimate, *, as_json: bool) -> None:
     if as_json:
         print_json(estimate)
         return
@@ -298,7 +300,7 @@ def _show_estimate(estimate: dict[str, Any], *, as_json: bool) -> None:
     )
 
 
-def _show_limit(sweep: dict[str, Any]) -> None:
+def _show_limit(sweep: SweepView) -> None:
     if sweep["state"] == "budget_exhausted":
         say(
             f"The budget is used up: `buildarena sweep resume {sweep['id']} --max-cost-usd …` "
@@ -306,14 +308,11 @@ def _show_limit(sweep: dict[str, Any]) -> None:
         )
 
 
-def _watch(client: Client, sweep_id: str, *, as_json: bool) -> dict[str, Any]:
+def _watch(client: Client, sweep_id: str, *, as_json: bool) -> SweepView:
     if not as_json:
         watched = watch_sweep(client, sweep_id)
         _show_limit(watched)
         return watched
-    while True:
-        sweep: dict[str, Any] = client.get_patiently(at("sweeps", sweep_id))
-        if ended(sweep):
-            print_json(sweep)
-            return sweep
-        time.sleep(0.5)
+    sweep = client.wait_for_sweep(sweep_id)
+    print_json(sweep)
+    return sweep

@@ -15,7 +15,6 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any, Self
 
-from buildarena_cli.client import HEALTH
 from buildarena_cli.errors import CommandError
 from buildarena_cli.local import (
     EmbeddedPostgres,
@@ -26,7 +25,10 @@ from buildarena_cli.local import (
 )
 from buildarena_cli.local.programs import programs
 from buildarena_cli.local.service import LOCK, READY, RUN, log_name, unwritable
-from buildarena_cli.wire import Failure, Wire
+from buildarena_client.faults import WireError
+from buildarena_client.paths import HEALTH
+from buildarena_client.requests import Request
+from buildarena_client.synchronous.wire import Wire
 from buildarena_pipeline.catalog.simulators import ENGINE_SIMULATORS
 from buildarena_pipeline.errors import StartupError
 from buildarena_pipeline.runtime.processes import PARENT, dying_with_me, tree_memory_bytes
@@ -228,10 +230,11 @@ class Stack:
         deadline = time.monotonic() + READY_WITHIN_S
         missing = "the API"
         wire = Wire(self.url, {})
+        request = Request(method="GET", path=HEALTH, timeout_s=5)
         while time.monotonic() < deadline:
             self.require_running()
-            with contextlib.suppress(*Failure, ValueError):
-                health = wire.send("GET", HEALTH, timeout_s=5).json()
+            with contextlib.suppress(WireError, ValueError):
+                health = wire.send(request).json()
                 served = {f"simulate.{engine}" for engine in self._simulators}
                 bad = [
                     check["name"]

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import typer
 
-from buildarena_cli.defaults import DEFAULT_URL, kept_key
+from buildarena_client.places import DEFAULT_URL, kept_key
 
 if TYPE_CHECKING:
     from socket import socket

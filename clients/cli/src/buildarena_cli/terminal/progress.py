@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import time
-from typing import Any
+from typing import TYPE_CHECKING
 
-from buildarena_cli.client import Client, at
+from buildarena_cli.client import Client
 from buildarena_cli.errors import DONE, PARTIAL
 from buildarena_cli.terminal.output import is_terminal, say
+from buildarena_client.waiting import sweep_has_stopped
+
+if TYPE_CHECKING:
+    from buildarena_client.schemas import SweepView
 
 POLL_S = 0.3
-PLAIN_POLL_S = 2.0
+PLAIN_PAUSE_S = 1.7
+"""How much longer lines wait for the next, once a job has ended."""
 FAULTS = ("errored", "cancelled")
 """Outcomes of jobs that were not scored, as the API spells them."""
-STOPPED = ("budget_exhausted", "paused")
-"""States of sweeps of which nothing more starts."""
 
 
-def watch_sweep(client: Client, sweep_id: str) -> dict[str, Any]:
+def watch_sweep(client: Client, sweep_id: str) -> SweepView:
     """Shows a sweep's progress until every job has ended.
 
     Returns:
@@ -26,21 +29,14 @@ def watch_sweep(client: Client, sweep_id: str) -> dict[str, Any]:
     return _watch_bars(client, sweep_id) if is_terminal() else _watch_lines(client, sweep_id)
 
 
-def exit_code(sweep: dict[str, Any]) -> int:
+def exit_code(sweep: SweepView) -> int:
     """0 when every job was scored, 3 when some errored, were cancelled, or had to stop."""
     progress = sweep["progress"]
     faults = any(progress["outcomes"].get(name) for name in FAULTS)
     return PARTIAL if faults or progress["done"] < progress["total"] else DONE
 
 
-def ended(sweep: dict[str, Any]) -> bool:
-    """Whether nothing more will happen: every job has ended, or all others are on hold."""
-    progress = sweep["progress"]
-    moving = [name for name in progress["stages"] if not name.endswith(" on_hold")]
-    return not moving and (progress["done"] == progress["total"] or sweep["state"] in STOPPED)
-
-
-def _watch_bars(client: Client, sweep_id: str) -> dict[str, Any]:
+def _watch_bars(client: Client, sweep_id: str) -> SweepView:
     from rich.progress import (
         BarColumn,
         MofNCompleteColumn,
@@ -70,8 +66,7 @@ def _watch_bars(client: Client, sweep_id: str) -> dict[str, Any]:
     with bars:
         built = bars.add_task("machines built", total=None, note="")
         scored = bars.add_task("jobs scored", total=None, note="")
-        while True:
-            sweep: dict[str, Any] = client.get_patiently(at("sweeps", sweep_id))
+        for sweep in client.watch_sweep(sweep_id, poll_s=POLL_S):
             progress = sweep["progress"]
             stages = progress["stages"]
             building = sum(n for name, n in stages.items() if name.startswith("construct"))
@@ -87,15 +82,12 @@ def _watch_bars(client: Client, sweep_id: str) -> dict[str, Any]:
                 completed=progress["done"],
                 note=f"${progress['cost_usd']:.2f}  {_counted(progress['outcomes'])}",
             )
-            if ended(sweep):
-                return sweep
-            time.sleep(POLL_S)
+    return sweep
 
 
-def _watch_lines(client: Client, sweep_id: str) -> dict[str, Any]:
+def _watch_lines(client: Client, sweep_id: str) -> SweepView:
     shown = ""
-    while True:
-        sweep: dict[str, Any] = client.get_patiently(at("sweeps", sweep_id))
+    for sweep in client.watch_sweep(sweep_id, poll_s=POLL_S):
         progress = sweep["progress"]
         line = (
             f"{progress['done']}/{progress['total']} jobs ended, "
@@ -105,9 +97,9 @@ def _watch_lines(client: Client, sweep_id: str) -> dict[str, Any]:
         if line != shown:
             say(line)
             shown = line
-        if ended(sweep):
-            return sweep
-        time.sleep(PLAIN_POLL_S if progress["done"] else POLL_S)
+        if progress["done"] and not sweep_has_stopped(sweep):
+            time.sleep(PLAIN_PAUSE_S)
+    return sweep
 
 
 def _counted(jobs: dict[str, int]) -> str:

@@ -1,0 +1,1 @@
+"""Writes what of the Python client is not written by hand."""

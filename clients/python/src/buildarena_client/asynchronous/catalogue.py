@@ -1,0 +1,64 @@
+"""What the service has: tasks, models, modules, workers.
+
+Generated from the synchronous module: `make openapi` writes this file.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, cast
+
+from buildarena_client.asynchronous.sending import AsyncSender
+from buildarena_client.paths import HEALTH, at
+
+if TYPE_CHECKING:
+    from buildarena_client.schemas import (
+        CallerView,
+        Health,
+        ModelView,
+        ModuleView,
+        TaskDetail,
+        TaskView,
+        WorkerView,
+    )
+
+
+class AsyncCatalogue(AsyncSender):
+    """What the service has: tasks, models, modules, workers."""
+
+    async def health(self) -> Health:
+        """How the service's parts are."""
+        return cast("Health", await self.get(HEALTH))
+
+    async def caller(self) -> CallerView:
+        """Whose key this is, and what it may do."""
+        return cast("CallerView", await self.get("/v1/caller"))
+
+    async def tasks(self) -> list[TaskView]:
+        """The tasks in their newest versions, the built-in ones first."""
+        return cast("list[TaskView]", await self.get("/v1/tasks"))
+
+    async def task(self, name: str, *, version: str | None = None) -> TaskDetail:
+        """A task with its whole document; the newest version by default."""
+        return cast("TaskDetail", await self.get(at("tasks", name), version=version))
+
+    async def add_task(self, source: Path | str) -> TaskDetail:
+        """Uploads a task.
+
+        Args:
+            source: A YAML file, or the YAML itself as text.
+        """
+        given = bytes(source, "utf-8") if isinstance(source, str) else source
+        return cast("TaskDetail", await self.upload("/v1/tasks", given, "application/yaml"))
+
+    async def models(self) -> list[ModelView]:
+        """The models that jobs can name."""
+        return cast("list[ModelView]", await self.get("/v1/models"))
+
+    async def modules(self) -> list[ModuleView]:
+        """The kinds of parts that machines are made of."""
+        return cast("list[ModuleView]", await self.get("/v1/modules"))
+
+    async def workers(self) -> list[WorkerView]:
+        """The workers that were heard of lately."""
+        return cast("list[WorkerView]", await self.get("/v1/workers"))

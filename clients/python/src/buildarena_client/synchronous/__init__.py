@@ -1,0 +1,1 @@
+"""The client on the standard library, which waits for each answer."""

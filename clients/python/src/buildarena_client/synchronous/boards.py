@@ -1,0 +1,78 @@
+"""Leaderboards and what stands beside them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Unpack, cast
+
+from buildarena_client.synchronous.sending import Sender
+
+if TYPE_CHECKING:
+    from buildarena_client.schemas import (
+        Board,
+        BoardFilters,
+        ChangePage,
+        Comparison,
+        Figures,
+        VerifyAccepted,
+    )
+
+
+class Boards(Sender):
+    """Leaderboards and what stands beside them."""
+
+    def leaderboard(self, **filters: Unpack[BoardFilters]) -> Board:
+        """One track's leaderboard, on each task and overall.
+
+        Args:
+            filters: Which jobs count; the first track with ended jobs by default.
+        """
+        return cast("Board", self.get("/v1/leaderboard", **filters))
+
+    def compare(self, first: str, second: str, **filters: Unpack[BoardFilters]) -> Comparison:
+        """Two models of a leaderboard side by side, with tests on the seeds that they share.
+
+        Args:
+            first: A model, or ``model@configuration``.
+            second: Another.
+            filters: Which jobs count.
+        """
+        answer = self.get("/v1/leaderboard/compare", first=first, second=second, **filters)
+        return cast("Comparison", answer)
+
+    def figures(self, **filters: Unpack[BoardFilters]) -> Figures:
+        """What a leaderboard's figures are drawn from."""
+        return cast("Figures", self.get("/v1/leaderboard/figures", **filters))
+
+    def changes(
+        self, *, before: int | None = None, limit: int = 100, **filters: Unpack[BoardFilters]
+    ) -> ChangePage:
+        """What entered a leaderboard, left it or was scored again, the newest first.
+
+        Args:
+            before: Only older ones than this, the ``next_before`` of the page before.
+            limit: Entries at most.
+            filters: Which leaderboard.
+        """
+        answer = self.get("/v1/leaderboard/changes", before=before, limit=limit, **filters)
+        return cast("ChangePage", answer)
+
+    def verify_leaderboard(
+        self,
+        model: str,
+        *,
+        track: str | None = None,
+        tasks: list[str] | None = None,
+        sample: int | None = None,
+        seed: int = 0,
+    ) -> VerifyAccepted:
+        """Asks for verifications of a model's results, of all or of a sample.
+
+        Args:
+            model: Whose.
+            track: On which track; the first by default.
+            tasks: On which tasks; all by default.
+            sample: How many; all by default.
+            seed: Of the sample.
+        """
+        body = {"model": model, "track": track, "tasks": tasks, "sample": sample, "seed": seed}
+        return cast("VerifyAccepted", self.post("/v1/leaderboard/verify", body))

@@ -1,0 +1,61 @@
+"""What the service has: tasks, models, modules, workers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, cast
+
+from buildarena_client.paths import HEALTH, at
+from buildarena_client.synchronous.sending import Sender
+
+if TYPE_CHECKING:
+    from buildarena_client.schemas import (
+        CallerView,
+        Health,
+        ModelView,
+        ModuleView,
+        TaskDetail,
+        TaskView,
+        WorkerView,
+    )
+
+
+class Catalogue(Sender):
+    """What the service has: tasks, models, modules, workers."""
+
+    def health(self) -> Health:
+        """How the service's parts are."""
+        return cast("Health", self.get(HEALTH))
+
+    def caller(self) -> CallerView:
+        """Whose key this is, and what it may do."""
+        return cast("CallerView", self.get("/v1/caller"))
+
+    def tasks(self) -> list[TaskView]:
+        """The tasks in their newest versions, the built-in ones first."""
+        return cast("list[TaskView]", self.get("/v1/tasks"))
+
+    def task(self, name: str, *, version: str | None = None) -> TaskDetail:
+        """A task with its whole document; the newest version by default."""
+        return cast("TaskDetail", self.get(at("tasks", name), version=version))
+
+    def add_task(self, source: Path | str) -> TaskDetail:
+        """Uploads a task.
+
+        Args:
+            source: A YAML file, or the YAML itself as text.
+        """
+        given = bytes(source, "utf-8") if isinstance(source, str) else source
+        return cast("TaskDetail", self.upload("/v1/tasks", given, "application/yaml"))
+
+    def models(self) -> list[ModelView]:
+        """The models that jobs can name."""
+        return cast("list[ModelView]", self.get("/v1/models"))
+
+    def modules(self) -> list[ModuleView]:
+        """The kinds of parts that machines are made of."""
+        return cast("list[ModuleView]", self.get("/v1/modules"))
+
+    def workers(self) -> list[WorkerView]:
+        """The workers that were heard of lately."""
+        return cast("list[WorkerView]", self.get("/v1/workers"))
