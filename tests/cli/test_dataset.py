@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
 
@@ -24,7 +25,9 @@ from buildarena_cli.dataset.messages import tools
 from buildarena_cli.dataset.reading import Fetched
 from buildarena_cli.dataset.replaying import parts_hash
 from buildarena_cli.defaults import KEY_VARIABLE
-from buildarena_geometry import Machine, replay
+from buildarena_cli.errors import CommandError
+from buildarena_geometry import Machine
+from buildarena_geometry import replay as done_again
 from buildarena_pipeline.runtime.context import open_context
 from buildarena_pipeline.runtime.machine_documents import machine_bytes
 
@@ -124,7 +127,7 @@ def test_a_sweep_loads_and_every_machine_is_found_again(url, context, tmp_path):
         if row["machine"] is not None:
             assert sha256(row["machine"].encode()).hexdigest() == row["machine_sha256"]
             machine = Machine.from_document(json.loads(row["machine"]))
-            assert replay(machine.log) == machine
+            assert done_again(machine.log) == machine
             assert row["replayed_sha256"] == row["parts_sha256"]
     assert by_model["builtin/idle"]["machine"] is None
     assert by_model["builtin/idle"]["reason"] == "plan_unreadable"
@@ -420,6 +423,31 @@ def test_rows_are_written_as_they_come(tmp_path, monkeypatch):
     file = pq.ParquetFile(tmp_path / "out" / "jobs.parquet")
     assert file.num_row_groups >= 5
     assert [row["seed"] for row in file.read().to_pylist()] == list(range(50))
+
+
+def test_half_a_letter_is_replaced_and_a_broken_transcript_is_named(tmp_path):
+    one = made_up(1)
+    half = {"index": 0, "stage": "plan", "role": "planner", "text": "a\ud800b", "actions": []}
+    spelled = json.dumps({"turns": [half]}).encode()
+    assert b"\\ud800" in spelled
+    writing.write_dataset([replace(one, transcript=spelled)], tmp_path / "half", licence="mit")
+    assert [m["content"] for m in rows(tmp_path / "half")[0]["messages"]] == ["a\ufffdb"]
+    for broken in (b"[]", b"{}", b'{"turns": [1]}', b"no JSON", b'{"turns": [{"text": 1}]}'):
+        with pytest.raises(CommandError, match="job_00000000000000000001 has documents that can"):
+            writing.write_dataset(
+                [made_up(0), replace(one, transcript=broken)], tmp_path / "out", licence="mit"
+            )
+    assert names(tmp_path) == {"half"}
+
+
+def test_an_interrupted_export_leaves_nothing(tmp_path):
+    def stopped():
+        yield made_up(0)
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        writing.write_dataset(stopped(), tmp_path / "out", licence="mit")
+    assert names(tmp_path) == set()
 
 
 def test_a_name_is_no_markup_in_the_card():

@@ -6,13 +6,23 @@ import os
 import re
 from pathlib import Path
 
+import httpx
 import nbformat
 import pytest
+from live_api import live_api
 from nbclient import NotebookClient
+from working import work
 
 from buildarena import pages
 
 FOLDER = Path(__file__).parents[2] / "examples" / "notebooks"
+SWEEP = {
+    "name": "two",
+    "tasks": ["support-1"],
+    "models": ["builtin/expert", "builtin/idle"],
+    "seeds": [0],
+    "simulator": "mujoco",
+}
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::ResourceWarning")
 
 
@@ -77,6 +87,18 @@ def test_designs_are_compared(tmp_path):
     assert float(lines[-1][1]) > 2 * float(lines[0][1])
     assert len(shown(done, "image/png")) == 1
     assert "(pybullet)" in shown(done, "text/html")[-1]
+
+
+def test_a_service_is_read(tmp_path, context, monkeypatch):
+    with live_api(context) as url:
+        httpx.post(f"{url}/v1/sweeps", json=SWEEP).raise_for_status()
+        work(context)
+        monkeypatch.setenv("BUILDARENA_URL", url)
+        done = run(read("service"), tmp_path)
+    board, jobs = shown(done, "text/plain")[:2]
+    assert "builtin/expert" in board
+    assert "construction_failed" in jobs
+    assert "success, load" in shown(done, "text/html")[-1]
 
 
 def test_a_cell_that_fails_is_a_failure(tmp_path):

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 if TYPE_CHECKING:
     from buildarena.known_tasks import tasks
     from buildarena.machines import Feedback, Machine
+    from buildarena.service import job_machine, job_trial, jobs, leaderboard
     from buildarena.trials import Trial, simulate, simulate_all
 
 __version__ = "0.1.0"
@@ -19,13 +20,29 @@ _PLACES: Final = {
     "Feedback": "machines",
     "Machine": "machines",
     "Trial": "trials",
+    "job_machine": "service",
+    "job_trial": "service",
+    "jobs": "service",
+    "leaderboard": "service",
     "simulate": "trials",
     "simulate_all": "trials",
     "tasks": "known_tasks",
 }
 """In which module each name is."""
 
-__all__ = ["Feedback", "Machine", "Trial", "__version__", "simulate", "simulate_all", "tasks"]
+__all__ = [
+    "Feedback",
+    "Machine",
+    "Trial",
+    "__version__",
+    "job_machine",
+    "job_trial",
+    "jobs",
+    "leaderboard",
+    "simulate",
+    "simulate_all",
+    "tasks",
+]
 
 
 def __getattr__(name: str) -> Any:

@@ -15,8 +15,10 @@ from buildarena_benchmark.flags import is_disqualified
 from buildarena_cli.dataset.messages import chat, compact
 from buildarena_cli.dataset.reading import Fetched
 from buildarena_cli.dataset.replaying import action_rows, parts_hash, replayed_hash
+from buildarena_cli.errors import CommandError
 from buildarena_pipeline.agents.briefing import briefing, briefing_digest
 from buildarena_pipeline.catalog.tracks import EXTERNAL_WORKFLOW
+from buildarena_store import clean
 
 BASELINE: Final = "builtin/"
 OURS: Final = "apache-2.0"
@@ -48,9 +50,23 @@ def rows_of(fetched: Fetched, *, tools: str, licence: str) -> Rows:
         fetched: The job.
         tools: The tools' definitions.
         licence: Licence of what models, agents and people made.
+
+    Raises:
+        CommandError: The job's documents are not what they should be, as an imported job's may be.
     """
+    try:
+        return _rows_of(fetched, tools=tools, licence=licence)
+    except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
+        told = f"{type(error).__name__}: {error}"
+        raise CommandError(
+            f"{fetched.job['id']} has documents that can't be read ({told}): leave it out by a "
+            "filter, such as --sweep"
+        ) from error
+
+
+def _rows_of(fetched: Fetched, *, tools: str, licence: str) -> Rows:
     job = fetched.job
-    turns = json.loads(fetched.transcript)["turns"] if fetched.transcript else []
+    turns = _turns(fetched.transcript) if fetched.transcript else []
     document = json.loads(fetched.machine) if fetched.machine else None
     manifest = job["manifest"] or {}
     track = manifest.get("track") or {}
@@ -82,6 +98,12 @@ def rows_of(fetched: Fetched, *, tools: str, licence: str) -> Rows:
         "license": OURS if job["model"].startswith(BASELINE) else licence,
     }
     return Rows(job=row, actions=action_rows(job["id"], turns, document))
+
+
+def _turns(transcript: bytes) -> list[dict[str, Any]]:
+    turns: list[dict[str, Any]] = json.loads(transcript)["turns"]
+    # Half a letter can be spelled in JSON, and in no other file.
+    return list(clean(turns)) if b"\\ud" in transcript.lower() else turns
 
 
 def _of_task(task: Mapping[str, Any] | None) -> dict[str, Any]:

@@ -115,6 +115,7 @@ def _size(value: Any) -> int:
 @contextlib.contextmanager
 def _new_folder(out: Path) -> Iterator[Path]:
     """A folder beside a place that takes it in the end; nothing stays of one that broke off."""
+    out = out.resolve()
     check_place(out)
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
