@@ -108,6 +108,14 @@ def test_a_player_carries_the_trajectory_to_the_bit(trial):
 
 
 @needs_viewer
+def test_a_trial_that_blew_up_can_be_read(trial):
+    peaks = [replace(peak, ratio=float("inf")) for peak in trial.trajectory.joint_peaks]
+    blown = replace(trial, trajectory=replace(trial.trajectory, joint_peaks=tuple(peaks)))
+    given = unpacked(Elements(framed(html_of(blown))).scripts["given"])
+    assert {peak["ratio"] for peak in given["trial"]["joint_peaks"]} == {None}
+
+
+@needs_viewer
 def test_a_page_asks_for_nothing(trial):
     page = trial.to_html()
     elements = Elements(page)

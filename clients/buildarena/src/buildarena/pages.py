@@ -9,6 +9,7 @@ from __future__ import annotations
 import base64
 import gzip
 import json
+import math
 from dataclasses import asdict, dataclass
 from functools import cache
 from html import escape
@@ -114,7 +115,16 @@ class Shown:
 
 def _packed(given: dict[str, Any]) -> str:
     """JSON, gzipped, in base64: of its letters none ends an element."""
-    return _packed_bytes(json.dumps(given).encode())
+    return _packed_bytes(json.dumps(_finite(given), allow_nan=False).encode())
+
+
+def _finite(value: Any) -> Any:
+    """A value without figures that JSON can't hold: a trial that blew up has such."""
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, dict):
+        return {name: _finite(one) for name, one in value.items()}
+    return [_finite(one) for one in value] if isinstance(value, list | tuple) else value
 
 
 @cache

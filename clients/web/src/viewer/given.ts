@@ -9,7 +9,7 @@ export interface GivenTrial {
   positions: string;
   quaternions: string;
   cargo: { size: [number, number, number]; positions: string; quaternions: string; mass: string } | null;
-  joint_peaks: JointPeak[];
+  joint_peaks: (Omit<JointPeak, "ratio"> & { ratio: number | null })[];
   joint_loads: string | null;
   breaks: Break[];
   engine: string;
@@ -46,7 +46,8 @@ export function trialOf(given: GivenTrial): Trial {
             quaternions: floats(given.cargo.quaternions),
             mass: doubles(given.cargo.mass),
           },
-    peaks: given.joint_peaks,
+    // A load that is no number is one that no joint bears.
+    peaks: given.joint_peaks.map((peak) => ({ ...peak, ratio: peak.ratio ?? Infinity })),
     loads: given.joint_loads === null ? null : floats(given.joint_loads),
     breaks: given.breaks,
     engine: given.engine,
