@@ -4,7 +4,7 @@ import { fileURLToPath } from "node:url";
 import type { Plugin } from "vite";
 import { defineConfig } from "vitest/config";
 
-const here = (path: string): string => fileURLToPath(new URL(path, import.meta.url));
+export const here = (path: string): string => fileURLToPath(new URL(path, import.meta.url));
 
 const MODULES = here("../../libs/geometry/src/buildarena_geometry/modules/modules.yaml");
 
@@ -13,7 +13,7 @@ interface ModulesFile {
 }
 
 /** What of the geometry library's modules a page draws; the file is JSON, whatever its ending says. */
-const moduleShapes: Plugin = {
+export const moduleShapes: Plugin = {
   name: "module-shapes",
   resolveId: (id) => (id === "virtual:modules" ? "\0modules" : null),
   load(id) {

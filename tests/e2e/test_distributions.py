@@ -138,6 +138,21 @@ def test_each_licence_is_the_repositorys() -> None:
 
 
 @needs_pages
+def test_a_notebook_draws_from_an_empty_environment(installed: Path, tmp_path) -> None:
+    code = (
+        "import buildarena as ba; machine = ba.Machine(); machine.start(); "
+        "print(machine._repr_mimebundle_()['text/html'])"
+    )
+    words = [str(installed / "python"), "-c", code]
+    shown = subprocess.run(
+        words, cwd=tmp_path, env=alone(), capture_output=True, text=True, check=False
+    )
+    assert shown.returncode == 0, shown.stderr
+    assert "<iframe sandbox=" in shown.stdout
+    assert len(shown.stdout) > 100_000
+
+
+@needs_pages
 def test_demo_report_and_pages_run_from_an_empty_environment(installed: Path, tmp_path) -> None:
     data = tmp_path / "data"
     words = ["demo", "--task", "support-1", "--data", str(data), "--port", str(free_port())]

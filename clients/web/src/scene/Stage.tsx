@@ -1,5 +1,4 @@
 import { Canvas } from "@react-three/fiber";
-import { Text } from "@mantine/core";
 import type { ReactNode } from "react";
 import { Object3D, type Box3 } from "three";
 import { Camera, FIELD_DEG } from "./Camera";
@@ -40,7 +39,7 @@ interface StageProps {
 export function Stage({ bounds, height, label, subject = "", lock, children }: StageProps) {
   drawing ??= whoDraws();
   if (drawing === "none") {
-    return <Text size="sm">This browser draws no 3D (WebGL 2 is off).</Text>;
+    return <p>This browser draws no 3D (WebGL 2 is off).</p>;
   }
   return (
     <div className="stage-3d" style={{ height }} role="img" aria-label={label}>

@@ -1,6 +1,5 @@
 import { Alert, Button, Group, Stack, Switch, Text } from "@mantine/core";
 import { useMemo, useState } from "react";
-import { Box3, Matrix4, Vector3 } from "three";
 import { duration } from "../format";
 import { useClock, type Clock } from "./clock";
 import { Curves } from "./Curves";
@@ -9,8 +8,8 @@ import { Film } from "./Film";
 import { Legend } from "./Legend";
 import { loadsAt, mostLoaded } from "./loads";
 import type { CameraLock } from "./lock";
-import { boundsOf, readScene, type Machine, type MachineScene } from "./machine";
-import { cargoAt, poseAt } from "./playing";
+import { readScene, type MachineScene } from "./machine";
+import { startBounds } from "./playing";
 import { Stage } from "./Stage";
 import { Surroundings, type Scenario } from "./Surroundings";
 import { TimeLine } from "./TimeLine";
@@ -72,16 +71,6 @@ export function TrialScene({ scene, trial, scenario, clock, loads, follow, heigh
       )}
     </>
   );
-}
-
-function startBounds(machine: Machine, trial: Trial): Box3 {
-  const start = poseAt(trial, 0);
-  const whole = boundsOf({ ...machine, parts: machine.parts.map((part) => ({ ...part, pose: start(part, part.pose.clone()) })) });
-  if (trial.cargo !== null) {
-    const size = new Vector3(...trial.cargo.size);
-    whole.union(new Box3().setFromCenterAndSize(new Vector3().setFromMatrixPosition(cargoAt(trial, 0, new Matrix4())), size));
-  }
-  return whole;
 }
 
 const NAMED = 8;

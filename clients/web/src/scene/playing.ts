@@ -1,4 +1,5 @@
-import { Matrix4, Quaternion, Vector3 } from "three";
+import { Box3, Matrix4, Quaternion, Vector3 } from "three";
+import { boundsOf, type Machine } from "./machine";
 import type { PoseNow } from "./Parts";
 import { moduleShape } from "./modules";
 import { instantAt, type Trial } from "./trial";
@@ -53,4 +54,15 @@ export function cargoAt(trial: Trial, time: number, into: Matrix4): Matrix4 {
   const { index, share } = instantAt(trial.times, time);
   const [place, facing] = blended(trial.cargo.positions, trial.cargo.quaternions, 0, 1, index, share);
   return into.compose(place, facing, ONE);
+}
+
+/** The box around everything that moves, as the trial begins. */
+export function startBounds(machine: Machine, trial: Trial): Box3 {
+  const start = poseAt(trial, 0);
+  const whole = boundsOf({ ...machine, parts: machine.parts.map((part) => ({ ...part, pose: start(part, part.pose.clone()) })) });
+  if (trial.cargo !== null) {
+    const size = new Vector3(...trial.cargo.size);
+    whole.union(new Box3().setFromCenterAndSize(new Vector3().setFromMatrixPosition(cargoAt(trial, 0, new Matrix4())), size));
+  }
+  return whole;
 }

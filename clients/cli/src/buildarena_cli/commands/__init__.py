@@ -39,7 +39,7 @@ COMMANDS: Final[Mapping[str, Entry]] = {
     "site": Entry(
         "site", "site", "Write a board as a static site, which any file server can show."
     ),
-    "export": Entry("leaderboard", "export", "Write the leaderboard to a file."),
+    "export": Entry("exports", "export", "Write the leaderboard to a file, or jobs as a dataset."),
     "audit": Entry("leaderboard", "audit", "Replay and simulate a model's results again."),
     "task": Entry("tasks", "app", "Look at tasks, and add your own."),
     "model": Entry("models", "app", "Look at models."),

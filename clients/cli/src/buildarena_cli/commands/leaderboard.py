@@ -1,16 +1,15 @@
-"""The commands around the leaderboard: leaderboard, compare, export, audit."""
+"""The commands around the leaderboard: leaderboard, compare, audit."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from datetime import datetime
-from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from buildarena_cli.client import Client, at
-from buildarena_cli.errors import DONE, FAILED, CommandError
+from buildarena_cli.errors import DONE, FAILED
 from buildarena_cli.options import (
     DEFAULT_URL,
     JsonOption,
@@ -25,7 +24,6 @@ from buildarena_cli.options import (
 from buildarena_cli.terminal.boards import overall_table, overview, published_table, task_table
 from buildarena_cli.terminal.output import columns, number, print_json, print_table, say
 
-FORMATS = {".csv": "csv", ".parquet": "parquet", ".tex": "latex"}
 COMPARED = ("first", "second", "diff %", "95 %", "pairs", "p success", "p indicator")
 COMPARISON = columns(
     "task", *COMPARED, figures=COMPARED, leaving=("pairs", "p indicator", "p success", "95 %")
@@ -145,40 +143,6 @@ def compare(
             "p: McNemar's and Wilcoxon's tests on shared seeds, adjusted over all of them (Holm)",
         ],
     )
-
-
-def export(
-    out: Annotated[Path, typer.Option("--out", help="File: .csv, .parquet or .tex.")],
-    *,
-    task: TasksOption = None,
-    level: LevelOption = None,
-    model: ModelsOption = None,
-    reading: ReadingOption = ReadingName.OURS,
-    track: TrackOption = None,
-    url: UrlOption = DEFAULT_URL,
-) -> None:
-    """Write the leaderboard to a file.
-
-    The paper's figures are in it, marked as published.
-    """
-    kind = FORMATS.get(out.suffix)
-    if kind is None:
-        raise CommandError(f"{out}: the name must end in {', '.join(FORMATS)}")
-    client = Client(url)
-    body = client.get_bytes(
-        "/v1/leaderboard/export",
-        format=kind,
-        task=task,
-        level=level,
-        model=model,
-        reading=reading.value,
-        track=track,
-    )
-    try:
-        out.write_bytes(body)
-    except OSError as error:
-        raise CommandError(f"{out} can't be written: {error.strerror}") from error
-    say(f"{out}: {len(body):,} bytes")
 
 
 def audit(

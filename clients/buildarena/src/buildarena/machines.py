@@ -1,0 +1,137 @@
+"""Machines in notebooks: each action is a method, and a machine shows itself in 3D."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from buildarena.pages import FRAME_HEIGHT, Shown
+from buildarena_geometry import Machine as GeometryMachine
+from buildarena_geometry import Outcome, Refused
+from buildarena_geometry.tools import ACTIONS, Action
+
+TYPES: Final = {
+    "string": "str",
+    "integer": "int",
+    "number": "float",
+    "boolean": "bool",
+    "array": "list[float]",
+    "object": "dict[str, object]",
+}
+"""What the types of JSON schemas are called here."""
+
+
+@dataclass(frozen=True, slots=True)
+class Feedback:
+    """What came of an action; shown as the text that a model reads.
+
+    Attributes:
+        ok: Whether the action was carried out; a refused one changed nothing.
+        text: What a model reads about it.
+        reason: The refusal class; None when it was carried out.
+        changed: Ids of the parts that are new, different or gone.
+    """
+
+    ok: bool
+    text: str
+    reason: str | None = None
+    changed: tuple[str, ...] = ()
+
+    def __bool__(self) -> bool:
+        return self.ok
+
+    def __str__(self) -> str:
+        return self.text
+
+    def __repr__(self) -> str:
+        return self.text if self.ok else f"Refused ({self.reason}): {self.text}"
+
+
+class Machine(GeometryMachine):
+    """A machine that is built action by action; see `buildarena_geometry.Machine`.
+
+    Every action of the geometry library is a method with the arguments that models give, and
+    returns a `Feedback`. As the last line of a cell a machine is drawn in 3D, by a page that
+    needs no server and no network.
+    """
+
+    __slots__ = ()
+
+    def to_html(self, *, title: str = "A machine") -> str:
+        """A whole page that shows the machine in 3D and asks for nothing else."""
+        return self._shown(title).page()
+
+    def save_html(self, path: str | Path, *, title: str = "A machine") -> None:
+        """Writes that page into a file."""
+        Path(path).write_text(self.to_html(title=title), encoding="utf-8")
+
+    def _repr_mimebundle_(self, **_asked: Any) -> dict[str, str]:
+        """What notebooks show: the machine in 3D, or its text where they show no HTML."""
+        return {"text/plain": repr(self), "text/html": self._shown("A machine").frame()}
+
+    def _shown(self, title: str) -> Shown:
+        return Shown(title=title, machine=self, height=FRAME_HEIGHT)
+
+    def __getattr__(self, name: str) -> Callable[..., Feedback]:
+        """Says which actions there are, when something else is asked for."""
+        # Notebooks look for many names of their own.
+        if name.startswith("_"):
+            raise AttributeError(name)
+        raise AttributeError(f"a machine has no {name!r}; its actions are {', '.join(ACTIONS)}")
+
+
+def _feedback(outcome: Outcome) -> Feedback:
+    if isinstance(outcome, Refused):
+        return Feedback(ok=False, text=outcome.text, reason=outcome.reason.value)
+    return Feedback(ok=True, text=outcome.text, changed=outcome.changed)
+
+
+def _method(action: Action) -> Callable[..., Feedback]:
+    """An action as a method: its signature and docstring are those of the tool."""
+    signature = _signature(action)
+
+    def carry_out(self: Machine, *values: Any, **named: Any) -> Feedback:
+        given = signature.bind(self, *values, **named).arguments
+        arguments = {name: value for name, value in given.items() if name != "self"}
+        return _feedback(self.act(action.definition.name, arguments))
+
+    carry_out.__name__ = action.definition.name
+    carry_out.__qualname__ = f"Machine.{action.definition.name}"
+    carry_out.__doc__ = _docstring(action)
+    carry_out.__signature__ = signature  # type: ignore[attr-defined] # functions have it
+    return carry_out
+
+
+def _signature(action: Action) -> inspect.Signature:
+    usual = inspect.signature(action.propose).parameters
+    kind = inspect.Parameter.POSITIONAL_OR_KEYWORD
+    parameters = [inspect.Parameter("self", kind)]
+    parameters += [
+        inspect.Parameter(name, kind, default=usual[name].default, annotation=_type(schema))
+        for name, schema in action.definition.parameters["properties"].items()
+    ]
+    return inspect.Signature(parameters, return_annotation="Feedback")
+
+
+def _type(schema: Any) -> str:
+    kind = schema.get("type")
+    if isinstance(kind, list):
+        return " | ".join(TYPES.get(one, "None") for one in kind)
+    return TYPES.get(kind, "object")
+
+
+def _docstring(action: Action) -> str:
+    definition = action.definition
+    lines = [definition.description]
+    about = definition.parameters["properties"]
+    if about:
+        lines += ["", "Args:"]
+        lines += [f"    {name}: {schema['description']}" for name, schema in about.items()]
+    return "\n".join([*lines, "", "Returns:", "    What came of it, as a model reads it."])
+
+
+for _name, _action in ACTIONS.items():
+    setattr(Machine, _name, _method(_action))

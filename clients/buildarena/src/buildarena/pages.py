@@ -1,0 +1,175 @@
+"""Pages that show machines and trials: whole in themselves, and alone in their frame.
+
+A page asks for nothing from anywhere, which its policy enforces. What it shows comes from
+documents of strangers: it is packed, so nothing of it is markup, whatever names are in it.
+"""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import json
+import math
+from dataclasses import asdict, dataclass
+from functools import cache
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from buildarena_benchmark import Task
+    from buildarena_geometry import Machine
+    from buildarena_simulation import Trajectory
+
+SCRIPT: Final = Path(__file__).parent / "viewer" / "viewer.js"
+"""The viewer, where it was built: `make web` does, and wheels carry it."""
+FRAME_HEIGHT: Final = 420
+MISSING: Final = (
+    "The 3D viewer was not built into this installation (`make web` builds it), so this is a "
+    "drawing."
+)
+POLICY: Final = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'"
+LOADER: Final = """
+const packed = document.getElementById("viewer").textContent;
+const bytes = Uint8Array.from(atob(packed), (letter) => letter.charCodeAt(0));
+const unpacked = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+new Response(unpacked).text().then((text) => {
+  const script = document.createElement("script");
+  script.textContent = text;
+  document.head.append(script);
+});
+"""
+_MOST_LOADED: Final = 4_000_000
+"""Figures of a series of loads; longer ones are left out, as a page would not open."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shown:
+    """A machine, or its trial, to be shown.
+
+    Attributes:
+        title: What it is called.
+        machine: The machine.
+        task: The task of the trial.
+        trajectory: How the trial went; None to show the machine as it was built.
+        height: Of the frame, pixels.
+    """
+
+    title: str
+    machine: Machine
+    height: int
+    task: Task | None = None
+    trajectory: Trajectory | None = None
+
+    def frame(self) -> str:
+        """HTML for a notebook: the page in a frame that reaches nothing outside of itself."""
+        if not SCRIPT.is_file():
+            return self._drawn()
+        return (
+            f'<iframe sandbox="allow-scripts" srcdoc="{escape(self.page())}" '
+            f'title="{escape(self.title)}" width="100%" height="{self.height}" '
+            'style="border: 0" loading="lazy"></iframe>'
+        )
+
+    def page(self) -> str:
+        """A whole page."""
+        title = f'<meta charset="utf-8"><title>{escape(self.title)}</title>'
+        if not SCRIPT.is_file():
+            return f"<!doctype html><html><head>{title}</head><body>{self._drawn()}</body></html>"
+        return (
+            f"<!doctype html><html><head>{title}"
+            f'<meta http-equiv="Content-Security-Policy" content="{POLICY}"></head>'
+            '<body><div id="root">This is drawn by a script.</div>'
+            f'<script type="text/plain" id="given">{_packed(self._given())}</script>'
+            f'<script type="text/plain" id="viewer">{_viewer()}</script>'
+            f"<script>{LOADER}</script></body></html>"
+        )
+
+    def _drawn(self) -> str:
+        """The geometry library's drawing, as a picture: nothing in it is run."""
+        if not self.machine.started:
+            return f"<p>{escape(MISSING)} The machine is empty.</p>"
+        from buildarena_geometry.export import machine_svg
+
+        drawing = base64.b64encode(machine_svg(self.machine).encode()).decode()
+        return (
+            f"<p>{escape(MISSING)}</p>"
+            f'<img alt="{escape(self.title)}" src="data:image/svg+xml;base64,{drawing}" '
+            f'style="max-height: {self.height}px; background: white">'
+        )
+
+    def _given(self) -> dict[str, Any]:
+        from buildarena_api.scenes import machine_scene
+
+        scenario = None if self.task is None else self.task.scenario.model_dump(mode="json")
+        return {
+            "title": self.title,
+            "machine": machine_scene(self.machine).model_dump(mode="json"),
+            "scenario": scenario,
+            "trial": None if self.trajectory is None else _trial(self.trajectory),
+        }
+
+
+def _packed(given: dict[str, Any]) -> str:
+    """JSON, gzipped, in base64: of its letters none ends an element."""
+    return _packed_bytes(json.dumps(_finite(given), allow_nan=False).encode())
+
+
+def _finite(value: Any) -> Any:
+    """A value without figures that JSON can't hold: a trial that blew up has such."""
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, dict):
+        return {name: _finite(one) for name, one in value.items()}
+    return [_finite(one) for one in value] if isinstance(value, list | tuple) else value
+
+
+@cache
+def _viewer() -> str:
+    return _packed_bytes(SCRIPT.read_bytes())
+
+
+def _packed_bytes(data: bytes) -> str:
+    # Without a time, so that equal things are equal pages.
+    return base64.b64encode(gzip.compress(data, 6, mtime=0)).decode()
+
+
+def _trial(trajectory: Trajectory) -> dict[str, Any]:
+    """A trajectory as `clients/web/src/viewer/given.ts` reads it."""
+    loads = trajectory.joint_loads
+    return {
+        "times": _bytes(trajectory.time_s, "<f8"),
+        "block_ids": list(trajectory.block_ids),
+        "positions": _bytes(trajectory.positions, "<f4"),
+        "quaternions": _bytes(trajectory.quaternions, "<f4"),
+        "cargo": _cargo(trajectory),
+        "joint_peaks": [asdict(peak) for peak in trajectory.joint_peaks],
+        "joint_loads": None if loads is None or loads.size > _MOST_LOADED else _bytes(loads, "<f4"),
+        "breaks": [asdict(event) for event in trajectory.breaks],
+        "engine": trajectory.engine,
+        "engine_version": trajectory.engine_version,
+    }
+
+
+def _cargo(trajectory: Trajectory) -> dict[str, Any] | None:
+    places, turns, masses = (
+        trajectory.cargo_position,
+        trajectory.cargo_quaternion,
+        trajectory.cargo_mass,
+    )
+    if places is None or turns is None or masses is None or trajectory.cargo_size is None:
+        return None
+    return {
+        "size": list(trajectory.cargo_size),
+        "positions": _bytes(places, "<f4"),
+        "quaternions": _bytes(turns, "<f4"),
+        "mass": _bytes(masses, "<f8"),
+    }
+
+
+def _bytes(array: NDArray[np.floating[Any]], kind: str) -> str:
+    """An array's figures, row after row; what is not finite stays so."""
+    return base64.b64encode(array.astype(kind).tobytes()).decode()

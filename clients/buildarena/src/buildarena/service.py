@@ -1,0 +1,121 @@
+"""What a service holds, for notebooks: boards and jobs as frames, a job's machine and trial."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any, Unpack
+
+from buildarena_client import Client, ClientError, jobs_frame, leaderboard_frame
+
+if TYPE_CHECKING:
+    from buildarena.machines import Machine
+    from buildarena.trials import Trial
+    from buildarena_client.frames import Kind
+    from buildarena_client.schemas import BoardFilters, JobDetail, JobFilters
+
+MACHINE = "machine"
+
+
+def leaderboard(
+    url: str | None = None,
+    *,
+    overall: bool = False,
+    kind: Kind = "pandas",
+    **filters: Unpack[BoardFilters],
+) -> Any:
+    """A service's leaderboard as a frame: a row for each model on each task.
+
+    Args:
+        url: Where the service is; by default BUILDARENA_URL, or this machine. A key is taken from
+            BUILDARENA_KEY or BUILDARENA_KEY_FILE.
+        overall: Whether there is a row for each model over all tasks instead.
+        kind: ``pandas`` or ``polars``.
+        filters: Which jobs count: ``track``, ``task``, ``level``, ``model``, ``sweep``, …
+
+    Raises:
+        ClientError: The service does not answer, or refuses; or the library is not installed.
+    """
+    with Client(url) as client:
+        return leaderboard_frame(client.leaderboard(**filters), overall=overall, kind=kind)
+
+
+def jobs(
+    url: str | None = None,
+    *,
+    limit: int | None = None,
+    kind: Kind = "pandas",
+    **filters: Unpack[JobFilters],
+) -> Any:
+    """Jobs of a service as a frame, a row for each, the newest first.
+
+    Args:
+        url: As in `leaderboard`.
+        limit: How many at most; all by default.
+        kind: ``pandas`` or ``polars``.
+        filters: Which jobs: ``sweep``, ``task``, ``model``, ``outcome``, …
+
+    Raises:
+        ClientError: The service does not answer, or refuses; or the library is not installed.
+    """
+    with Client(url) as client:
+        return jobs_frame(client.jobs(limit=limit, **filters), kind=kind)
+
+
+def job_machine(job_id: str, url: str | None = None) -> Machine:
+    """The machine that a job built; it shows itself, and can be built on.
+
+    Args:
+        job_id: The job.
+        url: As in `leaderboard`.
+
+    Raises:
+        ClientError: There is no such job, it has no machine, or the service does not answer.
+        DocumentError: The service's machine is none that is read here.
+    """
+    with Client(url) as client:
+        return _machine(client, job_id, client.job(job_id))
+
+
+def job_trial(job_id: str, url: str | None = None) -> Trial:
+    """The trial that a job's score is of, as the service keeps it; it plays.
+
+    Args:
+        job_id: The job.
+        url: As in `leaderboard`.
+
+    Raises:
+        ClientError: There is no such job, it was not simulated, or the service does not answer.
+        DocumentError: The service's machine is none that is read here.
+        TrajectoryFormatError: The service's trajectory is none that is read here.
+    """
+    from buildarena.trials import Trial
+    from buildarena_benchmark import Score, parse_task
+    from buildarena_simulation import read_trajectory
+
+    with Client(url) as client:
+        job = client.job(job_id)
+        name = f"trajectory-{(job['manifest'] or {}).get('rollout', 0)}"
+        if name not in job["artifacts"]:
+            ended = job["reason"] or job["outcome"] or job["state"]
+            raise ClientError(f"{job_id} has no trial: {ended}")
+        task = client.task(job["task"], version=job["task_version"])
+        return Trial(
+            task=parse_task(json.dumps(task["document"]), origin=f"task {job['task']}"),
+            machine=_machine(client, job_id, job),
+            score=Score(
+                success=bool(job["success"]),
+                indicator=job["indicator"] or 0.0,
+                metrics=job["metrics"] or {},
+                flags=tuple(job["flags"] or ()),
+            ),
+            trajectory=read_trajectory(client.artifact(job_id, name)),
+        )
+
+
+def _machine(client: Client, job_id: str, job: JobDetail) -> Machine:
+    from buildarena.machines import Machine
+
+    if MACHINE not in job["artifacts"]:
+        ended = job["reason"] or job["outcome"] or job["state"]
+        raise ClientError(f"{job_id} has no machine: {ended}")
+    return Machine.from_document(json.loads(client.artifact(job_id, MACHINE)))

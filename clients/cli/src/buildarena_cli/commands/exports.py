@@ -1,0 +1,133 @@
+"""The command ``buildarena export``: the leaderboard as a file, or jobs as a dataset."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+import typer
+
+from buildarena_cli.client import Client
+from buildarena_cli.commands.leaderboard import LevelOption
+from buildarena_cli.errors import USAGE, CommandError
+from buildarena_cli.ids import whole_id
+from buildarena_cli.near import did_you_mean
+from buildarena_cli.options import (
+    DEFAULT_URL,
+    ModelsOption,
+    ReadingName,
+    ReadingOption,
+    TasksOption,
+    TrackOption,
+    UrlOption,
+)
+from buildarena_cli.terminal.completion import complete_sweep
+from buildarena_cli.terminal.output import say
+
+FORMATS: Final = {".csv": "csv", ".parquet": "parquet", ".tex": "latex"}
+UNKNOWN: Final = "unknown"
+LICENCES: Final = (
+    *("apache-2.0", "mit", "cc0-1.0", "cc-by-4.0", "cc-by-sa-4.0", "cc-by-nc-4.0"),
+    *("cc-by-nc-sa-4.0", "odc-by", "odbl", "other", UNKNOWN),
+)
+"""What the hub calls licences of datasets; `other` wants a sentence of your own in the card."""
+
+SweepsOption = Annotated[
+    list[str] | None,
+    typer.Option("--sweep", help="Only jobs of these sweeps.", autocompletion=complete_sweep),
+]
+
+
+def export(
+    out: Annotated[
+        Path, typer.Option("--out", help="File: .csv, .parquet or .tex. Of a dataset: a folder.")
+    ],
+    *,
+    dataset: Annotated[
+        bool, typer.Option("--dataset", help="Jobs with their transcripts, as a dataset.")
+    ] = False,
+    task: TasksOption = None,
+    level: LevelOption = None,
+    model: ModelsOption = None,
+    reading: ReadingOption = ReadingName.OURS,
+    track: TrackOption = None,
+    sweep: SweepsOption = None,
+    success_only: Annotated[
+        bool, typer.Option("--success-only", help="Only jobs that succeeded.")
+    ] = False,
+    not_disqualified: Annotated[
+        bool, typer.Option("--not-disqualified", help="Only jobs without a disqualifying flag.")
+    ] = False,
+    licence: Annotated[
+        str | None,
+        typer.Option("--license", help="Licence of what models, agents and people made."),
+    ] = None,
+    url: UrlOption = DEFAULT_URL,
+) -> None:
+    """Write the leaderboard to a file, or jobs as a dataset.
+
+    The leaderboard holds the paper's figures, marked as published. With --dataset a folder gets
+    every job that has ended: Parquet with a card, which the `datasets` library loads.
+    """
+    if not dataset:
+        of_datasets = {
+            "--sweep": sweep,
+            "--success-only": success_only,
+            "--not-disqualified": not_disqualified,
+            "--license": licence,
+        }
+        _require_none(of_datasets, "goes with --dataset only")
+        _board(out, url, task=task, level=level, model=model, reading=reading.value, track=track)
+        return
+    of_boards = {"--level": level, "--reading": reading is not ReadingName.OURS}
+    _require_none(of_boards, "is for leaderboards, not for datasets")
+    _dataset(
+        Client(url),
+        out,
+        sweeps=sweep or [],
+        tasks=task or [],
+        models=model or [],
+        track=track,
+        success_only=success_only,
+        not_disqualified=not_disqualified,
+        licence=_known_licence(licence or UNKNOWN),
+    )
+
+
+def _board(out: Path, url: str, **asked: Any) -> None:
+    kind = FORMATS.get(out.suffix)
+    if kind is None:
+        raise CommandError(f"{out}: the name must end in {', '.join(FORMATS)}")
+    body = Client(url).get_bytes("/v1/leaderboard/export", format=kind, **asked)
+    try:
+        out.write_bytes(body)
+    except OSError as error:
+        raise CommandError(f"{out} can't be written: {error.strerror}") from error
+    say(f"{out}: {len(body):,} bytes")
+
+
+def _dataset(client: Client, out: Path, *, licence: str, sweeps: list[str], **filters: Any) -> None:
+    from buildarena_cli.dataset.reading import Filters, Reader
+    from buildarena_cli.dataset.writing import check_place, write_dataset
+
+    check_place(out)
+    chosen = Filters(sweeps=[whole_id(client, "sweep", id_) for id_ in sweeps], **filters)
+    reader = Reader(client, chosen)
+    reader.check()
+    counts = write_dataset(reader.jobs(), out, licence=licence)
+    say(f"{out}: {counts.jobs:,} jobs ({counts.successes:,} succeeded), {counts.actions:,} actions")
+
+
+def _require_none(options: dict[str, Any], why: str) -> None:
+    given = [option for option, value in options.items() if value]
+    if given:
+        raise CommandError(f"{given[0]} {why}", code=USAGE)
+
+
+def _known_licence(given: str) -> str:
+    if given.lower() not in LICENCES:
+        raise CommandError(
+            f"no licence {given!r}; there are {', '.join(LICENCES)}{did_you_mean(given, LICENCES)}",
+            code=USAGE,
+        )
+    return given.lower()

@@ -1,0 +1,83 @@
+"""The card of a dataset: what it holds, for people and for the `datasets` library."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Final
+
+import yaml
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from buildarena_benchmark.flags import DISQUALIFYING, INFORMATIVE
+from buildarena_cli.dataset.columns import ACTIONS, JOBS, Column
+from buildarena_cli.dataset.counts import Counts
+from buildarena_cli.report.escaping import markdown_cell
+
+CARD: Final = "README.md"
+FILES: Final = {"jobs": "jobs.parquet", "actions": "actions.parquet"}
+SIZES: Final = (1_000, 10_000, 100_000, 1_000_000)
+SIZE_NAMES: Final = ("n<1K", "1K<n<10K", "10K<n<100K", "100K<n<1M", "1M<n<10M")
+"""What the hub calls these sizes."""
+
+
+def card(counts: Counts) -> str:
+    """The card of a dataset with these counts; equal datasets have equal ones."""
+    environment = Environment(
+        loader=PackageLoader("buildarena_cli.dataset"),
+        autoescape=False,  # noqa: S701 - Markdown, whose values go through `escape`
+        finalize=_escaped,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    template = environment.get_template("card.md.j2")
+    text = template.render(
+        counts=counts,
+        outcomes=sorted(counts.outcomes.items()),
+        cells=sorted(counts.cells.items()),
+        licences=sorted(counts.licences.items()),
+        jobs=_told(JOBS),
+        actions=_told(ACTIONS),
+        flags=[*DISQUALIFYING.items(), *INFORMATIVE.items()],
+        disqualifying=set(DISQUALIFYING),
+        code=Markup,
+    )
+    return f"---\n{_front_matter(counts)}---\n\n{text}"
+
+
+def _front_matter(counts: Counts) -> str:
+    licences = sorted(counts.licences)
+    size = sum(counts.jobs >= bound for bound in SIZES)
+    facts: dict[str, Any] = {
+        "license": licences[0] if len(licences) == 1 else licences,
+        "language": ["en"],
+        "pretty_name": "Machines built by models in BuildArena",
+        "size_categories": [SIZE_NAMES[size]],
+        "task_categories": ["text-generation"],
+        "tags": ["buildarena", "tool-use", "agents", "engineering", "physics"],
+        "configs": [
+            {
+                "config_name": name,
+                **({"default": True} if name == "jobs" else {}),
+                "data_files": [{"split": "train", "path": file}],
+            }
+            for name, file in FILES.items()
+        ],
+    }
+    return yaml.safe_dump(facts, sort_keys=False, allow_unicode=True)
+
+
+def _escaped(value: Any) -> Any:
+    """A value as text that is no markup; what is our own is given as `Markup`."""
+    return markdown_cell(value) if type(value) is str else value
+
+
+def _told(columns: Sequence[Column]) -> list[tuple[str, str, str]]:
+    return [(column.name, _type(column.type), column.meaning) for column in columns]
+
+
+def _type(kind: Any) -> str:
+    text = str(kind)
+    return "list of messages" if "tool_calls" in text else text.replace("item: ", "")

@@ -1,0 +1,121 @@
+"""The tables of a dataset: each column with its type and its meaning, which the card repeats."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import pyarrow as pa
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """A column.
+
+    Attributes:
+        name: Its name.
+        type: Arrow's type; every column but those of ids may hold null.
+        meaning: What it says, for the card.
+    """
+
+    name: str
+    type: Any
+    meaning: str
+
+
+FUNCTION: Final = pa.struct([("name", pa.string()), ("arguments", pa.string())])
+CALL: Final = pa.struct([("id", pa.string()), ("type", pa.string()), ("function", FUNCTION)])
+MESSAGE: Final = pa.struct(
+    [
+        ("role", pa.string()),
+        ("content", pa.string()),
+        ("name", pa.string()),
+        ("tool_calls", pa.list_(CALL)),
+        ("tool_call_id", pa.string()),
+    ]
+)
+_TEXT, _WHOLE, _REAL, _YES = pa.string(), pa.int64(), pa.float64(), pa.bool_()
+
+JOBS: Final[Sequence[Column]] = (
+    Column("job_id", _TEXT, "The job. The same task, model, settings and seed have the same id."),
+    Column("task", _TEXT, "Name of the task."),
+    Column("task_version", _TEXT, "Hash of everything in the task that can change a score."),
+    Column("task_title", _TEXT, "The task's title."),
+    Column("category", _TEXT, "Kind of machine that the task asks for."),
+    Column("level", _WHOLE, "Difficulty, 1 to 3."),
+    Column("custom_task", _YES, "Whether somebody uploaded the task; others come with BuildArena."),
+    Column("model", _TEXT, "What built: a model, a baseline, `agent/NAME` or `human/NAME`."),
+    Column("configuration", _TEXT, "Hash of the model, its decoding and its limits."),
+    Column("decoding", _TEXT, "JSON: how the model was asked, such as its temperature."),
+    Column("track", _TEXT, "Workflow, simulator and prompts; scores of one track compare."),
+    Column("workflow", _TEXT, "How the session went about building."),
+    Column("simulator", _TEXT, "What tried the machine."),
+    Column("seed", _WHOLE, "Seed of the session and of its trials."),
+    Column("outcome", _TEXT, "How the job ended; `errored` and `cancelled` ones have no score."),
+    Column("reason", _TEXT, "Class of the failure, if there was one."),
+    Column("success", _YES, "Whether the task was solved, whatever the flags say."),
+    Column("disqualified", _YES, "Whether a flag makes it a failure in our rankings."),
+    Column("flags", pa.list_(_TEXT), "Remarks on the score."),
+    Column("indicator", _REAL, "The task's figure: load, distance, height or thrust to weight."),
+    Column("indicator_name", _TEXT, "What the figure is."),
+    Column("indicator_unit", _TEXT, "Its unit; `1` for a ratio."),
+    Column("censored", _YES, "Whether the figure is only known to be at least as great."),
+    Column("metrics", _TEXT, "JSON: further figures of the trial."),
+    Column(
+        "messages",
+        pa.list_(MESSAGE),
+        "The session as a chat, in the order in which things were said: first the task, then each "
+        "reply (`name` is who spoke) with its tool calls and their results. `arguments` is JSON.",
+    ),
+    Column("tools", _TEXT, "JSON: the tools as definitions of functions, as `tools=` takes them."),
+    Column("machine", _TEXT, "JSON: the machine document, byte for byte as it is kept."),
+    Column("machine_sha256", _TEXT, "SHA-256 of `machine` as UTF-8."),
+    Column(
+        "parts_sha256",
+        _TEXT,
+        "SHA-256 of the machine document without its logs: equal machines have equal ones, however "
+        "they were built.",
+    ),
+    Column(
+        "replayed_sha256",
+        _TEXT,
+        "`parts_sha256` of the machine that the actions of this row build when they are done "
+        "again; another one than `parts_sha256` where another version of the rules built it.",
+    ),
+    Column("transcript_sha256", _TEXT, "SHA-256 of the transcript as the service keeps it."),
+    Column("trajectory_sha256", pa.list_(_TEXT), "SHA-256 of each trial's trajectory, in order."),
+    Column("versions", _TEXT, "JSON: versions of everything that can change the result."),
+    Column("actions", _WHOLE, "Actions tried."),
+    Column("refused_actions", _WHOLE, "Those of them that were refused."),
+    Column("refusals", _TEXT, "JSON: refused actions by class."),
+    Column("requests", _WHOLE, "Model requests; null where an agent reports nothing, as below."),
+    Column("input_tokens", _WHOLE, "Tokens sent."),
+    Column("output_tokens", _WHOLE, "Tokens received, hidden reasoning included."),
+    Column("cached_tokens", _WHOLE, "Part of the input that the provider had in its cache."),
+    Column("reasoning_tokens", _WHOLE, "Part of the output that was hidden reasoning."),
+    Column("cost_usd", _REAL, "Price of the requests, US dollars."),
+    Column("imported", _YES, "Whether another service ran it."),
+    Column("verified", _YES, "Of imported jobs: whether their figures were found again here."),
+    Column("finished_at", pa.timestamp("us", tz="UTC"), "When it ended."),
+    Column("license", _TEXT, "Licence of the row."),
+)
+
+ACTIONS: Final[Sequence[Column]] = (
+    Column("job_id", _TEXT, "The job; `jobs` has its row."),
+    Column("index", _WHOLE, "Place of the action in the session, from 0."),
+    Column("turn", _WHOLE, "Reply that asked for it, from 0; null for the session's own."),
+    Column("phase", _TEXT, "Phase of the workflow."),
+    Column("sub_structure", _TEXT, "Part of the machine that it is about, if it is about one."),
+    Column("role", _TEXT, "Who asked for it; `session` for key presses of a program."),
+    Column("tool", _TEXT, "Name of the tool, as it was asked for."),
+    Column("arguments", _TEXT, "JSON: what it was given."),
+    Column("accepted", _YES, "Whether it was carried out."),
+    Column("refusal", _TEXT, "Refusal class, if it was refused."),
+    Column("feedback", _TEXT, "What was read of a refusal; that of accepted ones is in `jobs`."),
+)
+
+
+def schema(columns: Sequence[Column]) -> Any:
+    """The Arrow schema of a table."""
+    return pa.schema([pa.field(column.name, column.type) for column in columns])

@@ -1,0 +1,88 @@
+"""Sessions as chats, as training libraries take them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from buildarena_geometry import tool_definitions
+
+OBJECTION = "raise_objection"
+"""What a role calls to give up; no action of a machine."""
+
+
+def compact(value: Any) -> str:
+    """A JSON value in one spelling."""
+    return json.dumps(value, ensure_ascii=False, sort_keys=True, separators=(",", ":"))
+
+
+def chat(statement: str | None, turns: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """A session as messages.
+
+    Args:
+        statement: What was to be built; None where it is not known any more.
+        turns: The transcript's.
+
+    Returns:
+        The task as the user's message; then for each turn the reply as the assistant's, and each
+        tool's answer.
+    """
+    messages = [] if statement is None else [_message("user", statement)]
+    for turn in turns:
+        calls = [
+            (f"call_{turn['index']}_{number}", action)
+            for number, action in enumerate(turn["actions"])
+        ]
+        asked = [
+            {"id": id_, "type": "function", "function": _function(action)} for id_, action in calls
+        ]
+        messages.append(
+            _message("assistant", turn["text"], name=turn["role"], tool_calls=asked or None)
+        )
+        messages += [
+            _message("tool", action["feedback"], name=action["name"], tool_call_id=id_)
+            for id_, action in calls
+        ]
+    return messages
+
+
+def tools() -> str:
+    """The definitions of all actions, and of the way to give up, as JSON."""
+    given_up = {
+        "name": OBJECTION,
+        "description": "End the work as a failure because it cannot be done within the task's "
+        "rules.",
+        "parameters": {
+            "type": "object",
+            "properties": {"reason": {"type": "string", "description": "Why it cannot be done."}},
+            "required": ["reason"],
+            "additionalProperties": False,
+        },
+    }
+    actions = [
+        {"name": tool.name, "description": tool.description, "parameters": dict(tool.parameters)}
+        for tool in tool_definitions()
+    ]
+    return compact([{"type": "function", "function": tool} for tool in [*actions, given_up]])
+
+
+def _message(
+    role: str,
+    content: str,
+    *,
+    name: str | None = None,
+    tool_calls: list[dict[str, Any]] | None = None,
+    tool_call_id: str | None = None,
+) -> dict[str, Any]:
+    return {
+        "role": role,
+        "content": content,
+        "name": name,
+        "tool_calls": tool_calls,
+        "tool_call_id": tool_call_id,
+    }
+
+
+def _function(action: Mapping[str, Any]) -> dict[str, str]:
+    return {"name": action["name"], "arguments": compact(action["arguments"])}

@@ -1,0 +1,146 @@
+"""A job as the rows of its dataset."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from functools import lru_cache
+from hashlib import sha256
+from typing import Any, Final
+
+from buildarena_benchmark import TaskError, parse_task
+from buildarena_benchmark.flags import is_disqualified
+from buildarena_cli.dataset.messages import chat, compact
+from buildarena_cli.dataset.reading import Fetched
+from buildarena_cli.dataset.replaying import action_rows, parts_hash, replayed_hash
+from buildarena_cli.errors import CommandError
+from buildarena_pipeline.agents.briefing import briefing, briefing_digest
+from buildarena_pipeline.catalog.tracks import EXTERNAL_WORKFLOW
+from buildarena_store import clean
+
+BASELINE: Final = "builtin/"
+OURS: Final = "apache-2.0"
+"""Licence of what baselines made: they are part of BuildArena."""
+AS_THEY_ARE: Final = (
+    *("task", "task_version", "model", "configuration", "track", "seed", "outcome", "reason"),
+    *("success", "indicator", "censored", "flags", "actions", "refused_actions"),
+)
+USAGE: Final = (
+    *("requests", "input_tokens", "output_tokens", "cached_tokens", "reasoning_tokens"),
+    "cost_usd",
+)
+NO_VERSION: Final = frozenset({"model", "machine", "trajectory", "rollout", "seed"})
+"""Of a manifest: what is in columns of its own, or may name an operator's hosts."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rows:
+    """A job's row, and those of its actions."""
+
+    job: Mapping[str, Any]
+    actions: list[dict[str, Any]]
+
+
+def rows_of(fetched: Fetched, *, tools: str, licence: str) -> Rows:
+    """The rows of a job.
+
+    Args:
+        fetched: The job.
+        tools: The tools' definitions.
+        licence: Licence of what models, agents and people made.
+
+    Raises:
+        CommandError: The job's documents are not what they should be, as an imported job's may be.
+    """
+    try:
+        return _rows_of(fetched, tools=tools, licence=licence)
+    except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
+        told = f"{type(error).__name__}: {error}"
+        raise CommandError(
+            f"{fetched.job['id']} has documents that can't be read ({told}): leave it out by a "
+            "filter, such as --sweep"
+        ) from error
+
+
+def _rows_of(fetched: Fetched, *, tools: str, licence: str) -> Rows:
+    job = fetched.job
+    turns = _turns(fetched.transcript) if fetched.transcript else []
+    document = json.loads(fetched.machine) if fetched.machine else None
+    manifest = job["manifest"] or {}
+    track = manifest.get("track") or {}
+    row = {
+        **{name: job[name] for name in AS_THEY_ARE},
+        **{name: job["usage"][name] for name in USAGE},
+        **_of_task(fetched.task),
+        "job_id": job["id"],
+        "decoding": compact((manifest.get("model") or {}).get("decoding") or {}),
+        "workflow": track.get("workflow") or job["track"].partition("/")[0],
+        "simulator": track.get("simulator"),
+        "disqualified": is_disqualified(job["flags"] or ()),
+        "metrics": None if job["metrics"] is None else compact(job["metrics"]),
+        "messages": chat(_first_words(fetched.task, track), turns),
+        "tools": tools,
+        "machine": None if fetched.machine is None else fetched.machine.decode(),
+        "machine_sha256": job["artifacts"].get("machine"),
+        "parts_sha256": None if document is None else parts_hash(document),
+        "replayed_sha256": replayed_hash(turns, document),
+        "transcript_sha256": (
+            None if fetched.transcript is None else sha256(fetched.transcript).hexdigest()
+        ),
+        "trajectory_sha256": _trajectories(job["artifacts"]),
+        "versions": compact({k: v for k, v in manifest.items() if k not in NO_VERSION}),
+        "refusals": compact(job["refusals"] or {}),
+        "imported": job["imported_from"] is not None,
+        "verified": None if job["imported_from"] is None else job["verified_at"] is not None,
+        "finished_at": job["finished_at"] and datetime.fromisoformat(job["finished_at"]),
+        "license": OURS if job["model"].startswith(BASELINE) else licence,
+    }
+    return Rows(job=row, actions=action_rows(job["id"], turns, document))
+
+
+def _turns(transcript: bytes) -> list[dict[str, Any]]:
+    turns: list[dict[str, Any]] = json.loads(transcript)["turns"]
+    # Half a letter can be spelled in JSON, and in no other file.
+    return list(clean(turns)) if b"\\ud" in transcript.lower() else turns
+
+
+def _of_task(task: Mapping[str, Any] | None) -> dict[str, Any]:
+    told = task or {}
+    return {
+        "task_title": told.get("title"),
+        "category": told.get("category"),
+        "level": told.get("level"),
+        "custom_task": told.get("custom"),
+        "indicator_name": told.get("indicator"),
+        "indicator_unit": told.get("unit"),
+    }
+
+
+def _first_words(task: Mapping[str, Any] | None, track: Mapping[str, Any]) -> str | None:
+    """What a session begins with: a task's statement, for agents with the words around it."""
+    if task is None:
+        return None
+    as_read = track.get("workflow") == EXTERNAL_WORKFLOW
+    if as_read and track.get("prompts_digest") == briefing_digest():
+        return _briefing(compact(task["document"])) or str(task["statement"])
+    return str(task["statement"])
+
+
+@lru_cache(maxsize=64)
+def _briefing(document: str) -> str | None:
+    """The briefing of a task's document; None when it is of a version that is not read here."""
+    try:
+        return briefing(parse_task(document, origin="task"))
+    except TaskError:
+        return None
+
+
+def _trajectories(artifacts: Mapping[str, str]) -> list[str]:
+    numbered = {
+        int(name.removeprefix("trajectory-")): digest
+        for name, digest in artifacts.items()
+        if name.removeprefix("trajectory-").isdecimal()
+    }
+    return [numbered[number] for number in sorted(numbered)]

@@ -1,0 +1,133 @@
+"""The folder of a dataset: written beside its place, and moved there when it is whole."""
+
+from __future__ import annotations
+
+import contextlib
+import shutil
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from tempfile import mkdtemp
+from typing import Any, Final, Self
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from buildarena_cli.dataset.card import CARD, FILES, card
+from buildarena_cli.dataset.columns import ACTIONS, JOBS, Column, schema
+from buildarena_cli.dataset.counts import Counts
+from buildarena_cli.dataset.messages import tools
+from buildarena_cli.dataset.reading import Fetched
+from buildarena_cli.dataset.rows import rows_of
+from buildarena_cli.errors import CommandError
+
+GROUP_ROWS: Final = 256
+GROUP_BYTES: Final = 16 << 20
+"""Texts of a row group; at most so much and one row more is in memory."""
+MAX_NAMED: Final = 3
+
+
+def write_dataset(fetched: Iterable[Fetched], out: Path, *, licence: str) -> Counts:
+    """Writes jobs into a new folder, which is there whole or not at all.
+
+    Args:
+        fetched: The jobs; they are taken one by one.
+        out: The folder.
+        licence: Licence of what models, agents and people made.
+
+    Raises:
+        CommandError: There are no jobs, or the folder can't be written.
+    """
+    definitions, counts = tools(), Counts()
+    with _new_folder(out) as folder:
+        with (
+            _Table(folder / FILES["jobs"], JOBS) as jobs,
+            _Table(folder / FILES["actions"], ACTIONS) as actions,
+        ):
+            for one in fetched:
+                rows = rows_of(one, tools=definitions, licence=licence)
+                jobs.add(rows.job)
+                for action in rows.actions:
+                    actions.add(action)
+                counts.add(rows.job, rows.actions)
+        if not counts.jobs:
+            raise CommandError("no job that has ended is among those that were asked for")
+        (folder / CARD).write_text(card(counts), encoding="utf-8")
+    return counts
+
+
+def check_place(out: Path) -> None:
+    """Checks that a dataset can come to a place.
+
+    Raises:
+        CommandError: Something is there already.
+    """
+    if out.exists() and not out.is_dir():
+        raise CommandError(f"{out} is a file; with --dataset, --out names a folder")
+    try:
+        found = sorted(entry.name for entry in out.iterdir()) if out.is_dir() else []
+    except OSError as error:
+        raise CommandError(f"{out} can't be read: {error.strerror}") from error
+    if found:
+        named = ", ".join(found[:MAX_NAMED]) + (" …" if len(found) > MAX_NAMED else "")
+        raise CommandError(f"{out} is not empty ({named}): name a new folder")
+
+
+class _Table:
+    """A Parquet file that gets row groups as they come."""
+
+    def __init__(self, path: Path, columns: Sequence[Column]) -> None:
+        self._schema = schema(columns)
+        self._writer = pq.ParquetWriter(path, self._schema, compression="zstd")
+        self._rows: list[Mapping[str, Any]] = []
+        self._size = 0
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        if error[0] is None:
+            self._flush()
+        self._writer.close()
+
+    def add(self, row: Mapping[str, Any]) -> None:
+        """Adds a row."""
+        self._rows.append(row)
+        self._size += _size(row)
+        if len(self._rows) >= GROUP_ROWS or self._size >= GROUP_BYTES:
+            self._flush()
+
+    def _flush(self) -> None:
+        if self._rows:
+            table = pa.Table.from_pylist(self._rows, schema=self._schema)
+            self._writer.write_table(table, row_group_size=len(self._rows))
+        self._rows, self._size = [], 0
+
+
+def _size(value: Any) -> int:
+    """Characters of all texts in a value."""
+    if isinstance(value, str):
+        return len(value)
+    if isinstance(value, Mapping):
+        return sum(map(_size, value.values()))
+    return sum(map(_size, value)) if isinstance(value, list) else 0
+
+
+@contextlib.contextmanager
+def _new_folder(out: Path) -> Iterator[Path]:
+    """A folder beside a place that takes it in the end; nothing stays of one that broke off."""
+    out = out.resolve()
+    check_place(out)
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        partial = Path(mkdtemp(prefix=f".{out.name}.", suffix=".partial", dir=out.parent))
+    except OSError as error:
+        raise CommandError(f"{out} can't be written: {error.strerror}") from error
+    try:
+        yield partial
+        # What mkdtemp makes is for its owner alone.
+        partial.chmod(0o755)
+        partial.replace(out)
+    except OSError as error:
+        raise CommandError(f"{out} can't be written: {error.strerror or error}") from error
+    finally:
+        shutil.rmtree(partial, ignore_errors=True)
