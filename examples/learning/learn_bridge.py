@@ -183,6 +183,8 @@ def main() -> None:
     machine = options.out / "bridge.machine.json"
     machine.write_text(json.dumps(best.machine.to_document()) + "\n", encoding="utf-8")
     told = {engine: trial.as_document() for engine, trial in trials.items()}
+    for trial in told.values():
+        del trial["wall_s"]
     (options.out / "verdicts.json").write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
     for engine, trial in told.items():
         print(f"{engine}: {trial['indicator']} {trial['flags']}")

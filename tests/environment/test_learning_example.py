@@ -86,7 +86,8 @@ def test_the_learned_bridge_beats_the_expert(engine) -> None:
     assert learned.counts
     assert learned.reason is None
     assert set(learned.score.flags) <= {"never_fell"}
-    assert learned.score.metrics["floor_share"] == 0.0
+    assert learned.score.metrics["floor_share"] < 0.01
+    assert learned.score.metrics["least_terrain_share"] > 0.4
     before = try_machine(task, expert.machines["main"], engine)
     assert learned.score.indicator > before.score.indicator
     kept = json.loads((KEPT / "verdicts.json").read_text())[engine]
@@ -99,4 +100,4 @@ def test_the_curve_is_of_rewards_that_rise() -> None:
     assert [row["number"] for row in rows] == list(range(1, len(rows) + 1))
     assert rows[-1]["minutes"] < 60
     assert rows[0]["best"] < 1.0 < rows[-1]["best"]
-    assert np.mean([row["mean"] for row in rows[-5:]]) > 2 * rows[0]["mean"]
+    assert np.mean([row["mean"] for row in rows[-5:]]) > 3 * rows[0]["mean"]
