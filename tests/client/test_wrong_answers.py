@@ -5,7 +5,6 @@ from __future__ import annotations
 import inspect
 import json
 import time
-import traceback
 from itertools import product
 from typing import Any
 
@@ -28,7 +27,6 @@ from buildarena_client import (
 )
 from buildarena_client.patience import BREAK_PAUSE_S
 
-SECRET = "ba_secret-that-nobody-sees"
 JOB = "job_0a1b2c3d4e5f60718293"
 SWEEP = "sweep_0a1b2c3d4e5f60718293"
 SPEC = {"tasks": ["lift-1"], "models": ["builtin/idle"]}
@@ -125,67 +123,12 @@ def test_what_is_no_answer_of_an_api_is_one_sentence(make, said, error, says) ->
 
 
 def test_nobody_there(make) -> None:
+    """A refused connection is tried once: a thousand tries would take minutes."""
+    client = make("http://127.0.0.1:1", patience=Patience(breaks=1000))
     began = time.monotonic()
     with pytest.raises(UnreachableError, match=r"no BuildArena answers at http://127.0.0.1:1 \("):
-        make("http://127.0.0.1:1").tasks()
-    assert time.monotonic() - began < BREAK_PAUSE_S
-
-
-def test_a_key_goes_to_one_host_alone(make, monkeypatch) -> None:
-    with wrong_server(answer(200, b"[]")) as other:
-        for name in ("http_proxy", "HTTP_PROXY", "https_proxy", "ALL_PROXY", "all_proxy"):
-            monkeypatch.setenv(name, other.url)
-        for status in (301, 302, 303, 307, 308):
-            moved = answer(status, Location=f"{other.url}/v1/tasks")
-            with wrong_server(moved) as server:
-                client = make(server.url, SECRET)
-                for send in (client.tasks, lambda: client.submit_job("a", "b")):  # noqa: B023
-                    with pytest.raises(RefusedError, match=f"HTTP {status}"):
-                        send()
-                assert server.headers("Authorization") == [f"Bearer {SECRET}"] * 2
-        assert other.received == []
-
-
-@pytest.mark.parametrize("status", [400, 401, 403, 404, 409, 413, 422, 429, 500, 503])
-def test_a_key_is_in_no_error(make, status) -> None:
-    problem = {
-        "detail": f"Bearer {SECRET} is bad",
-        "errors": [{"field": SECRET, "message": f"not {SECRET}", "choices": [SECRET]}],
-    }
-    with wrong_server(answer(status, json.dumps(problem).encode())) as server:
-        client = make(server.url, SECRET)
-        with pytest.raises(ClientError) as raised:
-            client.tasks()
-    error = raised.value
-    told = [str(error), repr(error), str(vars(error)), *traceback.format_exception(error)]
-    assert SECRET not in "".join(told)
-    assert SECRET not in repr(client.made)
-    assert server.url in repr(client.made)
-
-
-@pytest.mark.parametrize("key", ["a\r\nHost: x", "é", "a\0b"])
-def test_what_is_no_key_is_refused_unseen(make, key) -> None:
-    with pytest.raises(BadArgumentError, match="is not a key") as refused:
-        make("http://127.0.0.1:1", key)
-    assert key not in str(refused.value)
-
-
-@pytest.mark.parametrize(
-    "url",
-    [
-        *("ftp://x", "nonsense", "http://", "http://x:99999", "http://x:0", "http://["),
-        *("http://x/?a=b", "http://x/#y", "http://x/\r\n", "file:///etc/passwd", ""),
-    ],
-)
-def test_what_is_no_url_is_refused(make, url) -> None:
-    with pytest.raises(BadArgumentError, match="is not the URL of an API"):
-        make(url)
-
-
-def test_a_password_in_a_url_is_refused_unseen(make) -> None:
-    with pytest.raises(BadArgumentError, match="no user or password") as refused:
-        make("http://me:hush@127.0.0.1:1")
-    assert "hush" not in str(refused.value)
+        client.tasks()
+    assert time.monotonic() - began < 1000 * BREAK_PAUSE_S / 10
 
 
 @pytest.mark.parametrize("name", methods())
@@ -236,17 +179,6 @@ def test_no_other_path_is_ever_sent(make, path) -> None:
         for send in (client.get, client.post, client.get_bytes):
             with pytest.raises(BadArgumentError, match="not a path of the service"):
                 send(path)
-    assert server.received == []
-
-
-def test_no_header_and_no_document_is_made_of_nonsense(make) -> None:
-    with wrong_server(answer(200)) as server:
-        client = make(server.url)
-        with pytest.raises(BadArgumentError, match="can't be sent as Idempotency-Key"):
-            client.submit_sweep(SPEC, request_key="a\r\nX: y")
-        for nonsense in (float("nan"), {1, 2}, object()):
-            with pytest.raises(BadArgumentError, match="can't be sent as JSON"):
-                client.submit_sweep({**SPEC, "seeds": nonsense})
     assert server.received == []
 
 
@@ -364,6 +296,22 @@ def test_a_stream_that_is_cut_goes_on_where_it_was(make) -> None:
     assert [one["id"] for one in seen] == [1, 2, 3, 4]
     assert seen[2]["data"] == {"said": "é"}
     assert server.headers("Last-Event-ID") == ["0", "2", "2", "2", "2", "4"]
+
+
+def test_streams_that_end_at_once_are_given_up(make) -> None:
+    head = b"HTTP/1.1 200 OK\r\n\r\n"
+    with wrong_server(head + event(1), head) as server:
+        events = make(server.url, patience=Patience(restart_s=0.3)).sweep_events(SWEEP)
+        assert next(events)["id"] == 1
+        with pytest.raises(UnreachableError, match="ends its streams at once"):
+            next(events)
+        assert 2 <= len(server.received) <= 4
+
+
+@pytest.mark.parametrize("page", [b"[]", b"{}", b'{"next_cursor": 5}', b"null"])
+def test_what_is_no_page_is_refused(make, page) -> None:
+    with wrong_server(answer(200, page)) as server, pytest.raises(NotAnApiError):
+        next(iter(make(server.url).jobs()))
 
 
 def test_a_stream_of_nonsense_is_refused(make) -> None:

@@ -48,6 +48,18 @@ def document(response: Response) -> Any:
         ) from error
 
 
+def next_cursor(page: Any, url: str) -> str | None:
+    """Where the page behind one begins; None behind the last.
+
+    Raises:
+        NotAnApiError: It is no page of a list.
+    """
+    if not isinstance(page, dict) or not isinstance(page.get("next_cursor", 0), str | None):
+        raise NotAnApiError(f"{url} is not BuildArena: a page of a list lacks its next_cursor")
+    cursor: str | None = page["next_cursor"]
+    return cursor
+
+
 def _failure(response: Response, key: str | None) -> ClientError:
     detail, errors = _problem(response, key)
     if response.status == HTTPStatus.SERVICE_UNAVAILABLE:

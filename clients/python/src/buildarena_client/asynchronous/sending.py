@@ -16,10 +16,11 @@ from typing import Any, BinaryIO, Final, Self
 
 from buildarena_client.errors import RefusedError, TimedOutError, UnreachableError
 from buildarena_client.event_streams import Event, EventReader
+from buildarena_client.faults import BrokenError, SilentError, WireError
 from buildarena_client.files import WholeFile
-from buildarena_client.patience import BREAK_PAUSE_S, Patience, Restarting, Waiting
+from buildarena_client.patience import Patience, Restarting, Waiting
 from buildarena_client.places import checked_key, checked_url, kept_key
-from buildarena_client.problems import document, require_success
+from buildarena_client.problems import document, next_cursor, require_success
 from buildarena_client.requests import JSON, Request, Response, json_body
 
 TIMEOUT_S: Final = 60.0
@@ -60,13 +61,11 @@ class AsyncSender:
     ) -> None:
         # Help and completion of the command line load this module, and send nothing by it.
         from buildarena_client.asynchronous.wire import AsyncWire
-        from buildarena_client.faults import BrokenError, SilentError, WireError
 
         self.url = checked_url(url)
         self._key = checked_key(key or kept_key())
         self._timeout_s = timeout_s
         self._patience = patience or Patience()
-        self._broken, self._silent, self._failed = BrokenError, SilentError, WireError
         headers = {"Authorization": f"Bearer {self._key}"} if self._key else {}
         self._wire = AsyncWire(self.url, headers, at_once=at_once)
 
@@ -213,8 +212,8 @@ class AsyncSender:
         """
         while True:
             page = await self.get(path, cursor=cursor, **params)
+            cursor = next_cursor(page, self.url)
             yield page
-            cursor = page["next_cursor"]
             if cursor is None:
                 return
 
@@ -241,6 +240,7 @@ class AsyncSender:
                 timeout_s=STREAM_TIMEOUT_S,
             )
             reader = EventReader()
+            ended = UnreachableError(f"{self.url} ends its streams at once")
             try:
                 async with contextlib.aclosing(self._chunks(request)) as chunks:
                     async for chunk in chunks:
@@ -248,10 +248,11 @@ class AsyncSender:
                         for event in reader.feed(chunk):
                             after = event["id"]
                             yield event
-            except UnreachableError:
-                if restarting.gives_up(now=time.monotonic()):
-                    raise
-            await asyncio.sleep(BREAK_PAUSE_S)
+            except UnreachableError as error:
+                ended = error
+            if restarting.gives_up(now=time.monotonic()):
+                raise ended
+            await asyncio.sleep(RESTART_POLL_S)
 
     def _reading(self, path: str, params: dict[str, Any], *, accept: str | None = None) -> Request:
         return Request(
@@ -273,8 +274,8 @@ class AsyncSender:
             try:
                 response = await self._wire.send(request)
                 pause_s = waiting.pause_after(response, now=time.monotonic())
-            except self._failed as error:
-                pause_s = waiting.pause_after_break() if isinstance(error, self._broken) else None
+            except WireError as error:
+                pause_s = waiting.pause_after_break() if isinstance(error, BrokenError) else None
                 if pause_s is None:
                     raise self._unreachable(error) from error
             else:
@@ -294,7 +295,7 @@ class AsyncSender:
                             yield chunk
                         return
                     response = await answer.read()
-            except self._failed as error:
+            except WireError as error:
                 raise self._unreachable(error) from error
             pause_s = waiting.pause_after(response, now=time.monotonic())
             if pause_s is None:
@@ -303,7 +304,7 @@ class AsyncSender:
             await asyncio.sleep(pause_s)
 
     def _unreachable(self, error: Exception) -> UnreachableError:
-        kind = TimedOutError if isinstance(error, self._silent) else UnreachableError
+        kind = TimedOutError if isinstance(error, SilentError) else UnreachableError
         # A stranger's words: one line, and nothing that a terminal would obey.
         words = "".join(one if one.isprintable() else " " for one in str(error)).strip()
         return kind(f"no BuildArena answers at {self.url} ({words})")

@@ -12,10 +12,11 @@ from typing import Any, BinaryIO, Final, Self
 
 from buildarena_client.errors import RefusedError, TimedOutError, UnreachableError
 from buildarena_client.event_streams import Event, EventReader
+from buildarena_client.faults import BrokenError, SilentError, WireError
 from buildarena_client.files import WholeFile
-from buildarena_client.patience import BREAK_PAUSE_S, Patience, Restarting, Waiting
+from buildarena_client.patience import Patience, Restarting, Waiting
 from buildarena_client.places import checked_key, checked_url, kept_key
-from buildarena_client.problems import document, require_success
+from buildarena_client.problems import document, next_cursor, require_success
 from buildarena_client.requests import JSON, Request, Response, json_body
 
 TIMEOUT_S: Final = 60.0
@@ -50,14 +51,12 @@ class Sender:
         patience: Patience | None = None,
     ) -> None:
         # Help and completion of the command line load this module, and send nothing by it.
-        from buildarena_client.faults import BrokenError, SilentError, WireError
         from buildarena_client.synchronous.wire import Wire
 
         self.url = checked_url(url)
         self._key = checked_key(key or kept_key())
         self._timeout_s = timeout_s
         self._patience = patience or Patience()
-        self._broken, self._silent, self._failed = BrokenError, SilentError, WireError
         headers = {"Authorization": f"Bearer {self._key}"} if self._key else {}
         self._wire = Wire(self.url, headers)
 
@@ -202,8 +201,8 @@ class Sender:
         """
         while True:
             page = self.get(path, cursor=cursor, **params)
+            cursor = next_cursor(page, self.url)
             yield page
-            cursor = page["next_cursor"]
             if cursor is None:
                 return
 
@@ -230,6 +229,7 @@ class Sender:
                 timeout_s=STREAM_TIMEOUT_S,
             )
             reader = EventReader()
+            ended = UnreachableError(f"{self.url} ends its streams at once")
             try:
                 with contextlib.closing(self._chunks(request)) as chunks:
                     for chunk in chunks:
@@ -237,10 +237,11 @@ class Sender:
                         for event in reader.feed(chunk):
                             after = event["id"]
                             yield event
-            except UnreachableError:
-                if restarting.gives_up(now=time.monotonic()):
-                    raise
-            time.sleep(BREAK_PAUSE_S)
+            except UnreachableError as error:
+                ended = error
+            if restarting.gives_up(now=time.monotonic()):
+                raise ended
+            time.sleep(RESTART_POLL_S)
 
     def _reading(self, path: str, params: dict[str, Any], *, accept: str | None = None) -> Request:
         return Request(
@@ -262,8 +263,8 @@ class Sender:
             try:
                 response = self._wire.send(request)
                 pause_s = waiting.pause_after(response, now=time.monotonic())
-            except self._failed as error:
-                pause_s = waiting.pause_after_break() if isinstance(error, self._broken) else None
+            except WireError as error:
+                pause_s = waiting.pause_after_break() if isinstance(error, BrokenError) else None
                 if pause_s is None:
                     raise self._unreachable(error) from error
             else:
@@ -283,7 +284,7 @@ class Sender:
                             yield chunk
                         return
                     response = answer.read()
-            except self._failed as error:
+            except WireError as error:
                 raise self._unreachable(error) from error
             pause_s = waiting.pause_after(response, now=time.monotonic())
             if pause_s is None:
@@ -292,7 +293,7 @@ class Sender:
             time.sleep(pause_s)
 
     def _unreachable(self, error: Exception) -> UnreachableError:
-        kind = TimedOutError if isinstance(error, self._silent) else UnreachableError
+        kind = TimedOutError if isinstance(error, SilentError) else UnreachableError
         # A stranger's words: one line, and nothing that a terminal would obey.
         words = "".join(one if one.isprintable() else " " for one in str(error)).strip()
         return kind(f"no BuildArena answers at {self.url} ({words})")
