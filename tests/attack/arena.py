@@ -19,7 +19,7 @@ from running import running_stack
 from tenants import WITH_KEYS, Tenant, new_tenant, operator
 
 from buildarena_cli.local.stack import Stack
-from buildarena_pipeline.runtime.processes import memory_bytes
+from buildarena_environment.processes import memory_bytes
 from buildarena_store import Database
 
 HOSTILE = "hostile/model"

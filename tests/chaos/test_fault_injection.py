@@ -30,7 +30,7 @@ from buildarena_simulation import simulate
 from buildarena_store import Database
 
 HERE = Path(__file__).parent
-JOBS = int(os.environ.get("CHAOS_JOBS", "80" if LONG else "40"))
+JOBS = int(os.environ.get("CHAOS_JOBS", "80" if LONG else "24"))
 EVERY_S = float(os.environ.get("CHAOS_EVERY_S", "2.5"))
 LEASE_S = float(os.environ.get("CHAOS_LEASE_S", "3"))
 SEED = os.environ.get("CHAOS_SEED", "1")

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from long_tests import LONG
 from provider_standin import ProviderStandIn
 from running import wait_until
 
@@ -21,7 +22,7 @@ from buildarena_pipeline.runtime.machine_documents import machine_bytes
 from buildarena_pipeline.runtime.reaper import Reaper
 from buildarena_pipeline.submission.submission import Submissions
 
-KILLS = int(os.environ.get("CHAOS_KILLS", "4"))
+KILLS = int(os.environ.get("CHAOS_KILLS", "4" if LONG else "2"))
 LATENCY_S = 0.02
 TASK = "support-2"
 """Its session has some two hundred turns, so that there is time for many kills."""

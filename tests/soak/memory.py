@@ -12,7 +12,7 @@ from typing import Self
 
 import psutil
 
-from buildarena_pipeline.runtime.processes import memory_bytes
+from buildarena_environment.processes import memory_bytes
 
 MEBI = 1 << 20
 NOISES = 3.0

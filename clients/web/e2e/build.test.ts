@@ -55,11 +55,26 @@ async function sideOf(page: Page, part: string, looks: Point): Promise<Side> {
 }
 
 async function chosenIs(page: Page, side: Side): Promise<void> {
-  await page.getByText(new RegExp(`^Attach to ${side.part}/${side.face} `)).waitFor({ timeout: 10_000 });
+  await page.getByText(new RegExp(`^Attach to ${side.part}/${side.face} `)).waitFor({ timeout: 5_000 });
 }
 
-/** Turns the view until the face is towards the camera, and clicks its middle. */
+/** Turns the view until the face is towards the camera, and clicks its middle; again where software draws so slowly that
+ * a click meets the picture of before. */
 async function clickFace(page: Page, side: Side): Promise<void> {
+  for (let tries = 1; ; tries += 1) {
+    await lookAt(page, side);
+    const at = await onPage(page, side.center);
+    await page.mouse.click(at.x, at.y);
+    try {
+      await chosenIs(page, side);
+      return;
+    } catch (error) {
+      if (tries === 4) throw error;
+    }
+  }
+}
+
+async function lookAt(page: Page, { center, normal }: Side): Promise<void> {
   await page.evaluate(({ center, normal }) => {
     interface Placed {
       position: { set: (...place: number[]) => void };
@@ -70,10 +85,7 @@ async function clickFace(page: Page, side: Side): Promise<void> {
     camera.position.set(center[0] + 7 * normal[0] + 0.8, center[1] + 7 * normal[1] + 0.8, center[2] + 7 * normal[2] + 0.8);
     camera.lookAt(...center);
     camera.updateMatrixWorld();
-  }, side);
-  const at = await onPage(page, side.center);
-  await page.mouse.click(at.x, at.y);
-  await chosenIs(page, side);
+  }, { center, normal });
 }
 
 async function accepted(page: Page, act: () => Promise<void>): Promise<void> {

@@ -133,17 +133,17 @@ describe.skipIf(sessions.length === 0)("two jobs", () => {
         }),
       );
     const [before] = await eyes();
-    const box = await page.locator("[data-trial=a] canvas").boundingBox();
-    if (box === null) throw new Error("no drawing");
     // Where software draws, the hands may be there before the picture can be turned.
     const turned = async (): Promise<number[] | undefined> => {
+      const box = await page.locator("[data-trial=a] canvas").boundingBox();
+      if (box === null) throw new Error("no drawing");
       await page.mouse.move(box.x + 100, box.y + 100);
       await page.mouse.down();
       await page.mouse.move(box.x + 220, box.y + 140, { steps: 4 });
       await page.mouse.up();
       return (await eyes())[0];
     };
-    await expect.poll(turned, { timeout: 10_000, interval: 500 }).not.toEqual(before);
+    await expect.poll(turned, { timeout: 40_000, interval: 500 }).not.toEqual(before);
     await expect
       .poll(async () => new Set((await eyes()).map((eye) => eye.join())).size, { timeout: 10_000 })
       .toBe(1);

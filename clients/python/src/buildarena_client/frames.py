@@ -131,14 +131,16 @@ def _made(rows: Iterable[Mapping[str, Any]], columns: Columns, kind: Kind) -> An
 
 def _pandas(library: Any, data: Mapping[str, list[Any]], columns: Columns) -> Any:
     made = {
-        name: library.Series(values, dtype=PANDAS.get(columns[name]) or _plain(columns[name]))
+        name: library.Series(values, dtype=_pandas_type(columns[name], values))
         for name, values in data.items()
     }
     return library.DataFrame(made)
 
 
-def _plain(kind: str) -> str:
-    return PANDAS[kind.removesuffix("?")]
+def _pandas_type(kind: str, values: list[Any]) -> str:
+    # An older service may not say what the contract says it must.
+    kind = _maybe(kind) if None in values else kind
+    return PANDAS.get(kind) or PANDAS[kind.removesuffix("?")]
 
 
 def _polars(library: Any, data: Mapping[str, list[Any]], columns: Columns) -> Any:

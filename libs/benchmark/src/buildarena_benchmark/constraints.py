@@ -7,14 +7,20 @@ submissions, verification of what an archive brought, and the command `machine s
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable
+from typing import Final
 
 from buildarena_benchmark.tasks.task import Task
 from buildarena_geometry import Machine
 
 _MAX_NAMED = 10
 
+Broken = tuple[str, str]
+"""A broken constraint: class and sentence."""
+Check = Callable[[Task, Machine], Broken | None]
 
-def broken_constraint(task: Task, machine: Machine) -> tuple[str, str] | None:
+
+def broken_constraint(task: Task, machine: Machine) -> Broken | None:
     """The first constraint of a task that a finished machine breaks.
 
     Args:
@@ -24,16 +30,50 @@ def broken_constraint(task: Task, machine: Machine) -> tuple[str, str] | None:
     Returns:
         Class and sentence, or None when the machine may be simulated.
     """
-    if not machine.started:
-        return "empty_machine", "no machine was started"
+    return next(filter(None, (check(task, machine) for check in _CHECKS)), None)
+
+
+def share_of_constraints(task: Task, machine: Machine) -> float:
+    """How far a machine gets in the checks of `broken_constraint`, 0 to 1; 1 when none is broken.
+
+    Args:
+        task: The task.
+        machine: What was built so far.
+    """
+    held = 0
+    for check in _CHECKS:
+        if check(task, machine) is not None:
+            break
+        held += 1
+    return held / len(_CHECKS)
+
+
+def _not_started(task: Task, machine: Machine) -> Broken | None:
+    del task  # every task asks for that
+    return None if machine.started else ("empty_machine", "no machine was started")
+
+
+def _only_started(task: Task, machine: Machine) -> Broken | None:
+    del task  # every task asks for more
     if len(machine.blocks) == 1 and not machine.connectors:
         return "empty_machine", "the machine is nothing but its starting block"
-    for check in (_crowded, _wrong_modules, _wrong_structures):
-        problem = check(task, machine)
-        if problem is not None:
-            return "constraint_violated", problem
-    loose = _unjoined(machine)
-    return None if loose is None else ("unjoined_parts", loose)
+    return None
+
+
+def _violated(problem: Callable[[Task, Machine], str | None]) -> Check:
+    """A check of what the task itself says."""
+
+    def check(task: Task, machine: Machine) -> Broken | None:
+        found = problem(task, machine)
+        return None if found is None else ("constraint_violated", found)
+
+    return check
+
+
+def _loose(task: Task, machine: Machine) -> Broken | None:
+    del task  # every task asks for one machine
+    found = _unjoined(machine)
+    return None if found is None else ("unjoined_parts", found)
 
 
 def _wrong_modules(task: Task, machine: Machine) -> str | None:
@@ -116,3 +156,14 @@ def _crowded(task: Task, machine: Machine) -> str | None:
             named = f"sub-structure {letter}" if letter else "the machine"
             return f"{named} has {size} blocks, the task allows {limits.max_blocks} in one"
     return None
+
+
+_CHECKS: Final[tuple[Check, ...]] = (
+    _not_started,
+    _only_started,
+    _violated(_crowded),
+    _violated(_wrong_modules),
+    _violated(_wrong_structures),
+    _loose,
+)
+"""In this order; each may rely on those before it."""

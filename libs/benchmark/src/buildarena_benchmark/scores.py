@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from buildarena_benchmark.tasks.task import Task
     from buildarena_geometry import Machine
     from buildarena_simulation import Trajectory
+    from buildarena_simulation.rollout import Decision
 
 _SCORERS: Final[Mapping[str, Callable[..., Verdict]]] = MappingProxyType(
     {
@@ -68,6 +69,21 @@ def score(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Score:
         metrics=MappingProxyType(metrics),
         flags=verdict.flags,
     )
+
+
+def decision(task: "Task") -> "Decision | None":
+    """Tells when a running trial is decided, for those who try many machines.
+
+    A trial that ends there has the success, indicator and flags of the whole one; metrics that tell
+    of the rest (lowest height, number of broken joints) are of what was seen.
+
+    Args:
+        task: The task.
+
+    Returns:
+        What `simulate` takes as `until`; None where the whole trial decides.
+    """
+    return support.decision(task) if task.scorer == "support" else None
 
 
 def failed_score(task: "Task", machine: "Machine | None" = None) -> Score:

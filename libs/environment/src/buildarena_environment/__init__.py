@@ -1,1 +1,60 @@
-"""Building tasks as environments: steps, rewards, snapshots and trials over processes."""
+"""Building tasks as environments: steps, rewards, snapshots, and trials over processes.
+
+Importing this package loads no engine; the first trial does.
+"""
+
+from buildarena_environment.calls import Answer, call, call_text, read_call
+from buildarena_environment.choices import references
+from buildarena_environment.environment import (
+    Environment,
+    Limits,
+    Observation,
+    Step,
+    Submission,
+)
+from buildarena_environment.errors import (
+    BuildarenaEnvironmentError,
+    CallError,
+    EpisodeOverError,
+    NothingToSubmitError,
+    SnapshotError,
+    UnknownChoiceError,
+)
+from buildarena_environment.evaluating import Evaluator
+from buildarena_environment.rewards import REWARDS, Progress
+from buildarena_environment.snapshots import Snapshot
+from buildarena_environment.trial_pool import Evaluation, TrialPool
+from buildarena_environment.trials import Trial, best_trial, try_machine
+from buildarena_environment.workbench import ASSEMBLY, MAIN, Workbench, tools_of_models
+
+__all__ = [
+    "ASSEMBLY",
+    "MAIN",
+    "REWARDS",
+    "Answer",
+    "BuildarenaEnvironmentError",
+    "CallError",
+    "Environment",
+    "EpisodeOverError",
+    "Evaluation",
+    "Evaluator",
+    "Limits",
+    "NothingToSubmitError",
+    "Observation",
+    "Progress",
+    "Snapshot",
+    "SnapshotError",
+    "Step",
+    "Submission",
+    "Trial",
+    "TrialPool",
+    "UnknownChoiceError",
+    "Workbench",
+    "best_trial",
+    "call",
+    "call_text",
+    "read_call",
+    "references",
+    "tools_of_models",
+    "try_machine",
+]

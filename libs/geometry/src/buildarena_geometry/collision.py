@@ -12,7 +12,7 @@ from buildarena_geometry.modules.module import Box, Solid
 from buildarena_geometry.poses import Pose
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping
 
     from buildarena_geometry.blocks import Block
 
@@ -33,9 +33,9 @@ class CollisionWorld:
         """An empty world."""
         self._tree = fcl.DynamicAABBTreeCollisionManager()
         self._tree.setup()
-        self._objects: dict[str, list[fcl.CollisionObject]] = {}
-        # FCL's contacts name geometries, so each block has its own, and this is the way back.
-        self._owners: dict[int, tuple[str, fcl.CollisionGeometry]] = {}
+        # FCL's contacts name geometries, so each block has its own, and owners are the way back.
+        self._objects: dict[str, list[tuple[fcl.CollisionObject, fcl.CollisionGeometry]]] = {}
+        self._owners: dict[int, str] = {}
 
     def overlaps(self, blocks: Iterable[Block]) -> list[tuple[str, str]]:
         """Pairs of ids of blocks that would overlap if these blocks were where they say they are.
@@ -70,27 +70,38 @@ class CollisionWorld:
             if known is None:
                 self._add(block)
                 continue
-            for solid, placed in zip(block.module.colliders, known, strict=True):
+            for solid, (placed, _) in zip(block.module.colliders, known, strict=True):
                 placed.setTransform(_transform(solid, block.world_from_block))
                 self._tree.update(placed)
 
     def remove(self, ids: Iterable[str]) -> None:
         """Takes blocks out; ids it does not have (connectors) are passed over."""
-        gone = [placed for block in ids for placed in self._objects.pop(block, ())]
-        for placed in gone:
-            self._tree.unregisterObject(placed)
-        if gone:
-            kept = set(self._objects)
-            self._owners = {key: owner for key, owner in self._owners.items() if owner[0] in kept}
+        for block in ids:
+            for placed, geometry in self._objects.pop(block, ()):
+                self._tree.unregisterObject(placed)
+                del self._owners[id(geometry)]
+
+    def become(self, before: Mapping[str, Block], after: Mapping[str, Block]) -> None:
+        """Goes from one state's blocks to another's; costs what differs.
+
+        Args:
+            before: the blocks it has.
+            after: those that it is to have, in the order in which they count as placed.
+        """
+        self.remove(before.keys() - after.keys())
+        self.place(block for key, block in after.items() if before.get(key) is not block)
+        if list(self._objects) != list(after):
+            self._objects = {key: self._objects[key] for key in after}
 
     def _add(self, block: Block) -> None:
-        placed = []
+        made = []
         for solid in block.module.colliders:
             geometry = _geometry(solid)
-            self._owners[id(geometry)] = (block.id, geometry)
-            placed.append(fcl.CollisionObject(geometry, _transform(solid, block.world_from_block)))
-            self._tree.registerObject(placed[-1])
-        self._objects[block.id] = placed
+            placed = fcl.CollisionObject(geometry, _transform(solid, block.world_from_block))
+            self._owners[id(geometry)] = block.id
+            self._tree.registerObject(placed)
+            made.append((placed, geometry))
+        self._objects[block.id] = made
 
     def _touched_by(self, solid: Solid, world_from_block: Pose) -> set[str]:
         request = fcl.CollisionRequest(num_max_contacts=_ALL_CONTACTS, enable_contact=True)
@@ -101,8 +112,7 @@ class CollisionWorld:
         for contact in found.result.contacts:
             if contact.penetration_depth >= TOUCHING:
                 # One side is the probe, which no block owns.
-                owner = self._owners.get(id(contact.o1)) or self._owners[id(contact.o2)]
-                touched.add(owner[0])
+                touched.add(self._owners.get(id(contact.o1)) or self._owners[id(contact.o2)])
         return touched
 
 

@@ -100,6 +100,24 @@ class Machine:
         """A machine equal to this one, with its log, that goes its own way from here."""
         return self.restored(self.logged)
 
+    def return_to(self, logged: LoggedState) -> None:
+        """Makes this machine what a value describes, which must be one of its own.
+
+        Costs what differs between the two, where `restored` costs the whole machine.
+
+        Args:
+            logged: what `logged` gave for this machine, or for a copy of it.
+
+        Raises:
+            ValueError: the value is another assembly's.
+        """
+        if logged.state.available is not self._state.available:
+            raise ValueError("the value is of a machine with other sub-structures at hand")
+        if self._world is not None:
+            self._world.become(self._state.blocks, logged.state.blocks)
+        self._state = logged.state
+        self._records = list(logged.records)
+
     def __eq__(self, other: object) -> bool:
         """Whether both are the same machine; how they were built does not matter."""
         if not isinstance(other, Machine):

@@ -32,7 +32,7 @@ class BearingMeter:
             forces: (K,) the forces on the blocks.
         """
         up = forces.force[:, 2] / GRAVITY
-        fixed = np.flatnonzero(surface >= 0)
+        fixed = (surface >= 0).nonzero()[0]
         on_surface = np.bincount(surface[fixed], up[fixed], minlength=self._surfaces)
         on_block = np.bincount(forces.block[fixed], up[fixed], minlength=self._blocks)
         cargo = -up[other == CARGO].sum()

@@ -196,7 +196,7 @@ class BreakingModel:
         ropes = self._structure.ropes
         pull = tensions / GRAVITY
         self._rope_peaks = np.maximum(self._rope_peaks, pull)
-        for r in np.flatnonzero(self._rope_holds & (pull > ropes.limit)):
+        for r in (self._rope_holds & (pull > ropes.limit)).nonzero()[0]:
             self._rope_holds[r] = False
             engine.drop_rope(int(r))
             self._log(ropes.names[r], "rope", float(pull[r] / ropes.limit[r]), (time_s, cargo_mass))

@@ -86,6 +86,13 @@ class Recorder:
             self._cargo_mass[row] = cargo_mass
         self._row += 1
 
+    @property
+    def cargo_now(self) -> NDArray[np.float32] | None:
+        """(3,) where the cargo was at the last sample, as the trajectory tells it."""
+        if self._cargo_size is None:
+            return None
+        return rounded_positions(self._cargo_position[self._row - 1])
+
     def _heated_in(self, clusters: Clusters, motion: Motion) -> BoolArray:
         structure = self._structure
         shown = motion.points(clusters, structure.shown)
@@ -133,22 +140,22 @@ class Recorder:
     ) -> Trajectory:
         """The trajectory of all samples kept."""
         has_cargo = self._cargo_size is not None
-        quaternion = np.where(
-            self._cargo_quaternion[:, :1] < 0, -self._cargo_quaternion, self._cargo_quaternion
-        )
+        kept = slice(self._row)
+        turns = self._cargo_quaternion[kept]
+        quaternion = np.where(turns[:, :1] < 0, -turns, turns)
         structure = self._structure
         positions, quaternions = self._poses()
         return Trajectory(
-            time_s=self._time_s,
+            time_s=self._time_s[kept],
             block_ids=self._ids,
             positions=rounded_positions(positions),
             quaternions=rounded_quaternions(quaternions),
-            cargo_position=rounded_positions(self._cargo_position) if has_cargo else None,
+            cargo_position=rounded_positions(self._cargo_position[kept]) if has_cargo else None,
             cargo_quaternion=rounded_quaternions(quaternion) if has_cargo else None,
-            cargo_mass=self._cargo_mass if has_cargo else None,
+            cargo_mass=self._cargo_mass[kept] if has_cargo else None,
             cargo_size=self._cargo_size,
             cannon_ids=tuple(structure.block_ids[i] for i in structure.cannons),
-            heated=self._heated,
+            heated=self._heated[kept],
             pieces=self._pieces(),
             bearing=breaking.bearing.series(
                 np.array(self._bearing), tuple(structure.block_ids[i] for i in structure.wheels)

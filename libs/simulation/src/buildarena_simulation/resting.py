@@ -29,6 +29,12 @@ _OVERLAP: Final = 0.01
 _FLAT: Final = 0.9
 """Cosine of the greatest angle between a face's normal and a contact's that belongs to it."""
 
+_NONE: Final[tuple[np.ndarray, ...]] = (
+    *(np.zeros(0, dtype=np.int64) for _ in range(3)),
+    *(np.zeros((0, *shape)) for shape in ((3,), (3,), (4, 3), ())),
+)
+"""The columns of `RestingFaces` where nothing rests."""
+
 _CORNERS: Final = np.array([[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]])
 
 
@@ -69,8 +75,8 @@ class RestingFaces:
         count = len(cluster_of)
         normal, weight = contacts.normal.copy(), contacts.weight.copy()
         for number in (WORLD, CARGO):
-            mine = np.flatnonzero(self.other == number)
-            rows = np.flatnonzero(contacts.other == number)
+            mine = (self.other == number).nonzero()[0]
+            rows = (contacts.other == number).nonzero()[0]
             if not len(mine) or not len(rows):
                 continue
             of_cluster = np.zeros((count, 3))
@@ -79,7 +85,9 @@ class RestingFaces:
             flat = (wanted * normal[rows]).sum(axis=1) > _FLAT
             rows, wanted = rows[flat], wanted[flat]
             normal[rows] = wanted
-            weight[rows[np.isin(contacts.block[rows], self.block[mine])]] = 0.0
+            rests = np.zeros(count, dtype=bool)
+            rests[self.block[mine]] = True
+            weight[rows[rests[contacts.block[rows]]]] = 0.0
         return ContactForces(
             block=np.concatenate([contacts.block, self.block]),
             other=np.concatenate([contacts.other, self.other]),
@@ -145,8 +153,7 @@ class FaceFinder:
             bottom = cargo.position + turn[:, 2] * self._cargo_half[2]
             frame = (bottom, turn, self._cargo_half[:2])
             found.append(self._resting(center, rotation, frame, (CARGO, -1)))
-        if not found:
-            found = [self._none()]
+        found = [columns for columns in found if len(columns[0])] or [_NONE]
         block, other, surface, normal, point, corners, area = (
             np.concatenate(column) for column in zip(*found, strict=True)
         )
@@ -159,10 +166,6 @@ class FaceFinder:
             corners=corners,
             area=area,
         )
-
-    def _none(self) -> tuple[np.ndarray, ...]:
-        none = np.zeros(0, dtype=np.int64)
-        return (none, none, none, *(np.zeros((0, *s)) for s in ((3,), (3,), (4, 3), ())))
 
     def _resting(
         self,
@@ -185,22 +188,24 @@ class FaceFinder:
         """
         middle, axes, size = frame
         height = (center - middle) @ axes[:, 2]
-        near = np.flatnonzero((height > 0.0) & (height < self._farthest))
+        near = ((height > 0.0) & (height < self._farthest)).nonzero()[0]
         if not len(near):
-            return self._none()
+            return _NONE
         local, turn = (center[near] - middle) @ axes, axes.T @ rotation[near]
         cosines, half = np.abs(turn[:, 2]), self._half[near]
         reach = (cosines * half).sum(axis=1)
         across = (np.abs(turn[:, :2]) @ half[:, :, None])[:, :, 0]
         low = np.maximum(local[:, :2] - across, -size)
         high = np.minimum(local[:, :2] + across, size)
-        kept = np.flatnonzero(
+        wide = high - low > _OVERLAP
+        kept = (
             (np.abs(local[:, 2] - reach) < _GAP)
             & (cosines.max(axis=1) > _LEVEL)
-            & (high - low > _OVERLAP).all(axis=1)
-        )
+            & wide[:, 0]
+            & wide[:, 1]
+        ).nonzero()[0]
         if not len(kept):
-            return self._none()
+            return _NONE
         rows = near[kept]
         corners = self._corners(local[kept], turn[kept], half[kept], size)
         plane = axes[:, :2].T
@@ -212,7 +217,7 @@ class FaceFinder:
             self._block[rows],
             np.full(count, numbers[0], dtype=np.int64),
             np.full(count, numbers[1], dtype=np.int64),
-            np.tile(axes[:, 2], (count, 1)),
+            np.full((count, 3), axes[:, 2]),
             middle + ((low + high) / 2)[kept] @ plane,
             middle + corners @ plane,
             (high - low)[kept].prod(axis=1) * share,

@@ -37,6 +37,9 @@ SIMULATION_VERSION: Final = "3"
 
 _PROGRESS_EVERY = 10
 
+Decision = Callable[[np.ndarray | None], bool]
+"""Whether a trial is decided, from the cargo's position (3,) as it is recorded; None without."""
+
 
 def simulate(
     machine: "Machine",
@@ -47,6 +50,7 @@ def simulate(
     start: Start | None = None,
     seed: int | None = None,
     finer: int = 1,
+    until: Decision | None = None,
     on_progress: Callable[[float], None] | None = None,
 ) -> Trajectory:
     """Puts a machine through a scenario. The same input gives the same bytes.
@@ -60,6 +64,8 @@ def simulate(
         seed: Varies the start as a fair repetition would, see `start_of`; None for the exact one.
         finer: By how much the engine's steps are shorter than usual, to tell a result of the model
             from one of the steps.
+        until: Ends the trial after the first sample for which it says so; by default it lasts as
+            long as the scenario says.
         on_progress: Called now and then with the share of the trial that is done, 0 to 1.
 
     Returns:
@@ -81,6 +87,7 @@ def simulate(
         start=start,
         seed=seed,
         finer=finer,
+        until=until,
         on_progress=on_progress,
     )
 
@@ -95,6 +102,7 @@ def simulate_structure(
     start: Start | None = None,
     seed: int | None = None,
     finer: int = 1,
+    until: Decision | None = None,
     on_progress: Callable[[float], None] | None = None,
 ) -> Trajectory:
     """Puts a structure through a scenario; see `simulate`.
@@ -108,6 +116,7 @@ def simulate_structure(
         start: See `simulate`.
         seed: See `simulate`.
         finer: See `simulate`.
+        until: See `simulate`.
         on_progress: Called now and then with the share of the trial that is done.
     """
     given, placed = scenario, start is not None
@@ -130,7 +139,7 @@ def simulate_structure(
     try:
         with single_threaded():
             trial = _Trial(world, scenario, adapter, at=(start.position, start.rotation))
-            trial.run(bindings or [{}] * len(structure), controls, on_progress)
+            trial.run(bindings or [{}] * len(structure), controls, until, on_progress)
         return trial.recorder.finished(
             breaking=trial.breaking,
             engine=engine,
@@ -187,6 +196,7 @@ class _Trial:
         self,
         bindings: Bindings,
         controls: Sequence[KeyHold],
+        until: Decision | None,
         on_progress: Callable[[float], None] | None,
     ) -> None:
         engine, scenario = self._engine, self._scenario
@@ -208,6 +218,8 @@ class _Trial:
                 rows = slice(first, first + engine.steps_per_evaluation)
                 self._advance(schedule.wheel_speeds[rows], schedule.firing[first], first)
             self._sample((sample + 1) / SAMPLE_RATE_HZ)
+            if until is not None and until(self.recorder.cargo_now):
+                return
             if on_progress and (sample % _PROGRESS_EVERY == 0 or sample + 1 == samples):
                 on_progress((sample + 1) / samples)
 

@@ -10,11 +10,11 @@ from buildarena_api.app import create_app
 from buildarena_api.http.access import check_binding
 from buildarena_api.http.own_pool import POOL_TIMEOUT_S
 from buildarena_api.http.serving import serve
+from buildarena_environment.processes import end_with_parent
 from buildarena_pipeline.catalog.models import load_registry
 from buildarena_pipeline.errors import StartupError
 from buildarena_pipeline.runtime.context import open_context
 from buildarena_pipeline.runtime.logs import set_up_logs
-from buildarena_pipeline.runtime.processes import end_with_parent
 from buildarena_pipeline.runtime.settings import load_settings
 from buildarena_pipeline.runtime.tracing import Tracing
 from buildarena_store import SchemaVersionError

@@ -29,8 +29,8 @@ from buildarena_cli.local.server import (
     stop_process,
     wait_until_ready,
 )
+from buildarena_environment.processes import dying_with_me
 from buildarena_pipeline.errors import StartupError
-from buildarena_pipeline.runtime.processes import dying_with_me
 
 ADVICE = (
     "choose another folder with --data or BUILDARENA_DATA, "

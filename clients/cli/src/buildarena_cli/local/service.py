@@ -22,7 +22,7 @@ from typing import Any, Final
 import psutil
 
 from buildarena_cli.errors import CommandError
-from buildarena_pipeline.runtime.processes import memory_bytes
+from buildarena_environment.processes import memory_bytes
 
 LOCK: Final = "lock"
 RUN: Final = "run.json"

@@ -29,9 +29,9 @@ from buildarena_client.faults import WireError
 from buildarena_client.paths import HEALTH
 from buildarena_client.requests import Request
 from buildarena_client.synchronous.wire import Wire
+from buildarena_environment.processes import PARENT, dying_with_me, tree_memory_bytes
 from buildarena_pipeline.catalog.simulators import ENGINE_SIMULATORS
 from buildarena_pipeline.errors import StartupError
-from buildarena_pipeline.runtime.processes import PARENT, dying_with_me, tree_memory_bytes
 from buildarena_pipeline.runtime.settings import PREFIX, SECRETS, Settings
 from buildarena_pipeline.secret_files import SUFFIX
 from buildarena_store import Database

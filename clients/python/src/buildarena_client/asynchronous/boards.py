@@ -5,17 +5,19 @@ Generated from the synchronous module: `make openapi` writes this file.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Unpack, cast
+from typing import TYPE_CHECKING, Literal, Unpack, cast
 
 from buildarena_client.asynchronous.sending import AsyncSender
 
 if TYPE_CHECKING:
     from buildarena_client.schemas import (
+        AgreementTable,
         Board,
         BoardFilters,
         ChangePage,
         Comparison,
         Figures,
+        ManifestEntry,
         VerifyAccepted,
     )
 
@@ -79,3 +81,26 @@ class AsyncBoards(AsyncSender):
         """
         body = {"model": model, "track": track, "tasks": tasks, "sample": sample, "seed": seed}
         return cast("VerifyAccepted", await self.post("/v1/leaderboard/verify", body))
+
+    async def manifest(self, **filters: Unpack[BoardFilters]) -> list[ManifestEntry]:
+        """The versions behind an entry: what its jobs' manifests say.
+
+        Args:
+            filters: Which entry: name ``task`` and ``model``.
+        """
+        return cast("list[ManifestEntry]", await self.get("/v1/leaderboard/manifest", **filters))
+
+    async def agreement(self, **filters: Unpack[BoardFilters]) -> AgreementTable:
+        """How far the engines say the same as the game, of the machines that it tried."""
+        return cast("AgreementTable", await self.get("/v1/leaderboard/agreement", **filters))
+
+    async def export_leaderboard(
+        self, kind: Literal["csv", "parquet", "latex"], **filters: Unpack[BoardFilters]
+    ) -> bytes:
+        """A leaderboard as a file.
+
+        Args:
+            kind: Of file.
+            filters: Which jobs count.
+        """
+        return await self.get_bytes("/v1/leaderboard/export", format=kind, **filters)

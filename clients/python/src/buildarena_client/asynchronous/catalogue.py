@@ -62,3 +62,7 @@ class AsyncCatalogue(AsyncSender):
     async def workers(self) -> list[WorkerView]:
         """The workers that were heard of lately."""
         return cast("list[WorkerView]", await self.get("/v1/workers"))
+
+    async def module_model(self, name: str) -> bytes:
+        """The shape of a module, as GLB."""
+        return await self.get_bytes(at("modules", f"{name}.glb"))

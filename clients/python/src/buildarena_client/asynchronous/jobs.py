@@ -123,6 +123,14 @@ class AsyncJobs(AsyncSender):
         """How a job's machine came about, step by step."""
         return cast("ReplayView", await self.get(at("jobs", job_id, "replay")))
 
+    async def machine_model(self, job_id: str) -> bytes:
+        """The shape of a job's machine, as GLB."""
+        return await self.get_bytes(at("jobs", job_id, "machine.glb"))
+
+    async def thumbnail(self, job_id: str) -> bytes:
+        """A picture of a job's machine, as PNG."""
+        return await self.get_bytes(at("jobs", job_id, "thumbnail.png"))
+
     async def scene(self, job_id: str, *, number: int = 0) -> SceneView:
         """All that is needed to draw a trial of a job, besides its trajectory."""
         return cast("SceneView", await self.get(at("jobs", job_id, "scene"), number=number))

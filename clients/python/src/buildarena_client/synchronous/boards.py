@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Unpack, cast
+from typing import TYPE_CHECKING, Literal, Unpack, cast
 
 from buildarena_client.synchronous.sending import Sender
 
 if TYPE_CHECKING:
     from buildarena_client.schemas import (
+        AgreementTable,
         Board,
         BoardFilters,
         ChangePage,
         Comparison,
         Figures,
+        ManifestEntry,
         VerifyAccepted,
     )
 
@@ -76,3 +78,26 @@ class Boards(Sender):
         """
         body = {"model": model, "track": track, "tasks": tasks, "sample": sample, "seed": seed}
         return cast("VerifyAccepted", self.post("/v1/leaderboard/verify", body))
+
+    def manifest(self, **filters: Unpack[BoardFilters]) -> list[ManifestEntry]:
+        """The versions behind an entry: what its jobs' manifests say.
+
+        Args:
+            filters: Which entry: name ``task`` and ``model``.
+        """
+        return cast("list[ManifestEntry]", self.get("/v1/leaderboard/manifest", **filters))
+
+    def agreement(self, **filters: Unpack[BoardFilters]) -> AgreementTable:
+        """How far the engines say the same as the game, of the machines that it tried."""
+        return cast("AgreementTable", self.get("/v1/leaderboard/agreement", **filters))
+
+    def export_leaderboard(
+        self, kind: Literal["csv", "parquet", "latex"], **filters: Unpack[BoardFilters]
+    ) -> bytes:
+        """A leaderboard as a file.
+
+        Args:
+            kind: Of file.
+            filters: Which jobs count.
+        """
+        return self.get_bytes("/v1/leaderboard/export", format=kind, **filters)

@@ -59,3 +59,7 @@ class Catalogue(Sender):
     def workers(self) -> list[WorkerView]:
         """The workers that were heard of lately."""
         return cast("list[WorkerView]", self.get("/v1/workers"))
+
+    def module_model(self, name: str) -> bytes:
+        """The shape of a module, as GLB."""
+        return self.get_bytes(at("modules", f"{name}.glb"))

@@ -119,6 +119,14 @@ class Jobs(Sender):
         """How a job's machine came about, step by step."""
         return cast("ReplayView", self.get(at("jobs", job_id, "replay")))
 
+    def machine_model(self, job_id: str) -> bytes:
+        """The shape of a job's machine, as GLB."""
+        return self.get_bytes(at("jobs", job_id, "machine.glb"))
+
+    def thumbnail(self, job_id: str) -> bytes:
+        """A picture of a job's machine, as PNG."""
+        return self.get_bytes(at("jobs", job_id, "thumbnail.png"))
+
     def scene(self, job_id: str, *, number: int = 0) -> SceneView:
         """All that is needed to draw a trial of a job, besides its trajectory."""
         return cast("SceneView", self.get(at("jobs", job_id, "scene"), number=number))

@@ -293,4 +293,6 @@ class Sender:
 
     def _unreachable(self, error: Exception) -> UnreachableError:
         kind = TimedOutError if isinstance(error, self._silent) else UnreachableError
-        return kind(f"no BuildArena answers at {self.url} ({error})")
+        # A stranger's words: one line, and nothing that a terminal would obey.
+        words = "".join(one if one.isprintable() else " " for one in str(error)).strip()
+        return kind(f"no BuildArena answers at {self.url} ({words})")

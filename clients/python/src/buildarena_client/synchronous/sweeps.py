@@ -17,6 +17,7 @@ from buildarena_client.waiting import POLL_S, require_time, sweep_has_stopped
 if TYPE_CHECKING:
     from buildarena_client.schemas import (
         Budget,
+        ImportedView,
         Result,
         SweepAccepted,
         SweepComparison,
@@ -123,6 +124,10 @@ class Sweeps(Sender):
     def export_sweep(self, sweep_id: str, target: Path) -> None:
         """Writes a sweep with its jobs, journals and artifacts into one ZIP file, or nothing."""
         self.download(at("sweeps", sweep_id, "archive"), target)
+
+    def import_sweep(self, source: Path) -> ImportedView:
+        """Imports an exported sweep, whose scores count when they were found again. For admins."""
+        return cast("ImportedView", self.upload("/v1/archives", source, "application/zip"))
 
     def sweep_events(self, sweep_id: str, *, after: int = 0) -> Iterator[Event]:
         """What happens to a sweep and its jobs, from the beginning; waits for more.

@@ -81,12 +81,19 @@ def deciding_sample(
         fall_height: Units.
     """
     assert trajectory.cargo_position is not None  # noqa: S101 - the caller looked
-    position = trajectory.cargo_position.astype(np.float64)
-    lost = ~(position[:, 2] >= fall_height)
-    if isinstance(scenario.placement, SpanPlacement):
-        lost |= np.abs(position[:, 1]) > scenario.placement.gap / 2 + _EDGE
-    found = np.flatnonzero(lost)
+    found = np.flatnonzero(is_lost(scenario, trajectory.cargo_position, fall_height=fall_height))
     return int(found[0]) if len(found) else None
+
+
+def is_lost(
+    scenario: "Scenario", position: NDArray[np.float32], *, fall_height: float
+) -> NDArray[np.bool_]:
+    """(T,) whether a cargo at these positions (T, 3) is not carried over the gap."""
+    at = position.astype(np.float64)
+    lost = ~(at[:, 2] >= fall_height)
+    if isinstance(scenario.placement, SpanPlacement):
+        lost |= np.abs(at[:, 1]) > scenario.placement.gap / 2 + _EDGE
+    return np.asarray(lost)
 
 
 def measure_span(

@@ -1,13 +1,16 @@
 """Support: how heavy a cargo a bridge carries before it falls into the gap."""
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from buildarena_benchmark.scorers.pieces import Mask, spans_of
 from buildarena_benchmark.scorers.spanning import (
     Span,
     deciding_sample,
+    is_lost,
     measure_span,
     terrain_sides,
 )
@@ -84,6 +87,26 @@ def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict
             cargo=True,
         ),
     )
+
+
+def decision(task: "Task") -> Callable[[NDArray[np.float32] | None], bool]:
+    """Tells the sample after which nothing changes success, indicator and flags.
+
+    Args:
+        task: Fall height and gap.
+
+    Returns:
+        Whether the cargo at a position is lost, as `judge` reads it.
+    """
+    scoring, scenario = task.scoring, task.scenario
+    assert isinstance(scoring, SupportScoring)  # noqa: S101 - the scorer is chosen by it
+
+    def decided(cargo: NDArray[np.float32] | None) -> bool:
+        return cargo is not None and bool(
+            is_lost(scenario, cargo[None], fall_height=scoring.fall_height)[0]
+        )
+
+    return decided
 
 
 def _span_metrics(span: Span | None) -> dict[str, Metric]:

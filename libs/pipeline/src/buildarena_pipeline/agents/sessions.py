@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import OrderedDict
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from threading import Lock
 from typing import Any, Literal
@@ -18,7 +18,7 @@ from buildarena_pipeline.agents.briefing import (
     briefing_digest,
 )
 from buildarena_pipeline.agents.handing_in import chosen_task, hand_in
-from buildarena_pipeline.agents.workbench import ASSEMBLY, Workbench, check_arguments, rebuild
+from buildarena_pipeline.agents.workbench import Workbench, check_arguments, rebuild
 from buildarena_pipeline.catalog.simulators import simulation_version
 from buildarena_pipeline.catalog.tracks import EXTERNAL_WORKFLOW, external_track
 from buildarena_pipeline.errors import PipelineError, SubmissionError
@@ -46,10 +46,6 @@ PlayerKind = Literal["agent", "human"]
 
 class SessionClosedError(PipelineError):
     """The session is not open: it was submitted, cancelled, or never there."""
-
-
-class NothingToSubmitError(PipelineError):
-    """There is no machine, or there are several without an assembly."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -241,11 +237,9 @@ class ExternalSessions:
             lease = self._open_lease(job_id, connection)
             calls = context.store.external_calls.read(job_id, connection=connection)
             bench = rebuild(calls)
-            chosen = bench.result()
-            if chosen is None:
-                raise NothingToSubmitError(_what_to_do(bench.machines))
+            machine = bench.submitted()
             transcript = Transcript([turn_of_call(i, call) for i, call in enumerate(calls)])
-            queue = hand_in(context, lease, chosen[1], transcript, connection=connection)
+            queue = hand_in(context, lease, machine, transcript, connection=connection)
         if queue is not None:
             context.queues.announce(queue, [job_id])
         return context.store.jobs.get(job_id)
@@ -274,15 +268,3 @@ class ExternalSessions:
             self._benches[job_id, count] = bench
             while len(self._benches) > CACHED_BENCHES:
                 self._benches.popitem(last=False)
-
-
-def _what_to_do(machines: Collection[str]) -> str:
-    """Why there is nothing to submit, and how there would be."""
-    if not machines:
-        return "there is no machine to simulate: build one, beginning with the tool 'start'"
-    listed = ", ".join(repr(name) for name in machines)
-    return (
-        f"there are {len(machines)} machines ({listed}) and no assembly: put them together in the "
-        f"machine {ASSEMBLY!r}, with add_machine for each and connect_blocks between them, then "
-        "submit again"
-    )

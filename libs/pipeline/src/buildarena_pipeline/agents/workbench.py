@@ -1,4 +1,4 @@
-"""The workbench of an external agent: the machines it builds, by name, and their assembly."""
+"""The workbench of an external agent: as everybody's, and each call is kept."""
 
 from __future__ import annotations
 
@@ -7,38 +7,32 @@ from collections.abc import Sequence
 from typing import Any
 
 from buildarena_benchmark import ValidationIssue
-from buildarena_geometry import Machine, Refused, ToolDefinition, tool_definitions
+from buildarena_environment import workbench as building
+from buildarena_geometry import Refused
 from buildarena_geometry.json_values import levels
 from buildarena_pipeline.errors import SubmissionError
 from buildarena_store import ExternalCall, clean
 
-MAIN = "main"
-ASSEMBLY = "assembly"
 MAX_DEPTH = 20
 MAX_BYTES = 64 << 10
 """What the arguments of one call may have as JSON; real ones have some hundred bytes."""
-GROUPS = ("build", "refine", "assemble", "control", "query")
 
 
-class Workbench:
-    """Machines that are made by calls; the same calls make the same machines.
-
-    The machine called ``assembly`` is put together from copies of all others, as they are when
-    the first call to it is made.
+class Workbench(building.Workbench):
+    """A workbench whose calls are kept: their texts are such that a database takes them.
 
     Attributes:
-        machines: What was built, by name.
         size: Bytes of all arguments and feedback so far.
     """
 
     def __init__(self) -> None:
-        self.machines: dict[str, Machine] = {}
+        super().__init__()
         self.size = 0
 
     def call(self, machine: str, tool: str, arguments: Any) -> ExternalCall:
         """Carries out an action and returns its result; no argument makes it raise."""
         tool, arguments = clean(tool), clean(arguments)
-        outcome = self.machine(machine).act(tool, arguments)
+        outcome = self.act(machine, tool, arguments)
         self.size += _size(tool) + _size(arguments) + len(outcome.text.encode())
         return ExternalCall(
             machine=machine,
@@ -48,21 +42,6 @@ class Workbench:
             reason=outcome.reason.value if isinstance(outcome, Refused) else None,
             feedback=outcome.text,
         )
-
-    def result(self) -> tuple[str, Machine] | None:
-        """What is to be simulated: the assembly if there is one, otherwise the only machine."""
-        if ASSEMBLY in self.machines:
-            return ASSEMBLY, self.machines[ASSEMBLY]
-        if len(self.machines) == 1:
-            return next(iter(self.machines.items()))
-        return None
-
-    def machine(self, name: str) -> Machine:
-        """The machine with a name, empty when there was none."""
-        if name not in self.machines:
-            available = dict(self.machines) if name == ASSEMBLY else {}
-            self.machines[name] = Machine(available=available) if available else Machine()
-        return self.machines[name]
 
 
 def check_arguments(arguments: Any) -> None:
@@ -94,8 +73,3 @@ def rebuild(calls: Sequence[ExternalCall]) -> Workbench:
     for call in calls:
         bench.call(call.machine, call.tool, call.arguments)
     return bench
-
-
-def agent_tools() -> tuple[ToolDefinition, ...]:
-    """The tools of external agents: all actions of the geometry library."""
-    return tool_definitions(GROUPS)

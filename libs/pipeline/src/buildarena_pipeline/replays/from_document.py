@@ -9,9 +9,9 @@ from difflib import SequenceMatcher
 from itertools import groupby
 from typing import Any, Final
 
+from buildarena_environment import ASSEMBLY
 from buildarena_geometry import Machine
 from buildarena_geometry.documents.log import LoggedState
-from buildarena_pipeline.agents.workbench import ASSEMBLY
 from buildarena_pipeline.replays.chapters import (
     Chapter,
     Recorder,

@@ -6,8 +6,9 @@ from collections.abc import Mapping, Sequence
 from itertools import groupby
 from typing import Any, Final
 
+from buildarena_environment import ASSEMBLY
 from buildarena_geometry import Machine
-from buildarena_pipeline.agents.workbench import ASSEMBLY, Workbench
+from buildarena_pipeline.agents.workbench import Workbench
 from buildarena_pipeline.replays.chapters import (
     Chapter,
     Kind,

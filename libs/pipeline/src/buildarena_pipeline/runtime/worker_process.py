@@ -15,6 +15,7 @@ from typing import Any, Protocol
 import structlog
 from sqlalchemy.exc import OperationalError
 
+from buildarena_environment.processes import die_with_parent, end_with_parent
 from buildarena_pipeline.broker.consumer import FORKING_POOL, THREADS, Callbacks, consume
 from buildarena_pipeline.errors import StartupError
 from buildarena_pipeline.runtime.active_lease import LeaseKeeper
@@ -22,7 +23,6 @@ from buildarena_pipeline.runtime.context import Context, open_context
 from buildarena_pipeline.runtime.job_runner import JobRunner, StageHandler
 from buildarena_pipeline.runtime.logs import set_up_logs
 from buildarena_pipeline.runtime.owner_slots import OwnerSlots
-from buildarena_pipeline.runtime.processes import die_with_parent, end_with_parent
 from buildarena_pipeline.runtime.reaper import Reaper
 from buildarena_pipeline.runtime.settings import Settings
 from buildarena_pipeline.runtime.tracing import Tracing

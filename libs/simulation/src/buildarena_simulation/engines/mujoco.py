@@ -239,16 +239,14 @@ class MujocoEngine:
         data, at = self._data, self._addresses
         contact, count = data.contact, data.ncon
         address = contact.efc_address[:count]
-        active = np.flatnonzero(address >= 0)
+        active = (address >= 0).nonzero()[0]
         geoms = contact.geom[active]
         components = data.efc_force[address[active][:, None] + np.arange(3)]
         frames = contact.frame[active].reshape(-1, 3, 3)
         # MuJoCo's contact force acts on the second geom; its frame's rows are normal and tangents.
         force = (components[:, None] @ frames)[:, 0]
         clusters = at.body_of_geom[geoms]
-        sides = [
-            (np.flatnonzero(clusters[:, k] >= 0), k, sign) for k, sign in ((0, -1.0), (1, 1.0))
-        ]
+        sides = [((clusters[:, k] >= 0).nonzero()[0], k, sign) for k, sign in ((0, -1.0), (1, 1.0))]
         row = np.concatenate([rows for rows, _, _ in sides])
         own = np.concatenate([geoms[rows, k] for rows, k, _ in sides])
         facing = np.concatenate([geoms[rows, 1 - k] for rows, k, _ in sides])
@@ -272,15 +270,15 @@ class MujocoEngine:
         """Rows of one contact and one block each: the contact's index, the block, its share."""
         at = self._addresses
         block = at.block_of_geom[geoms]
-        lone = np.flatnonzero(block >= 0)
+        lone = (block >= 0).nonzero()[0]
         rows, blocks, weights = [lone], [block[lone]], [np.ones(len(lone))]
         if len(lone) < len(geoms):
             motion = self.motion()
             cluster = np.where(block >= 0, -1, at.body_of_geom[geoms])
-            for c in np.unique(cluster[cluster >= 0]).tolist():
+            for c in sorted(set(cluster[cluster >= 0].tolist())):
                 if c not in self._shapes:
                     self._shapes[c] = shape_table(self._structure, self._clusters.blocks[c])
-                among = np.flatnonzero(cluster == c)
+                among = (cluster == c).nonzero()[0]
                 local = (points[among] - motion.position[c]) @ motion.rotation[c]
                 row, found, weight = self._shapes[c].share(local)
                 rows.append(among[row])

@@ -114,10 +114,10 @@ class EdgeSupports:
         found: list[tuple[IntArray, _Candidates]] = []
         of = self._cluster_of[contacts.block]
         resting = contacts.other[first_face:] == WORLD
-        for c in np.unique(of[first_face:][resting]).tolist():
+        for c in sorted(set(of[first_face:][resting].tolist())):
             rows = self._patch(contacts, of, first_face, c)
             candidates = _candidates(contacts, spread, corners, rows, first_face)
-            if len(np.unique(candidates.block)) > 1 and self._matters(candidates):
+            if (candidates.block != candidates.block[0]).any() and self._matters(candidates):
                 found.append((rows, candidates))
         if not found:
             return contacts, spread
@@ -137,7 +137,7 @@ class EdgeSupports:
 
     def _patch(self, contacts: ContactForces, of: IntArray, first_face: int, c: int) -> IntArray:
         """Rows of a cluster's contacts with the world along the normal of its resting faces."""
-        mine: IntArray = np.flatnonzero((of == c) & (contacts.other == WORLD))
+        mine: IntArray = ((of == c) & (contacts.other == WORLD)).nonzero()[0]
         normal = contacts.normal[mine[mine >= first_face][0]]
         return np.asarray(mine[(contacts.normal[mine] == normal).all(axis=1)])
 
@@ -160,7 +160,7 @@ class EdgeSupports:
         inward = turn.T @ normal
         local = (point - motion.position[c]) @ turn
         moments = cross(local - self._centers[block], inward[None])
-        unit = np.concatenate([np.tile(inward, (len(block), 1)), moments], axis=1)
+        unit = np.concatenate([np.full((len(block), 3), inward), moments], axis=1)
         known = self._system(block, unit, local, structure)
         gap = (unit * displaced[block]).sum(axis=1) + base / _FOUNDATION
         force = known.solver.solve(known.compliance @ base - gap, base)
@@ -291,7 +291,7 @@ class _LeastEnergy:
         """Forces of points that bear, and how far the others open, each (P,)."""
         from scipy.linalg import lu_factor, lu_solve
 
-        held = np.flatnonzero(bearing)
+        held = bearing.nonzero()[0]
         size = len(held)
         if self._factors[0] != bearing.tobytes():
             matrix = np.zeros((size + 3, size + 3))
@@ -353,7 +353,7 @@ def _with(
         surface=surface,
         weight=np.ones(count),
         area=np.zeros(count),
-        normal=np.tile([0.0, 0.0, 1.0], (count, 1)),
+        normal=np.full((count, 3), [0.0, 0.0, 1.0]),
         point=point,
         force=force,
     )

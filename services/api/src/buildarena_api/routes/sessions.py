@@ -13,9 +13,10 @@ from buildarena_api.dependencies import ContextDep, ExternalDep
 from buildarena_api.http.access import Caller, CallerDep
 from buildarena_api.http.problems import ProblemError, problem_responses
 from buildarena_api.schemas import JobView
+from buildarena_environment import ASSEMBLY, MAIN, NothingToSubmitError
+from buildarena_environment.workbench import building_tools
 from buildarena_pipeline.agents.briefing import LIMITS
-from buildarena_pipeline.agents.sessions import NothingToSubmitError, SessionClosedError
-from buildarena_pipeline.agents.workbench import ASSEMBLY, MAIN, agent_tools
+from buildarena_pipeline.agents.sessions import SessionClosedError
 from buildarena_pipeline.catalog.simulators import SIMULATORS
 from buildarena_pipeline.catalog.specs import Name, Seed
 from buildarena_pipeline.runtime.context import Context
@@ -215,7 +216,7 @@ def submit_session(
 def _tools() -> list[ToolView]:
     return [
         ToolView(name=tool.name, description=tool.description, parameters=dict(tool.parameters))
-        for tool in agent_tools()
+        for tool in building_tools()
     ]
 
 

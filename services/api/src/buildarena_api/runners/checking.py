@@ -10,9 +10,9 @@ from typing import Any, Final
 
 import structlog
 
+from buildarena_environment.warm_process import ProcessEndedError, WarmProcess
 from buildarena_geometry import Machine
 from buildarena_pipeline.runtime.trial_checks import OutcomeRefusedError, checked_trajectory
-from buildarena_pipeline.runtime.warm_process import ProcessEndedError, WarmProcess
 from buildarena_simulation import Scenario, Trajectory
 
 SPARE_BYTES: Final = 1 << 30

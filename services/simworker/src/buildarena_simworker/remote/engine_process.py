@@ -8,8 +8,8 @@ from typing import Any
 
 from buildarena_benchmark.tasks.document import TaskDocument
 from buildarena_benchmark.tasks.task import task_of
+from buildarena_environment.warm_process import ProcessEndedError, WarmProcess
 from buildarena_geometry import Machine
-from buildarena_pipeline.runtime.warm_process import ProcessEndedError, WarmProcess
 from buildarena_simworker.simulators.engines import EngineSimulator
 from buildarena_simworker.simulators.simulator import (
     MachineRefusedError,

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TypeVar
 
+from buildarena_benchmark import Score
+from buildarena_environment.trials import told
 from buildarena_geometry import Machine
 from buildarena_pipeline.runtime.scoring import best_rollout
 from buildarena_store import RolloutRecord
@@ -107,19 +109,10 @@ def _report(session: Session, played: _Round, number: int, loop: Loop) -> None:
 
 def describe(session: Session, record: RolloutRecord) -> str:
     """A rollout's result in words, generated from its score."""
-    indicator = session.task.indicator
-    parts = [
-        "It succeeded." if record.success else "It did not succeed.",
-        f"{indicator.name.capitalize()}: {record.indicator or 0.0:.2f} {indicator.unit}.".strip(),
-    ]
-    metrics = record.metrics or {}
-    known = [f"{name} {_rendered(value)}" for name, value in metrics.items() if value is not None]
-    if known:
-        parts.append("Measured: " + ", ".join(known) + ".")
-    if record.flags:
-        parts.append("Flags: " + ", ".join(record.flags) + ".")
-    return " ".join(parts)
-
-
-def _rendered(value: object) -> str:
-    return f"{value:.3g}" if isinstance(value, float) else str(value)
+    measured = Score(
+        success=bool(record.success),
+        indicator=record.indicator or 0.0,
+        metrics=record.metrics or {},
+        flags=tuple(record.flags or ()),
+    )
+    return told(session.task, measured)

@@ -11,7 +11,7 @@ import psutil
 import pytest
 from warm_work import make
 
-from buildarena_pipeline.runtime.warm_process import ProcessEndedError, WarmProcess
+from buildarena_environment.warm_process import ProcessEndedError, WarmProcess
 
 SPARE = 200 << 20
 

@@ -13,15 +13,15 @@ from typing import Any, Final
 
 import psutil
 
-from buildarena_pipeline.errors import PipelineError
-from buildarena_pipeline.runtime.processes import end_with_parent
+from buildarena_environment.errors import BuildarenaEnvironmentError
+from buildarena_environment.processes import end_with_parent
 
 LOOK_EVERY_S: Final = 0.1
 """How soon work that is given up is broken off."""
 LONGEST_END_S: Final = 2.0
 
 
-class ProcessEndedError(PipelineError):
+class ProcessEndedError(BuildarenaEnvironmentError):
     """The process ended in the middle of its work.
 
     Attributes:

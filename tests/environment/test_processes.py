@@ -14,7 +14,7 @@ from running import wait_until
 
 PARENT = """
 import subprocess, sys, os, signal
-from buildarena_pipeline.runtime.processes import PARENT, dying_with_me
+from buildarena_environment.processes import PARENT, dying_with_me
 child = subprocess.Popen(
     [sys.executable, "-c", sys.argv[1]],
     env={**os.environ, PARENT: str(os.getpid())},
@@ -26,7 +26,7 @@ signal.pause()
 """
 WATCHING = """
 import signal, time
-from buildarena_pipeline.runtime.processes import end_with_parent
+from buildarena_environment.processes import end_with_parent
 end_with_parent()
 {extra}
 print("ready", flush=True)

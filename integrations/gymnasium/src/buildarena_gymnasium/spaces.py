@@ -1,0 +1,89 @@
+"""Spaces of text, the same for all tasks, so that vector environments can mix them."""
+
+from __future__ import annotations
+
+import string
+from collections.abc import Sequence
+from typing import Any, Final, overload
+
+import numpy as np
+from gymnasium import spaces
+from gymnasium.vector.utils import read_from_shared_memory, write_to_shared_memory
+
+MAX_ACTION: Final = 2_000
+"""Characters of a call; the longest one of the built-in expert has 152."""
+MAX_OBSERVATION: Final = 32_768
+"""Characters of an answer; a briefing has about 6,500."""
+CUT: Final = " [cut]"
+UNKNOWN: Final = "?"
+_PRINTABLE: Final = string.digits + string.ascii_letters + string.punctuation + " "
+
+
+class AnswerText(spaces.Text):
+    """Text that an asynchronous vector environment passes on as it changes.
+
+    Of Gymnasium's own `Text` such an environment with shared memory, its default, reads what stood
+    there when it was made.
+    """
+
+
+ACTION_SPACE: Final = spaces.Text(MAX_ACTION, charset=frozenset(_PRINTABLE))
+"""A tool call as JSON, which can escape any other character."""
+OBSERVATION_SPACE: Final = AnswerText(
+    MAX_OBSERVATION, min_length=0, charset=frozenset(_PRINTABLE + "\n°—…")
+)
+"""What a model would read."""
+
+
+def observed(text: str) -> str:
+    """The text as an element of the observation space.
+
+    Characters that the space does not have, which only an answer that quotes its call contains,
+    become question marks; what is too long is cut.
+    """
+    if len(text) > MAX_OBSERVATION:
+        text = text[: MAX_OBSERVATION - len(CUT)] + CUT
+    known = OBSERVATION_SPACE.character_set
+    if known.issuperset(text):
+        return text
+    return "".join(character if character in known else UNKNOWN for character in text)
+
+
+class _Current(Sequence[str]):
+    """The texts in a shared memory as they stand when they are read; a copy keeps them."""
+
+    def __init__(self, rows: np.ndarray[Any, np.dtype[np.int32]]) -> None:
+        self._rows = rows
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    @overload
+    def __getitem__(self, index: int) -> str: ...
+    @overload
+    def __getitem__(self, index: slice) -> tuple[str, ...]: ...
+    def __getitem__(self, index: int | slice) -> str | tuple[str, ...]:
+        if isinstance(index, slice):
+            return tuple(self)[index]
+        row = self._rows[index]
+        ends = np.flatnonzero(row == 0)
+        length = int(ends[0]) if len(ends) else len(row)
+        text: bytes = row[:length].tobytes()
+        return text.decode("utf-32-le")
+
+    def __deepcopy__(self, memo: object) -> tuple[str, ...]:
+        return tuple(self)
+
+
+@read_from_shared_memory.register(AnswerText)
+def _read(space: AnswerText, shared_memory: Any, n: int = 1) -> _Current:
+    found = np.frombuffer(shared_memory.get_obj(), dtype=np.int32)
+    return _Current(found.reshape(n, space.max_length))
+
+
+@write_to_shared_memory.register(AnswerText)
+def _write(space: AnswerText, index: int, values: str, shared_memory: Any) -> None:
+    found = np.frombuffer(shared_memory.get_obj(), dtype=np.int32)
+    row = found.reshape(-1, space.max_length)[index]
+    row[: len(values)] = np.frombuffer(values.encode("utf-32-le"), dtype=np.int32)
+    row[len(values) :] = 0

@@ -1,0 +1,37 @@
+"""The built-in expert's calls, as actions."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+DATA = Path(__file__).parents[3] / "tests/data/expert_calls.json"
+SUBMIT = '{"tool": "submit"}'
+
+
+@pytest.fixture(scope="session")
+def experts() -> dict[str, Any]:
+    return json.loads(DATA.read_text())
+
+
+@pytest.fixture(scope="session")
+def actions(experts) -> dict[str, list[str]]:
+    """By task, what builds the expert's machine and submits it."""
+    return {
+        task: [
+            *(
+                json.dumps(
+                    {
+                        "tool": made["tool"],
+                        "arguments": {**made["arguments"], "machine": made["machine"]},
+                    }
+                )
+                for made in told["calls"]
+            ),
+            SUBMIT,
+        ]
+        for task, told in experts.items()
+    }

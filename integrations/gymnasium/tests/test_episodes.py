@@ -1,0 +1,174 @@
+"""Episodes through Gymnasium's own doors."""
+
+from __future__ import annotations
+
+import json
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.error import ResetNeeded
+from gymnasium.utils.env_checker import check_env
+
+import buildarena_gymnasium
+from buildarena_environment import SnapshotError, UnknownChoiceError
+from buildarena_gymnasium.spaces import MAX_OBSERVATION, UNKNOWN, observed
+
+SUBMIT = '{"tool": "submit"}'
+START = '{"tool": "start", "arguments": {}}'
+IDS = buildarena_gymnasium.ids()
+
+
+def task_of(name: str) -> str:
+    return name.split("/")[1].removesuffix("-v0").lower()
+
+
+def test_all_tasks_are_registered_and_registering_twice_is_quiet() -> None:
+    buildarena_gymnasium.register_all()
+    assert len(IDS) == 9
+    assert IDS[3] == "BuildArena/Support-1-v0"
+    found = gymnasium.make("buildarena_gymnasium:BuildArena/Lift-3-v0")
+    assert found.unwrapped.environment.task.name == "lift-3"
+
+
+@pytest.mark.parametrize("name", IDS)
+def test_gymnasiums_checker_is_content(name) -> None:
+    check_env(gymnasium.make(name, render_mode="rgb_array").unwrapped)
+
+
+@pytest.mark.parametrize("arguments", [{"varied_start": True}, {"rounds": 2, "steps": 5}])
+def test_the_checker_is_content_with_other_arguments(arguments) -> None:
+    check_env(gymnasium.make(IDS[6], **arguments).unwrapped)
+
+
+@pytest.mark.parametrize("name", IDS)
+def test_the_expert_scores_what_it_scores_elsewhere(name, actions, experts) -> None:
+    task = task_of(name)
+    environment = gymnasium.make(name, rewards={"success": 1.0, "indicator": 2.0})
+    briefing, info = environment.reset(seed=3)
+    assert f"# Task: {task}" in briefing
+    assert UNKNOWN * 2 not in briefing
+    assert json.loads(info["tools"])[-1]["name"] == "submit"
+    total = 0.0
+    for action in actions[task]:
+        observation, reward, terminated, truncated, info = environment.step(action)
+        assert info["accepted"], observation
+        total += reward
+    assert (terminated, truncated) == (True, False)
+    kept = experts[task]["score"]
+    assert info["score"]["success"] == kept["success"]
+    assert info["score"]["indicator"] == pytest.approx(kept["indicator"], rel=0.02)
+    assert info["score"]["flags"] == kept["flags"]
+    assert total == pytest.approx(3.0, rel=0.02)
+    with pytest.raises(ResetNeeded):
+        environment.step(SUBMIT)
+
+
+def test_what_is_read_stands_in_the_observation_space_unchanged() -> None:
+    for name in IDS:
+        environment = gymnasium.make(name).unwrapped
+        briefing, _ = environment.reset()
+        assert briefing == environment.environment.observation.briefing
+
+
+def test_nonsense_is_answered_inside_the_spaces() -> None:
+    environment = gymnasium.make(IDS[3], steps=50).unwrapped
+    environment.reset()
+    space = environment.observation_space
+    for action in (
+        "",
+        "x" * 10_000_000,
+        "\0\N{SNOWMAN}",
+        '{"tool": "\N{SNOWMAN}\\u2603", "arguments": {}}',
+        '{"tool": "start", "arguments": {"machine": "\\ud800"}}',
+        json.dumps({"tool": "start", "arguments": {"note": "a" * 3000}}),
+    ):
+        observation, reward, terminated, truncated, info = environment.step(action)
+        assert observation in space
+        assert (reward, terminated, truncated, info["accepted"]) == (0.0, False, False, False)
+    assert observed("\N{SNOWMAN}!") == "?!"
+    assert len(observed("a" * 10**6)) == MAX_OBSERVATION
+    assert observed("a" * 10**6).endswith(" [cut]")
+
+
+def test_the_last_step_has_what_was_built_tried(actions) -> None:
+    built = actions["support-1"][:-1]
+    environment = gymnasium.make(IDS[3], steps=len(built))
+    environment.reset()
+    *_, last = [environment.step(action) for action in built]
+    observation, reward, terminated, truncated, info = last
+    assert (reward, terminated, truncated) == (1.0, False, True)
+    assert info["score"]["success"]
+    assert "It succeeded." in observation
+    observation, _ = environment.reset()
+    assert observation.startswith("# How you play")
+
+
+def test_submitting_nothing_forever_ends() -> None:
+    environment = gymnasium.make(IDS[3], steps=3)
+    environment.reset()
+    outcomes = [environment.step(SUBMIT) for _ in range(3)]
+    assert [outcome[3] for outcome in outcomes] == [False, False, True]
+    assert outcomes[-1][4]["score"]["reason"] == "nothing_submitted"
+
+
+def test_states_are_reached_again_and_lead_to_the_same(actions) -> None:
+    built = actions["lift-1"]
+    environment = gymnasium.make(IDS[6])
+    environment.reset()
+    for action in built[:-4]:
+        environment.step(action)
+    builder = environment.unwrapped
+    state = builder.state()
+    first = [environment.step(action) for action in built[-4:]]
+    builder.restore(state)
+    second = [environment.step(action) for action in built[-4:]]
+    assert first == second
+    other = gymnasium.make(IDS[6])
+    other.reset(options={"state": json.loads(json.dumps(state.as_document()))})
+    assert [other.step(action)[:4] for action in built[-4:]] == [step[:4] for step in first]
+    with pytest.raises(SnapshotError, match="is of lift-1"):
+        gymnasium.make(IDS[0]).reset(options={"state": state})
+
+
+def test_starts_vary_when_asked_for_and_only_then(actions) -> None:
+    def indicator(environment, **options) -> float:
+        environment.reset(**options)
+        return [environment.step(action) for action in actions["transport-1"]][-1][4]["score"][
+            "indicator"
+        ]
+
+    exact = gymnasium.make(IDS[0])
+    assert indicator(exact, seed=1) == indicator(exact, seed=2) == indicator(exact)
+    varied = gymnasium.make(IDS[0], varied_start=True)
+    first, second = indicator(varied, seed=1), indicator(varied)
+    assert len({first, second, indicator(exact)}) == 3
+    assert (indicator(varied, seed=1), indicator(varied)) == (first, second)
+    chosen = indicator(exact, options={"start_seed": 7})
+    assert chosen == indicator(varied, options={"start_seed": 7}) != indicator(exact)
+
+
+def test_what_does_not_exist_is_named_with_the_choices() -> None:
+    with pytest.raises(UnknownChoiceError, match="no simulator 'game'"):
+        gymnasium.make(IDS[0], simulator="game")
+    with pytest.raises(UnknownChoiceError, match="no reward 'fun'"):
+        gymnasium.make(IDS[0], rewards={"fun": 1.0})
+    with pytest.raises(ValueError, match="no option 'sede': choose from state, start_seed"):
+        gymnasium.make(IDS[0]).reset(options={"sede": 1})
+    with pytest.raises(ValueError, match="no render mode 'film'"):
+        buildarena_gymnasium.BuildEnv("support-1", render_mode="film")
+    with pytest.raises(ResetNeeded):
+        buildarena_gymnasium.BuildEnv("support-1").step(START)
+
+
+def test_pictures_show_what_was_built(actions) -> None:
+    environment = gymnasium.make(IDS[3], render_mode="rgb_array")
+    environment.reset()
+    empty = environment.render()
+    assert (empty.shape, empty.dtype) == ((320, 480, 3), np.uint8)
+    assert (empty == 255).all()
+    for action in actions["support-1"][:-1]:
+        environment.step(action)
+    shown = environment.render()
+    assert shown.shape == empty.shape
+    assert len(np.unique(shown.reshape(-1, 3), axis=0)) > 5

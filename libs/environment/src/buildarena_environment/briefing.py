@@ -1,0 +1,100 @@
+"""What one who builds alone reads first: the task, the rules and the modules.
+
+A task's statement is written once, for models in workflows. What differs for a builder that brings
+its own loop (it writes its own key presses) is said around it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from hashlib import sha256
+from importlib import resources
+from string import Template
+from typing import Final
+
+from buildarena_benchmark import Task
+from buildarena_environment.workbench import ASSEMBLY, MAIN
+from buildarena_geometry import load_catalogue
+from buildarena_geometry.feedback.modules import modules_text
+from buildarena_geometry.feedback.words import counted
+
+_CONTROL: Final = {
+    "agent": (
+        "You write the key presses yourself, before you submit: bind a key to each action that "
+        "shall be used with `change_control_key`, and say when which key is held with "
+        "`add_control_sequence`, both on the machine that is simulated. An assembly keeps the "
+        "bindings of its sub-structures and has a sequence of its own."
+    ),
+    "held": "You need not bind any key: every water cannon fires from t = {from_s:g} s on.",
+    "none": "No key is pressed in this trial, so you need not bind any.",
+}
+
+_CHECKS: Final = {
+    "always": (
+        "There is more than the starting block. Joints that hold and connectors join every part to "
+        "the first starting block. At most {own} blocks in a sub-structure, {all} in all."
+    ),
+    "modules": "Only the modules listed below.",
+    "least": "At least {count} x {name}.",
+    "wheels": "At least {count} powered wheels.",
+}
+
+
+def briefing(task: Task, *, trials: str, conduct: str, values: Mapping[str, str]) -> str:
+    """All that a builder must know to play a task, but for its tools.
+
+    Args:
+        task: The task.
+        trials: How often it may submit, in a sentence or two.
+        conduct: What holds for its calls and for the end, as paragraphs; a template.
+        values: What stands in for the names in `conduct`, beside those of every task.
+
+    Returns:
+        Markdown: how it plays, the statement, the frame, the rules, the modules.
+    """
+    return Template(_text(trials, conduct)).substitute(
+        task=task.name,
+        control=_CONTROL[task.control].format(from_s=task.scenario.control.from_s),
+        statement=task.statement.strip(),
+        sub_structures=_sub_structures(task),
+        main=MAIN,
+        assembly=ASSEMBLY,
+        checks=_checks(task),
+        modules=modules_text(load_catalogue(), task.constraints.modules),
+        **values,
+    )
+
+
+@cache
+def briefing_digest(trials: str, conduct: str) -> str:
+    """Hash of the words around a statement: results of different ones don't compare."""
+    words = [_text(trials, conduct), *_CONTROL.values(), *_CHECKS.values()]
+    return sha256("\0".join(words).encode()).hexdigest()
+
+
+@cache
+def _text(trials: str, conduct: str) -> str:
+    frame = resources.files(__package__).joinpath("briefing.md").read_text(encoding="utf-8")
+    return frame.strip().replace("$trials", trials).replace("$conduct", conduct.strip()) + "\n"
+
+
+def _sub_structures(task: Task) -> str:
+    fewest, most = task.constraints.min_sub_structures, task.constraints.max_sub_structures
+    if fewest == most:
+        return f"exactly {counted(most, 'sub-structure')}"
+    return f"{fewest} to {most} sub-structures"
+
+
+def _checks(task: Task) -> str:
+    limits = task.constraints
+    checks = [_CHECKS["always"].format(own=limits.max_blocks, all=limits.most_blocks)]
+    if limits.modules is not None:
+        checks.append(_CHECKS["modules"])
+    checks += [
+        _CHECKS["least"].format(count=count, name=name)
+        for name, count in limits.min_modules.items()
+    ]
+    if limits.min_wheels:
+        checks.append(_CHECKS["wheels"].format(count=limits.min_wheels))
+    return " ".join(checks)

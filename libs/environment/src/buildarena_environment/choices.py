@@ -1,0 +1,73 @@
+"""What an environment is made with, by name: tasks, simulators, reference indicators."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from functools import cache
+from importlib import resources
+from typing import Final
+
+from buildarena_benchmark import Task, builtin_tasks
+from buildarena_environment.errors import UnknownChoiceError
+from buildarena_simulation import ENGINES
+
+WITHOUT: Final = 1.0
+"""The reference of a task that has none, where no reward asks for it."""
+
+
+def chosen_task(task: Task | str) -> Task:
+    """The task, or the built-in one of this name; underscores count as dashes.
+
+    Raises:
+        UnknownChoiceError: There is none.
+    """
+    if isinstance(task, Task):
+        return task
+    found = builtin_tasks().get(task.replace("_", "-"))
+    if found is None:
+        raise UnknownChoiceError("task", task, builtin_tasks())
+    return found
+
+
+def checked_simulator(name: str) -> str:
+    """The name, if an engine of ours has it.
+
+    Raises:
+        UnknownChoiceError: None has.
+    """
+    if name not in ENGINES:
+        raise UnknownChoiceError("simulator", name, ENGINES)
+    return name
+
+
+def reference_of(task: Task, given: float | None = None, *, needed: bool = False) -> float:
+    """The indicator that is worth 1.
+
+    Args:
+        task: The task.
+        given: What takes its place.
+        needed: Whether a task without a reference is refused.
+
+    Raises:
+        ValueError: It is not above 0, or the task has none and one is needed.
+    """
+    if given is not None:
+        if not given > 0:
+            raise ValueError(f"reference is {given}: it must be above 0")
+        return given
+    found = references().get(task.name)
+    if found is not None and builtin_tasks().get(task.name) == task:
+        return found
+    if needed:
+        raise ValueError(
+            f"{task.name} has no reference indicator: give one, or leave the reward 'indicator' out"
+        )
+    return WITHOUT
+
+
+@cache
+def references() -> Mapping[str, float]:
+    """The built-in expert's indicators on MuJoCo, by built-in task."""
+    text = resources.files(__package__).joinpath("references.json").read_text(encoding="utf-8")
+    return {str(name): float(value) for name, value in json.loads(text).items()}

@@ -1,0 +1,158 @@
+"""One trial of a machine, from the task's constraints to its score."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any, Protocol, Self
+
+from buildarena_benchmark import Score, Task, broken_constraint, failed_score, score
+from buildarena_benchmark.flags import is_disqualified
+from buildarena_benchmark.scores import decision
+from buildarena_geometry import Machine
+from buildarena_simulation import MachineNotSimulable, Trajectory, simulate
+
+NOT_SIMULABLE = "not_simulable"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trial:
+    """What came of a machine.
+
+    Attributes:
+        score: Its score.
+        reason: Why it was not simulated: the class of the broken constraint, or ``not_simulable``;
+            None where it was.
+        detail: That in a sentence; "" where it was simulated.
+        wall_s: Seconds that it took.
+        trajectory: What the simulator recorded, where there was a trial and it is kept.
+    """
+
+    score: Score
+    reason: str | None = None
+    detail: str = ""
+    wall_s: float = 0.0
+    trajectory: Trajectory | None = None
+
+    @property
+    def counts(self) -> bool:
+        """Whether it is a success in our ranking: met the criterion, and not disqualified."""
+        return self.score.success and not is_disqualified(self.score.flags)
+
+    def as_document(self) -> dict[str, Any]:
+        """JSON values that `from_document` reads; without the trajectory."""
+        return {
+            "success": self.score.success,
+            "indicator": self.score.indicator,
+            "metrics": dict(self.score.metrics),
+            "flags": list(self.score.flags),
+            "reason": self.reason,
+            "detail": self.detail,
+            "wall_s": self.wall_s,
+        }
+
+    @classmethod
+    def from_document(
+        cls, document: Mapping[str, Any], trajectory: Trajectory | None = None
+    ) -> Self:
+        """A trial from `as_document`."""
+        found = Score(
+            success=bool(document["success"]),
+            indicator=float(document["indicator"]),
+            metrics=MappingProxyType(dict(document["metrics"])),
+            flags=tuple(document["flags"]),
+        )
+        return cls(
+            score=found,
+            reason=document["reason"],
+            detail=document["detail"],
+            wall_s=float(document["wall_s"]),
+            trajectory=trajectory,
+        )
+
+
+class Tries(Protocol):
+    """What tries machines: `try_machine`, or something that has it done elsewhere."""
+
+    def __call__(
+        self, task: Task, machine: Machine, simulator: str, /, *, seed: int | None
+    ) -> Trial:
+        """As `try_machine`."""
+        ...
+
+
+def try_machine(
+    task: Task,
+    machine: Machine,
+    simulator: str = "mujoco",
+    *,
+    seed: int | None = None,
+    whole: bool = True,
+) -> Trial:
+    """Checks a machine by the task's constraints, and simulates and scores it.
+
+    Args:
+        task: The task.
+        machine: The machine.
+        simulator: Name of the engine, see `buildarena_simulation.ENGINES`.
+        seed: Varies the start as a fair repetition would; None for the exact one, which is the
+            service's.
+        whole: False ends the trial when it is decided: success, indicator and flags are those of
+            the whole trial, other metrics and the trajectory of what was seen until then.
+
+    Raises:
+        SimulationError: The simulator failed, which says nothing of the machine.
+    """
+    started = time.perf_counter()
+    broken = broken_constraint(task, machine)
+    if broken is not None:
+        return Trial(
+            score=failed_score(task, machine),
+            reason=broken[0],
+            detail=broken[1],
+            wall_s=time.perf_counter() - started,
+        )
+    try:
+        until = None if whole else decision(task)
+        trajectory = simulate(machine, task.scenario, simulator, seed=seed, until=until)
+    except MachineNotSimulable as refusal:
+        return Trial(
+            score=failed_score(task, machine),
+            reason=NOT_SIMULABLE,
+            detail=refusal.reason,
+            wall_s=time.perf_counter() - started,
+        )
+    found = score(task, machine, trajectory)
+    return Trial(score=found, wall_s=time.perf_counter() - started, trajectory=trajectory)
+
+
+def best_trial(trials: Sequence[Trial]) -> Trial:
+    """The one that counts, as the service chooses it.
+
+    A success before none, one that no flag disqualifies before others, then the larger indicator,
+    then the first.
+    """
+    return max(trials, key=lambda trial: (trial.counts, trial.score.success, trial.score.indicator))
+
+
+def told(task: Task, found: Score) -> str:
+    """A trial's score in words, for models."""
+    indicator = task.indicator
+    parts = [
+        "It succeeded." if found.success else "It did not succeed.",
+        f"{indicator.name.capitalize()}: {found.indicator:.2f} {indicator.unit}.".strip(),
+    ]
+    known = [
+        f"{name} {_rendered(value)}" for name, value in found.metrics.items() if value is not None
+    ]
+    if known:
+        parts.append("Measured: " + ", ".join(known) + ".")
+    if found.flags:
+        parts.append("Flags: " + ", ".join(found.flags) + ".")
+    return " ".join(parts)
+
+
+def _rendered(value: object) -> str:
+    return f"{value:.3g}" if isinstance(value, float) else str(value)

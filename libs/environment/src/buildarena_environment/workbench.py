@@ -1,0 +1,150 @@
+"""The workbench of one who builds alone: the machines it builds, by name, and their assembly."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Final, Self
+
+from buildarena_environment.errors import NothingToSubmitError
+from buildarena_geometry import GROUPS, Cause, Machine, Refused, ToolDefinition, tool_definitions
+
+if TYPE_CHECKING:
+    from buildarena_geometry import Outcome
+    from buildarena_geometry.documents.log import LoggedState
+
+MAIN: Final = "main"
+"""What a machine is called where no name is given."""
+ASSEMBLY: Final = "assembly"
+"""The machine that is put together from copies of all others."""
+NAME: Final = re.compile(r"[A-Za-z0-9_-]{1,40}")
+"""What a machine may be called."""
+SUBMIT: Final = ToolDefinition(
+    name="submit",
+    description="End the building: the machine is simulated and scored.",
+    parameters={
+        "type": "object",
+        "properties": {},
+        "required": [],
+        "additionalProperties": False,
+    },
+    group="submit",
+)
+MACHINE: Final = {
+    "type": "string",
+    "description": "Sub-structure it is meant for, a new one if there is none of this name; "
+    f"{ASSEMBLY!r} joins copies of all others.",
+    "default": MAIN,
+}
+"""Schema of the argument that says which machine a call is meant for."""
+
+
+def building_tools() -> tuple[ToolDefinition, ...]:
+    """All actions of the geometry library, as they are."""
+    return tool_definitions(GROUPS)
+
+
+def tools_of_models() -> tuple[ToolDefinition, ...]:
+    """The actions with one more argument, `machine`, and the tool that submits."""
+    building = [
+        ToolDefinition(
+            name=tool.name,
+            description=tool.description,
+            parameters={
+                **tool.parameters,
+                "properties": {**tool.parameters["properties"], "machine": MACHINE},
+            },
+            group=tool.group,
+        )
+        for tool in building_tools()
+    ]
+    return (*building, SUBMIT)
+
+
+class Workbench:
+    """Machines that are made by calls; the same calls make the same machines.
+
+    The machine called ``assembly`` is put together from copies of all others, as they are when
+    the first call to it is made.
+    """
+
+    def __init__(self) -> None:
+        self._machines: dict[str, Machine] = {}
+
+    @property
+    def machines(self) -> Mapping[str, Machine]:
+        """What was built, by name, in the order of the first calls."""
+        return MappingProxyType(self._machines)
+
+    def act(self, machine: str, tool: object, arguments: Any) -> Outcome:
+        """Carries out an action on a machine; no argument makes it raise."""
+        if machine not in self._machines and NAME.fullmatch(machine) is None:
+            return Refused(
+                cause=Cause.MALFORMED_ARGUMENTS,
+                text="A machine's name has 1 to 40 letters, digits, dashes and underscores.",
+            )
+        return self.machine(machine).act(tool, arguments)
+
+    def machine(self, name: str) -> Machine:
+        """The machine with a name, empty when there was none."""
+        found = self._machines.get(name)
+        if found is None:
+            found = Machine(available=self._machines if name == ASSEMBLY else None)
+            self._machines[name] = found
+        return found
+
+    def result(self) -> tuple[str, Machine] | None:
+        """What is to be simulated: the assembly if there is one, otherwise the only machine."""
+        if ASSEMBLY in self._machines:
+            return ASSEMBLY, self._machines[ASSEMBLY]
+        if len(self._machines) == 1:
+            return next(iter(self._machines.items()))
+        return None
+
+    def submitted(self) -> Machine:
+        """The machine that is to be simulated.
+
+        Raises:
+            NothingToSubmitError: There is none, or there are several; the message says what to do.
+        """
+        result = self.result()
+        if result is None:
+            raise NothingToSubmitError(_what_to_do(self._machines))
+        return result[1]
+
+    def values(self) -> dict[str, LoggedState]:
+        """Everything that stands on it, as values by name."""
+        return {name: machine.logged for name, machine in self._machines.items()}
+
+    def return_to(self, values: Mapping[str, LoggedState]) -> None:
+        """Puts on it what `values` gave; costs what differs where the machines are its own."""
+        self._machines = {
+            name: _returned(self._machines.get(name), value) for name, value in values.items()
+        }
+
+    @classmethod
+    def holding(cls, machines: Mapping[str, Machine]) -> Self:
+        """A workbench with these machines on it."""
+        bench = cls()
+        bench._machines = dict(machines)
+        return bench
+
+
+def _returned(machine: Machine | None, value: LoggedState) -> Machine:
+    if machine is None or machine.state.available is not value.state.available:
+        return Machine.restored(value)
+    machine.return_to(value)
+    return machine
+
+
+def _what_to_do(machines: Mapping[str, Machine]) -> str:
+    """Why there is nothing to submit, and how there would be."""
+    if not machines:
+        return "there is no machine to simulate: build one, beginning with the tool 'start'"
+    listed = ", ".join(repr(name) for name in machines)
+    return (
+        f"there are {len(machines)} machines ({listed}) and no assembly: put them together in the "
+        f"machine {ASSEMBLY!r}, with add_machine for each and connect_blocks between them, then "
+        "submit again"
+    )

@@ -1,0 +1,305 @@
+"""What both clients say of a real service."""
+
+from __future__ import annotations
+
+import threading
+import zipfile
+from contextlib import contextmanager
+from itertools import islice
+from pathlib import Path
+
+import pytest
+from tenants import ADMIN
+from working import work
+
+from buildarena_client import (
+    BadArgumentError,
+    ConflictError,
+    ForbiddenError,
+    InvalidError,
+    KeyRefusedError,
+    NotFoundError,
+    TimedOutError,
+    TooLargeError,
+    schemas,
+)
+from buildarena_geometry import Machine
+
+NOBODY = "job_00000000000000000000"
+
+
+def require_shape(document, of) -> None:
+    """Every key is one of the type's, and all that must be there are."""
+    assert of.__required_keys__ <= document.keys() <= of.__annotations__.keys()
+
+
+@contextmanager
+def working(context):
+    """Does what waits, again and again, beside the test."""
+    ended = threading.Event()
+
+    def run() -> None:
+        while not ended.wait(0.05):
+            work(context)
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join()
+
+
+def test_the_catalogue(client) -> None:
+    assert client.health()["status"] == "ok" or client.health()["checks"]
+    require_shape(client.caller(), schemas.CallerView)
+    tasks = client.tasks()
+    assert len(tasks) == 9
+    require_shape(tasks[0], schemas.TaskView)
+    task = client.task("lift-1")
+    require_shape(task, schemas.TaskDetail)
+    assert client.task("lift-1", version=task["version"]) == task
+    assert "builtin/idle" in [model["name"] for model in client.models()]
+    name = client.modules()[0]["name"]
+    assert client.module_model(name).startswith(b"glTF")
+    assert isinstance(client.workers(), list)
+
+
+def test_jobs_come_page_after_page(client, service) -> None:
+    assert len(service.jobs) == 6
+    for page in (1, 2, 4, 6, 100):
+        assert [job["id"] for job in client.jobs(page=page, sweep=service.sweep)] == service.jobs
+    assert [job["id"] for job in client.jobs(limit=4, page=3)] == service.jobs[:4]
+    assert list(client.jobs(limit=0)) == []
+    require_shape(next(iter(client.jobs())), schemas.JobView)
+
+
+def test_jobs_are_filtered_and_sorted(client) -> None:
+    idle = list(client.jobs(model="builtin/idle", sort="seed", order="asc"))
+    assert [job["seed"] for job in idle] == [0, 1, 2]
+    assert {job["model"] for job in idle} == {"builtin/idle"}
+    with pytest.raises(InvalidError) as refused:
+        list(client.jobs(task="lift-9"))
+    assert refused.value.status == 422
+    (error,) = refused.value.errors
+    assert error["field"] == "task"
+    assert "lift-1" in error["choices"]
+    assert "there is no task 'lift-9'; choose from" in str(refused.value)
+
+
+def test_a_job_and_what_it_left(client, service, tmp_path) -> None:
+    job = client.job(service.built)
+    require_shape(job, schemas.JobDetail)
+    assert client.wait_for_job(service.built)["id"] == job["id"]
+    assert Machine.from_document(client.machine(service.built)).started
+    assert client.transcript(service.built)
+    require_shape(client.replay(service.built), schemas.ReplayView)
+    assert client.machine_model(service.built).startswith(b"glTF")
+    require_shape(client.scene(service.built), schemas.SceneView)
+    assert client.trajectory(service.built).startswith(b"PAR1")
+    files = {file["name"]: file for file in client.artifacts(service.built)}
+    assert job["artifacts"].keys() == files.keys()
+    target = tmp_path / "trial.parquet"
+    client.download_artifact(service.built, "trajectory-0", target)
+    assert target.read_bytes() == client.artifact(service.built, "trajectory-0")
+    assert target.stat().st_size == files["trajectory-0"]["size"]
+    assert list(tmp_path.iterdir()) == [target]
+    with pytest.raises(BadArgumentError, match=r"has no file 'x'; it has .*machine"):
+        client.artifact(service.built, "x")
+    assert client.thumbnail(service.built).startswith(b"\x89PNG")
+
+
+def test_the_leaderboard_and_what_stands_beside_it(client, service) -> None:
+    board = client.leaderboard()
+    require_shape(board, schemas.Board)
+    require_shape(board["tasks"][0]["rows"][0], schemas.Row)
+    assert client.leaderboard(sweep=[service.sweep], model=["builtin/idle"], reading="published")
+    found = client.compare("builtin/expert", "builtin/idle", task=["lift-1"])
+    require_shape(found, schemas.Comparison)
+    assert found["tasks"][0]["trials"] == [3, 3]
+    require_shape(client.figures(), schemas.Figures)
+    assert client.manifest(task=["lift-1"], model=["builtin/idle"])
+    require_shape(client.agreement(), schemas.AgreementTable)
+    assert b"builtin/idle" in client.export_leaderboard("csv")
+    page = client.changes(limit=2)
+    assert len(page["changes"]) == 2
+    older = client.changes(before=page["next_before"])["changes"]
+    assert older
+    assert older[0]["id"] < page["changes"][-1]["id"]
+
+
+def test_verifications_are_asked_for(client, service) -> None:
+    asked = client.verify_leaderboard("builtin/expert", sample=1)
+    assert asked["scored"] == 3
+    require_shape(client.verification(asked["verifications"][0]), schemas.VerificationView)
+    again = client.verify_job(service.built)
+    with pytest.raises(TimedOutError, match="has not ended within 0 s"):
+        client.wait_for_verification(again["id"], timeout_s=0)
+
+
+def test_sweeps_are_submitted_once_for_each_key(client, service) -> None:
+    spec = {"tasks": ["lift-1"], "models": ["builtin/idle"], "seeds": [0, 1]}
+    spec["simulator"] = "mujoco"
+    first = client.submit_sweep(spec, request_key=f"one of {id(client)}")
+    assert client.submit_sweep(spec, request_key=f"one of {id(client)}")["id"] == first["id"]
+    with pytest.raises(ConflictError, match="was used for another sweep"):
+        client.submit_sweep({**spec, "seeds": [1]}, request_key=f"one of {id(client)}")
+    assert client.submit_sweep(spec)["id"] != first["id"]
+    resumed = client.submit_sweep(spec, resume=True)
+    assert resumed["resumed"]
+    ids = [sweep["id"] for sweep in client.sweeps(page=1)]
+    assert ids == [sweep["id"] for sweep in client.sweeps()]
+    assert ids[-1] == service.sweep
+    assert len(list(client.sweeps(limit=2))) == 2
+
+
+def test_a_sweep_is_a_file(client, tmp_path) -> None:
+    file = tmp_path / "sweep.yaml"
+    file.write_text("tasks: [lift-1]\nmodels: [builtin/idle]\nsamples: 2\nsimulator: mujoco\n")
+    assert client.estimate_sweep(file)["jobs"] == 2
+    assert client.submit_sweep(file)["jobs"] == 2
+    for text, says in (("- a\n", "must be a mapping"), ("a: [", "is not valid YAML")):
+        file.write_text(text)
+        with pytest.raises(BadArgumentError, match=says):
+            client.submit_sweep(file)
+    with pytest.raises(BadArgumentError, match="No such file"):
+        client.submit_sweep(tmp_path / "none.yaml")
+    with pytest.raises(BadArgumentError, match="give its fields, or the Path"):
+        client.submit_sweep(str(file))
+
+
+def test_a_sweep_is_paused_resumed_cancelled_and_retried(client, make) -> None:
+    spec = {
+        "tasks": ["support-1"],
+        "models": ["builtin/idle"],
+        "seeds": [3 + (make.kind == "sync")],
+    }
+    sweep = client.submit_sweep(spec)["id"]
+    assert client.pause_sweep(sweep)["state"] == "paused"
+    assert client.wait_for_sweep(sweep)["state"] == "paused"
+    assert client.resume_sweep(sweep, budget={"max_requests": 5})["state"] == "active"
+    job = next(iter(client.jobs(sweep=sweep)))["id"]
+    with pytest.raises(TimedOutError, match=f"{job} has not ended"):
+        client.wait_for_job(job, timeout_s=0)
+    with pytest.raises(TimedOutError, match=f"{sweep} has not ended"):
+        client.wait_for_sweep(sweep, timeout_s=0)
+    with pytest.raises(ConflictError):
+        client.retry_job(job)
+    assert client.cancel_job(job)["outcome"] == "cancelled"
+    assert client.cancel_sweep(sweep)["state"] in {"cancelled", "done"}
+    with pytest.raises(ConflictError):
+        client.retry_sweep(sweep)
+
+
+def test_a_sweep_is_waited_for(client, service, make) -> None:
+    seeds = [10, 11] if make.kind == "sync" else [12, 13]
+    spec = {"tasks": ["lift-1"], "models": ["builtin/idle"], "seeds": seeds, "simulator": "mujoco"}
+    sweep = client.submit_sweep(spec)["id"]
+    seen = []
+    with working(service.context):
+        ended = client.wait_for_sweep(
+            sweep, progress=lambda one: seen.append(one["progress"]["done"]), poll_s=0.05
+        )
+    assert ended["state"] == "done"
+    assert ended["progress"]["done"] == seen[-1] == 2
+    assert seen == sorted(seen)
+    assert [one["state"] for one in client.watch_sweep(sweep)] == ["done"]
+    assert len(client.sweep_results(sweep)) == 2
+    assert client.sweep_troubles(sweep) == []
+
+
+def test_two_sweeps_are_compared_and_one_is_exported(client, service, tmp_path) -> None:
+    found = client.compare_sweeps(service.sweep, service.sweep)
+    require_shape(found, schemas.SweepComparison)
+    client.export_sweep(service.sweep, tmp_path / "sweep.zip")
+    assert zipfile.is_zipfile(tmp_path / "sweep.zip")
+    assert [file.name for file in tmp_path.iterdir()] == ["sweep.zip"]
+
+
+def test_equal_jobs_are_one(client, service) -> None:
+    job = client.submit_job("lift-1", "builtin/expert", seed=1, simulator="mujoco")
+    assert job["id"] in service.jobs
+
+
+def test_an_agent_builds_and_submits(client, service, make) -> None:
+    opened = client.open_session("lift-1", f"agent-{make.kind}", seed=2, simulator="mujoco")
+    again = client.open_session("lift-1", f"agent-{make.kind}", seed=2, simulator="mujoco")
+    assert opened["id"] == again["id"]
+    with pytest.raises(ConflictError):
+        client.submit_session(opened["id"])
+    assert client.call_tool(opened["id"], "start")["ok"]
+    refused = client.call_tool(opened["id"], "attach_block", {"base_block": 7})
+    assert not refused["ok"]
+    shown = client.session(opened["id"])
+    assert shown["calls"] == 2
+    assert shown["open"]
+    client.submit_session(opened["id"])
+    with working(service.context):
+        assert client.wait_for_job(opened["id"], timeout_s=60)["outcome"] == "construction_failed"
+
+
+def test_machines_from_files_are_checked_and_tried(client, service, tmp_path) -> None:
+    data = client.artifact(service.built, "machine")
+    file = tmp_path / "machine.json"
+    file.write_bytes(data)
+    assert client.check_machine(file, task="lift-1")["faults"] == []
+    tried = client.try_machine(file, task="lift-1", simulator="mujoco", seed=5)
+    assert client.try_machine(data, task="lift-1", simulator="mujoco", seed=5)["id"] == tried["id"]
+    with pytest.raises(InvalidError, match="file: "):
+        client.check_machine(b"no machine")
+    with pytest.raises(TooLargeError):
+        client.check_machine(b" " * ((2 << 20) + 1))
+
+
+def test_tasks_are_uploaded(client, tmp_path) -> None:
+    from buildarena_api.routes.tasks import EXAMPLE
+
+    file = tmp_path / "task.yaml"
+    file.write_text(EXAMPLE)
+    task = client.add_task(file)
+    assert client.add_task(EXAMPLE) == task
+    with pytest.raises(InvalidError):
+        client.add_task("name: x")
+
+
+def test_events_are_read_from_anywhere(client, service) -> None:
+    first = list(islice(client.sweep_events(service.sweep), 8))
+    assert [event["id"] for event in first] == sorted(event["id"] for event in first)
+    assert {event["sweep"] or event["job"] for event in first}
+    behind = list(islice(client.sweep_events(service.sweep, after=first[3]["id"]), 4))
+    assert behind == first[4:]
+    own = next(iter(client.job_events(service.built)))
+    assert own["job"] == service.built
+    with pytest.raises(NotFoundError):
+        next(iter(client.job_events(NOBODY)))
+
+
+def test_what_is_not_there_or_not_allowed(make, service) -> None:
+    admin = make(service.locked, ADMIN)
+    for ask in (admin.job, admin.machine, admin.replay, admin.artifacts, admin.session):
+        with pytest.raises(NotFoundError):
+            ask(NOBODY)
+    with pytest.raises(InvalidError, match=r"ZIP|archive"):
+        admin.import_sweep(Path(__file__))
+    made = admin.post("/v1/keys", {"name": f"reads-{make.kind}", "scopes": ["read"]})
+    reader = make(service.locked, made["secret"])
+    assert reader.caller()["scope"] == "read"
+    with pytest.raises(ForbiddenError, match="needs the scope 'submit'"):
+        reader.submit_job("lift-1", "builtin/idle")
+    for key in (None, "unknown"):
+        with pytest.raises(KeyRefusedError, match="API key"):
+            make(service.locked, key).tasks()
+
+
+def test_the_key_and_the_url_may_stand_in_the_environment(make, service, monkeypatch, tmp_path):
+    monkeypatch.setenv("BUILDARENA_URL", service.locked + "/")
+    monkeypatch.setenv("BUILDARENA_KEY", ADMIN)
+    assert make().caller()["scope"] == "admin"
+    file = tmp_path / "key"
+    file.write_text(f"{ADMIN}\n")
+    monkeypatch.setenv("BUILDARENA_KEY_FILE", str(file))
+    with pytest.raises(BadArgumentError, match="are both set"):
+        make()
+    monkeypatch.delenv("BUILDARENA_KEY")
+    assert make().caller()["scope"] == "admin"

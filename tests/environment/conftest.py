@@ -1,0 +1,27 @@
+"""What is built again and again: the expert's bridge, as calls and as a machine."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+from expert_calls import DATA, Call, played
+
+from buildarena_environment import Environment
+from buildarena_geometry import Machine
+
+
+@pytest.fixture(scope="session")
+def experts() -> dict[str, Any]:
+    return json.loads(DATA.read_text())
+
+
+@pytest.fixture(scope="session")
+def bridge_calls(experts) -> list[Call]:
+    return experts["support-1"]["calls"]
+
+
+@pytest.fixture
+def bridge(bridge_calls) -> Machine:
+    return played(Environment("support-1"), bridge_calls).machines["main"]

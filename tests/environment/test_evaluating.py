@@ -1,0 +1,136 @@
+"""Many trials over processes: in order, the same however many, and a crash costs one."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+from dataclasses import replace
+
+import psutil
+import pytest
+
+from buildarena_benchmark import TaskError, builtin_tasks
+from buildarena_environment import Environment, Evaluator, UnknownChoiceError, try_machine
+from buildarena_geometry import DocumentError, Machine
+
+
+@pytest.fixture(scope="module")
+def short():
+    """The first bridge, with a trial of three seconds."""
+    task = builtin_tasks()["support-1"]
+    scenario = task.scenario.model_copy(update={"duration_s": 3.0})
+    return replace(task, scenario=scenario)
+
+
+def variants(bridge: Machine, count: int) -> list[Machine]:
+    """Bridges with a brace more or less, and one that is nothing."""
+    made = []
+    for number in range(count):
+        machine = bridge.copy()
+        for connector in list(machine.connectors)[: number % 4]:
+            machine.act("remove_block", {"block_id": connector})
+        made.append(machine)
+    return [*made[:-1], Machine()]
+
+
+def test_results_come_in_order_whatever_the_number_of_processes(short, bridge) -> None:
+    machines = variants(bridge, 7)
+    with Evaluator(short, processes=1) as one, Evaluator(short, processes=3) as three:
+        alone = [found.trial.score for found in one.map(machines)]
+        apart = [found.trial.score for found in three.map(reversed(machines))]
+    assert alone == apart[::-1]
+    assert alone == [try_machine(short, machine).score for machine in machines]
+    assert alone[-1].indicator == 0.0
+
+
+def test_documents_do_as_well_and_nonsense_is_refused_before_it_is_sent(short, bridge) -> None:
+    with Evaluator(short, processes=1) as evaluator:
+        found = evaluator.evaluate(bridge.to_document())
+        assert found.trial.score == evaluator.evaluate(bridge).trial.score
+        with pytest.raises(DocumentError):
+            evaluator.evaluate({"no": "machine"})
+        broken = evaluator.evaluate(Machine())
+        assert (broken.trial.reason, broken.error) == ("empty_machine", "")
+
+
+def test_trajectories_come_along_when_asked_for(short, bridge) -> None:
+    with Evaluator(short, processes=1, trajectories=True) as evaluator:
+        trajectory = evaluator.evaluate(bridge).trial.trajectory
+    assert trajectory is not None
+    assert len(trajectory.time_s) == short.scenario.sample_count
+
+
+def test_a_process_that_dies_costs_one_trial_and_is_replaced(bridge) -> None:
+    task = builtin_tasks()["support-1"]
+    with Evaluator(task, processes=1) as evaluator:
+        evaluator.evaluate(Machine())
+        (child,) = [p for p in psutil.Process().children() if "spawn_main" in " ".join(p.cmdline())]
+        threading.Timer(0.1, os.kill, (child.pid, signal.SIGKILL)).start()
+        lost, kept = evaluator.map([bridge, Machine()])
+        assert (lost.trial, kept.error) == (None, "")
+        assert "ended with code -9" in lost.error
+    assert not child.is_running()
+
+
+def test_a_trial_that_takes_too_long_is_broken_off(bridge) -> None:
+    with Evaluator("support-1", processes=1, timeout_s=0.2) as evaluator:
+        evaluator._pool.processes[0].start()
+        started = time.monotonic()
+        assert evaluator.evaluate(bridge).error == "the trial took longer than 0.2 s"
+        assert time.monotonic() - started < 60
+
+
+def test_machines_are_taken_as_they_are_needed_and_stopping_early_leaves_nothing(short) -> None:
+    taken = []
+
+    def endless():
+        while True:
+            taken.append(len(taken))
+            yield Machine()
+
+    with Evaluator(short, processes=2) as evaluator:
+        found = evaluator.map(endless())
+        assert [next(found).trial.reason for _ in range(3)] == ["empty_machine"] * 3
+        found.close()
+        assert len(taken) < 20
+        assert evaluator.evaluate(Machine()).trial is not None
+
+
+def test_names_and_numbers_are_checked() -> None:
+    with pytest.raises(UnknownChoiceError, match="no simulator 'game'"):
+        Evaluator("support-1", "game")
+    with pytest.raises(ValueError, match="processes is 0"):
+        Evaluator("support-1", processes=0)
+    with pytest.raises(ValueError, match="timeout_s is 0"):
+        Evaluator("support-1", timeout_s=0)
+    task = builtin_tasks()["support-1"]
+    hasty = replace(task, scenario=task.scenario.model_copy(update={"duration_s": 1.0}))
+    with pytest.raises(TaskError, match="longer than the trial"):
+        Evaluator(hasty)
+
+
+def test_environments_and_evaluators_agree(short, bridge) -> None:
+    environment = Environment(short)
+    environment.restore(replace(environment.state(), machines={"main": bridge.logged}))
+    with Evaluator(short, processes=1) as evaluator:
+        assert environment.submit().trial.score == evaluator.evaluate(bridge).trial.score
+
+
+def test_a_trial_that_ends_when_it_is_decided_has_the_same_verdict(bridge) -> None:
+    task = builtin_tasks()["support-1"]
+    weak = bridge.copy()
+    for connector in list(weak.connectors):
+        weak.act("remove_block", {"block_id": connector})
+    for machine, decided in ((bridge, False), (weak, True)):
+        whole = try_machine(task, machine)
+        ended = try_machine(task, machine, whole=False)
+        assert ended.score.success == whole.score.success
+        assert ended.score.indicator == whole.score.indicator
+        assert ended.score.flags == whole.score.flags
+        assert whole.score.metrics["fall_time_s"] == ended.score.metrics["fall_time_s"]
+        lengths = [len(trial.trajectory.time_s) for trial in (ended, whole)]
+        assert (lengths[0] < lengths[1]) is (
+            decided or whole.score.metrics["fall_time_s"] is not None
+        )

@@ -1,0 +1,77 @@
+"""Runs what a document shows, word for word, and compares what it says it prints."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import re
+import subprocess
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+_FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+
+
+class Shown(NamedTuple):
+    """A block of code, and the output that the document shows after it, if it does."""
+
+    language: str
+    code: str
+    output: str | None
+
+
+def shown_in(document: Path) -> Iterator[Shown]:
+    """The blocks of code of a document; a block called `output` belongs to the one before it."""
+    blocks = _FENCE.findall(document.read_text(encoding="utf-8"))
+    for number, (language, code) in enumerate(blocks):
+        if language == "output":
+            assert number > 0, "an output needs code before it"
+            continue
+        follows = blocks[number + 1] if number + 1 < len(blocks) else ("", "")
+        yield Shown(language, code, follows[1] if follows[0] == "output" else None)
+
+
+def run_document(document: Path, *, environment: Mapping[str, str], folder: Path) -> int:
+    """Runs all blocks of Python, in one namespace, and of bash, in a folder, in their order.
+
+    Args:
+        document: Markdown.
+        environment: Environment variables for commands.
+        folder: Where commands run.
+
+    Returns:
+        How many blocks were run.
+
+    Raises:
+        AssertionError: A block prints something else than the document shows, or a command fails.
+    """
+    names: dict[str, Any] = {"__name__": "document"}
+    count = 0
+    for language, code, output in shown_in(document):
+        if language == "python":
+            printed = io.StringIO()
+            with contextlib.redirect_stdout(printed):
+                exec(compile(code, str(document), "exec"), names)
+            said = printed.getvalue()
+        elif language == "bash":
+            said = _command(code, environment, folder)
+        else:
+            continue
+        count += 1
+        assert output is None or said == output, f"{code}\nprints\n{said}\nand not\n{output}"
+    return count
+
+
+def _command(code: str, environment: Mapping[str, str], folder: Path) -> str:
+    done = subprocess.run(
+        ["bash", "-euo", "pipefail", "-c", code],
+        check=False,
+        capture_output=True,
+        text=True,
+        env=dict(environment),
+        cwd=folder,
+        timeout=200,
+    )
+    assert done.returncode == 0, f"{code}\n{done.stdout}\n{done.stderr}"
+    return done.stdout
