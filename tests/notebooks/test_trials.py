@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import buildarena as ba
+from buildarena import trials
 from buildarena_benchmark import builtin_tasks, score
-from buildarena_simulation import simulate
+from buildarena_environment import Evaluator
+from buildarena_simulation import SimulationError, simulate
 
 ROOT = Path(__file__).parents[2]
 ROW = "Small Wooden Block"
@@ -66,6 +69,12 @@ def test_many_trials_come_in_the_order_of_the_machines():
             if other.trajectory is not None:
                 assert np.array_equal(one.trajectory.positions, other.trajectory.positions)
     assert alone[0].score.indicator > alone[2].score.indicator
+
+
+def test_a_trial_that_is_broken_off_is_no_score(monkeypatch):
+    monkeypatch.setattr(trials, "Evaluator", partial(Evaluator, timeout_s=0.001))
+    with pytest.raises(SimulationError, match="machine 0 could not be tried"):
+        ba.simulate_all([row(3)], "support-1", processes=1)
 
 
 def test_nonsense_is_refused_with_the_choices(tmp_path):

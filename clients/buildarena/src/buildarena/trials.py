@@ -2,29 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import partial
 from html import escape
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, Final
 
 from buildarena.known_tasks import chosen_task
 from buildarena.pages import FRAME_HEIGHT, Shown
-from buildarena_benchmark import Score, Task, broken_constraint, failed_score, score
+from buildarena_benchmark import Score, Task
 from buildarena_benchmark.flags import is_censored, meaning
+from buildarena_environment import Evaluator, try_machine
+from buildarena_environment import Trial as TriedMachine
 from buildarena_geometry import Machine as GeometryMachine
-from buildarena_simulation import (
-    ENGINES,
-    MachineNotSimulable,
-    Scenario,
-    Trajectory,
-    read_trajectory,
-    write_trajectory,
-)
-from buildarena_simulation import simulate as simulate_here
+from buildarena_simulation import ENGINES, SimulationError, Trajectory
 
 PLAYER_HEIGHT: Final = FRAME_HEIGHT + 84
 
@@ -108,13 +99,12 @@ def simulate(
 
     Raises:
         ValueError: There is no such task or engine.
+        SimulationError: The engine failed, which says nothing of the machine.
     """
     chosen = chosen_task(task)
     _check_engine(engine)
     copy = machine.copy()
-    why = _broken(chosen, copy)
-    tried = _tried(copy, chosen.scenario, engine, seed) if why is None else why
-    return _judged(chosen, copy, tried)
+    return _shown_trial(chosen, copy, try_machine(chosen, copy, engine, seed=seed))
 
 
 def simulate_all(
@@ -139,65 +129,29 @@ def simulate_all(
 
     Raises:
         ValueError: There is no such task or engine, or there are fewer processes than one.
+        SimulationError: The engine failed on a machine, which says nothing of it. What came of the
+            others is kept by `buildarena_environment.Evaluator`, which this is made of.
     """
-    if processes < 1:
-        raise ValueError(f"processes is {processes}; at least 1 is needed")
     chosen, copies = chosen_task(task), [machine.copy() for machine in machines]
     _check_engine(engine)
-    broken = [_broken(chosen, machine) for machine in copies]
-    work = partial(
-        _tried_elsewhere, scenario=chosen.scenario.model_dump_json(), engine=engine, seed=seed
+    trials = []
+    with Evaluator(chosen, engine, seed=seed, processes=processes, trajectories=True) as evaluator:
+        for number, (machine, found) in enumerate(zip(copies, evaluator.map(copies), strict=True)):
+            if found.trial is None:
+                raise SimulationError(f"machine {number} could not be tried: {found.error}")
+            trials.append(_shown_trial(chosen, machine, found.trial))
+    return trials
+
+
+def _shown_trial(task: Task, machine: GeometryMachine, tried: TriedMachine) -> Trial:
+    refusal = None if tried.reason is None else f"{tried.reason}: {tried.detail}"
+    return Trial(
+        task=task,
+        machine=machine,
+        score=tried.score,
+        trajectory=tried.trajectory,
+        refusal=refusal,
     )
-    documents = [
-        machine.to_document() for machine, why in zip(copies, broken, strict=True) if why is None
-    ]
-    results = iter(_mapped(work, documents, processes))
-    return [
-        _judged(chosen, machine, next(results) if why is None else why)
-        for machine, why in zip(copies, broken, strict=True)
-    ]
-
-
-def _mapped(
-    work: Callable[[object], bytes | str], documents: Sequence[object], processes: int
-) -> list[bytes | str]:
-    if processes == 1 or len(documents) < 2:  # noqa: PLR2004 - one trial has nothing beside it
-        return list(map(work, documents))
-    # Notebooks have threads of their own, which a forked process would be left without.
-    with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
-        return list(pool.map(work, documents))
-
-
-def _tried_elsewhere(
-    document: object, *, scenario: str, engine: str, seed: int | None
-) -> bytes | str:
-    """A trajectory's file, or why there is none: what goes from one process to another."""
-    machine = GeometryMachine.from_document(document)
-    tried = _tried(machine, Scenario.model_validate_json(scenario), engine, seed)
-    return tried if isinstance(tried, str) else write_trajectory(tried)
-
-
-def _tried(
-    machine: GeometryMachine, scenario: Scenario, engine: str, seed: int | None
-) -> Trajectory | str:
-    try:
-        return simulate_here(machine, scenario, engine, seed=seed)
-    except MachineNotSimulable as failure:
-        return str(failure.reason)
-
-
-def _broken(task: Task, machine: GeometryMachine) -> str | None:
-    """What of a task a machine breaks, in words."""
-    broken = broken_constraint(task, machine)
-    return None if broken is None else f"{broken[0]}: {broken[1]}"
-
-
-def _judged(task: Task, machine: GeometryMachine, tried: Trajectory | bytes | str) -> Trial:
-    if isinstance(tried, str):
-        return Trial(task=task, machine=machine, score=failed_score(task, machine), refusal=tried)
-    trajectory = read_trajectory(tried) if isinstance(tried, bytes) else tried
-    result = score(task, machine, trajectory)
-    return Trial(task=task, machine=machine, score=result, trajectory=trajectory)
 
 
 def _check_engine(engine: str) -> None:

@@ -51,7 +51,7 @@ JOBS: Final[Sequence[Column]] = (
     Column("track", _TEXT, "Workflow, simulator and prompts; scores of one track compare."),
     Column("workflow", _TEXT, "How the session went about building."),
     Column("simulator", _TEXT, "What tried the machine."),
-    Column("seed", _WHOLE, "Seed of the session and of its trials."),
+    Column("seed", _WHOLE, "Seed of the session; trials of one machine are alike."),
     Column("outcome", _TEXT, "How the job ended; `errored` and `cancelled` ones have no score."),
     Column("reason", _TEXT, "Class of the failure, if there was one."),
     Column("success", _YES, "Whether the task was solved, whatever the flags say."),
@@ -74,8 +74,8 @@ JOBS: Final[Sequence[Column]] = (
     Column(
         "parts_sha256",
         _TEXT,
-        "SHA-256 of the machine document without its logs: equal machines have equal ones, however "
-        "they were built.",
+        "SHA-256 of the machine document without its logs, keys sorted and without spaces: what "
+        "was looked up on the way makes no difference.",
     ),
     Column(
         "replayed_sha256",
