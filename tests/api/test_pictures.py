@@ -67,6 +67,7 @@ def test_machines_are_models_and_pictures(api, context, monkeypatch) -> None:
     assert ended.content == drawn.content
     assert context.artifacts.get(context.store.jobs.artifacts(job)["thumbnail"]) == drawn.content
     kept = api.get(f"/v1/jobs/{job}/artifacts/thumbnail")
+    assert kept.headers["content-security-policy"] == "sandbox"
     assert kept.headers["content-type"] == "image/png"
     monkeypatch.setattr(pictures, "still_png", None)
     api.app.state.pictures = pictures.KeptAnswers(1 << 20)

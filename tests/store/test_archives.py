@@ -28,6 +28,7 @@ from buildarena_store import (
     archives,
 )
 from buildarena_store.archives import ArchiveError, Imported, members, rows, write_archive
+from buildarena_store.artifacts.kinds import EVIDENCE
 from buildarena_store.jobs.job import configuration_hash
 from buildarena_store.tables import metadata
 from buildarena_worker.wiring import verification_runner, verifier
@@ -105,6 +106,25 @@ def test_a_sweep_arrives_whole_and_can_be_verified_there(context, played, elsewh
     assert other.store.sweeps.progress(sweep_id).outcomes == {"success": 2}
     report = verifier(other).verify(after[0].id)
     assert report["ok"], report
+
+
+def test_pictures_and_evidence_arrive_too(context, played, elsewhere, tmp_path) -> None:
+    sweep_id, _ = played
+    job = context.store.jobs.page(limit=1, sweep_id=sweep_id)[0].id
+    made = {
+        f"log-0-{n}.{end}": (end.encode(), kind) for n, (end, kind) in enumerate(EVIDENCE.items())
+    }
+    made["thumbnail"] = (b"drawn", EVIDENCE["png"])
+    with context.store.database.transaction() as connection:
+        infos = {name: context.artifacts.put(data, kind) for name, (data, kind) in made.items()}
+        context.store.results.attach(job, infos, connection=connection)
+    again = tmp_path / "again.zip"
+    write_archive(context.store.database, context.artifacts, sweep_id, again)
+    other = elsewhere()
+    assert read_archive(other, again).added == 2
+    files = {file.name: file for file in other.store.jobs.files(job)}
+    for name, (data, kind) in made.items():
+        assert (other.artifacts.get(files[name].hash), files[name].media_type) == (data, kind)
 
 
 def test_taking_in_twice_changes_nothing(context, played) -> None:

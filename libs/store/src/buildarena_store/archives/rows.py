@@ -17,13 +17,12 @@ from buildarena_benchmark import TaskError, parse_task
 from buildarena_benchmark.outcomes import SCORED
 from buildarena_benchmark.tasks.sources import MAX_BYTES
 from buildarena_geometry.json_values import levels
+from buildarena_store.artifacts.kinds import MEDIA_TYPES, NAME
 from buildarena_store.jobs.job import JobKey, configuration_hash
 from buildarena_store.states import JobState, Outcome, Stage, SweepState
 
 DEEPEST: Final = 64
 LARGEST_COUNT: Final = 2**53 - 1
-MEDIA_TYPES: Final = ("application/json", "application/vnd.apache.parquet")
-"""What artifacts are: they are served under these names, so that no other may come in."""
 AHEAD: Final = timedelta(minutes=5)
 """How far another service's clock may be ahead of ours."""
 
@@ -293,5 +292,5 @@ class JobArtifactRow(_Row):
     """An artifact's name in a job."""
 
     job_id: JobId
-    name: Annotated[str, Field(pattern=r"^(machine|transcript|trajectory-[0-9]{1,5})$")]
+    name: Annotated[str, Field(pattern=NAME)]
     hash: Digest

@@ -32,11 +32,11 @@ from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.notify import notify_waiting
 from buildarena_pipeline.turns import Transcripts
 from buildarena_store import Job
+from buildarena_store.artifacts.kinds import MEDIA_TYPES
 from buildarena_store.jobs.pages import JobFilter, Order, Sort, sort_value
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
 
-KEPT_TYPES = ("application/json", "application/vnd.apache.parquet", "image/png", "text/plain")
 ARTIFACT_TYPES = {
     "machine": "application/json",
     "transcript": "application/json",
@@ -221,7 +221,7 @@ def list_artifacts(job_id: str, context: ContextDep) -> list[JobFileView]:
 @router.get(
     "/{job_id}/artifacts/{name}",
     responses={
-        200: {"content": {kind: {} for kind in KEPT_TYPES}},
+        200: {"content": {kind: {} for kind in MEDIA_TYPES}},
         **problem_responses(404, 503),
     },
     response_class=Response,
@@ -235,7 +235,8 @@ def get_artifact_by_name(job_id: str, name: str, context: ContextDep) -> Respons
     return Response(
         context.artifacts.get(found[0].hash),
         media_type=found[0].media_type,
-        headers={"ETag": f'"{found[0].hash}"'},
+        # What a runner or an archive brought must not run as a page of ours.
+        headers={"ETag": f'"{found[0].hash}"', "Content-Security-Policy": "sandbox"},
     )
 
 

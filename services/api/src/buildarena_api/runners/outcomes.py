@@ -21,16 +21,10 @@ from buildarena_pipeline.runtime.trial_checks import (
 from buildarena_pipeline.runtime.trial_outcomes import File, TrialOutcome
 from buildarena_simulation import Trajectory
 from buildarena_store import Lease, StaleLeaseError, UploadedFile, UploadError, Uploads, clean
+from buildarena_store.artifacts.kinds import EVIDENCE
 from buildarena_store.jobs.runner_leases import JobToken
 from buildarena_store.states import AttemptResult
 
-MEDIA_TYPES: Final = {
-    "bsg": "application/xml",
-    "json": "application/json",
-    "lua": "text/x-lua",
-    "png": "image/png",
-    "txt": "text/plain",
-}
 LONGEST_DETAIL: Final = 2000
 Status = Literal["done", "already_done"]
 
@@ -170,7 +164,7 @@ class Outcomes:
                     f"{one.name}: files of this trial are named KIND-{number}.ENDING, each once"
                 )
             data = self._uploads.take(named, UploadedFile(sha256=one.sha256, size=one.size))
-            found[one.name] = File(data=data, media_type=MEDIA_TYPES[ending])
+            found[one.name] = File(data=data, media_type=EVIDENCE[ending])
         return found
 
 

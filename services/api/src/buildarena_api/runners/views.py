@@ -8,6 +8,7 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from buildarena_pipeline.catalog.simulators import ENGINE_SIMULATORS, SIMULATORS
+from buildarena_store.artifacts.kinds import EVIDENCE_NAME
 from buildarena_store.uploads import MAX_FILE_BYTES, MAX_LEASE_FILES
 
 LONGEST_WAIT_S: Final = 25.0
@@ -148,8 +149,7 @@ class NamedFile(SentFile):
     name: Annotated[
         str,
         Field(
-            pattern=r"^(log|machine|screenshot|script|state)-[0-9]{1,6}(-[0-9]{1,20}){0,2}"
-            r"\.(bsg|json|lua|png|txt)$",
+            pattern=f"^{EVIDENCE_NAME}$",
             max_length=80,
             description="KIND-NUMBER.ENDING, with the rollout's number",
             examples=["log-0.txt"],
