@@ -54,6 +54,12 @@ def test_an_episode_from_reset_to_reward(bridge_calls) -> None:
     assert done.trial.score.success
     assert done.reward == pytest.approx(3.0, rel=1e-4)
     assert done.report.startswith("It succeeded. ")
+    assert environment.named_rewards == {
+        "success": 1.0,
+        "indicator": pytest.approx(1.0, rel=1e-4),
+        "accepted_share": 1.0,
+        "constraint_progress": 1.0,
+    }
     with pytest.raises(EpisodeOverError):
         environment.step("start")
     with pytest.raises(EpisodeOverError):

@@ -17,6 +17,7 @@ from buildarena_environment.errors import (
 )
 from buildarena_environment.rewards import (
     DEFAULT_WEIGHTS,
+    REWARDS,
     TERMINAL,
     Progress,
     checked_weights,
@@ -211,6 +212,12 @@ class Environment:
         return self._reward
 
     @property
+    def named_rewards(self) -> Mapping[str, float]:
+        """Every reward as it stands, by name and without weights."""
+        progress = self._progress()
+        return {name: reward(progress) for name, reward in REWARDS.items()}
+
+    @property
     def done(self) -> bool:
         """Whether the episode has ended."""
         return self._done
@@ -337,8 +344,11 @@ class Environment:
         self._reward = self._worth()
 
     def _worth(self) -> float:
+        return weighed(self.weights, self._progress())
+
+    def _progress(self) -> Progress:
         result = self._bench.result()
-        progress = Progress(
+        return Progress(
             task=self.task,
             reference=self.reference,
             machine=None if result is None else result[1],
@@ -346,4 +356,3 @@ class Environment:
             refused=self._refused,
             trial=best_trial(self._trials) if self._trials else None,
         )
-        return weighed(self.weights, progress)
