@@ -81,6 +81,21 @@ def test_refused_steps_change_nothing_but_are_counted() -> None:
     assert environment.submit().trial.reason == "empty_machine"
 
 
+def test_machines_have_room_for_so_many_parts_together(bridge_calls) -> None:
+    environment = played(Environment("support-1", limits=Limits(parts=20)), bridge_calls)
+    size = environment.machines["main"].part_count
+    before = environment.machines["main"].to_document()
+    for _ in range(2):
+        copied = environment.step("add_machine", {"machine_id": "main"}, machine=ASSEMBLY)
+        assert not copied.ok
+        assert f"would have {2 * size} parts together; there is room for 20" in copied.feedback
+    assert environment.machines["main"].to_document() == before
+    assert ASSEMBLY not in environment.machines
+    assert environment.step("start", machine="other").ok
+    with pytest.raises(ValueError, match="parts is 0"):
+        Limits(parts=0)
+
+
 def test_nothing_to_submit_leaves_the_episode_open_until_it_is_ended() -> None:
     environment = Environment("support-1")
     with pytest.raises(NothingToSubmitError, match="beginning with the tool 'start'"):
