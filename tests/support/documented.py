@@ -46,7 +46,7 @@ def run_document(document: Path, *, environment: Mapping[str, str], folder: Path
     Raises:
         AssertionError: A block prints something else than the document shows, or a command fails.
     """
-    names: dict[str, Any] = {"__name__": "document"}
+    names: dict[str, Any] = {"__name__": "__main__"}
     count = 0
     for language, code, output in shown_in(document):
         if language == "python":

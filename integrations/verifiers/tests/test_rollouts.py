@@ -200,6 +200,15 @@ def test_whatever_a_model_calls_is_answered() -> None:
     assert trace.metrics["refused"] == 6
 
 
+def test_another_harness_is_told_that_it_has_no_tools() -> None:
+    config = load_environment("lift-1").config
+    agent = vf.AgentConfig(runtime=vf.SubprocessConfig(), harness={"id": "null"})
+    environment = vf.load_environment(config.model_copy(update={"agent": agent}))
+    (trace,) = played(environment, "http://127.0.0.1:9/v1")
+    assert not trace.ok
+    assert "the harness 'null' has no building tools" in trace.last_error.message
+
+
 def test_starts_are_rows() -> None:
     environment = load_environment(["lift-1", "support_1"], start_seeds=[1, 2])
     rows = [(task.data.name, task.data.task, task.data.start_seed) for task in environment.taskset]

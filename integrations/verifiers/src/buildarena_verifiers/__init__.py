@@ -1,7 +1,8 @@
 """BuildArena's tasks as an environment of verifiers: taskset, harness and environment."""
 
 from buildarena_verifiers.environment import BuildEnv, BuildEnvConfig, load_environment
-from buildarena_verifiers.harness import BuildHarness, BuildHarnessConfig
+from buildarena_verifiers.harness import BuildHarness
+from buildarena_verifiers.harness_config import BuildHarnessConfig
 from buildarena_verifiers.taskset import (
     BuildData,
     BuildTask,

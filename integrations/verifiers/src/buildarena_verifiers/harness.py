@@ -7,16 +7,13 @@ from typing import Any
 import verifiers.v1 as vf
 from openai import AsyncOpenAI
 
+from buildarena_verifiers.harness_config import BuildHarnessConfig
 from buildarena_verifiers.seat import Seat
 from buildarena_verifiers.taskset import seat_of
 
 MAX_REMINDERS = 3
 """Replies in a row without a tool call; the next one ends the building."""
 REMINDER = "Call a tool, or call `submit` when your machine is finished."
-
-
-class BuildHarnessConfig(vf.HarnessConfig):
-    """The harness has no settings of its own."""
 
 
 class BuildHarness(vf.Harness[BuildHarnessConfig]):

@@ -10,6 +10,7 @@ from pydantic import Field, PrivateAttr
 
 from buildarena_benchmark import builtin_tasks
 from buildarena_environment import Environment, Limits
+from buildarena_verifiers.harness_config import BuildHarnessConfig
 from buildarena_verifiers.seat import Seat
 from buildarena_verifiers.trial_runners import RUNNERS
 
@@ -81,7 +82,17 @@ class BuildTask(vf.Task[BuildData, BuildState, BuildTaskConfig]):
         trace: vf.Trace[Any, Any, Any],
         runtime: vf.Runtime,  # noqa: ARG002 - the framework's signature
     ) -> None:
-        """Makes the rollout's own episode."""
+        """Makes the rollout's own episode.
+
+        Raises:
+            TypeError: Another harness plays it, which has none of the tools.
+        """
+        harness = trace.agent.config.harness
+        if not isinstance(harness, BuildHarnessConfig):
+            raise TypeError(
+                f"the harness {getattr(harness, 'id', None)!r} has no building tools: choose "
+                "buildarena_verifiers"
+            )
         config = self.config
         runner = RUNNERS.get(config.processes, config.trial_timeout_s)
         environment = _environment(self.data, tries=runner.pool.try_machine)
