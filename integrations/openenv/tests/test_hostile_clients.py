@@ -6,6 +6,7 @@ import asyncio
 import json
 from contextlib import AsyncExitStack
 
+import httpx
 import psutil
 import pytest
 import websockets
@@ -128,6 +129,21 @@ def test_a_huge_message_is_not_read(server) -> None:
             assert closed.value.rcvd.code == 1009
 
     run(server, play)
+
+
+def test_a_huge_request_is_not_read(server) -> None:
+    def pieces():
+        for _ in range(100):
+            yield b" " * 100_000
+
+    for content in (b'{"action": {"tool": "' + b"x" * 300_000 + b'"}}', pieces()):
+        try:
+            answer = httpx.post(f"{server[0]}/step", content=content, timeout=20)
+        except httpx.TransportError:  # it was closed while more was sent
+            continue
+        assert answer.status_code == 413
+    small = httpx.post(f"{server[0]}/step", json={"action": {"tool": "start"}}, timeout=20)
+    assert small.json()["observation"]["accepted"]
 
 
 def test_too_many_sessions_are_refused_and_leaving_makes_room(server) -> None:

@@ -93,7 +93,9 @@ def test_a_killed_engine_costs_one_trial_and_no_session(server, experts) -> None
                 for child in psutil.Process(server[1].pid).children(recursive=True)
                 if "spawn_main" in " ".join(child.cmdline())
             ]
-            asyncio.get_running_loop().call_later(0.2, os.kill, engine.pid, signal.SIGKILL)
+            # Stopped, it can't be done before it is killed.
+            engine.suspend()
+            asyncio.get_running_loop().call_later(0.5, os.kill, engine.pid, signal.SIGKILL)
             with pytest.raises(RuntimeError, match="ended with code -9"):
                 await one.step(BuildAction(tool="submit"))
             assert not (await one.state()).done

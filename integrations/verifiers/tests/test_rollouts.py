@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import os
 import signal
 import threading
@@ -125,14 +126,13 @@ def test_a_crashed_engine_costs_one_rollout(scripts) -> None:
     def kill_once() -> None:
         deadline = time.monotonic() + 120
         while time.monotonic() < deadline and not killed:
-            for child in engines():
-                if busy(child):
-                    os.kill(child.pid, signal.SIGKILL)
-                    killed.append(child.pid)
+            with contextlib.suppress(psutil.Error):
+                # The first trial loads the engine, and is under way as soon as it is there.
+                for engine in engines():
+                    if any("mujoco" in file.path for file in engine.memory_maps()):
+                        os.kill(engine.pid, signal.SIGKILL)
+                        killed.append(engine.pid)
             time.sleep(0.02)
-
-    def busy(child: psutil.Process) -> bool:
-        return any("mujoco" in file.path for file in child.memory_maps())
 
     with serving({"transport-1": [[*scripts["transport-1"], SUBMIT]]}) as stand_in:
         killer = threading.Thread(target=kill_once)

@@ -13,6 +13,7 @@ from openenv.core.env_server.http_server import create_app
 from openenv.core.env_server.types import ConcurrencyConfig
 
 from buildarena_environment import TrialPool
+from buildarena_openenv.body_limit import BodyLimitMiddleware
 from buildarena_openenv.environment import (
     DEFAULT_SIMULATOR,
     DEFAULT_STEPS,
@@ -26,7 +27,9 @@ MAX_SESSIONS: Final = 64
 SESSION_IDLE_S: Final = 1800.0
 TRIAL_TIMEOUT_S: Final = 120.0
 MAX_MESSAGE: Final = 256 * 1024
-"""Bytes of a message; a call has a few hundred."""
+"""Bytes of a message or a request; a call has a few hundred."""
+CONNECTIONS: Final = 8
+"""Connections at once for each session that there may be; others get 503."""
 
 
 def build_app(
@@ -63,6 +66,7 @@ def build_app(
         ),
         state_cls=BuildState,
     )
+    app.add_middleware(BodyLimitMiddleware, limit=MAX_MESSAGE)
     app.router.on_shutdown.append(pool.close)
     return app
 
@@ -85,7 +89,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
         app = build_app(terms, max_sessions=given.max_sessions, processes=given.processes)
     except ValueError as error:
         parser.error(str(error))
-    uvicorn.run(app, host=given.host, port=given.port, ws_max_size=MAX_MESSAGE)
+    uvicorn.run(
+        app,
+        host=given.host,
+        port=given.port,
+        ws_max_size=MAX_MESSAGE,
+        limit_concurrency=CONNECTIONS * given.max_sessions,
+    )
 
 
 if __name__ == "__main__":
