@@ -11,18 +11,18 @@ from buildarena_cli.commands import COMMANDS
 
 ROOT = Path(__file__).parents[1]
 SOURCES = [
-    folder for kind in ("libs", "services", "clients") for folder in ROOT.glob(f"{kind}/*/src")
+    folder
+    for kind in ("libs", "services", "clients", "integrations")
+    for folder in ROOT.glob(f"{kind}/*/src")
 ]
 # It names what modules were called before.
 RENAMES = "CHANGELOG.md"
 DOCUMENTS = [
     file
     for pattern in (
-        "*.md",
-        "docs/**/*.md",
-        "libs/*/README.md",
+        *("*.md", "docs/**/*.md", "libs/*/README.md", "libs/*/src/**/README.md"),
         "clients/*/README.md",
-        "libs/*/src/**/README.md",
+        "integrations/*/README.md",
     )
     for file in sorted(ROOT.glob(pattern))
     if file.name != RENAMES
@@ -56,7 +56,7 @@ def test_links_lead_somewhere(document) -> None:
 
 def test_files_exist(document) -> None:
     named = re.findall(
-        r"`((?:libs|services|clients|tests|examples|docs|deploy|mk)/[\w./*-]+)`",
+        r"`((?:libs|services|clients|integrations|tests|examples|docs|deploy|mk)/[\w./*-]+)`",
         document.read_text(),
     )
     assert not [name for name in named if not list(ROOT.glob(name))]

@@ -54,6 +54,12 @@ def test_an_episode_from_reset_to_reward(bridge_calls) -> None:
     assert done.trial.score.success
     assert done.reward == pytest.approx(3.0, rel=1e-4)
     assert done.report.startswith("It succeeded. ")
+    assert environment.named_rewards == {
+        "success": 1.0,
+        "indicator": pytest.approx(1.0, rel=1e-4),
+        "accepted_share": 1.0,
+        "constraint_progress": 1.0,
+    }
     with pytest.raises(EpisodeOverError):
         environment.step("start")
     with pytest.raises(EpisodeOverError):
@@ -73,6 +79,21 @@ def test_refused_steps_change_nothing_but_are_counted() -> None:
     with pytest.raises(EpisodeOverError, match="all 4 steps"):
         environment.step("start")
     assert environment.submit().trial.reason == "empty_machine"
+
+
+def test_machines_have_room_for_so_many_parts_together(bridge_calls) -> None:
+    environment = played(Environment("support-1", limits=Limits(parts=20)), bridge_calls)
+    size = environment.machines["main"].part_count
+    before = environment.machines["main"].to_document()
+    for _ in range(2):
+        copied = environment.step("add_machine", {"machine_id": "main"}, machine=ASSEMBLY)
+        assert not copied.ok
+        assert f"would have {2 * size} parts together; there is room for 20" in copied.feedback
+    assert environment.machines["main"].to_document() == before
+    assert ASSEMBLY not in environment.machines
+    assert environment.step("start", machine="other").ok
+    with pytest.raises(ValueError, match="parts is 0"):
+        Limits(parts=0)
 
 
 def test_nothing_to_submit_leaves_the_episode_open_until_it_is_ended() -> None:

@@ -45,7 +45,8 @@ def test_a_process_that_dies_costs_one_submission_which_can_be_made_again(expert
         )
         played(Environment("lift-1", tries=pool.try_machine), experts["lift-1"]["calls"]).submit()
         (child,) = set(children()) - before
-        threading.Timer(0.1, os.kill, (child.pid, signal.SIGKILL)).start()
+        child.suspend()  # stopped, it can't be done before it is killed
+        threading.Timer(0.2, os.kill, (child.pid, signal.SIGKILL)).start()
         with pytest.raises(SimulationError, match="ended with code -9"):
             environment.submit()
         assert not environment.done

@@ -17,6 +17,7 @@ from buildarena_environment.errors import (
 )
 from buildarena_environment.rewards import (
     DEFAULT_WEIGHTS,
+    REWARDS,
     TERMINAL,
     Progress,
     checked_weights,
@@ -44,13 +45,18 @@ class Limits:
 
     Attributes:
         steps: Steps that it may have, refused ones included.
+        parts: Parts that all its machines may have together, for those who serve strangers: copies
+            of copies grow fast. None for any number.
     """
 
     steps: int = 2000
+    parts: int | None = None
 
     def __post_init__(self) -> None:
         if self.steps < 1:
             raise ValueError(f"steps is {self.steps}: an episode has at least one")
+        if self.parts is not None and self.parts < 1:
+            raise ValueError(f"parts is {self.parts}: a machine has at least one")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -211,6 +217,12 @@ class Environment:
         return self._reward
 
     @property
+    def named_rewards(self) -> Mapping[str, float]:
+        """Every reward as it stands, by name and without weights."""
+        progress = self._progress()
+        return {name: reward(progress) for name, reward in REWARDS.items()}
+
+    @property
     def done(self) -> bool:
         """Whether the episode has ended."""
         return self._done
@@ -232,7 +244,7 @@ class Environment:
             EpisodeOverError: The episode has ended, or has no steps left.
         """
         self._require_a_step()
-        return self._stepped(self._bench.act(machine, tool, arguments))
+        return self._stepped(self._acted(machine, tool, arguments))
 
     def refuse(self, reason: str) -> Step:
         """Counts a step that names no action, as a refused one.
@@ -245,6 +257,21 @@ class Environment:
         """
         self._require_a_step()
         return self._stepped(Refused(cause=Cause.MALFORMED_ARGUMENTS, text=reason))
+
+    def _acted(self, machine: str, tool: object, arguments: Any) -> Outcome:
+        room = self.limits.parts
+        if room is None:
+            return self._bench.act(machine, tool, arguments)
+        before = self._bench.values()
+        outcome = self._bench.act(machine, tool, arguments)
+        count = sum(found.part_count for found in self._bench.machines.values())
+        if count <= room:
+            return outcome
+        self._bench.return_to(before)
+        return Refused(
+            cause=Cause.OUT_OF_RANGE,
+            text=f"Your machines would have {count:,} parts together; there is room for {room:,}.",
+        )
 
     def _require_a_step(self) -> None:
         if self._done:
@@ -337,8 +364,11 @@ class Environment:
         self._reward = self._worth()
 
     def _worth(self) -> float:
+        return weighed(self.weights, self._progress())
+
+    def _progress(self) -> Progress:
         result = self._bench.result()
-        progress = Progress(
+        return Progress(
             task=self.task,
             reference=self.reference,
             machine=None if result is None else result[1],
@@ -346,4 +376,3 @@ class Environment:
             refused=self._refused,
             trial=best_trial(self._trials) if self._trials else None,
         )
-        return weighed(self.weights, progress)

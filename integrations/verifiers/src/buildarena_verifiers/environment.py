@@ -1,0 +1,98 @@
+"""The environment of verifiers that plays our taskset with our harness."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import verifiers.v1 as vf
+
+from buildarena_benchmark import builtin_tasks
+from buildarena_environment import REWARDS, UnknownChoiceError
+from buildarena_verifiers.taskset import BuildTaskConfig, BuildTasksetConfig
+from buildarena_verifiers.trial_runners import RUNNERS
+
+ID = "buildarena_verifiers"
+
+
+class BuildEnvConfig(vf.EnvConfig):
+    """One seat over the taskset; its harness runs in this process and needs no sandbox."""
+
+    agent: vf.AgentConfig = vf.AgentConfig(runtime=vf.SubprocessConfig())
+
+
+class BuildEnv(vf.Env[BuildEnvConfig]):
+    """Rollouts that share warm engines and nothing else."""
+
+    async def run(self, task: vf.Task[Any, Any, Any], agents: vf.Agents) -> None:
+        """Has the one agent play the task."""
+        await agents.agent.run(task)
+
+    async def start(self) -> None:
+        """Keeps the engines for as long as rollouts are served."""
+        RUNNERS.hold(*self._trials)
+
+    async def stop(self) -> None:
+        """Ends the engines' processes, if no other environment uses them."""
+        await asyncio.to_thread(RUNNERS.release, *self._trials)
+
+    @property
+    def _trials(self) -> tuple[int | None, float]:
+        config = self.config.taskset.task
+        if not isinstance(config, BuildTaskConfig):
+            config = BuildTaskConfig()
+        return config.processes, config.trial_timeout_s
+
+
+def load_environment(
+    tasks: Sequence[str] | str | None = None,
+    simulator: str = "mujoco",
+    *,
+    rounds: int = 1,
+    steps: int = 2000,
+    start_seeds: Sequence[int] = (),
+    rewards: Mapping[str, float] | None = None,
+    processes: int | None = None,
+    trial_timeout_s: float = 600.0,
+) -> BuildEnv:
+    """The environment, for programs that don't write a configuration.
+
+    Args:
+        tasks: Names of tasks, or one; all nine by default.
+        simulator: Name of the engine that tries machines.
+        rounds: How often a builder may submit.
+        steps: Calls that it may make.
+        start_seeds: A row for each start; by default one that starts exactly.
+        rewards: Weights by the names of `buildarena_environment.rewards`; success alone by default.
+        processes: Processes that try machines; by default one for each core.
+        trial_timeout_s: Seconds after which a trial is broken off.
+
+    Raises:
+        UnknownChoiceError: A task, the simulator or a reward does not exist.
+        ValueError: A number is out of range.
+    """
+    names = [tasks] if isinstance(tasks, str) else list(tasks or builtin_tasks())
+    taskset = BuildTasksetConfig(
+        id=ID,
+        tasks=names,
+        simulator=simulator,
+        rounds=rounds,
+        steps=steps,
+        start_seeds=list(start_seeds),
+        task=BuildTaskConfig(
+            processes=processes,
+            trial_timeout_s=trial_timeout_s,
+            rewards={} if rewards is None else _weights(rewards),
+        ),
+    )
+    environment = BuildEnv(BuildEnvConfig(taskset=taskset))
+    list(environment.taskset)
+    return environment
+
+
+def _weights(rewards: Mapping[str, float]) -> dict[str, vf.RewardFunctionConfig]:
+    for name in rewards:
+        if name not in REWARDS:
+            raise UnknownChoiceError("reward", name, REWARDS)
+    return {name: vf.RewardFunctionConfig(weight=rewards.get(name, 0.0)) for name in REWARDS}

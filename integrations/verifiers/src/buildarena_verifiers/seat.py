@@ -1,0 +1,102 @@
+"""One rollout's episode: nothing of it is shared with any other rollout."""
+
+from __future__ import annotations
+
+import json
+import threading
+from collections.abc import Mapping
+from typing import Any
+
+from buildarena_environment import Answer, Environment, NothingToSubmitError, best_trial, call
+from buildarena_verifiers.trial_runners import TrialRunner
+
+
+class Seat:
+    """An episode that is played from an event loop.
+
+    Args:
+        environment: The episode.
+        runner: What its trials wait in.
+    """
+
+    def __init__(self, environment: Environment, runner: TrialRunner) -> None:
+        self.environment = environment
+        self._runner = runner
+        # A call that was given up may still be at work when the rollout is finalized.
+        self._lock = threading.Lock()
+
+    @property
+    def tools(self) -> list[dict[str, Any]]:
+        """The tools as chat completions name them."""
+        return [
+            {
+                "type": "function",
+                "function": {
+                    "name": tool.name,
+                    "description": tool.description,
+                    "parameters": dict(tool.parameters),
+                },
+            }
+            for tool in self.environment.observation.tools
+        ]
+
+    async def call(self, tool: str, arguments: str) -> Answer:
+        """Carries out a tool call.
+
+        Args:
+            tool: The tool's name.
+            arguments: Its arguments as the model wrote them.
+
+        Raises:
+            SimulationError: The simulator failed.
+        """
+        read = _read(arguments)
+        if tool == "submit" or self.environment.steps_left <= 1:
+            return await self._runner.run(lambda: self._call(tool, read))
+        return self._call(tool, read)
+
+    async def end(self) -> None:
+        """Submits what there is, unless the episode has ended."""
+        if not self.environment.done:
+            await self._runner.run(self._end)
+
+    def record(self) -> dict[str, Any]:
+        """How the episode ended, as JSON values: rewards by name, score, machine, steps."""
+        environment = self.environment
+        state = environment.state()
+        try:
+            machine: Mapping[str, Any] | None = environment.submitted().to_document()
+        except NothingToSubmitError:
+            machine = None
+        trial = best_trial(environment.trials)
+        return {
+            "task": state.task,
+            "task_version": state.task_version,
+            "simulator": environment.simulator,
+            "start_seed": environment.seed,
+            "rewards": dict(environment.named_rewards),
+            "score": trial.as_document(),
+            "trials": len(environment.trials),
+            "steps": state.steps,
+            "refused": state.refused,
+            "machine": machine,
+        }
+
+    def _call(self, tool: str, arguments: object) -> Answer:
+        with self._lock:
+            return call(self.environment, tool, arguments)
+
+    def _end(self) -> None:
+        with self._lock:
+            if not self.environment.done:
+                self.environment.finish()
+
+
+def _read(arguments: str) -> object:
+    """The arguments, or the text itself where it is not valid JSON: the geometry refuses it."""
+    if not arguments.strip():
+        return None
+    try:
+        return json.loads(arguments)
+    except (ValueError, RecursionError):
+        return arguments

@@ -1,0 +1,95 @@
+"""Processes that try machines, shared by all rollouts of this program that ask for the same."""
+
+from __future__ import annotations
+
+import asyncio
+import atexit
+import os
+import threading
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import TypeVar
+
+from buildarena_environment import TrialPool
+
+T = TypeVar("T")
+
+
+class TrialRunner:
+    """Warm processes, and threads in which rollouts wait for them.
+
+    Args:
+        processes: How many; None for one for each core that this process may use.
+        timeout_s: Seconds after which a trial is broken off.
+    """
+
+    def __init__(self, processes: int | None, timeout_s: float) -> None:
+        self.pool = TrialPool(processes, timeout_s=timeout_s)
+        self._threads = ThreadPoolExecutor(
+            len(self.pool.processes), thread_name_prefix="rollouts wait"
+        )
+
+    async def run(self, work: Callable[[], T]) -> T:
+        """What work that waits for a trial returns; other rollouts go on meanwhile."""
+        return await asyncio.get_running_loop().run_in_executor(self._threads, work)
+
+    def close(self) -> None:
+        """Ends the processes; trials under way are broken off."""
+        self._threads.shutdown(wait=False, cancel_futures=True)
+        self.pool.close()
+        self._threads.shutdown()
+
+
+class TrialRunners:
+    """The trial runners of a program, by what they were asked for."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._runners: dict[tuple[int, int | None, float], TrialRunner] = {}
+        self._holders: dict[tuple[int, int | None, float], int] = {}
+
+    def get(self, processes: int | None, timeout_s: float) -> TrialRunner:
+        """The runner of this kind; made when it is first asked for."""
+        with self._lock:
+            return self._got(processes, timeout_s)
+
+    def hold(self, processes: int | None, timeout_s: float) -> None:
+        """Keeps a runner until as many releases."""
+        key = _key(processes, timeout_s)
+        with self._lock:
+            self._got(processes, timeout_s)
+            self._holders[key] = self._holders.get(key, 0) + 1
+
+    def release(self, processes: int | None, timeout_s: float) -> None:
+        """Ends a runner's processes when its last holder releases it."""
+        key = _key(processes, timeout_s)
+        with self._lock:
+            self._holders[key] = self._holders.get(key, 1) - 1
+            unused = self._runners.pop(key, None) if self._holders[key] <= 0 else None
+            if self._holders[key] <= 0:
+                del self._holders[key]
+        if unused is not None:
+            unused.close()
+
+    def close(self) -> None:
+        """Ends all processes of this program."""
+        with self._lock:
+            mine = [key for key in self._runners if key[0] == os.getpid()]
+            unused = [self._runners.pop(key) for key in mine]
+        for runner in unused:
+            runner.close()
+
+    def _got(self, processes: int | None, timeout_s: float) -> TrialRunner:
+        key = _key(processes, timeout_s)
+        if key not in self._runners:
+            self._runners[key] = TrialRunner(processes, timeout_s)
+        return self._runners[key]
+
+
+def _key(processes: int | None, timeout_s: float) -> tuple[int, int | None, float]:
+    # A forked program must not talk to its parent's processes.
+    return os.getpid(), processes, timeout_s
+
+
+RUNNERS = TrialRunners()
+atexit.register(RUNNERS.close)

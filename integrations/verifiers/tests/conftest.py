@@ -1,0 +1,37 @@
+"""The built-in expert's calls as a model makes them, and a place for verifiers' files."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+DATA = Path(__file__).parents[3] / "tests/data/expert_calls.json"
+SUBMIT = {"tool": "submit", "arguments": {}}
+
+
+@pytest.fixture(scope="session")
+def experts() -> dict[str, Any]:
+    return json.loads(DATA.read_text())
+
+
+@pytest.fixture(scope="session")
+def scripts(experts) -> dict[str, list[dict[str, Any]]]:
+    """By task, what builds the expert's machine; without the submission."""
+    return {
+        task: [
+            {"tool": made["tool"], "arguments": {**made["arguments"], "machine": made["machine"]}}
+            for made in told["calls"]
+        ]
+        for task, told in experts.items()
+    }
+
+
+def without(script: list[dict[str, Any]], *places: int) -> list[dict[str, Any]]:
+    """The script with some calls left out, and submitted."""
+    return [*(call for place, call in enumerate(script) if place not in places), SUBMIT]

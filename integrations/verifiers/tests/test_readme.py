@@ -1,0 +1,45 @@
+"""The README does what it says, against an endpoint on loopback."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+import pytest
+from conftest import SUBMIT
+from documented import run_document
+from stand_in import serving
+from test_rollouts import several
+
+README = Path(__file__).parents[1] / "README.md"
+
+
+@pytest.fixture
+def ran(scripts, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+    def run(document: Path) -> int:
+        with serving({"support-1": [several([*scripts["support-1"], SUBMIT])]}) as stand_in:
+            environment = {
+                **os.environ,
+                "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}",
+                "MODEL_URL": stand_in.url,
+                "MODEL": "stand-in",
+                "HOME": str(tmp_path),
+                "XDG_CACHE_HOME": str(tmp_path / "cache"),
+            }
+            return run_document(document, environment=environment, folder=tmp_path)
+
+    return run
+
+
+def test_the_readme_runs_word_for_word(ran) -> None:
+    assert ran(README) == 3
+
+
+def test_a_wrong_readme_fails(ran, tmp_path) -> None:
+    wrong = tmp_path / "README.md"
+    wrong.write_text(README.read_text().replace("--run.name", "--run.nmae"))
+    with pytest.raises(AssertionError, match="nmae"):
+        ran(wrong)

@@ -1,0 +1,235 @@
+"""Rollouts through verifiers' own machinery against an endpoint on loopback."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import signal
+import threading
+import time
+from itertools import combinations
+
+import psutil
+import pytest
+import verifiers.v1 as vf
+from conftest import SUBMIT, without
+from stand_in import serving
+
+from buildarena_benchmark import builtin_tasks
+from buildarena_environment import Environment, NothingToSubmitError, call, try_machine
+from buildarena_geometry import Machine
+from buildarena_verifiers import load_environment
+from buildarena_verifiers.harness import MAX_REMINDERS
+
+
+def context(url: str) -> vf.ModelContext:
+    return vf.ModelContext(
+        client=vf.EvalClientConfig(base_url=url), model="stand-in", sampling=vf.SamplingConfig()
+    )
+
+
+def played(environment, url: str, rollouts: int = 1) -> list[vf.Trace]:
+    """Traces of all rows, each played so often, all at once."""
+
+    async def play() -> list[vf.Trace]:
+        async with environment.serving():
+            slots = [
+                slot for task in environment.taskset for slot in environment.slots(task, rollouts)
+            ]
+            episodes = await asyncio.gather(
+                *(environment.run_slot(slot, context(url)) for slot in slots)
+            )
+        return [trace for episode in episodes for trace in episode.traces]
+
+    return asyncio.run(play())
+
+
+def expected(task: str, script):
+    """What a script's machine scores when it is built and tried here."""
+    environment = Environment(task)
+    for made in script:
+        if made != SUBMIT:
+            call(environment, made["tool"], made["arguments"])
+    try:
+        machine = environment.submitted()
+    except NothingToSubmitError:
+        machine = Machine()
+    return machine, try_machine(builtin_tasks()[task], machine).score
+
+
+def several(script, at_once: int = 6):
+    """The script with several calls in each reply."""
+    return [script[first : first + at_once] for first in range(0, len(script), at_once)]
+
+
+def engines() -> list[psutil.Process]:
+    return [p for p in psutil.Process().children() if "spawn_main" in " ".join(p.cmdline())]
+
+
+def record(trace) -> dict:
+    return trace.info["buildarena"]
+
+
+def test_the_expert_earns_the_services_scores_in_all_nine_tasks(scripts, experts) -> None:
+    environment = load_environment(rewards={"success": 1.0, "indicator": 0.5})
+    whole = {task: [several([*script, SUBMIT])] for task, script in scripts.items()}
+    with serving(whole) as stand_in:
+        traces = played(environment, stand_in.url)
+    assert [record(trace)["task"] for trace in traces] == list(builtin_tasks())
+    for trace in traces:
+        kept = experts[record(trace)["task"]]["score"]
+        assert trace.ok, trace.errors
+        assert record(trace)["score"]["success"]
+        assert record(trace)["score"]["flags"] == kept["flags"]
+        assert record(trace)["score"]["indicator"] == pytest.approx(kept["indicator"], rel=0.02)
+        assert trace.rewards["success"].value == 1.0
+        assert trace.reward == pytest.approx(1.5, rel=0.02)
+        assert trace.rewards["constraint_progress"].value == 0.0
+        assert trace.rewards["constraint_progress"].score == 1.0
+
+
+def test_64_rollouts_at_once_earn_what_their_own_machines_score(scripts) -> None:
+    built = scripts["lift-1"]
+    pairs = list(combinations(range(2, len(built)), 2))[:64]
+    variants = [without(built, *pair) for pair in pairs]
+    environment = load_environment("lift-1", rewards={"indicator": 1.0}, processes=2)
+    with serving({"lift-1": [several(script) for script in variants]}) as stand_in:
+        traces = played(environment, stand_in.url, rollouts=64)
+    assert len(traces) == 64
+    assert all(trace.ok for trace in traces)
+    played_ones = set()
+    for trace in traces:
+        (first, *_) = [node.message for node in trace.nodes if node.message.role == "assistant"]
+        number = int(first.tool_calls[0].id.split("-")[1])
+        played_ones.add(number)
+        machine, score = expected("lift-1", variants[number])
+        found = record(trace)
+        assert Machine.from_document(found["machine"]).logged == (
+            Machine.from_document(machine.to_document()).logged
+        )
+        assert (found["score"]["indicator"], found["score"]["success"]) == (
+            score.indicator,
+            score.success,
+        )
+        assert found["score"]["flags"] == list(score.flags)
+    assert len(played_ones) == 64
+    assert len({record(trace)["score"]["indicator"] for trace in traces}) > 3
+    assert not engines()
+
+
+def test_a_crashed_engine_costs_one_rollout(scripts) -> None:
+    rollouts = 6
+    environment = load_environment("transport-1", processes=1)
+    killed = []
+
+    def kill_once() -> None:
+        deadline = time.monotonic() + 120
+        while time.monotonic() < deadline and not killed:
+            with contextlib.suppress(psutil.Error):
+                # The first trial loads the engine, and is under way as soon as it is there.
+                for engine in engines():
+                    if any("mujoco" in file.path for file in engine.memory_maps()):
+                        os.kill(engine.pid, signal.SIGKILL)
+                        killed.append(engine.pid)
+            time.sleep(0.02)
+
+    with serving({"transport-1": [[*scripts["transport-1"], SUBMIT]]}) as stand_in:
+        killer = threading.Thread(target=kill_once)
+        killer.start()
+        traces = played(environment, stand_in.url, rollouts=rollouts)
+        killer.join()
+    assert killed
+    lost = [trace for trace in traces if not trace.ok]
+    assert len(lost) == 1
+    assert "ended with code -9" in lost[0].last_error.message
+    assert not any(lost[0].rewards.values())
+    assert [trace.reward for trace in traces if trace.ok] == [1.0] * (rollouts - 1)
+
+
+def test_rollouts_of_one_row_share_its_prompt_and_nothing_that_changes(scripts) -> None:
+    environment = load_environment("lift-1")
+    whole = [*scripts["lift-1"], SUBMIT]
+    with serving({"lift-1": [whole, [SUBMIT, *["nothing"] * 9], whole]}) as stand_in:
+        traces = played(environment, stand_in.url, rollouts=3)
+        prompts = {request["messages"][0]["content"] for request in stand_in.requests}
+        tools = {len(request["tools"]) for request in stand_in.requests}
+    assert len(prompts) == len(tools) == 1
+    assert sorted(trace.reward for trace in traces) == [0.0, 1.0, 1.0]
+    assert len({trace.task.hash for trace in traces}) == 1
+
+
+@pytest.mark.parametrize("ending", ["turns", "talk", "silence"])
+def test_what_ends_a_rollout_early_has_its_machine_tried(ending, scripts) -> None:
+    script = scripts["lift-1"]
+    environment = load_environment("lift-1", steps=len(script) if ending == "silence" else 2000)
+    if ending == "turns":
+        environment = vf.load_environment(
+            environment.config.model_copy(
+                update={
+                    "agent": environment.config.agent.model_copy(update={"max_turns": len(script)})
+                }
+            )
+        )
+    with serving({"lift-1": [script]}) as stand_in:
+        (trace,) = played(environment, stand_in.url)
+    assert trace.ok, trace.errors
+    assert trace.reward == 1.0
+    assert trace.stop_condition == ("max_turns" if ending == "turns" else "agent_completed")
+    talk = {"turns": 0, "talk": MAX_REMINDERS + 1, "silence": 0}
+    assert trace.num_turns == len(script) + talk[ending]
+
+
+def test_whatever_a_model_calls_is_answered() -> None:
+    script = [
+        SUBMIT,
+        {"tool": "fly", "arguments": "{}"},
+        {"tool": "start", "arguments": "not JSON"},
+        {"tool": "start", "arguments": "[" * 500},
+        {"tool": "start", "arguments": '{"machine": 7}'},
+        [{"tool": "start", "arguments": ""}, {"tool": "start", "arguments": {}}],
+        "Let me think.",
+        [SUBMIT, SUBMIT],
+    ]
+    with serving({"support-2": [script]}) as stand_in:
+        (trace,) = played(load_environment("support-2"), stand_in.url)
+    assert trace.ok, trace.errors
+    assert record(trace)["refused"] == 6
+    assert record(trace)["steps"] == 7
+    assert (record(trace)["trials"], trace.reward) == (1, 0.0)
+    assert trace.metrics["refused"] == 6
+
+
+def test_another_harness_is_told_that_it_has_no_tools() -> None:
+    config = load_environment("lift-1").config
+    agent = vf.AgentConfig(runtime=vf.SubprocessConfig(), harness={"id": "null"})
+    environment = vf.load_environment(config.model_copy(update={"agent": agent}))
+    (trace,) = played(environment, "http://127.0.0.1:9/v1")
+    assert not trace.ok
+    assert "the harness 'null' has no building tools" in trace.last_error.message
+
+
+def test_starts_are_rows() -> None:
+    environment = load_environment(["lift-1", "support_1"], start_seeds=[1, 2])
+    rows = [(task.data.name, task.data.task, task.data.start_seed) for task in environment.taskset]
+    assert rows == [
+        ("lift-1 from 1", "lift-1", 1),
+        ("lift-1 from 2", "lift-1", 2),
+        ("support-1 from 1", "support-1", 1),
+        ("support-1 from 2", "support-1", 2),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ({"tasks": "support-9"}, "no task 'support-9'"),
+        ({"simulator": "game"}, "no simulator 'game'"),
+        ({"rewards": {"fun": 1.0}}, "no reward 'fun': choose from success"),
+        ({"rounds": 0}, "rounds"),
+        ({"processes": 0}, "processes"),
+    ],
+)
+def test_what_does_not_exist_is_named(arguments, said) -> None:
+    with pytest.raises(ValueError, match=said):
+        load_environment(**arguments)
