@@ -32,20 +32,22 @@ up: $(STAMP) ## The whole service on this machine until Ctrl-C
 	@$(BIN)/buildarena up
 
 test: check check-web-if-it-can-be ## Lints, types, import rules and all tests
-	@echo "== 6/6 tests, $(WORKERS) at once (left out: make test-long, chaos, peer and bench-*)"
+	@echo "== 6/7 tests, $(WORKERS) at once (left out: make test-long, chaos, peer and bench-*)"
 	@$(BIN)/pytest -n $(WORKERS) --dist loadgroup -rs
+	@echo "== 7/7 adapters, each in its own environment"
+	@$(MAKE) --no-print-directory test-integrations
 
 test-long: $(WEB_STAMP) ## Further variants and larger sizes of what make test tries
 	@BUILDARENA_TEST_LONG=1 $(BIN)/pytest -n $(WORKERS) --dist loadgroup -rs -m "long or sized"
 
 check: $(STAMP) ## Lints, types and import rules alone
-	@echo "== 1/6 format"
+	@echo "== 1/7 format"
 	@$(BIN)/ruff format --check --quiet $(CODE)
-	@echo "== 2/6 lint"
+	@echo "== 2/7 lint"
 	@$(BIN)/ruff check --quiet $(CODE)
-	@echo "== 3/6 types"
+	@echo "== 3/7 types"
 	@$(BIN)/mypy --no-error-summary $(addsuffix /src,$(PACKAGES))
-	@echo "== 4/6 import rules"
+	@echo "== 4/7 import rules"
 	@set -o pipefail; $(BIN)/lint-imports --no-cache | tail -n 3
 
 clean: ## Removes the environment, caches and local data
