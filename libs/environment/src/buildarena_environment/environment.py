@@ -23,7 +23,7 @@ from buildarena_environment.rewards import (
     weighed,
 )
 from buildarena_environment.snapshots import Snapshot
-from buildarena_environment.trials import Trial, best_trial, told, try_machine
+from buildarena_environment.trials import Trial, Tries, best_trial, told, try_machine
 from buildarena_environment.workbench import MAIN, Workbench, tools_of_models
 from buildarena_geometry import Accepted, Machine, ToolDefinition
 
@@ -124,6 +124,7 @@ class Environment:
         limits: How long an episode may be.
         rewards: Weights by the names of `buildarena_environment.rewards`; success alone by default.
         reference: The indicator that is worth 1; the task's reference where there is one.
+        tries: What tries a submitted machine; in this process by default.
 
     Raises:
         UnknownChoiceError: Task, simulator or a reward does not exist.
@@ -140,6 +141,7 @@ class Environment:
         limits: Limits | None = None,
         rewards: Mapping[str, float] | None = None,
         reference: float | None = None,
+        tries: Tries = try_machine,
     ) -> None:
         if rounds < 1:
             raise ValueError(f"rounds is {rounds}: a builder submits at least once")
@@ -150,6 +152,7 @@ class Environment:
         self.limits = limits or Limits()
         self.weights = checked_weights(DEFAULT_WEIGHTS if rewards is None else rewards)
         self.reference = reference_of(self.task, reference, needed="indicator" in self.weights)
+        self._tries = tries
         self._shaped = bool(self.weights.keys() - TERMINAL)
         self._bench = Workbench()
         self._steps = self._changes = self._refused = 0
@@ -245,7 +248,7 @@ class Environment:
         """
         if self._done:
             raise EpisodeOverError("the episode has ended: reset begins another")
-        trial = try_machine(self.task, self._bench.submitted(), self.simulator, seed=self.seed)
+        trial = self._tries(self.task, self._bench.submitted(), self.simulator, seed=self.seed)
         self._trials = (*self._trials, trial)
         self._done = trial.counts or len(self._trials) >= self.rounds
         self._reward = self._worth()

@@ -6,7 +6,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, Self
+from typing import Any, Protocol, Self
 
 from buildarena_benchmark import Score, Task, broken_constraint, failed_score, score
 from buildarena_benchmark.flags import is_disqualified
@@ -70,6 +70,14 @@ class Trial:
             wall_s=float(document["wall_s"]),
             trajectory=trajectory,
         )
+
+
+class Tries(Protocol):
+    """What puts a machine through a task's trial, as `try_machine` does."""
+
+    def __call__(
+        self, task: Task, machine: Machine, simulator: str, *, seed: int | None
+    ) -> Trial: ...
 
 
 def try_machine(

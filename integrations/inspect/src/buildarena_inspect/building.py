@@ -1,0 +1,186 @@
+"""What one sample builds: its environment, and the calls that were made to it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any, Final, Self
+
+import anyio
+from inspect_ai.solver import TaskState
+
+from buildarena_environment import (
+    MAIN,
+    Environment,
+    EpisodeOverError,
+    Limits,
+    Submission,
+    Trial,
+    best_trial,
+)
+from buildarena_inspect.errors import LogError
+from buildarena_inspect.trial_processes import trial_processes
+
+STATE: Final = "buildarena:state"
+"""Where a sample's store keeps how its episode stood when it was scored."""
+CALLS: Final = "buildarena:calls"
+"""Where a sample's store keeps the calls it made, in order."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Conditions:
+    """What a sample is played under; kept as its metadata.
+
+    Attributes:
+        task: Name of the task.
+        simulator: Name of the engine.
+        seed: Varies the start as a fair repetition would; None for the exact one.
+        rounds: How often a model may submit.
+        steps: Calls that it may make.
+        rewards: Weights of rewards by name; None for none but success.
+    """
+
+    task: str
+    simulator: str = "mujoco"
+    seed: int | None = None
+    rounds: int = 1
+    steps: int = 2000
+    rewards: Mapping[str, float] | None = None
+
+    def environment(self) -> Environment:
+        """The environment that they describe.
+
+        Raises:
+            UnknownChoiceError: Task, simulator or a reward does not exist.
+            ValueError: A number is out of range.
+        """
+        return Environment(
+            self.task,
+            self.simulator,
+            seed=self.seed,
+            rounds=self.rounds,
+            limits=Limits(steps=self.steps),
+            rewards=self.rewards,
+            tries=trial_processes(),
+        )
+
+    def as_metadata(self) -> dict[str, Any]:
+        """JSON values that `from_metadata` reads, with the version of the task."""
+        task = self.environment().task
+        return {**asdict(self), "task_version": task.version, "level": task.level}
+
+    @classmethod
+    def from_metadata(cls, metadata: Mapping[str, Any]) -> Self:
+        """The conditions of a sample.
+
+        Raises:
+            LogError: Its metadata are not those of a sample of ours.
+        """
+        try:
+            return cls(**{name: metadata[name] for name in cls.__slots__})
+        except KeyError as missing:
+            raise LogError(f"this is no sample of BuildArena: it has no {missing}") from missing
+
+
+class Building:
+    """The environment of one sample, with every call that reached it.
+
+    Args:
+        conditions: What it is played under.
+    """
+
+    def __init__(self, conditions: Conditions) -> None:
+        self.conditions = conditions
+        self.environment = conditions.environment()
+        self.calls: list[dict[str, Any]] = []
+        self._submitting = anyio.Lock()
+
+    @property
+    def trial(self) -> Trial | None:
+        """The trial that counts so far."""
+        return best_trial(self.environment.trials) if self.environment.trials else None
+
+    def call(self, tool: str, arguments: Mapping[str, Any]) -> str:
+        """Carries out one action.
+
+        Returns:
+            What the model reads about it; of a refused one why, and what would be allowed.
+        """
+        given = dict(arguments)
+        machine = given.pop("machine", MAIN)
+        try:
+            step = self.environment.step(tool, given, machine=machine)
+        except EpisodeOverError as over:
+            return str(over)
+        self.calls.append({"machine": machine, "tool": tool, "arguments": given})
+        return step.feedback
+
+    async def submit(self) -> Submission:
+        """Has what was built simulated and scored, beside the event loop.
+
+        Raises:
+            EpisodeOverError: The episode has ended.
+            NothingToSubmitError: There is no machine, or there are several without an assembly.
+            SimulationError: The engine failed or crashed.
+        """
+        async with self._submitting:
+            return await anyio.to_thread.run_sync(
+                self.environment.submit, limiter=anyio.CapacityLimiter(1)
+            )
+
+    async def ended(self) -> Trial:
+        """The trial that counts; what was never submitted is tried now.
+
+        Raises:
+            SimulationError: The engine failed or crashed.
+        """
+        if self.trial is None:
+            async with self._submitting:
+                await anyio.to_thread.run_sync(
+                    self.environment.finish, limiter=anyio.CapacityLimiter(1)
+                )
+        found = self.trial
+        assert found is not None  # noqa: S101 - an ended episode has a trial
+        return found
+
+
+_UNDER_WAY: dict[str, Building] = {}
+"""By the id that a sample has once for each epoch and each try."""
+
+
+def begin(state: TaskState) -> Building:
+    """The building of a sample that begins, or begins again."""
+    building = Building(Conditions.from_metadata(state.metadata))
+    _UNDER_WAY[state.uuid] = building
+    return building
+
+
+def end(state: TaskState) -> None:
+    """Forgets a sample's building."""
+    _UNDER_WAY.pop(state.uuid, None)
+
+
+def building_of(state: TaskState) -> Building:
+    """The building of a sample under way, or of one that is scored again from its log.
+
+    Raises:
+        LogError: There is none, or it was built for another version of the task.
+    """
+    found = _UNDER_WAY.get(state.uuid)
+    if found is not None:
+        return found
+    kept = state.store.get(STATE)
+    if kept is None:
+        raise LogError(f"sample {state.sample_id} has no building: it was never set up")
+    conditions = Conditions.from_metadata(state.metadata)
+    again = Building(conditions)
+    version = again.environment.task.version
+    if state.metadata["task_version"] != version:
+        raise LogError(
+            f"sample {state.sample_id} was built for {conditions.task} at version "
+            f"{state.metadata['task_version']}, and this release has {version}"
+        )
+    # The trials are made again, so that scoring again means something.
+    again.environment.restore({**kept, "trials": [], "done": False})
+    again.calls = list(state.store.get(CALLS, []))
+    return again
