@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Final, Self
 
 import anyio
 from inspect_ai.solver import TaskState
 
 from buildarena_environment import (
+    ASSEMBLY,
     MAIN,
     Environment,
     EpisodeOverError,
     Limits,
     Submission,
     Trial,
+    Workbench,
     best_trial,
 )
+from buildarena_geometry import Machine
 from buildarena_inspect.errors import LogError
 from buildarena_inspect.trial_processes import trial_processes
 
@@ -93,12 +96,19 @@ class Building:
         self.conditions = conditions
         self.environment = conditions.environment()
         self.calls: list[dict[str, Any]] = []
+        self._tried: list[Machine | None] = []
         self._submitting = anyio.Lock()
 
     @property
     def trial(self) -> Trial | None:
         """The trial that counts so far."""
         return best_trial(self.environment.trials) if self.environment.trials else None
+
+    @property
+    def machine(self) -> Machine | None:
+        """The machine of the trial that counts so far, if there was one."""
+        trials = self.environment.trials
+        return self._tried[trials.index(best_trial(trials))] if trials else None
 
     def call(self, tool: str, arguments: Mapping[str, Any]) -> str:
         """Carries out one action.
@@ -123,10 +133,7 @@ class Building:
             NothingToSubmitError: There is no machine, or there are several without an assembly.
             SimulationError: The engine failed or crashed.
         """
-        async with self._submitting:
-            return await anyio.to_thread.run_sync(
-                self.environment.submit, limiter=anyio.CapacityLimiter(1)
-            )
+        return await self._tried_by(self.environment.submit)
 
     async def ended(self) -> Trial:
         """The trial that counts; what was never submitted is tried now.
@@ -135,13 +142,53 @@ class Building:
             SimulationError: The engine failed or crashed.
         """
         if self.trial is None:
-            async with self._submitting:
-                await anyio.to_thread.run_sync(
-                    self.environment.finish, limiter=anyio.CapacityLimiter(1)
-                )
+            await self._tried_by(self.environment.finish)
         found = self.trial
         assert found is not None  # noqa: S101 - an ended episode has a trial
         return found
+
+    def adopt(self, machine: Machine | None, trial: Trial) -> None:
+        """Takes over what a workflow of ours built and tried, as the end of the episode."""
+        state = self.environment.state()
+        machines = {} if machine is None else {_name_of(machine): machine.logged}
+        self.environment.restore(
+            replace(state, machines=machines, trials=(*state.trials, trial), done=True)
+        )
+        self._tried.append(None if machine is None else machine.copy())
+        self.calls = calls_of(machine)
+
+    async def _tried_by(self, submit: Callable[[], Submission]) -> Submission:
+        async with self._submitting:
+            done = await anyio.to_thread.run_sync(submit, limiter=anyio.CapacityLimiter(1))
+        found = Workbench.holding(self.environment.machines).result()
+        self._tried.append(None if found is None else found[1].copy())
+        return done
+
+
+def calls_of(machine: Machine | None) -> list[dict[str, Any]]:
+    """The calls that one who builds alone would make for the same machine.
+
+    A plan may call its sub-structures anything; here they are called part-1, part-2 and so on.
+    """
+    if machine is None:
+        return []
+    parts = machine.logged.available
+    names = {name: f"part-{number}" for number, name in enumerate(parts, start=1)}
+    calls = [
+        {"machine": names[name], "tool": record.name, "arguments": record.arguments}
+        for name, part in parts.items()
+        for record in part.records
+    ]
+    for record in machine.logged.records:
+        given = record.arguments
+        if isinstance(given, Mapping) and given.get("machine_id") in names:
+            given = {**given, "machine_id": names[str(given["machine_id"])]}
+        calls.append({"machine": _name_of(machine), "tool": record.name, "arguments": given})
+    return calls
+
+
+def _name_of(machine: Machine) -> str:
+    return ASSEMBLY if machine.logged.available else MAIN
 
 
 _UNDER_WAY: dict[str, Building] = {}

@@ -16,12 +16,11 @@ from buildarena_environment.trials import told
 from buildarena_geometry import Machine
 from buildarena_inspect.building import CALLS, STATE, Building, building_of, end
 from buildarena_inspect.errors import LogError
-from buildarena_inspect.scorers import submitted_machine
 from buildarena_simulation import write_trajectory
 from buildarena_simulation.render.film import write_film
 
 MACHINE: Final = "buildarena:machine"
-"""Where a sample's store keeps the document of the machine that was submitted last."""
+"""Where a sample's store keeps the document of the machine of the trial that counts."""
 TRAJECTORY: Final = "buildarena:trajectory"
 """Where it keeps the trajectory of that machine's trial: Parquet, as base64."""
 PICTURES: Final = "buildarena"
@@ -43,16 +42,14 @@ async def keep(state: TaskState) -> None:
 async def _keep(state: TaskState, building: Building) -> None:
     state.store.set(STATE, building.environment.state().as_document())
     state.store.set(CALLS, building.calls)
-    machine = submitted_machine(building)
-    trials = building.environment.trials
-    if machine is None or not trials:
+    machine, trial = building.machine, building.trial
+    if machine is None or trial is None:
         return
     state.store.set(MACHINE, machine.to_document())
-    last = trials[-1]
-    if last.trajectory is None:
+    if trial.trajectory is None:
         return
-    state.store.set(TRAJECTORY, base64.b64encode(write_trajectory(last.trajectory)).decode())
-    state.messages.append(await anyio.to_thread.run_sync(_pictured, building, machine, last))
+    state.store.set(TRAJECTORY, base64.b64encode(write_trajectory(trial.trajectory)).decode())
+    state.messages.append(await anyio.to_thread.run_sync(_pictured, building, machine, trial))
 
 
 def _pictured(building: Building, machine: Machine, trial: Trial) -> ChatMessageUser:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 from inspect_ai.scorer import Metric, SampleScore, Value, metric, value_to_float
 
 from buildarena_benchmark.statistics import mean_interval, mean_ranks, wilson_interval
 from buildarena_environment import references
 
-BESIDE = "the built-in expert"
-"""Who a log's model is ranked beside, as a log holds but one."""
+DIGITS: Final = 4
+"""References have so many; more would make equal figures differ."""
 
 
 @metric(scores="unreduced")
@@ -66,7 +68,7 @@ def mean_rank() -> Metric:
             return {}
         found = _by_task(scores)
         rates = [[_rate(found[task]), 1.0] for task in tasks]
-        figures = [[_mean(found[task]), known[task]] for task in tasks]
+        figures = [[round(_mean(found[task]), DIGITS), known[task]] for task in tasks]
         return {"mean_rank": float(mean_ranks(np.array(rates), np.array(figures))[0])}
 
     return compute

@@ -14,7 +14,6 @@ from buildarena_benchmark.flags import is_disqualified
 from buildarena_benchmark.tasks.task import SCORER_VERSION
 from buildarena_environment import Trial
 from buildarena_environment.trials import told
-from buildarena_environment.workbench import Workbench
 from buildarena_geometry import Machine
 from buildarena_inspect.building import Building, building_of
 from buildarena_inspect.metrics import indicator_by_task, mean_rank, success_interval
@@ -88,7 +87,7 @@ def counted_indicator(trial: Trial) -> float:
 def described(building: Building, trial: Trial) -> dict[str, Any]:
     """All figures of a trial, with the versions of everything that can change them."""
     environment = building.environment
-    machine = submitted_machine(building)
+    machine = building.machine
     return {
         "task": environment.task.name,
         "task_version": environment.task.version,
@@ -107,12 +106,6 @@ def described(building: Building, trial: Trial) -> dict[str, Any]:
         "trials": len(environment.trials),
         "machine_hash": None if machine is None else machine_hash(machine),
     }
-
-
-def submitted_machine(building: Building) -> Machine | None:
-    """What would be simulated as the building stands now, if anything."""
-    found = Workbench.holding(building.environment.machines).result()
-    return None if found is None else found[1]
 
 
 def machine_hash(machine: Machine) -> str:

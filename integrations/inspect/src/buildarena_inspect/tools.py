@@ -37,6 +37,17 @@ def submit_tool(building: Building) -> ToolDef:
     return _tool(definition, execute)
 
 
+def parameters_of(schema: Mapping[str, Any]) -> ToolParams:
+    """A tool's schema as Inspect has it, which knows no bounds on the length of arrays."""
+    return ToolParams(
+        properties={
+            name: JSONSchema.model_validate(value) for name, value in schema.get("properties", {}).items()
+        },
+        required=list(schema.get("required", ())),
+        additionalProperties=bool(schema.get("additionalProperties", False)),
+    )
+
+
 def _action(definition: ToolDefinition, building: Building) -> ToolDef:
     async def execute(**kwargs: Any) -> str:
         return building.call(definition.name, kwargs)
@@ -63,16 +74,6 @@ def _tool(definition: ToolDefinition, execute: Any) -> ToolDef:
         execute,
         name=definition.name,
         description=definition.description,
-        parameters=_parameters(definition.parameters),
+        parameters=parameters_of(definition.parameters),
         max_output=0,  # what a model reads is not cut off elsewhere
-    )
-
-
-def _parameters(schema: Mapping[str, Any]) -> ToolParams:
-    return ToolParams(
-        properties={
-            name: JSONSchema.model_validate(value) for name, value in schema["properties"].items()
-        },
-        required=list(schema["required"]),
-        additionalProperties=bool(schema["additionalProperties"]),
     )
