@@ -147,15 +147,21 @@ class Building:
         assert found is not None  # noqa: S101 - an ended episode has a trial
         return found
 
-    def adopt(self, machine: Machine | None, trial: Trial) -> None:
-        """Takes over what a workflow of ours built and tried, as the end of the episode."""
+    def adopt(self, machine: Machine | None, trial: Trial, *, handed_in: bool = True) -> None:
+        """Takes over what a workflow of ours built and tried, as the end of the episode.
+
+        Args:
+            machine: What it built, if anything.
+            trial: Its trial.
+            handed_in: Whether it was finished; what was not is no call of one who submits.
+        """
         state = self.environment.state()
         machines = {} if machine is None else {_name_of(machine): machine.logged}
         self.environment.restore(
             replace(state, machines=machines, trials=(*state.trials, trial), done=True)
         )
         self._tried.append(None if machine is None else machine.copy())
-        self.calls = calls_of(machine)
+        self.calls = calls_of(machine) if handed_in else []
 
     async def _tried_by(self, submit: Callable[[], Submission]) -> Submission:
         async with self._submitting:

@@ -62,8 +62,9 @@ def _pictured(building: Building, machine: Machine, trial: Trial) -> ChatMessage
         image = base64.b64encode(path.read_bytes()).decode()
     return ChatMessageUser(
         content=[
-            ContentText(text=f"Trial of {task.name}, for readers of this log. "
-                        + told(task, trial.score)),
+            ContentText(
+                text=f"Trial of {task.name}, for readers of this log. " + told(task, trial.score)
+            ),
             ContentImage(image=f"data:image/png;base64,{image}"),
         ],
         metadata={PICTURES: "film"},

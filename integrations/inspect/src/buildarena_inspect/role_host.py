@@ -160,9 +160,7 @@ def _usage(output: ModelOutput) -> Usage:
     return Usage(requests=1, input_tokens=used.input_tokens, output_tokens=used.output_tokens)
 
 
-def _record(
-    trial: Trial, number: int, engine: str, digest: str, *, final: bool
-) -> RolloutRecord:
+def _record(trial: Trial, number: int, engine: str, digest: str, *, final: bool) -> RolloutRecord:
     now = datetime.now(UTC)
     return RolloutRecord(
         number=number,

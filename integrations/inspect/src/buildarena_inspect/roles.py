@@ -84,7 +84,7 @@ def _fail(building: Building, session: Session, reason: str, detail: str) -> Non
     """Scores a session that built nothing that may be simulated; what it built is kept."""
     machine = session.machine
     score = failed_score(building.environment.task, machine)
-    building.adopt(machine, Trial(score=score, reason=reason, detail=detail))
+    building.adopt(machine, Trial(score=score, reason=reason, detail=detail), handed_in=False)
 
 
 def _told(turn: ModelTurn) -> ChatMessageAssistant:

@@ -77,7 +77,7 @@ def _weights(text: str) -> dict[str, float]:
 def _named(name: str, tasks: Sequence[str]) -> Callable[..., Task]:
     """Registers a task under our name; Inspect's own way would put the module's before it."""
 
-    def make(
+    def make(  # noqa: PLR0917 - Inspect gives them by name
         simulator: str = "mujoco",
         rounds: int = 1,
         rewards: dict[str, float] | str | None = None,

@@ -41,7 +41,8 @@ def parameters_of(schema: Mapping[str, Any]) -> ToolParams:
     """A tool's schema as Inspect has it, which knows no bounds on the length of arrays."""
     return ToolParams(
         properties={
-            name: JSONSchema.model_validate(value) for name, value in schema.get("properties", {}).items()
+            name: JSONSchema.model_validate(value)
+            for name, value in schema.get("properties", {}).items()
         },
         required=list(schema.get("required", ())),
         additionalProperties=bool(schema.get("additionalProperties", False)),

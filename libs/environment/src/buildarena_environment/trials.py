@@ -75,9 +75,8 @@ class Trial:
 class Tries(Protocol):
     """What puts a machine through a task's trial, as `try_machine` does."""
 
-    def __call__(
-        self, task: Task, machine: Machine, simulator: str, *, seed: int | None
-    ) -> Trial: ...
+    def __call__(self, task: Task, machine: Machine, simulator: str, *, seed: int | None) -> Trial:
+        """What came of a machine."""
 
 
 def try_machine(

@@ -1,0 +1,167 @@
+"""Brings samples of logs into a service: their calls are made again, and judged there."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from hashlib import sha256
+from typing import Any, Final
+
+from buildarena_environment import ASSEMBLY, MAIN
+from buildarena_inspect.logs import LoggedSample, Unusable
+from buildarena_inspect.service import RefusedError, Service
+
+PREFIX: Final = "inspect-"
+"""Begins the name of every imported builder, so that a leaderboard says where it comes from."""
+MAX_NAME: Final = 80
+MAX_SEED: Final = 2**53 - 1
+CONFLICT: Final = 409
+UNPROCESSABLE: Final = 422
+SAME: Final = 1e-6
+"""Indicators that differ by a smaller share are the same."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Imported:
+    """A sample that is a job of the service now.
+
+    Attributes:
+        sample: Its id in the data set.
+        epoch: Its epoch.
+        agent: The builder's name there, without the ``agent/`` before it.
+        job: The job's id.
+        again: Whether an earlier import had brought it.
+        outcome: How the job ended; None where it has not ended yet.
+        differences: Where the service's figures are others than the log's, in words.
+    """
+
+    sample: str
+    epoch: int
+    agent: str
+    job: str
+    again: bool
+    outcome: str | None
+    differences: tuple[str, ...] = field(default=())
+
+
+def bring(
+    sample: LoggedSample, service: Service, *, agent: str | None = None, within_s: float
+) -> Imported | Unusable:
+    """Makes a sample's calls again in a session, and compares what the service finds.
+
+    The seed is made of the sample's own id, so a sample gives one job however often it is brought,
+    and an import that was broken off goes on where it stopped.
+
+    Args:
+        sample: The sample.
+        service: Where to.
+        agent: The builder's name, which is put behind ``inspect-``; the model's by default.
+        within_s: Seconds to wait for the job's end.
+
+    Raises:
+        ServiceError: The service does not answer, or refuses what it should not.
+    """
+    why = _hindrance(sample, service)
+    if why:
+        return Unusable(sample=sample.sample, epoch=sample.epoch, why=why)
+    name = (PREFIX + (agent or sample.agent))[:MAX_NAME]
+    wanted = {
+        "task": sample.conditions.task,
+        "agent": name,
+        "seed": seed_of(sample),
+        "simulator": sample.conditions.simulator,
+    }
+    try:
+        opened = service.post("/v1/sessions", wanted)
+    except RefusedError as error:
+        found = _brought_before(wanted, service) if error.status == UNPROCESSABLE else None
+        if found is None:
+            raise
+        job_id, again = found, True
+    else:
+        job_id, again = str(opened["id"]), False
+        limit = int(opened["limits"]["calls"])
+        if len(sample.calls) > limit:
+            why = f"it has {len(sample.calls):,} calls, and a session may have {limit:,}"
+            return Unusable(sample=sample.sample, epoch=sample.epoch, why=why)
+        _play(sample, service, job_id, made=int(opened["calls"]))
+    job = service.ended(job_id, within_s)
+    return Imported(
+        sample=sample.sample,
+        epoch=sample.epoch,
+        agent=name,
+        job=job_id,
+        again=again,
+        outcome=job["outcome"],
+        differences=tuple(_differences(sample, job)) if job["state"] == "done" else (),
+    )
+
+
+def seed_of(sample: LoggedSample) -> int:
+    """The seed of a sample's job."""
+    digest = sha256(sample.uuid.encode()).digest()
+    return int.from_bytes(digest[:8], "big") % (MAX_SEED + 1)
+
+
+def _hindrance(sample: LoggedSample, service: Service) -> str:
+    """Why the service could not judge a sample as its log did; "" where it can."""
+    conditions = sample.conditions
+    if conditions.rounds != 1:
+        return f"it was played with {conditions.rounds} rounds, and a session has one trial"
+    try:
+        task = service.get(f"/v1/tasks/{conditions.task}")
+    except RefusedError as error:
+        return str(error)
+    if task["version"] != sample.figures["task_version"]:
+        return (
+            f"it was built for {conditions.task} at version {sample.figures['task_version']}, and "
+            f"the service has {task['version']}"
+        )
+    return ""
+
+
+def _play(sample: LoggedSample, service: Service, session: str, *, made: int) -> None:
+    calls = f"/v1/sessions/{session}/calls"
+    for call in sample.calls[made:]:
+        service.post(calls, dict(call))
+    submit = f"/v1/sessions/{session}/submit"
+    try:
+        service.post(submit)
+    except RefusedError as error:
+        if error.status != CONFLICT:
+            raise
+        # Nothing to submit is a failure in the log, so it is one here: of an empty machine.
+        machines = {call["machine"] for call in sample.calls}
+        machine = ASSEMBLY if len(machines) > 1 else MAIN
+        service.post(calls, {"machine": machine, "tool": "get_machine_summary"})
+        service.post(submit)
+
+
+def _brought_before(wanted: dict[str, Any], service: Service) -> str | None:
+    """The job that an earlier import made of a sample, if there is one."""
+    model = f"agent/{wanted['agent']}"
+    cursor: dict[str, str] = {}
+    while True:
+        page = service.get("/v1/jobs", task=wanted["task"], model=model, limit="200", **cursor)
+        for job in page["jobs"]:
+            if job["seed"] == wanted["seed"] and f"/{wanted['simulator']}-" in job["track"]:
+                return str(job["id"])
+        if page["next_cursor"] is None:
+            return None
+        cursor = {"cursor": str(page["next_cursor"])}
+
+
+def _differences(sample: LoggedSample, job: dict[str, Any]) -> Iterator[str]:
+    """Where the service's figures are others than the log's."""
+    here = {"success": bool(job["success"]), "flags": sorted(job["flags"] or [])}
+    there = {
+        "success": bool(sample.figures.get("success")),
+        "flags": sorted(sample.figures.get("flags") or []),
+    }
+    for name, value in there.items():
+        if value != here[name]:
+            yield f"{name}: {value} in the log, {here[name]} in the service"
+    logged, found = float(sample.figures.get("indicator") or 0.0), float(job["indicator"] or 0.0)
+    if not math.isclose(logged, found, rel_tol=SAME, abs_tol=SAME):
+        yield f"indicator: {logged:g} in the log, {found:g} in the service"
