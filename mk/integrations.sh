@@ -26,7 +26,7 @@ check() {
     for name in "$@"; do
         .venv/bin/ruff format --check --quiet "integrations/$name"
         .venv/bin/ruff check --quiet "integrations/$name"
-        .venv/bin/mypy --no-error-summary --python-executable "$environments/$name/bin/python" "integrations/$name/src"
+        MYPYPATH=integrations/$name/src .venv/bin/mypy --no-error-summary --python-executable "$environments/$name/bin/python" "integrations/$name/src"
     done
 }
 
