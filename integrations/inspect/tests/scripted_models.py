@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from inspect_ai.log import EvalLog, EvalSample
+from inspect_ai.log import EvalLog, EvalSample, read_eval_log
 from inspect_ai.model import ChatMessage, Model, ModelOutput, ModelUsage, get_model
 
 from buildarena_environment import Trial, try_machine
@@ -75,8 +75,8 @@ def tried(task: str) -> Trial:
 
 
 def only(log: EvalLog) -> EvalSample:
-    """The one sample of a log."""
-    (sample,) = log.samples or ()
+    """The one sample of a log, as its file has it."""
+    (sample,) = read_eval_log(log.location, resolve_attachments="full").samples or ()
     return sample
 
 

@@ -51,7 +51,7 @@ def _parser() -> argparse.ArgumentParser:
 def _import(given: argparse.Namespace) -> int:
     clean = True
     with Service(given.url, os.environ.get(KEY)) as service:
-        for path in given.logs:
+        for path in _files(given.logs):
             for sample in islice(logged_samples(path), given.limit):
                 found: Imported | Unusable = (
                     sample
@@ -79,7 +79,7 @@ def _told(found: Imported | Unusable) -> bool:
 def _rank(given: argparse.Namespace) -> int:
     samples: list[LoggedSample] = []
     left = 0
-    for path in given.logs:
+    for path in _files(given.logs):
         for sample in logged_samples(path):
             if isinstance(sample, Unusable):
                 left += 1
@@ -93,6 +93,14 @@ def _rank(given: argparse.Namespace) -> int:
         rate = "-" if row.success_rate_mean is None else f"{row.success_rate_mean:.0%}"
         _say(f"{rank:>4}  {mean:>9}  {rate:>7}  {row.trials:>6}  {row.model}")
     return 1 if left else 0
+
+
+def _files(places: Sequence[Path]) -> list[Path]:
+    """The logs that were named, and those in folders that were."""
+    found: list[Path] = []
+    for place in places:
+        found += sorted(place.glob("*.eval")) if place.is_dir() else [place]
+    return found
 
 
 def _say(line: str) -> None:

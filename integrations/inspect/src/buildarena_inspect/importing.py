@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
 from hashlib import sha256
 from typing import Any, Final
@@ -75,7 +76,10 @@ def bring(
     try:
         opened = service.post("/v1/sessions", wanted)
     except RefusedError as error:
-        found = _brought_before(wanted, service) if error.status == UNPROCESSABLE else None
+        found = None
+        if error.status == UNPROCESSABLE:
+            with suppress(RefusedError):  # nobody of this name has played
+                found = _brought_before(wanted, service)
         if found is None:
             raise
         job_id, again = found, True
