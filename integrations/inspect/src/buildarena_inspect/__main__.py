@@ -86,12 +86,14 @@ def _rank(given: argparse.Namespace) -> int:
                 _say(f"{sample.sample} epoch {sample.epoch}: left out: {sample.why}")
             else:
                 samples.append(sample)
-    _say("rank  mean rank  success  trials  model")
-    for row in ranked(samples):
-        rank = "-" if row.rank is None else str(row.rank)
-        mean = "-" if row.mean_rank is None else f"{row.mean_rank:.2f}"
-        rate = "-" if row.success_rate_mean is None else f"{row.success_rate_mean:.0%}"
-        _say(f"{rank:>4}  {mean:>9}  {rate:>7}  {row.trials:>6}  {row.model}")
+    for simulator, rows in ranked(samples).items():
+        _say(f"{simulator}: rank  mean rank  success  trials  model")
+        for row in rows:
+            rank = "-" if row.rank is None else str(row.rank)
+            mean = "-" if row.mean_rank is None else f"{row.mean_rank:.2f}"
+            rate = "-" if row.success_rate_mean is None else f"{row.success_rate_mean:.0%}"
+            before = " " * len(f"{simulator}: ")
+            _say(f"{before}{rank:>4}  {mean:>9}  {rate:>7}  {row.trials:>6}  {row.model}")
     return 1 if left else 0
 
 

@@ -10,31 +10,39 @@ from buildarena_inspect.errors import LogError
 from buildarena_inspect.logs import LoggedSample
 
 
-def ranked(samples: Iterable[LoggedSample]) -> list[OverallRow]:
+def ranked(samples: Iterable[LoggedSample]) -> dict[str, list[OverallRow]]:
     """Who builds best over the tasks of some samples, and who is statistically tied.
 
+    Returns:
+        A ranking for each simulator: results of different ones are not compared.
+
     Raises:
-        LogError: They are of several simulators, or of versions of tasks that this release has not.
+        LogError: One is of a version of its task that this release does not have.
     """
+    boards: dict[str, TrackBoard] = {}
+    for sample in samples:
+        board = boards.setdefault(sample.conditions.simulator, _empty())
+        board.put(_ended(_current(sample)))
+    return {name: list(board.board(BoardQuery()).overall) for name, board in boards.items()}
+
+
+def _empty() -> TrackBoard:
     tasks = builtin_tasks()
-    board = TrackBoard(
+    return TrackBoard(
         {name: task.version for name, task in tasks.items()},
         {name: task.difficulty for name, task in tasks.items() if task.difficulty},
     )
-    simulators = set()
-    for sample in samples:
-        version = str(sample.figures["task_version"])
-        known = tasks[sample.conditions.task].version
-        if version != known:
-            raise LogError(
-                f"sample {sample.sample} was built for version {version} of its task, and this "
-                f"release ranks {known}"
-            )
-        simulators.add(sample.conditions.simulator)
-        board.put(_ended(sample))
-    if len(simulators) > 1:
-        raise LogError(f"logs of {' and '.join(sorted(simulators))} are not ranked together")
-    return list(board.board(BoardQuery()).overall)
+
+
+def _current(sample: LoggedSample) -> LoggedSample:
+    version = str(sample.figures["task_version"])
+    known = builtin_tasks()[sample.conditions.task].version
+    if version != known:
+        raise LogError(
+            f"sample {sample.sample} was built for version {version} of its task, and this "
+            f"release ranks {known}"
+        )
+    return sample
 
 
 def _ended(sample: LoggedSample) -> EndedJob:
