@@ -38,9 +38,8 @@ def run(tmp_path: Path) -> Callable[..., EvalLog]:
     """Evaluates a task and gives its log, which must have been written."""
 
     def run(task: Any, answer: Answer = expert, **more: Any) -> EvalLog:
-        (log,) = evaluate(
-            task, model=scripted(answer), log_dir=str(tmp_path / "logs"), display="none", **more
-        )
+        more.setdefault("model", scripted(answer))
+        (log,) = evaluate(task, log_dir=str(tmp_path / "logs"), display="none", **more)
         return log
 
     return run

@@ -34,9 +34,9 @@ def call(tool: str, arguments: dict[str, Any]) -> ModelOutput:
     return ModelOutput.for_tool_call("mockllm", tool, arguments)
 
 
-def expert(messages: list[ChatMessage]) -> ModelOutput:
-    """The built-in expert's next call, or `submit`."""
-    calls, done = EXPERTS[task_in(messages)]["calls"], calls_in(messages)
+def expert(messages: list[ChatMessage], late: int = 0) -> ModelOutput:
+    """The built-in expert's next call, or `submit`; it begins after so many calls of others."""
+    calls, done = EXPERTS[task_in(messages)]["calls"], calls_in(messages) - late
     if done >= len(calls):
         return call("submit", {})
     made = calls[done]

@@ -103,6 +103,6 @@ def test_the_calls_that_a_log_keeps_are_those_that_were_made(run) -> None:
     (found,) = logged_samples(Path(log.location))
     assert isinstance(found, LoggedSample)
     assert list(found.calls) == EXPERTS["support-1"]["calls"]
-    assert (found.agent, found.counts) == ("mockllm-model", True)
+    assert (found.agent, found.success) == ("mockllm-model", True)
     assert read_eval_log(log.location).status == "success"
     assert only(log).uuid == found.uuid

@@ -8,11 +8,14 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
+import anyio
 import psutil
 import pytest
 from inspect_ai import eval_retry, score
-from inspect_ai.model import ModelOutput
+from inspect_ai.approval import ApprovalPolicy, auto_approver
+from inspect_ai.model import ModelOutput, get_model
 from inspect_ai.model._providers.mockllm import MockLLM
+from inspect_ai.solver import solver
 from scripted_models import (
     EXPERTS,
     USAGE,
@@ -199,6 +202,55 @@ def test_epochs_and_samples_side_by_side_share_nothing(run) -> None:
         indicator = sample.scores["indicator"].value
         assert (indicator == tried(sample.id).score.indicator) is whole
     assert sum(sample.scores["success"].value == "C" for sample in log.samples) == 4
+
+
+def test_a_trial_does_not_hold_up_another_samples_requests(run, monkeypatch) -> None:
+    usual = trial_processes.Evaluator.evaluate
+    trying, asked = threading.Event(), threading.Event()
+
+    def evaluate(self, machine):
+        if self.task.name == "lift-1":
+            trying.set()
+            assert asked.wait(30), "the other sample's model was not asked meanwhile"
+        return usual(self, machine)
+
+    async def answer(messages, *_):
+        if task_in(messages) == "support-1":
+            await anyio.to_thread.run_sync(trying.wait, 30)
+            asked.set()
+        output = expert(messages)
+        output.usage = USAGE
+        return output
+
+    monkeypatch.setattr(trial_processes.Evaluator, "evaluate", evaluate)
+    model = get_model("mockllm/model", custom_outputs=answer, memoize=False)
+    log = run("buildarena/all", model=model, sample_id=["lift-1", "support-1"], max_samples=2)
+    assert [sample.scores["success"].value for sample in log.samples] == ["C", "C"]
+
+
+def test_another_solver_finds_the_tools_in_the_state(run) -> None:
+    @solver
+    def loop():
+        async def solve(state, generate):
+            while not any(m.role == "tool" and m.function == "submit" for m in state.messages):
+                state = await generate(state, tool_calls="single")
+            return state
+
+        return solve
+
+    sample = only(run("buildarena/support_1", solver=loop()))
+    assert sample.scores["success"].value == "C"
+
+
+def test_calls_that_nobody_approves_do_not_reach_the_machine(run) -> None:
+    approval = [
+        ApprovalPolicy(auto_approver("reject"), "connect_blocks"),
+        ApprovalPolicy(auto_approver("approve"), "*"),
+    ]
+    sample = only(run("buildarena/support_1", approval=approval))
+    told = [message.error for message in sample.messages if message.role == "tool"]
+    assert sum(error is not None for error in told) == 6
+    assert sample.scores["success"].metadata["metrics"]["parts"] == 7
 
 
 def test_a_machine_that_ends_its_process_costs_one_sample_and_only_that_is_run_again(

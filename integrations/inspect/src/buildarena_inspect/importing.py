@@ -2,20 +2,29 @@
 
 from __future__ import annotations
 
+import json
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from hashlib import sha256
+from itertools import islice
 from typing import Any, Final
 
 from buildarena_environment import ASSEMBLY, MAIN
+from buildarena_environment.workbench import NAME
+from buildarena_geometry.json_values import levels
 from buildarena_inspect.logs import LoggedSample, Unusable
 from buildarena_inspect.service import RefusedError, Service
 
 PREFIX: Final = "inspect-"
 """Begins the name of every imported builder, so that a leaderboard says where it comes from."""
 MAX_NAME: Final = 80
+MAX_CALLS: Final = 1999
+"""What a session may have, but for one that an empty machine needs."""
+MAX_BYTES: Final = 64 << 10
+MAX_DEPTH: Final = 20
+"""What the arguments of a session's call may have."""
 MAX_SEED: Final = 2**53 - 1
 CONFLICT: Final = 409
 UNPROCESSABLE: Final = 422
@@ -85,10 +94,6 @@ def bring(
         job_id, again = found, True
     else:
         job_id, again = str(opened["id"]), False
-        limit = int(opened["limits"]["calls"])
-        if len(sample.calls) > limit:
-            why = f"it has {len(sample.calls):,} calls, and a session may have {limit:,}"
-            return Unusable(sample=sample.sample, epoch=sample.epoch, why=why)
         _play(sample, service, job_id, made=int(opened["calls"]))
     job = service.ended(job_id, within_s)
     return Imported(
@@ -111,15 +116,17 @@ def seed_of(sample: LoggedSample) -> int:
 def _hindrance(sample: LoggedSample, service: Service) -> str:
     """Why the service could not judge a sample as its log did; "" where it can."""
     conditions = sample.conditions
+    if len(sample.calls) > MAX_CALLS:
+        return f"it has {len(sample.calls):,} calls, and a session may have {MAX_CALLS:,}"
     if conditions.rounds != 1:
         return f"it was played with {conditions.rounds} rounds, and a session has one trial"
     try:
         task = service.get(f"/v1/tasks/{conditions.task}")
     except RefusedError as error:
         return str(error)
-    if task["version"] != sample.figures["task_version"]:
+    if task["version"] != sample.task_version:
         return (
-            f"it was built for {conditions.task} at version {sample.figures['task_version']}, and "
+            f"it was built for {conditions.task} at version {sample.task_version}, and "
             f"the service has {task['version']}"
         )
     return ""
@@ -127,7 +134,9 @@ def _hindrance(sample: LoggedSample, service: Service) -> str:
 
 def _play(sample: LoggedSample, service: Service, session: str, *, made: int) -> None:
     calls = f"/v1/sessions/{session}/calls"
-    for call in sample.calls[made:]:
+    # What a session does not even read was refused in the log too, and changed nothing.
+    sent = [call for call in sample.calls if _readable(call)]
+    for call in sent[made:]:
         service.post(calls, dict(call))
     submit = f"/v1/sessions/{session}/submit"
     try:
@@ -136,10 +145,18 @@ def _play(sample: LoggedSample, service: Service, session: str, *, made: int) ->
         if error.status != CONFLICT:
             raise
         # Nothing to submit is a failure in the log, so it is one here: of an empty machine.
-        machines = {call["machine"] for call in sample.calls}
+        machines = {call["machine"] for call in sent}
         machine = ASSEMBLY if len(machines) > 1 else MAIN
         service.post(calls, {"machine": machine, "tool": "get_machine_summary"})
         service.post(submit)
+
+
+def _readable(call: Mapping[str, Any]) -> bool:
+    arguments = call["arguments"]
+    deep = next(islice(levels(arguments), MAX_DEPTH, None), None) is not None
+    if deep or NAME.fullmatch(call["machine"]) is None:
+        return False
+    return len(json.dumps(arguments).encode()) <= MAX_BYTES
 
 
 def _brought_before(wanted: dict[str, Any], service: Service) -> str | None:
@@ -158,14 +175,11 @@ def _brought_before(wanted: dict[str, Any], service: Service) -> str | None:
 
 def _differences(sample: LoggedSample, job: dict[str, Any]) -> Iterator[str]:
     """Where the service's figures are others than the log's."""
+    there = {"success": sample.success, "flags": sorted(sample.flags)}
     here = {"success": bool(job["success"]), "flags": sorted(job["flags"] or [])}
-    there = {
-        "success": bool(sample.figures.get("success")),
-        "flags": sorted(sample.figures.get("flags") or []),
-    }
     for name, value in there.items():
         if value != here[name]:
             yield f"{name}: {value} in the log, {here[name]} in the service"
-    logged, found = float(sample.figures.get("indicator") or 0.0), float(job["indicator"] or 0.0)
-    if not math.isclose(logged, found, rel_tol=SAME, abs_tol=SAME):
-        yield f"indicator: {logged:g} in the log, {found:g} in the service"
+    found = float(job["indicator"] or 0.0)
+    if not math.isclose(sample.indicator, found, rel_tol=SAME, abs_tol=SAME):
+        yield f"indicator: {sample.indicator:g} in the log, {found:g} in the service"

@@ -22,7 +22,7 @@ from buildarena_inspect.errors import LogError
 from buildarena_inspect.scorers import INDICATOR, SUCCESS
 from buildarena_inspect.solvers import react_builder
 
-MAX_LOG_BYTES: Final = 4 << 30
+MAX_LOG_BYTES: Final = 1 << 30
 NOT_IN_NAMES: Final = re.compile(r"[^A-Za-z0-9_.-]+")
 
 
@@ -37,10 +37,12 @@ class LoggedSample:
         model: Name of the evaluated model.
         solver: Name of its solver.
         conditions: What it was played under.
+        task_version: Version of its task.
         calls: The calls that reached its machines, in order.
-        figures: What its scorers said, as the metadata of the scorer `success`.
-        counts: Whether it is a success in our rankings.
-        indicator: Its indicator as our rankings count it.
+        success: Whether it met the task's criterion, as its log says.
+        indicator: Its indicator, as its log says.
+        flags: Remarks on its score, as its log says.
+        reason: Why it was not simulated; None where it was.
     """
 
     uuid: str
@@ -49,10 +51,12 @@ class LoggedSample:
     model: str
     solver: str
     conditions: Conditions
+    task_version: str
     calls: Sequence[Mapping[str, Any]]
-    figures: Mapping[str, Any]
-    counts: bool
+    success: bool
     indicator: float
+    flags: tuple[str, ...]
+    reason: str | None
 
     @property
     def agent(self) -> str:
@@ -132,8 +136,18 @@ def _read(header: EvalLog, sample: EvalSample) -> LoggedSample:
         model=header.eval.model,
         solver=header.plan.steps[-1].solver.rpartition("/")[2] if header.plan.steps else "",
         conditions=conditions,
-        calls=list(sample.store[CALLS]),
-        figures={**figures, "task_version": sample.metadata["task_version"]},
-        counts=scores[SUCCESS].as_str() == "C",
-        indicator=scores[INDICATOR].as_float(),
+        task_version=str(sample.metadata["task_version"]),
+        calls=[_call(made) for made in sample.store[CALLS]],
+        success=bool(figures["success"]),
+        indicator=float(figures["indicator"]),
+        flags=tuple(str(flag) for flag in figures["flags"]),
+        reason=None if figures["reason"] is None else str(figures["reason"]),
     )
+
+
+def _call(made: Mapping[str, Any]) -> Mapping[str, Any]:
+    return {
+        "machine": str(made["machine"]),
+        "tool": str(made["tool"]),
+        "arguments": made["arguments"],
+    }

@@ -35,7 +35,7 @@ def _empty() -> TrackBoard:
 
 
 def _current(sample: LoggedSample) -> LoggedSample:
-    version = str(sample.figures["task_version"])
+    version = sample.task_version
     known = builtin_tasks()[sample.conditions.task].version
     if version != known:
         raise LogError(
@@ -46,21 +46,19 @@ def _current(sample: LoggedSample) -> LoggedSample:
 
 
 def _ended(sample: LoggedSample) -> EndedJob:
-    success = bool(sample.figures["success"])
-    reason = sample.figures.get("reason")
-    outcome = "success" if success else "construction_failed" if reason else "unsuccessful"
+    failed = "construction_failed" if sample.reason else "unsuccessful"
     return EndedJob(
         job_id=sample.uuid,
         task=sample.conditions.task,
-        task_version=str(sample.figures["task_version"]),
+        task_version=sample.task_version,
         model=sample.agent,
         configuration=sample.agent,
-        outcome=outcome,
-        reason=None if reason is None else str(reason),
-        success=success,
-        indicator=float(sample.figures["indicator"]),
+        outcome="success" if sample.success else failed,
+        reason=sample.reason,
+        success=sample.success,
+        indicator=sample.indicator,
         seed=sample.epoch,
-        flags=tuple(sample.figures["flags"]),
+        flags=sample.flags,
         requests=None,
         input_tokens=None,
         output_tokens=None,
