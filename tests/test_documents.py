@@ -11,7 +11,9 @@ from buildarena_cli.commands import COMMANDS
 
 ROOT = Path(__file__).parents[1]
 SOURCES = [
-    folder for kind in ("libs", "services", "clients") for folder in ROOT.glob(f"{kind}/*/src")
+    folder
+    for kind in ("libs", "services", "clients", "integrations")
+    for folder in ROOT.glob(f"{kind}/*/src")
 ]
 # It names what modules were called before.
 RENAMES = "CHANGELOG.md"

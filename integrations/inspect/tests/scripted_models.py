@@ -55,7 +55,7 @@ def scripted(answer: Answer) -> Model:
 
 
 def listed(*outputs: ModelOutput) -> Answer:
-    """These answers, by the number of calls or replies so far; the last for ever."""
+    """These answers, by the number of calls or replies so far; the last again and again."""
 
     def answer(messages: list[ChatMessage]) -> ModelOutput:
         said = sum(message.role == "assistant" for message in messages)
