@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import json
+
 import pytest
 from inspect_ai.model import ChatMessage, ModelOutput
 from scripted_models import EXPERTS, only
 
 from buildarena_benchmark import builtin_tasks
 from buildarena_environment import Workbench, try_machine
+from buildarena_geometry import Machine
+from buildarena_inspect.scorers import machine_hash
 
 expert = pytest.importorskip("buildarena_worker.builtin.expert", reason="needs the extra `roles`")
 
@@ -55,6 +59,32 @@ def test_its_calls_build_the_same_machine_by_hand(run, task) -> None:
         assert bench.act(made["machine"], made["tool"], made["arguments"]).ok
     again = try_machine(builtin_tasks()[task], bench.submitted())
     assert again.score.indicator == sample.scores["indicator"].value
+
+
+def test_of_several_drives_the_best_counts_with_its_machine_and_calls(run) -> None:
+    """The controller presses its key for ever shorter times: the first drive is the best."""
+
+    def tiring(messages: list[ChatMessage]) -> ModelOutput:
+        output = five_roles(messages)
+        if "control_sequence" not in output.completion:
+            return output
+        drives = sum(message.role == "assistant" for message in messages)
+        program = json.loads(output.completion)
+        for press in program["control_sequence"]:
+            press["hold_for"] /= 10**drives
+        return ModelOutput.from_content("mockllm", json.dumps(program))
+
+    sample = only(run("buildarena/transport_1", tiring, task_args={"solver": "roles"}))
+    told = sample.scores["success"].metadata
+    assert told["trials"] == 3
+    assert told["indicator"] == pytest.approx(
+        EXPERTS["transport-1"]["score"]["indicator"], rel=0.02
+    )
+    kept = Machine.from_document(sample.store["buildarena:machine"])
+    bench = Workbench()
+    for made in sample.store["buildarena:calls"]:
+        bench.act(made["machine"], made["tool"], made["arguments"])
+    assert machine_hash(kept) == machine_hash(bench.submitted()) == told["machine_hash"]
 
 
 def test_a_session_that_fails_is_scored_as_one(run) -> None:

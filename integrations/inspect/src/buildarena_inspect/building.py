@@ -107,8 +107,10 @@ class Building:
     @property
     def machine(self) -> Machine | None:
         """The machine of the trial that counts so far, if there was one."""
-        trials = self.environment.trials
-        return self._tried[trials.index(best_trial(trials))] if trials else None
+        for trial, machine in zip(self.environment.trials, self._tried, strict=False):
+            if trial is self.trial:
+                return machine
+        return None
 
     def call(self, tool: str, arguments: Mapping[str, Any]) -> str:
         """Carries out one action.
@@ -150,18 +152,21 @@ class Building:
     def adopt(self, machine: Machine | None, trial: Trial, *, handed_in: bool = True) -> None:
         """Takes over what a workflow of ours built and tried, as the end of the episode.
 
+        The episode then holds the machine of the trial that counts, and the calls that make it.
+
         Args:
             machine: What it built, if anything.
             trial: Its trial.
             handed_in: Whether it was finished; what was not is no call of one who submits.
         """
-        state = self.environment.state()
-        machines = {} if machine is None else {_name_of(machine): machine.logged}
-        self.environment.restore(
-            replace(state, machines=machines, trials=(*state.trials, trial), done=True)
-        )
+        state = replace(self.environment.state(), done=True)
+        state = replace(state, trials=(*state.trials, trial))
+        if best_trial(state.trials) is trial:
+            machines = {} if machine is None else {_name_of(machine): machine.logged}
+            state = replace(state, machines=machines)
+            self.calls = calls_of(machine) if handed_in else []
+        self.environment.restore(state)
         self._tried.append(None if machine is None else machine.copy())
-        self.calls = calls_of(machine) if handed_in else []
 
     async def _tried_by(self, submit: Callable[[], Submission]) -> Submission:
         async with self._submitting:

@@ -120,6 +120,8 @@ def _hindrance(sample: LoggedSample, service: Service) -> str:
         return f"it has {len(sample.calls):,} calls, and a session may have {MAX_CALLS:,}"
     if conditions.rounds != 1:
         return f"it was played with {conditions.rounds} rounds, and a session has one trial"
+    if sample.trials > 1:
+        return f"its machines had {sample.trials} trials, and a session has one"
     try:
         task = service.get(f"/v1/tasks/{conditions.task}")
     except RefusedError as error:

@@ -39,6 +39,7 @@ class LoggedSample:
         conditions: What it was played under.
         task_version: Version of its task.
         calls: The calls that reached its machines, in order.
+        trials: How many trials it had.
         success: Whether it met the task's criterion, as its log says.
         indicator: Its indicator, as its log says.
         flags: Remarks on its score, as its log says.
@@ -53,6 +54,7 @@ class LoggedSample:
     conditions: Conditions
     task_version: str
     calls: Sequence[Mapping[str, Any]]
+    trials: int
     success: bool
     indicator: float
     flags: tuple[str, ...]
@@ -138,6 +140,7 @@ def _read(header: EvalLog, sample: EvalSample) -> LoggedSample:
         conditions=conditions,
         task_version=str(sample.metadata["task_version"]),
         calls=[_call(made) for made in sample.store[CALLS]],
+        trials=int(figures["trials"]),
         success=bool(figures["success"]),
         indicator=float(figures["indicator"]),
         flags=tuple(str(flag) for flag in figures["flags"]),
