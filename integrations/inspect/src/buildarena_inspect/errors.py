@@ -15,3 +15,7 @@ class ChoiceError(BuildarenaInspectError, ValueError):
 
 class ServiceError(BuildarenaInspectError):
     """The service refused something, or does not answer."""
+
+
+class UnguardedProgramError(BuildarenaInspectError):
+    """A program that starts evaluations is run again by the processes that they start."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
+from multiprocessing import current_process
 from typing import Any, Final
 
 from inspect_ai import Task, task
@@ -14,7 +15,7 @@ from inspect_ai.solver import Solver
 
 from buildarena_benchmark import builtin_tasks
 from buildarena_inspect.building import Conditions
-from buildarena_inspect.errors import ChoiceError
+from buildarena_inspect.errors import ChoiceError, UnguardedProgramError
 from buildarena_inspect.keeping import keep
 from buildarena_inspect.roles import five_roles
 from buildarena_inspect.scorers import indicator, reward, success
@@ -27,6 +28,7 @@ SOLVERS: Final[Mapping[str, Callable[[], Solver]]] = {"react": react_builder, "r
 
 
 def _made(tasks: Sequence[str], solver: str, **conditions: Any) -> Task:
+    _require_guard()
     if solver not in SOLVERS:
         raise ChoiceError(f"there is no solver {solver!r}: choose from {', '.join(SOLVERS)}")
     rewards = conditions["rewards"]
@@ -45,6 +47,15 @@ def _made(tasks: Sequence[str], solver: str, **conditions: Any) -> Task:
         continue_on_fail=True,
         version=_version(tasks),
     )
+
+
+def _require_guard() -> None:
+    """Checks that this is no process of a trial which runs its parent's program again."""
+    if getattr(current_process(), "_inheriting", False):
+        raise UnguardedProgramError(
+            "trials start processes, which run a program's top level again: put what evaluates "
+            'under `if __name__ == "__main__":`'
+        )
 
 
 def _sample(conditions: Conditions) -> Sample:
