@@ -3,6 +3,8 @@
 # Adapters to frameworks, each with an environment of its own: the frameworks exclude each other.
 INTEGRATIONS := inspect verifiers openenv gymnasium
 LIBRARIES := libs/geometry libs/simulation libs/benchmark libs/environment
+# What one of them needs besides: our workflows, which Inspect's models can play.
+LIBRARIES_inspect := libs/besiege libs/store libs/pipeline services/worker
 INTEGRATION_STAMPS := $(foreach name,$(INTEGRATIONS),.venv-integrations/$(name)/.installed)
 
 test-integrations: check-integrations ## Each adapter against its real framework
@@ -12,9 +14,9 @@ check-integrations: $(INTEGRATION_STAMPS)
 	@bash mk/integrations.sh check $(INTEGRATIONS)
 
 .venv-integrations/%/.installed: integrations/%/requirements.lock integrations/%/pyproject.toml $(STAMP)
-	@bash mk/integrations.sh install $* $(LIBRARIES)
+	@bash mk/integrations.sh install $* $(LIBRARIES) $(LIBRARIES_$*)
 	@touch $@
 
 # Physics comes in the versions of requirements.lock: elsewhere the same trial has other bytes.
 lock-integrations:
-	@bash mk/integrations.sh lock "$(LIBRARIES)" $(INTEGRATIONS)
+	@set -e; $(foreach name,$(INTEGRATIONS),bash mk/integrations.sh lock $(name) $(LIBRARIES) $(LIBRARIES_$(name));)

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Environments of the adapters: integrations.sh install NAME LIBRARY..., check NAME..., test NAME...,
-# lock "LIBRARY ..." NAME...
+# lock NAME LIBRARY...
 set -euo pipefail
 here=$(dirname "$0")
 environments=.venv-integrations
@@ -40,20 +40,18 @@ run_tests() {
 }
 
 lock() {
-    local libraries=$1 name
+    local name=$1
     shift
     physics=$(mktemp)
     trap 'rm -f "$physics"' EXIT
     grep -E '^(numpy|scipy|mujoco|pybullet|python-fcl|threadpoolctl)==' requirements.lock | sed 's/ *\\$//' >"$physics"
-    for name in "$@"; do
-        # shellcheck disable=SC2086 # libraries are words
-        uv pip compile --quiet --universal --generate-hashes --no-annotate -c "$physics" \
-            --custom-compile-command "make lock" \
-            $(printf -- '--no-emit-package buildarena-%s ' $(basename -a $libraries) "$name") \
-            -o "integrations/$name/requirements.lock" \
-            integrations/tests.in "integrations/$name/pyproject.toml" \
-            $(printf '%s/pyproject.toml ' $libraries)
-    done
+    # shellcheck disable=SC2046 # libraries are words
+    uv pip compile --quiet --universal --generate-hashes --no-annotate -c "$physics" \
+        --custom-compile-command "make lock" \
+        $(printf -- '--no-emit-package buildarena-%s ' $(basename -a "$@") "$name") \
+        -o "integrations/$name/requirements.lock" \
+        integrations/tests.in "integrations/$name/pyproject.toml" \
+        $(printf '%s/pyproject.toml ' "$@")
 }
 
 command=$1

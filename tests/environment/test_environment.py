@@ -19,7 +19,9 @@ from buildarena_environment import (
     SnapshotError,
     UnknownChoiceError,
     references,
+    try_machine,
 )
+from buildarena_geometry import Machine
 
 WOOD = {"base_block": "1", "face": "A", "new_block": "Small Wooden Block"}
 ALL = {"success": 1.0, "indicator": 1.0, "accepted_share": 0.1, "constraint_progress": 0.1}
@@ -242,6 +244,19 @@ def test_a_custom_task_needs_a_reference_for_its_indicator_alone() -> None:
     with pytest.raises(ValueError, match="support-x has no reference"):
         Environment(custom, rewards={"indicator": 1.0})
     assert Environment(custom, rewards={"indicator": 1.0}, reference=500.0).reference == 500.0
+
+
+def test_machines_may_be_tried_elsewhere(bridge_calls) -> None:
+    asked = []
+
+    def tries(task, machine, simulator, *, seed):
+        asked.append((task.name, machine.part_count, simulator, seed))
+        return try_machine(task, Machine())
+
+    environment = Environment("support-1", "pybullet", seed=4, tries=tries)
+    submitted = played(environment, bridge_calls).submit()
+    assert asked == [("support-1", 13, "pybullet", 4)]
+    assert submitted.trial.reason == "empty_machine"
 
 
 def test_a_seed_varies_the_start_and_none_does_not(bridge_calls) -> None:

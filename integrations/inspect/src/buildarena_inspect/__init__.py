@@ -1,1 +1,5 @@
 """BuildArena's tasks in Inspect."""
+
+from buildarena_inspect.tasks import TASKS
+
+__all__ = ["TASKS"]

@@ -145,7 +145,7 @@ class TrialBooks:
         else:
             values |= _scored(score(due.task, due.machine, trajectory))
             info = self._artifacts.put(write_trajectory(trajectory), PARQUET)
-            values |= {"trajectory_hash": info.hash, "trace": _trace(trajectory)}
+            values |= {"trajectory_hash": info.hash, "trace": tracked_at_1_hz(trajectory)}
             kept[f"trajectory-{due.request.number}"] = info
         if outcome.annotations is not None:
             values["annotations"] = dict(outcome.annotations)
@@ -209,7 +209,7 @@ def _scored(found: Score) -> dict[str, Any]:
     }
 
 
-def _trace(trajectory: Trajectory) -> list[list[float]]:
+def tracked_at_1_hz(trajectory: Trajectory) -> list[list[float]]:
     """The tracked body at 1 Hz: the cargo where there is one, otherwise the first block."""
     times = trajectory.time_s
     track = trajectory.cargo_position

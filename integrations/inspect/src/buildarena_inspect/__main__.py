@@ -1,0 +1,113 @@
+"""Commands on logs: `python -m buildarena_inspect import LOG…` and `… rank LOG…`."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from itertools import islice
+from pathlib import Path
+from typing import Final
+
+from buildarena_inspect.errors import BuildarenaInspectError
+from buildarena_inspect.importing import Imported, bring
+from buildarena_inspect.logs import LoggedSample, Unusable, logged_samples
+from buildarena_inspect.ranking import ranked
+from buildarena_inspect.service import Service
+
+KEY: Final = "BUILDARENA_KEY"
+URL: Final = "BUILDARENA_URL"
+HERE: Final = "http://127.0.0.1:8321"
+MOST: Final = 1000
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Carries out a command; 1 when something was left out or is not as the log says."""
+    given = _parser().parse_args(arguments)
+    try:
+        return int(given.command(given))
+    except BuildarenaInspectError as error:
+        sys.stderr.write(f"{error}\n")
+        return 2
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="python -m buildarena_inspect", description=__doc__)
+    commands = parser.add_subparsers(required=True)
+    one = commands.add_parser("import", help="make the calls of logs again in a service")
+    one.add_argument("logs", nargs="+", type=Path, metavar="LOG")
+    one.add_argument("--url", default=os.environ.get(URL, HERE), help=f"the service; or {URL}")
+    one.add_argument("--agent", help="name behind `inspect-`; the model's by default")
+    one.add_argument("--limit", type=int, default=MOST, help="samples of a log at most")
+    one.add_argument("--wait", type=float, default=600.0, help="seconds for a job to end")
+    one.set_defaults(command=_import)
+    two = commands.add_parser("rank", help="rank the models of logs over their tasks")
+    two.add_argument("logs", nargs="+", type=Path, metavar="LOG")
+    two.set_defaults(command=_rank)
+    return parser
+
+
+def _import(given: argparse.Namespace) -> int:
+    clean = True
+    with Service(given.url, os.environ.get(KEY)) as service:
+        for path in _files(given.logs):
+            for sample in islice(logged_samples(path), given.limit):
+                found: Imported | Unusable = (
+                    sample
+                    if isinstance(sample, Unusable)
+                    else bring(sample, service, agent=given.agent, within_s=given.wait)
+                )
+                clean &= _told(found)
+    return 0 if clean else 1
+
+
+def _told(found: Imported | Unusable) -> bool:
+    """Prints what came of a sample; whether it is a job that says what its log says."""
+    about = f"{found.sample} epoch {found.epoch}"
+    if isinstance(found, Unusable):
+        _say(f"{about}: left out: {found.why}")
+        return False
+    again = ", brought before" if found.again else ""
+    outcome = found.outcome or "has not ended yet"
+    _say(f"{about}: {found.job} by agent/{found.agent}{again}: {outcome}")
+    for difference in found.differences:
+        _say(f"  {difference}")
+    return found.outcome is not None and not found.differences
+
+
+def _rank(given: argparse.Namespace) -> int:
+    samples: list[LoggedSample] = []
+    left = 0
+    for path in _files(given.logs):
+        for sample in logged_samples(path):
+            if isinstance(sample, Unusable):
+                left += 1
+                _say(f"{sample.sample} epoch {sample.epoch}: left out: {sample.why}")
+            else:
+                samples.append(sample)
+    for simulator, rows in ranked(samples).items():
+        _say(f"{simulator}: rank  mean rank  success  trials  model")
+        for row in rows:
+            rank = "-" if row.rank is None else str(row.rank)
+            mean = "-" if row.mean_rank is None else f"{row.mean_rank:.2f}"
+            rate = "-" if row.success_rate_mean is None else f"{row.success_rate_mean:.0%}"
+            before = " " * len(f"{simulator}: ")
+            _say(f"{before}{rank:>4}  {mean:>9}  {rate:>7}  {row.trials:>6}  {row.model}")
+    return 1 if left else 0
+
+
+def _files(places: Sequence[Path]) -> list[Path]:
+    """The logs that were named, and those in folders that were."""
+    found: list[Path] = []
+    for place in places:
+        found += sorted(place.glob("*.eval")) if place.is_dir() else [place]
+    return found
+
+
+def _say(line: str) -> None:
+    sys.stdout.write(f"{line}\n")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,71 @@
+"""What a sample's log keeps beside its messages: the building, the trial, and pictures of it."""
+
+from __future__ import annotations
+
+import base64
+import tempfile
+from pathlib import Path
+from typing import Final
+
+import anyio
+from inspect_ai.model import ChatMessageUser, ContentImage, ContentText
+from inspect_ai.solver import TaskState
+
+from buildarena_environment import Trial
+from buildarena_environment.trials import told
+from buildarena_geometry import Machine
+from buildarena_inspect.building import CALLS, STATE, Building, building_of, end
+from buildarena_inspect.errors import LogError
+from buildarena_simulation import write_trajectory
+from buildarena_simulation.render.film import write_film
+
+MACHINE: Final = "buildarena:machine"
+"""Where a sample's store keeps the document of the machine of the trial that counts."""
+TRAJECTORY: Final = "buildarena:trajectory"
+"""Where it keeps the trajectory of that machine's trial: Parquet, as base64."""
+PICTURES: Final = "buildarena"
+"""What the metadata of the message with the film strip are called."""
+
+
+async def keep(state: TaskState) -> None:
+    """Keeps what a sample built; called when it is over, whichever way it went."""
+    try:
+        building = building_of(state)
+    except LogError:
+        return
+    try:
+        await _keep(state, building)
+    finally:
+        end(state)
+
+
+async def _keep(state: TaskState, building: Building) -> None:
+    state.store.set(STATE, building.environment.state().as_document())
+    state.store.set(CALLS, building.calls)
+    machine, trial = building.machine, building.trial
+    if machine is None or trial is None:
+        return
+    state.store.set(MACHINE, machine.to_document())
+    if trial.trajectory is None:
+        return
+    state.store.set(TRAJECTORY, base64.b64encode(write_trajectory(trial.trajectory)).decode())
+    state.messages.append(await anyio.to_thread.run_sync(_pictured, building, machine, trial))
+
+
+def _pictured(building: Building, machine: Machine, trial: Trial) -> ChatMessageUser:
+    """Six pictures of a trial. Added after the last request, so no model reads it."""
+    task = building.environment.task
+    assert trial.trajectory is not None  # noqa: S101 - asked before
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "trial.png"
+        write_film(machine, task.scenario, trial.trajectory, path)
+        image = base64.b64encode(path.read_bytes()).decode()
+    return ChatMessageUser(
+        content=[
+            ContentText(
+                text=f"Trial of {task.name}, for readers of this log. " + told(task, trial.score)
+            ),
+            ContentImage(image=f"data:image/png;base64,{image}"),
+        ],
+        metadata={PICTURES: "film"},
+    )

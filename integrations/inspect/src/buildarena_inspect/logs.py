@@ -1,0 +1,156 @@
+"""What logs of Inspect say of our samples, read one sample at a time."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from inspect_ai.log import (
+    EvalLog,
+    EvalSample,
+    EvalSampleSummary,
+    read_eval_log,
+    read_eval_log_sample,
+    read_eval_log_sample_summaries,
+)
+
+from buildarena_inspect.building import CALLS, Conditions
+from buildarena_inspect.errors import LogError
+from buildarena_inspect.scorers import INDICATOR, SUCCESS
+from buildarena_inspect.solvers import react_builder
+
+MAX_LOG_BYTES: Final = 1 << 30
+NOT_IN_NAMES: Final = re.compile(r"[^A-Za-z0-9_.-]+")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoggedSample:
+    """A sample as its log has it; nothing of it is believed by the service.
+
+    Attributes:
+        uuid: Its id, which no other sample, epoch or log has.
+        sample: Its id in the data set.
+        epoch: Its epoch.
+        model: Name of the evaluated model.
+        solver: Name of its solver.
+        conditions: What it was played under.
+        task_version: Version of its task.
+        calls: The calls that reached its machines, in order.
+        trials: How many trials it had.
+        success: Whether it met the task's criterion, as its log says.
+        indicator: Its indicator, as its log says.
+        flags: Remarks on its score, as its log says.
+        reason: Why it was not simulated; None where it was.
+    """
+
+    uuid: str
+    sample: str
+    epoch: int
+    model: str
+    solver: str
+    conditions: Conditions
+    task_version: str
+    calls: Sequence[Mapping[str, Any]]
+    trials: int
+    success: bool
+    indicator: float
+    flags: tuple[str, ...]
+    reason: str | None
+
+    @property
+    def agent(self) -> str:
+        """What an import calls its builder: the model, and an unusual solver."""
+        usual = react_builder.__name__
+        solver = "" if self.solver in {"", usual} else f"-{self.solver}"
+        return NOT_IN_NAMES.sub("-", f"{self.model}{solver}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Unusable:
+    """A sample that says nothing.
+
+    Attributes:
+        sample: Its id in the data set.
+        epoch: Its epoch.
+        why: Why it says nothing, in a sentence.
+    """
+
+    sample: str
+    epoch: int
+    why: str
+
+
+def logged_samples(path: Path) -> Iterator[LoggedSample | Unusable]:
+    """The samples of a log, one after the other.
+
+    Raises:
+        LogError: The file is no log, or one of other tasks.
+    """
+    header, summaries = _opened(path)
+    for summary in summaries:
+        try:
+            sample = read_eval_log_sample(
+                str(path), id=summary.id, epoch=summary.epoch, resolve_attachments=True
+            )
+            yield _read(header, sample)
+        except LogError as error:
+            yield _unusable(summary, str(error))
+        except (IndexError, KeyError, TypeError, ValueError) as error:
+            yield _unusable(summary, f"it can't be read: {error}")
+
+
+def _opened(path: Path) -> tuple[EvalLog, list[EvalSampleSummary]]:
+    try:
+        size = path.stat().st_size
+        header = read_eval_log(str(path), header_only=True) if size <= MAX_LOG_BYTES else None
+        summaries = read_eval_log_sample_summaries(str(path)) if header is not None else []
+    except OSError as error:
+        raise LogError(f"{path}: {error.strerror or error}") from error
+    except Exception as error:  # its readers raise what their formats' libraries do
+        raise LogError(f"{path} is no log of Inspect: {error}") from error
+    if header is None:
+        raise LogError(f"{path}: {size:,} bytes are more than a log may have")
+    return header, summaries
+
+
+def _unusable(summary: EvalSampleSummary, why: str) -> Unusable:
+    return Unusable(sample=str(summary.id), epoch=summary.epoch, why=why)
+
+
+def _read(header: EvalLog, sample: EvalSample) -> LoggedSample:
+    conditions = Conditions.from_metadata(sample.metadata)
+    if sample.error is not None:
+        first = sample.error.message.strip().partition("\\n")[0]
+        raise LogError(f"it ended in an error: {first}")
+    scores = sample.scores or {}
+    if SUCCESS not in scores or INDICATOR not in scores or CALLS not in sample.store:
+        raise LogError("it was not scored by our scorers")
+    if sample.uuid is None:
+        raise LogError("it has no id of its own: its log was written by an older Inspect")
+    figures = scores[SUCCESS].metadata or {}
+    return LoggedSample(
+        uuid=sample.uuid,
+        sample=str(sample.id),
+        epoch=sample.epoch,
+        model=header.eval.model,
+        solver=header.plan.steps[-1].solver.rpartition("/")[2] if header.plan.steps else "",
+        conditions=conditions,
+        task_version=str(sample.metadata["task_version"]),
+        calls=[_call(made) for made in sample.store[CALLS]],
+        trials=int(figures["trials"]),
+        success=bool(figures["success"]),
+        indicator=float(figures["indicator"]),
+        flags=tuple(str(flag) for flag in figures["flags"]),
+        reason=None if figures["reason"] is None else str(figures["reason"]),
+    )
+
+
+def _call(made: Mapping[str, Any]) -> Mapping[str, Any]:
+    return {
+        "machine": str(made["machine"]),
+        "tool": str(made["tool"]),
+        "arguments": made["arguments"],
+    }

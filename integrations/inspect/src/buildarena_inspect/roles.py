@@ -1,0 +1,98 @@
+"""Our workflow of five roles, played by Inspect's models; needs the extra `roles`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import anyio
+from inspect_ai.model import ChatMessageAssistant
+from inspect_ai.solver import Generate, Solver, TaskState, solver
+
+from buildarena_benchmark import failed_score
+from buildarena_environment import Trial
+from buildarena_inspect.building import Building, building_of
+from buildarena_inspect.errors import ChoiceError
+
+if TYPE_CHECKING:
+    from buildarena_pipeline.transcript import ModelTurn
+    from buildarena_store import JournalEntry
+    from buildarena_worker.session.session import Session
+
+PACK = "default"
+"""The prompts that the service uses by default."""
+EXTRA = 'the solver `roles` needs the extra of this name: pip install "buildarena-inspect[roles]"'
+
+
+@solver
+def five_roles() -> Solver:
+    """The benchmark's workflow: planner, drafter, reviewer, builder and guidance, and controller.
+
+    Each role may be given a model of its own by Inspect's `--model-role`; the evaluated model
+    plays those that have none.
+
+    Raises:
+        ChoiceError: The extra `roles` is not installed.
+    """
+    _require_extra()
+
+    async def solve(state: TaskState, generate: Generate) -> TaskState:
+        del generate
+        building = building_of(state)
+        await anyio.to_thread.run_sync(_play, state, building, limiter=anyio.CapacityLimiter(1))
+        return state
+
+    return solve
+
+
+def _require_extra() -> None:
+    try:
+        import buildarena_worker.workflow  # noqa: F401 - asked for, used below
+    except ImportError as error:
+        raise ChoiceError(EXTRA) from error
+
+
+def _play(state: TaskState, building: Building) -> None:
+    """Plays a session from beginning to end, in a thread of its own."""
+    from buildarena_inspect.role_host import RoleHost
+    from buildarena_pipeline.catalog.prompt_packs import PromptPacks
+    from buildarena_worker.session.results import Failed
+    from buildarena_worker.session.session import Session
+    from buildarena_worker.workflow.five_role import FiveRole
+    from buildarena_worker.workflow.rounds import Loop, run_session
+
+    def on_turn(turn: ModelTurn, entry: JournalEntry) -> None:
+        del entry
+        state.messages.append(_told(turn))
+
+    host = RoleHost(building)
+    session = Session(
+        task=building.environment.task,
+        seed=building.conditions.seed or 0,
+        model_config={"decoding": {}},
+        pack=PromptPacks().load(PACK),
+        host=host,
+        on_turn=on_turn,
+    )
+    result = run_session(session, FiveRole(), Loop(rounds=building.conditions.rounds))
+    if host.output is not None:
+        state.output = host.output
+    if isinstance(result, Failed):
+        _fail(building, session, result.reason, result.detail)
+
+
+def _fail(building: Building, session: Session, reason: str, detail: str) -> None:
+    """Scores a session that built nothing that may be simulated; what it built is kept."""
+    machine = session.machine
+    score = failed_score(building.environment.task, machine)
+    building.adopt(machine, Trial(score=score, reason=reason, detail=detail), handed_in=False)
+
+
+def _told(turn: ModelTurn) -> ChatMessageAssistant:
+    """A turn as a reader of the log sees it; what the model was sent stands in its event."""
+    lines = [turn.text] if turn.text else []
+    lines += [f"{action.name}({action.arguments})\n→ {action.feedback}" for action in turn.actions]
+    about = turn.stage if turn.sub_structure is None else f"{turn.stage}, {turn.sub_structure}"
+    return ChatMessageAssistant(
+        content=f"[{turn.role}, {about}]\n" + "\n".join(lines),
+        metadata={"role": turn.role, "phase": turn.stage, "sub_structure": turn.sub_structure},
+    )

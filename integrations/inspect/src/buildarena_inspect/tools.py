@@ -1,0 +1,80 @@
+"""The tools of one sample, with the names, words and schemas that they have everywhere."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+from inspect_ai.tool import ToolDef, ToolError, ToolParams
+from inspect_ai.tool._tool_canonical import set_tool_canonical_arguments
+from inspect_ai.util import JSONSchema
+
+from buildarena_environment import EpisodeOverError, NothingToSubmitError, tools_of_models
+from buildarena_geometry import ToolDefinition
+from buildarena_inspect.building import Building
+
+SUBMIT: Final = "submit"
+
+
+def building_tools(building: Building) -> list[ToolDef]:
+    """All actions, each on this building."""
+    return [_action(tool, building) for tool in tools_of_models() if tool.name != SUBMIT]
+
+
+def submit_tool(building: Building) -> ToolDef:
+    """The tool that has the machine simulated.
+
+    What can't be submitted is an error that the model reads; agents of Inspect go on after one.
+    """
+    (definition,) = (tool for tool in tools_of_models() if tool.name == SUBMIT)
+
+    async def execute() -> str:
+        try:
+            return (await building.submit()).report
+        except (NothingToSubmitError, EpisodeOverError) as error:
+            raise ToolError(str(error)) from error
+
+    return _tool(definition, execute)
+
+
+def parameters_of(schema: Mapping[str, Any]) -> ToolParams:
+    """A tool's schema as Inspect has it, which knows no bounds on the length of arrays."""
+    return ToolParams(
+        properties={
+            name: JSONSchema.model_validate(value)
+            for name, value in schema.get("properties", {}).items()
+        },
+        required=list(schema.get("required", ())),
+        additionalProperties=bool(schema.get("additionalProperties", False)),
+    )
+
+
+def _action(definition: ToolDefinition, building: Building) -> ToolDef:
+    async def execute(**kwargs: Any) -> str:
+        return building.call(definition.name, kwargs)
+
+    texts = {
+        name
+        for name, schema in definition.parameters["properties"].items()
+        if schema.get("type") == "string"
+    }
+
+    def canonical(arguments: dict[str, Any]) -> dict[str, Any]:
+        return {
+            name: str(value) if name in texts and type(value) is int else value
+            for name, value in arguments.items()
+        }
+
+    # Inspect refuses what does not fit a schema; a block's id as a number does, everywhere else.
+    set_tool_canonical_arguments(execute, canonical)
+    return _tool(definition, execute)
+
+
+def _tool(definition: ToolDefinition, execute: Any) -> ToolDef:
+    return ToolDef(
+        execute,
+        name=definition.name,
+        description=definition.description,
+        parameters=parameters_of(definition.parameters),
+        max_output=0,  # what a model reads is not cut off elsewhere
+    )

@@ -1,0 +1,108 @@
+"""Logs: opened by Inspect's viewer and its own readers, ranked, and refused in plain words."""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+from urllib.parse import quote
+from urllib.request import urlopen
+
+from inspect_ai import Task
+from inspect_ai.dataset import Sample
+from inspect_ai.log import read_eval_log, write_eval_log
+from inspect_ai.model import ModelOutput
+from scripted_models import EXPERTS, call, listed, only
+
+from buildarena_inspect.__main__ import main
+from buildarena_inspect.logs import LoggedSample, logged_samples
+
+BIN = Path(sys.executable).parent
+OFFLINE = Path(__file__).with_name("offline")
+
+
+def inspect(*words: str) -> subprocess.CompletedProcess[str]:
+    """Inspect's command, without a network."""
+    return subprocess.run(
+        [BIN / "inspect", *words],
+        env={**os.environ, "PYTHONPATH": str(OFFLINE), "TERM": "dumb"},
+        capture_output=True,
+        text=True,
+        timeout=200,
+        check=False,
+    )
+
+
+def test_the_viewer_serves_a_log_with_its_pictures(run, tmp_path) -> None:
+    log = run("buildarena/support_1")
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    words = ["view", "--log-dir", str(tmp_path / "logs"), "--host", "127.0.0.1", "--port", port]
+    with subprocess.Popen(
+        [BIN / "inspect", *map(str, words)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    ) as viewer:
+        try:
+            shown = _got(f"http://127.0.0.1:{port}/api/logs/{quote(log.location, safe='')}")
+        finally:
+            viewer.terminate()
+    document = json.loads(shown)
+    (sample,) = document["samples"]
+    assert sample["scores"]["success"]["value"] == "C"
+    assert any(text.startswith("data:image/png") for text in sample["attachments"].values())
+    dumped = inspect("log", "dump", log.location)
+    assert json.loads(dumped.stdout)["eval"]["task"] == "buildarena/support_1"
+
+
+def _got(url: str) -> bytes:
+    until = time.monotonic() + 60
+    while True:
+        try:
+            with urlopen(url) as answer:
+                return answer.read()
+        except OSError:
+            if time.monotonic() > until:
+                raise
+            time.sleep(0.1)
+
+
+def test_models_of_several_logs_are_ranked_over_their_tasks(run, tmp_path, capsys) -> None:
+    run("buildarena/all", sample_id=["support-1", "lift-1"], epochs=3)
+    lazy = listed(call("start", {}), call("submit", {}))
+    log = run("buildarena/all", lazy, sample_id=["support-1", "lift-1"], epochs=3)
+    other = tmp_path / "lazy.json"
+    whole = read_eval_log(log.location, resolve_attachments="full")
+    whole.eval.model = "mockllm/lazy"
+    write_eval_log(whole, str(other))
+    Path(log.location).unlink()
+    assert main(["rank", str(tmp_path / "logs"), str(other)]) == 0
+    heading, first, second = capsys.readouterr().out.splitlines()
+    assert heading.split()[-1] == "model"
+    assert first.split() == ["1", "1.00", "100%", "6", "mockllm-model"]
+    assert second.split()[1:] == ["2.00", "0%", "6", "mockllm-lazy"]
+
+
+def test_what_is_no_log_of_ours_is_refused_in_plain_words(run, tmp_path, capsys) -> None:
+    nothing, garbage = tmp_path / "nothing.eval", tmp_path / "garbage.eval"
+    garbage.write_bytes(b"PK no")
+    for path, message in ((nothing, "No such file"), (garbage, "is no log of Inspect")):
+        assert main(["rank", str(path)]) == 2
+        assert message in capsys.readouterr().err
+    talking = listed(ModelOutput.from_content("mockllm", "Hello"))
+    strange = run(Task([Sample(input="Say hello.")]), talking)
+    (found,) = logged_samples(Path(strange.location))
+    assert "no sample of BuildArena" in found.why
+
+
+def test_the_calls_that_a_log_keeps_are_those_that_were_made(run) -> None:
+    log = run("buildarena/support_1")
+    (found,) = logged_samples(Path(log.location))
+    assert isinstance(found, LoggedSample)
+    assert list(found.calls) == EXPERTS["support-1"]["calls"]
+    assert (found.agent, found.success) == ("mockllm-model", True)
+    assert read_eval_log(log.location).status == "success"
+    assert only(log).uuid == found.uuid

@@ -1,0 +1,84 @@
+"""The README's commands and its program run as they stand there."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+HERE = Path(__file__).parent
+README = (HERE.parent / "README.md").read_text(encoding="utf-8")
+BLOCKS = re.findall(r"^```(bash|python)\n(.*?)^```", README, re.MULTILINE | re.DOTALL)
+
+
+def run(folder: Path, *words: str) -> str:
+    """What a program prints that must end well; Inspect reaches no network."""
+    done = subprocess.run(
+        words,
+        cwd=folder,
+        env={
+            **os.environ,
+            "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
+            "PYTHONPATH": str(HERE / "offline"),
+            "TERM": "dumb",
+        },
+        capture_output=True,
+        text=True,
+        timeout=200,
+        check=False,
+    )
+    assert done.returncode == 0, (words, done.stdout[-3000:], done.stderr[-3000:])
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory) -> Path:
+    return tmp_path_factory.mktemp("readme")
+
+
+def test_commands_and_program_in_the_order_of_the_page(folder) -> None:
+    assert [kind for kind, _ in BLOCKS] == ["bash", "bash", "bash", "bash", "python"]
+    told = []
+    for kind, text in BLOCKS:
+        if kind == "bash":
+            told.append(run(folder, "bash", "-ec", text))
+        else:
+            (folder / "script.py").write_text(text)
+            told.append(run(folder, sys.executable, "script.py"))
+    assert len(list((folder / "logs").glob("*.eval"))) == 4
+    for shown in told[:3]:
+        assert "accuracy" in shown
+        assert "errors and were not scored" not in shown
+    assert "mockllm-model-five_roles" in told[3]
+    assert told[4].startswith("there is no machine to simulate")
+
+
+BARE = f"""
+import sys
+sys.path.insert(0, {str(HERE)!r})
+from inspect_ai import eval
+from buildarena_inspect import TASKS
+from scripted_models import expert, scripted
+(log,) = eval(TASKS["support_1"](), model=scripted(expert), display="none", log_dir="bare")
+print(log.status)
+"""
+
+
+def test_a_program_without_its_guard_is_told_so(folder) -> None:
+    (folder / "bare.py").write_text(BARE)
+    done = subprocess.run(
+        [sys.executable, "bare.py"],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(HERE / "offline")},
+        capture_output=True,
+        text=True,
+        timeout=200,
+        check=False,
+    )
+    assert done.stdout.splitlines()[-1] == "error"
+    assert 'put what evaluates under `if __name__ == "__main__":`' in done.stderr
+    assert len(list((folder / "bare").iterdir())) == 1

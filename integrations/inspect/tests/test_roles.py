@@ -1,0 +1,98 @@
+"""Our workflow of five roles on Inspect's models, played by the built-in expert."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from inspect_ai.model import ChatMessage, ModelOutput
+from scripted_models import EXPERTS, only
+
+from buildarena_benchmark import builtin_tasks
+from buildarena_environment import Workbench, try_machine
+from buildarena_geometry import Machine
+from buildarena_inspect.scorers import machine_hash
+
+expert = pytest.importorskip("buildarena_worker.builtin.expert", reason="needs the extra `roles`")
+
+
+def five_roles(messages: list[ChatMessage], seed: int = 0) -> ModelOutput:
+    """What the built-in expert says in the role that it is asked in."""
+    from buildarena_worker.session.messages import Message, Request, ToolCall
+
+    heard = [
+        Message(
+            role=message.role,
+            text=message.text,
+            calls=[
+                ToolCall(id=made.id, name=made.function, arguments=made.arguments)
+                for made in getattr(message, "tool_calls", None) or ()
+            ],
+        )
+        for message in messages
+    ]
+    reply = expert.reply(Request(model_config={}, messages=heard, seed=seed))
+    for made in reply.calls:
+        return ModelOutput.for_tool_call("mockllm", made.name, dict(made.arguments))
+    return ModelOutput.from_content("mockllm", reply.text)
+
+
+@pytest.mark.parametrize("task", ["support-1", "lift-3", "transport-1"])
+def test_the_workflow_builds_what_it_builds_in_the_service(run, task) -> None:
+    log = run(f"buildarena/{task.replace('-', '_')}", five_roles, task_args={"solver": "roles"})
+    sample = only(log)
+    told = sample.scores["success"].metadata
+    assert told["indicator"] == pytest.approx(EXPERTS[task]["score"]["indicator"], rel=0.02)
+    roles = [m.metadata["role"] for m in sample.messages if (m.metadata or {}).get("role")]
+    assert {"planner", "drafter", "reviewer", "builder", "guidance"} <= set(roles)
+    asked = [event for event in sample.events if event.event == "model"]
+    assert len(asked) == len(roles)
+    assert sample.model_usage["mockllm/model"].total_tokens == 10 * len(roles)
+
+
+@pytest.mark.parametrize("task", ["lift-3", "transport-1"])
+def test_its_calls_build_the_same_machine_by_hand(run, task) -> None:
+    log = run(f"buildarena/{task.replace('-', '_')}", five_roles, task_args={"solver": "roles"})
+    sample = only(log)
+    bench = Workbench()
+    for made in sample.store["buildarena:calls"]:
+        assert bench.act(made["machine"], made["tool"], made["arguments"]).ok
+    again = try_machine(builtin_tasks()[task], bench.submitted())
+    assert again.score.indicator == sample.scores["indicator"].value
+
+
+def test_of_several_drives_the_best_counts_with_its_machine_and_calls(run) -> None:
+    """The controller presses its key for ever shorter times: the first drive is the best."""
+
+    def tiring(messages: list[ChatMessage]) -> ModelOutput:
+        output = five_roles(messages)
+        if "control_sequence" not in output.completion:
+            return output
+        drives = sum(message.role == "assistant" for message in messages)
+        program = json.loads(output.completion)
+        for press in program["control_sequence"]:
+            press["hold_for"] /= 10**drives
+        return ModelOutput.from_content("mockllm", json.dumps(program))
+
+    sample = only(run("buildarena/transport_1", tiring, task_args={"solver": "roles"}))
+    told = sample.scores["success"].metadata
+    assert told["trials"] == 3
+    assert told["indicator"] == pytest.approx(
+        EXPERTS["transport-1"]["score"]["indicator"], rel=0.02
+    )
+    kept = Machine.from_document(sample.store["buildarena:machine"])
+    bench = Workbench()
+    for made in sample.store["buildarena:calls"]:
+        bench.act(made["machine"], made["tool"], made["arguments"])
+    assert machine_hash(kept) == machine_hash(bench.submitted()) == told["machine_hash"]
+
+
+def test_a_session_that_fails_is_scored_as_one(run) -> None:
+    def silent(_: list[ChatMessage]) -> ModelOutput:
+        return ModelOutput.from_content("mockllm", "I do not know.")
+
+    sample = only(run("buildarena/support_1", silent, task_args={"solver": "roles"}))
+    told = sample.scores["success"].metadata
+    assert (sample.scores["success"].value, told["indicator"]) == ("I", 0.0)
+    assert told["reason"]
+    assert sample.store["buildarena:calls"] == []

@@ -1,0 +1,319 @@
+"""Tasks in Inspect: found by name, played by a scripted model, scored as elsewhere."""
+
+from __future__ import annotations
+
+import base64
+import json
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+
+import anyio
+import psutil
+import pytest
+from inspect_ai import eval_retry, score
+from inspect_ai.approval import ApprovalPolicy, auto_approver
+from inspect_ai.model import ModelOutput, get_model
+from inspect_ai.model._providers.mockllm import MockLLM
+from inspect_ai.solver import solver
+from scripted_models import (
+    EXPERTS,
+    USAGE,
+    answers,
+    call,
+    calls_in,
+    expert,
+    listed,
+    only,
+    task_in,
+    tried,
+)
+
+from buildarena_benchmark import builtin_tasks
+from buildarena_environment import UnknownChoiceError
+from buildarena_environment.workbench import tools_of_models
+from buildarena_geometry import Machine
+from buildarena_inspect import trial_processes
+from buildarena_inspect.errors import ChoiceError
+from buildarena_inspect.keeping import MACHINE, TRAJECTORY
+from buildarena_inspect.scorers import indicator, machine_hash, success
+from buildarena_inspect.solvers import MAX_IDLE_TURNS
+from buildarena_inspect.tasks import TASKS
+from buildarena_simulation import read_trajectory
+
+WOOD = {"base_block": 1, "face": "A", "new_block": "Small Wooden Block"}
+
+
+def test_all_nine_tasks_end_to_end_score_as_the_library_does(run) -> None:
+    log = run("buildarena/all")
+    assert log.status == "success"
+    assert [sample.id for sample in log.samples] == sorted(builtin_tasks())
+    for sample in log.samples:
+        trial = tried(sample.id)
+        told = sample.scores["success"].metadata
+        assert sample.scores["success"].value == "C"
+        assert sample.scores["indicator"].value == trial.score.indicator
+        assert (told["success"], told["flags"]) == (True, list(trial.score.flags))
+        assert told["metrics"] == dict(trial.score.metrics)
+        assert told["task_version"] == builtin_tasks()[sample.id].version
+    figures = {
+        name: metric.value for score in log.results.scores for name, metric in score.metrics.items()
+    }
+    assert figures["accuracy"] == 1.0
+    assert figures["wilson_low"] == pytest.approx(0.7008, abs=1e-4)
+    assert figures["mean_rank"] == 1.5
+    load = EXPERTS["support-1"]["score"]["indicator"]
+    assert figures["support-1 load (mass units)"] == pytest.approx(load, rel=0.02)
+
+
+def test_tools_are_those_of_everybody(run) -> None:
+    sample = only(run("buildarena/support_1", listed(call("start", {}), call("submit", {}))))
+    asked = next(event for event in sample.events if event.event == "model")
+    seen = {tool.name: tool for tool in asked.tools}
+    ours = {tool.name: tool for tool in tools_of_models()}
+    assert list(seen) == list(ours)
+    for name, tool in ours.items():
+        shown = seen[name].parameters.model_dump(exclude_none=True)
+        assert seen[name].description == tool.description
+        assert shown["required"] == tool.parameters["required"]
+        for argument, schema in tool.parameters["properties"].items():
+            # Inspect has no bounds on the length of arrays; their descriptions have.
+            known = {k: v for k, v in schema.items() if k not in {"minItems", "maxItems"}}
+            assert shown["properties"][argument] == known
+
+
+def test_what_the_log_keeps_of_a_sample(run) -> None:
+    sample = only(run("buildarena/support_1"))
+    machine = Machine.from_document(sample.store[MACHINE])
+    assert machine_hash(machine) == sample.scores["success"].metadata["machine_hash"]
+    trajectory = read_trajectory(base64.b64decode(sample.store[TRAJECTORY]))
+    assert len(trajectory.time_s) == builtin_tasks()["support-1"].scenario.sample_count
+    pictured = sample.messages[-1]
+    assert pictured.content[1].image.startswith("data:image/png;base64,")
+    assert all("image" not in str(event.input) for event in sample.events if event.event == "model")
+    assert [len(answers(sample)), sample.model_usage["mockllm/model"].total_tokens] == [14, 140]
+
+
+def test_refused_and_nonsensical_calls_are_answers_and_the_building_goes_on(run) -> None:
+    log = run(
+        "buildarena/support_1",
+        listed(
+            call("submit", {}),
+            call("start", {"machine": "main"}),
+            call("attach_block_to", {**WOOD, "face": "Z"}),
+            call("attach_block_to", {"base_block": ["1"], "face": {}}),
+            call("fly", {"up": 1}),
+            call("start", {"machine": "a name with blanks"}),
+            call("get_block_details", {"block_id": "\x00" * 3}),
+            call("attach_block_to", WOOD),
+            call("submit", {}),
+        ),
+    )
+    told = answers(only(log))
+    errors = [m.error for m in only(log).messages if m.role == "tool"]
+    assert "build one, beginning with the tool 'start'" in errors[0].message
+    assert told[1].startswith("Started.")
+    assert 'has no face "Z"' in told[2]
+    assert "B <West>" in told[2]
+    assert "validation errors" in errors[3].message
+    assert "fly not found" in errors[4].message
+    assert "1 to 40 letters" in told[5]
+    assert errors[2] is errors[5] is errors[7] is None
+    assert told[7].startswith("Attached.")
+    assert only(log).scores["success"].value == "I"
+    assert only(log).scores["success"].metadata["metrics"]["parts"] == 2
+
+
+def test_one_who_only_talks_or_only_fails_comes_to_an_end(run) -> None:
+    for answer in (ModelOutput.from_content("mockllm", "Well…"), call("fly", {})):
+        sample = only(run("buildarena/support_1", listed(answer)))
+        replies = [message for message in sample.messages if message.role == "assistant"]
+        assert len(replies) == MAX_IDLE_TURNS
+        told = sample.scores["success"].metadata
+        assert (sample.scores["success"].value, told["reason"]) == ("I", "nothing_submitted")
+
+
+def test_what_was_never_submitted_is_tried_in_the_end(run) -> None:
+    sample = only(run("buildarena/support_1", message_limit=20))
+    assert sample.limit.type == "message"
+    assert sample.scores["success"].metadata["trials"] == 1
+    assert sample.scores["success"].metadata["metrics"]["parts"] > 2
+
+
+def test_several_rounds_end_with_the_first_success(run) -> None:
+    calls = EXPERTS["support-1"]["calls"]
+
+    def answer(messages):
+        done = calls_in(messages)
+        if done == 5:
+            return call("submit", {})
+        number = done - (done > 5)
+        if number >= len(calls):
+            return call("submit", {})
+        return call(calls[number]["tool"], calls[number]["arguments"])
+
+    sample = only(run("buildarena/support_1", answer, task_args={"rounds": 3}))
+    assert sample.scores["success"].value == "C"
+    assert sample.scores["success"].metadata["trials"] == 2
+    assert "You may submit 3 times" in sample.messages[0].text
+
+
+def test_rewards_and_seeds_are_task_arguments(run) -> None:
+    weights = {"success": 1.0, "indicator": 0.5}
+    args = {"rewards": json.dumps(weights), "seed": 3, "simulator": "mujoco"}
+    sample = only(run("buildarena/support_1", task_args=args))
+    assert sample.scores["reward"].metadata["weights"] == weights
+    assert sample.scores["success"].metadata["seed"] == 3
+    assert sample.scores["indicator"].value != tried("support-1").score.indicator
+
+
+@pytest.mark.parametrize(
+    ("given", "error", "message"),
+    [
+        ({"solver": "rect"}, ChoiceError, "choose from react, roles"),
+        ({"simulator": "bullet"}, UnknownChoiceError, "choose from pybullet, mujoco"),
+        ({"rewards": "[1]"}, ChoiceError, "an object of weights"),
+        ({"rewards": {"style": 1}}, UnknownChoiceError, "choose from success"),
+        ({"rounds": 0}, ValueError, "rounds is 0"),
+    ],
+)
+def test_arguments_that_do_not_exist_are_refused_with_the_choices(given, error, message) -> None:
+    with pytest.raises(error, match=message):
+        TASKS["support_1"](**given)
+
+
+def test_epochs_and_samples_side_by_side_share_nothing(run) -> None:
+    """Half of the epochs build something else; each is judged by its own machine."""
+    kinds: dict[str, bool] = {}
+
+    def answer(messages):
+        whole = kinds.setdefault(messages[0].id, len(kinds) % 2 == 0)
+        if not whole and calls_in(messages) >= 3:
+            return call("submit", {})
+        return expert(messages)
+
+    log = run("buildarena/all", answer, epochs=4, sample_id=["support-1", "lift-1"], max_samples=8)
+    assert len(log.samples) == 8
+    assert sorted(kinds.values()) == [False] * 4 + [True] * 4
+    for sample in log.samples:
+        whole = sample.scores["success"].value == "C"
+        made = len(EXPERTS[sample.id]["calls"]) if whole else 3
+        assert len(answers(sample)) == made + 1
+        indicator = sample.scores["indicator"].value
+        assert (indicator == tried(sample.id).score.indicator) is whole
+    assert sum(sample.scores["success"].value == "C" for sample in log.samples) == 4
+
+
+def test_a_trial_does_not_hold_up_another_samples_requests(run, monkeypatch) -> None:
+    usual = trial_processes.Evaluator.evaluate
+    trying, asked = threading.Event(), threading.Event()
+
+    def evaluate(self, machine):
+        if self.task.name == "lift-1":
+            trying.set()
+            assert asked.wait(30), "the other sample's model was not asked meanwhile"
+        return usual(self, machine)
+
+    async def answer(messages, *_):
+        if task_in(messages) == "support-1":
+            await anyio.to_thread.run_sync(trying.wait, 30)
+            asked.set()
+        output = expert(messages)
+        output.usage = USAGE
+        return output
+
+    monkeypatch.setattr(trial_processes.Evaluator, "evaluate", evaluate)
+    model = get_model("mockllm/model", custom_outputs=answer, memoize=False)
+    log = run("buildarena/all", model=model, sample_id=["lift-1", "support-1"], max_samples=2)
+    assert [sample.scores["success"].value for sample in log.samples] == ["C", "C"]
+
+
+def test_another_solver_finds_the_tools_in_the_state(run) -> None:
+    @solver
+    def loop():
+        async def solve(state, generate):
+            while not any(m.role == "tool" and m.function == "submit" for m in state.messages):
+                state = await generate(state, tool_calls="single")
+            return state
+
+        return solve
+
+    sample = only(run("buildarena/support_1", solver=loop()))
+    assert sample.scores["success"].value == "C"
+
+
+def test_calls_that_nobody_approves_do_not_reach_the_machine(run) -> None:
+    approval = [
+        ApprovalPolicy(auto_approver("reject"), "connect_blocks"),
+        ApprovalPolicy(auto_approver("approve"), "*"),
+    ]
+    sample = only(run("buildarena/support_1", approval=approval))
+    told = [message.error for message in sample.messages if message.role == "tool"]
+    assert sum(error is not None for error in told) == 6
+    assert sample.scores["success"].metadata["metrics"]["parts"] == 7
+
+
+def test_a_machine_that_ends_its_process_costs_one_sample_and_only_that_is_run_again(
+    run, monkeypatch
+) -> None:
+    usual = trial_processes.Evaluator.evaluate
+
+    def evaluate(self, machine):
+        if self.task.name != "support-1":
+            return usual(self, machine)
+        with killing_children():
+            return usual(self, machine)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(trial_processes.Evaluator, "evaluate", evaluate)
+        log = run("buildarena/all", sample_id=["lift-1", "support-1"], max_samples=1)
+    before = {sample.id: sample for sample in log.samples}
+    assert log.status == "error"
+    assert before["lift-1"].scores["success"].value == "C"
+    assert "ended with code -9" in before["support-1"].error.message
+    asked = set()
+
+    async def generate(*given, **named):
+        messages = named.get("input") or given[1]
+        asked.add(task_in(messages))
+        output = expert(messages)
+        output.usage = USAGE
+        return output
+
+    monkeypatch.setattr(MockLLM, "generate", generate)  # a retry makes the model anew, by its name
+    (again,) = eval_retry(log, log_dir="logs", display="none")
+    assert again.status == "success"
+    after = {sample.id: sample for sample in again.samples}
+    assert [after[name].scores["success"].value for name in after] == ["C", "C"]
+    assert asked == {"support-1"}
+    assert after["lift-1"].uuid == before["lift-1"].uuid
+
+
+@contextmanager
+def killing_children() -> Iterator[None]:
+    """Kills every process of a trial that there is."""
+    over = threading.Event()
+
+    def kill() -> None:
+        while not over.wait(0.05):
+            for child in psutil.Process().children():
+                with suppress(psutil.NoSuchProcess):
+                    if "spawn_main" in " ".join(child.cmdline()):
+                        child.kill()
+
+    thread = threading.Thread(target=kill)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
+
+
+def test_a_log_is_scored_again_from_what_it_keeps(run) -> None:
+    log = run("buildarena/support_1")
+    again = score(log, [success(), indicator()], action="overwrite", display="none")
+    for name in ("success", "indicator"):
+        assert only(again).scores[name].value == only(log).scores[name].value
+    told = only(again).scores["success"].metadata
+    assert told["machine_hash"] == only(log).scores["success"].metadata["machine_hash"]

@@ -1,0 +1,123 @@
+"""Logs of Inspect in the service: their calls are made again, and the service judges."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import subprocess
+import time
+from pathlib import Path
+
+import httpx
+import pytest
+from live_api import live_api
+from working import work
+
+ROOT = Path(__file__).parents[2]
+ADAPTER = ROOT / "integrations/inspect"
+PYTHON = ROOT / ".venv-integrations/inspect/bin/python"
+README_LINE = re.compile(r"^python -m buildarena_inspect import .*$", re.MULTILINE)
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory) -> Path:
+    """A log of the adapter's real environment, and the same with made-up scores."""
+    if not PYTHON.exists():
+        if os.environ.get("BUILDARENA_TEST_ALL"):
+            pytest.fail("the environment of integrations/inspect is not there: make check")
+        pytest.skip("the environment of integrations/inspect is not there: make check")
+    folder = tmp_path_factory.mktemp("logs")
+    subprocess.run(
+        [PYTHON, ADAPTER / "tests/write_logs.py", folder], check=True, cwd=folder, timeout=200
+    )
+    return folder
+
+
+def bring(url: str, *words: object, key: str = "") -> tuple[int, list[str]]:
+    """Runs the import; its exit code and lines."""
+    done = subprocess.run(
+        [PYTHON, "-m", "buildarena_inspect", "import", *map(str, words), "--url", url],
+        env={**os.environ, "BUILDARENA_KEY": key},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=200,
+    )
+    return done.returncode, [*done.stdout.splitlines(), *done.stderr.splitlines()]
+
+
+def jobs_of(client: httpx.Client) -> dict[str, dict]:
+    return {job["task"]: job for job in client.get("/v1/jobs").json()["jobs"]}
+
+
+def test_a_log_becomes_jobs_that_the_service_simulates_and_scores_itself(logs, context) -> None:
+    with live_api(context) as url, httpx.Client(base_url=url) as client:
+        code, first = bring(url, logs / "honest.eval", "--wait", 0)
+        assert code == 1, first
+        assert sum("has not ended yet" in line for line in first) == 2
+        work(context)
+        code, second = bring(url, logs / "honest.eval")
+        assert (code, len(second)) == (0, 4), second
+        assert all("by agent/inspect-mockllm-model, brought before" in line for line in second)
+        assert [re.findall(r"job_\w+", line) for line in second] == [
+            re.findall(r"job_\w+", line) for line in first
+        ]
+        jobs = jobs_of(client)
+        assert len(jobs) == 4
+        assert {job["track"].split("-")[0] for job in jobs.values()} == {"external/mujoco"}
+        assert [jobs[name]["outcome"] for name in ("support-1", "support-3")] == ["success"] * 2
+        for name in ("lift-2", "support-2"):
+            assert jobs[name]["outcome"] == "construction_failed"
+            assert jobs[name]["reason"] == "empty_machine"
+        code, lying = bring(url, logs / "lying.eval")
+        assert code == 1
+        assert "  indicator: 999 in the log, 1214.95 in the service" in lying
+        assert "  success: True in the log, False in the service" in lying
+        assert jobs_of(client) == jobs
+
+
+def test_an_import_that_was_broken_off_goes_on_where_it_stopped(logs, context) -> None:
+    with live_api(context) as url, httpx.Client(base_url=url) as client:
+        command = [PYTHON, "-m", "buildarena_inspect", "import", logs / "honest.eval"]
+        with subprocess.Popen([*command, "--url", url, "--wait", "0"]) as broken:
+            until = time.monotonic() + 60
+            while jobs_of(client).get("support-3", {}).get("actions", 0) < 5:
+                assert time.monotonic() < until
+                time.sleep(0.02)
+            broken.kill()
+        half = jobs_of(client)["support-3"]
+        bring(url, logs / "honest.eval", "--wait", 0)
+        whole = jobs_of(client)["support-3"]
+        assert whole["id"] == half["id"]
+        turns = client.get(f"/v1/jobs/{whole['id']}/transcript").json()["turns"]
+        assert len(turns) == whole["actions"] == 61
+
+
+def test_what_the_service_refuses_is_told(logs, context) -> None:
+    with live_api(context) as url:
+        code, told = bring(url, logs / "honest.eval", "--agent", "no name", "--wait", 0)
+        assert code == 2
+        assert "1 to 80 letters" in told[-1]
+    code, told = bring(url, logs / "honest.eval")
+    assert (code, told[0][:24]) == (2, "no BuildArena answers at")
+
+
+def test_the_readmes_own_line_does_it(logs, context, tmp_path) -> None:
+    (line,) = README_LINE.findall((ADAPTER / "README.md").read_text(encoding="utf-8"))
+    (tmp_path / "logs").mkdir()
+    (tmp_path / "logs/run.eval").write_bytes((logs / "honest.eval").read_bytes())
+    words = shlex.split(line)
+    assert words[:2] == ["python", "-m"]
+    with live_api(context) as url:
+        work(context)
+        done = subprocess.run(
+            [PYTHON, *words[1:], "--wait", "0"],
+            env={**os.environ, "BUILDARENA_URL": url},
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=200,
+        )
+    assert "by agent/inspect-mockllm-model" in done.stdout, done.stderr
