@@ -77,7 +77,12 @@ def test_nonsense_is_answered_and_counts_as_a_step(text, said) -> None:
 def test_text_that_is_no_call_says_how_one_looks() -> None:
     with pytest.raises(CallError, match=r'write \{"tool": "start", "arguments": \{\}\}'):
         read_call("let us begin")
-    assert read_call('{"tool": "start"}') == ("start", {})
+    assert read_call('{"tool": "start"}', longest=17) == ("start", {})
+    with pytest.raises(CallError, match="the call has 17 characters: at most 16 are read"):
+        read_call('{"tool": "start"}', longest=16)
+    environment = Environment("support-1")
+    assert "at most 10 are read" in call_text(environment, START, longest=10).text
+    assert environment.steps_left == 1999
 
 
 @pytest.mark.parametrize("last", [START, "nonsense", '{"tool": "submit", "arguments": 1}'])

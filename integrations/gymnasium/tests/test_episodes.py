@@ -7,7 +7,7 @@ import json
 import gymnasium
 import numpy as np
 import pytest
-from gymnasium.error import ResetNeeded
+from gymnasium.error import InvalidAction, ResetNeeded
 from gymnasium.utils.env_checker import check_env
 
 import buildarena_gymnasium
@@ -86,6 +86,10 @@ def test_nonsense_is_answered_inside_the_spaces() -> None:
         observation, reward, terminated, truncated, info = environment.step(action)
         assert observation in space
         assert (reward, terminated, truncated, info["accepted"]) == (0.0, False, False, False)
+    observation, *_ = environment.step("x" * 2001)
+    assert observation == "the call has 2,001 characters: at most 2,000 are read"
+    with pytest.raises(InvalidAction, match="an action is text, not int"):
+        environment.step(3)
     assert observed("\N{SNOWMAN}!") == "?!"
     assert len(observed("a" * 10**6)) == MAX_OBSERVATION
     assert observed("a" * 10**6).endswith(" [cut]")

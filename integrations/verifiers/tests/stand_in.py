@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import re
 import threading
+import time
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -16,7 +17,8 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
 Script = Sequence[Any]
-"""Tool calls, each with `tool` and `arguments`; text is said instead of a call."""
+"""Tool calls, each with `tool` and `arguments`, or several in a list; text is said instead of a
+call, and a number is waited for, in seconds."""
 
 
 class StandIn:
@@ -51,6 +53,9 @@ class StandIn:
         if len(said) >= len(script):
             return {"role": "assistant", "content": "That is all."}
         step = script[len(said)]
+        if isinstance(step, float):
+            time.sleep(step)
+            step = "That took a while."
         if isinstance(step, str):
             return {"role": "assistant", "content": step}
         steps = step if isinstance(step, list) else [step]

@@ -180,6 +180,31 @@ def test_what_ends_a_rollout_early_has_its_machine_tried(ending, scripts) -> Non
     assert trace.num_turns == len(script) + talk[ending]
 
 
+def test_an_agent_out_of_time_has_its_machine_tried(scripts) -> None:
+    config = load_environment("lift-1").config
+    agent = config.agent.model_copy(
+        update={"timeout": config.agent.timeout.model_copy(update={"rollout": 4.0})}
+    )
+    environment = vf.load_environment(config.model_copy(update={"agent": agent}))
+    with serving({"lift-1": [[scripts["lift-1"], 8.0]]}) as stand_in:
+        (trace,) = played(environment, stand_in.url)
+    assert (trace.ok, trace.is_timeout, trace.reward) == (True, True, 1.0)
+
+
+def test_a_kept_trace_is_scored_again_without_physics(scripts) -> None:
+    environment = load_environment("lift-1")
+    with serving({"lift-1": [several([*scripts["lift-1"], SUBMIT])]}) as stand_in:
+        (trace,) = played(environment, stand_in.url)
+    kept = vf.WireTrace.model_validate_json(trace.model_dump_json())
+    kept.rewards.clear()
+    weighed = load_environment("lift-1", rewards={"indicator": 2.0})
+    (task,) = weighed.taskset
+    asyncio.run(task.score(kept))
+    assert kept.reward == pytest.approx(2.0, rel=0.02)
+    assert kept.rewards["success"].score == 1.0
+    assert kept.metrics["parts"] == record(trace)["score"]["metrics"]["parts"]
+
+
 def test_whatever_a_model_calls_is_answered() -> None:
     script = [
         SUBMIT,

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 import gymnasium
-from gymnasium.error import ResetNeeded
+from gymnasium.error import InvalidAction, ResetNeeded
 
 from buildarena_benchmark import Task
 from buildarena_environment import (
@@ -125,12 +125,15 @@ class BuildEnv(gymnasium.Env[str, str]):
 
         Raises:
             ResetNeeded: The episode has ended, or none has begun.
+            InvalidAction: The action is not text.
             SimulationError: The simulator failed; the same action may be tried again.
         """
         if not self._begun:
             raise ResetNeeded("no episode has begun: call reset first")
+        if not isinstance(action, str):
+            raise InvalidAction(f"an action is text, not {type(action).__name__}")
         try:
-            answer = self._answer(action)
+            answer = call_text(self.environment, action, longest=MAX_ACTION)
         except EpisodeOverError as over:
             raise ResetNeeded(str(over)) from over
         return (
@@ -162,10 +165,6 @@ class BuildEnv(gymnasium.Env[str, str]):
         """
         self.environment.restore(state)
         self._begun = True
-
-    def _answer(self, action: str) -> Answer:
-        # A long text is cut, not read: numbers and nesting cost more than their length.
-        return call_text(self.environment, action[: MAX_ACTION + 1])
 
 
 def _info(answer: Answer) -> dict[str, Any]:

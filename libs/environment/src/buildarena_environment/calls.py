@@ -68,10 +68,15 @@ def call(environment: Environment, tool: object, arguments: object = None) -> An
     return _stepped(environment, tool, arguments, text, before)
 
 
-def call_text(environment: Environment, text: str) -> Answer:
+def call_text(environment: Environment, text: str, *, longest: int | None = None) -> Answer:
     """Carries out a call that is written as JSON, such as `EXAMPLE`.
 
     Text that is no call counts as a refused step.
+
+    Args:
+        environment: The episode.
+        text: The call.
+        longest: Characters that it may have; None for any number.
 
     Raises:
         EpisodeOverError: The episode has ended.
@@ -79,7 +84,7 @@ def call_text(environment: Environment, text: str) -> Answer:
     """
     before = environment.reward
     try:
-        tool, arguments = read_call(text)
+        tool, arguments = read_call(text, longest=longest)
     except CallError as error:
         if not environment.done and environment.steps_left == 0:
             return _submitted(environment.finish(), before, truncated=True)
@@ -87,12 +92,18 @@ def call_text(environment: Environment, text: str) -> Answer:
     return call(environment, tool, arguments)
 
 
-def read_call(text: str) -> tuple[str, dict[str, Any]]:
+def read_call(text: str, *, longest: int | None = None) -> tuple[str, dict[str, Any]]:
     """Tool and arguments of a call that is written as JSON.
+
+    Args:
+        text: The call.
+        longest: Characters that it may have; None for any number.
 
     Raises:
         CallError: It is none; the message says what is wrong.
     """
+    if longest is not None and len(text) > longest:
+        raise CallError(f"the call has {len(text):,} characters: at most {longest:,} are read")
     try:
         found = json.loads(text)
     except (ValueError, RecursionError) as error:
