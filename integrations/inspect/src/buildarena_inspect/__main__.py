@@ -19,7 +19,6 @@ from buildarena_inspect.service import Service
 KEY: Final = "BUILDARENA_KEY"
 URL: Final = "BUILDARENA_URL"
 HERE: Final = "http://127.0.0.1:8321"
-MOST: Final = 1000
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -39,7 +38,7 @@ def _parser() -> argparse.ArgumentParser:
     one.add_argument("logs", nargs="+", type=Path, metavar="LOG")
     one.add_argument("--url", default=os.environ.get(URL, HERE), help=f"the service; or {URL}")
     one.add_argument("--agent", help="name behind `inspect-`; the model's by default")
-    one.add_argument("--limit", type=int, default=MOST, help="samples of a log at most")
+    one.add_argument("--limit", type=int, help="only so many samples of each log")
     one.add_argument("--wait", type=float, default=600.0, help="seconds for a job to end")
     one.set_defaults(command=_import)
     two = commands.add_parser("rank", help="rank the models of logs over their tasks")
