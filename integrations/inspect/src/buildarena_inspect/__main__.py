@@ -10,7 +10,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Final
 
-from buildarena_inspect.errors import BuildarenaInspectError
+from buildarena_inspect.errors import BuildarenaInspectError, ServiceError
 from buildarena_inspect.importing import Imported, bring
 from buildarena_inspect.logs import LoggedSample, Unusable, logged_samples
 from buildarena_inspect.ranking import ranked
@@ -49,7 +49,7 @@ def _parser() -> argparse.ArgumentParser:
 
 def _import(given: argparse.Namespace) -> int:
     clean = True
-    with Service(given.url, os.environ.get(KEY)) as service:
+    with Service(given.url, _key()) as service:
         for path in _files(given.logs):
             for sample in islice(logged_samples(path), given.limit):
                 found: Imported | Unusable = (
@@ -59,6 +59,17 @@ def _import(given: argparse.Namespace) -> int:
                 )
                 clean &= _told(found)
     return 0 if clean else 1
+
+
+def _key() -> str | None:
+    """The key, or what the file that is named has; on a command line, others could read it."""
+    file = os.environ.get(f"{KEY}_FILE")
+    if not file:
+        return os.environ.get(KEY)
+    try:
+        return Path(file).read_text(encoding="utf-8").strip()
+    except OSError as error:
+        raise ServiceError(f"{KEY}_FILE: {file}: {error.strerror}") from error
 
 
 def _told(found: Imported | Unusable) -> bool:
