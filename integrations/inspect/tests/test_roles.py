@@ -64,7 +64,7 @@ def test_its_calls_build_the_same_machine_by_hand(run, task) -> None:
 
 
 def test_of_several_drives_the_best_counts_with_its_machine_and_calls(run) -> None:
-    """The controller presses its key for ever shorter times: the first drive is the best."""
+    """The controller presses its key for shorter and shorter times: the first drive is the best."""
 
     def tiring(messages: list[ChatMessage]) -> ModelOutput:
         output = five_roles(messages)
