@@ -7,12 +7,16 @@ import re
 import shlex
 import subprocess
 import time
+from contextlib import closing
 from pathlib import Path
 
 import httpx
 import pytest
 from live_api import live_api
+from tenants import WITH_KEYS, new_tenant
 from working import work
+
+from buildarena_pipeline.runtime.context import open_context
 
 ROOT = Path(__file__).parents[2]
 ADAPTER = ROOT / "integrations/inspect"
@@ -101,6 +105,20 @@ def test_what_the_service_refuses_is_told(logs, context) -> None:
         assert "1 to 80 letters" in told[-1]
     code, told = bring(url, logs / "honest.eval")
     assert (code, told[0][:24]) == (2, "no BuildArena answers at")
+
+
+def test_jobs_belong_to_the_key_and_its_name_is_nobody_elses(logs, context) -> None:
+    own = open_context(context.settings.model_copy(update=WITH_KEYS))
+    with closing(own), live_api(own) as url, httpx.Client(base_url=url) as client:
+        mine, theirs = (new_tenant(client, name) for name in ("mine", "theirs"))
+        code, told = bring(url, logs / "honest.eval", "--limit", 1)
+        assert code == 2, told
+        code, told = bring(url, logs / "honest.eval", "--limit", 1, "--wait", 0, key=mine.secret)
+        (job,) = mine.get("/v1/jobs")["jobs"]
+        assert (job["owner"], job["id"] in told[0]) == (mine.id, True)
+        code, told = bring(url, logs / "honest.eval", "--limit", 1, key=theirs.secret)
+        assert code == 2
+        assert "inspect-mockllm-model" in told[-1]
 
 
 def test_the_readmes_own_line_does_it(logs, context, tmp_path) -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 
 import pytest
 from inspect_ai.model import ChatMessage, ModelOutput
@@ -62,7 +64,7 @@ def test_its_calls_build_the_same_machine_by_hand(run, task) -> None:
 
 
 def test_of_several_drives_the_best_counts_with_its_machine_and_calls(run) -> None:
-    """The controller presses its key for ever shorter times: the first drive is the best."""
+    """The controller presses its key for shorter and shorter times: the first drive is the best."""
 
     def tiring(messages: list[ChatMessage]) -> ModelOutput:
         output = five_roles(messages)
@@ -96,3 +98,23 @@ def test_a_session_that_fails_is_scored_as_one(run) -> None:
     assert (sample.scores["success"].value, told["indicator"]) == ("I", 0.0)
     assert told["reason"]
     assert sample.store["buildarena:calls"] == []
+
+
+WITHOUT = """
+import sys
+sys.modules["buildarena_worker"] = None
+from buildarena_inspect import TASKS
+TASKS["support_1"]()
+assert not [name for name in sys.modules if name.startswith(("buildarena_pipeline", "sqlalchemy"))]
+try:
+    TASKS["support_1"](solver="roles")
+except ValueError as error:
+    print(error)
+"""
+
+
+def test_everything_else_does_without_the_extra() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", WITHOUT], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip().endswith('pip install "buildarena-inspect[roles]"')

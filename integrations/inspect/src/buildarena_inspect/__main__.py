@@ -10,7 +10,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Final
 
-from buildarena_inspect.errors import BuildarenaInspectError
+from buildarena_inspect.errors import BuildarenaInspectError, ServiceError
 from buildarena_inspect.importing import Imported, bring
 from buildarena_inspect.logs import LoggedSample, Unusable, logged_samples
 from buildarena_inspect.ranking import ranked
@@ -19,7 +19,6 @@ from buildarena_inspect.service import Service
 KEY: Final = "BUILDARENA_KEY"
 URL: Final = "BUILDARENA_URL"
 HERE: Final = "http://127.0.0.1:8321"
-MOST: Final = 1000
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -39,7 +38,7 @@ def _parser() -> argparse.ArgumentParser:
     one.add_argument("logs", nargs="+", type=Path, metavar="LOG")
     one.add_argument("--url", default=os.environ.get(URL, HERE), help=f"the service; or {URL}")
     one.add_argument("--agent", help="name behind `inspect-`; the model's by default")
-    one.add_argument("--limit", type=int, default=MOST, help="samples of a log at most")
+    one.add_argument("--limit", type=int, help="only so many samples of each log")
     one.add_argument("--wait", type=float, default=600.0, help="seconds for a job to end")
     one.set_defaults(command=_import)
     two = commands.add_parser("rank", help="rank the models of logs over their tasks")
@@ -50,7 +49,7 @@ def _parser() -> argparse.ArgumentParser:
 
 def _import(given: argparse.Namespace) -> int:
     clean = True
-    with Service(given.url, os.environ.get(KEY)) as service:
+    with Service(given.url, _key()) as service:
         for path in _files(given.logs):
             for sample in islice(logged_samples(path), given.limit):
                 found: Imported | Unusable = (
@@ -60,6 +59,17 @@ def _import(given: argparse.Namespace) -> int:
                 )
                 clean &= _told(found)
     return 0 if clean else 1
+
+
+def _key() -> str | None:
+    """The key, or what the file that is named has; on a command line, others could read it."""
+    file = os.environ.get(f"{KEY}_FILE")
+    if not file:
+        return os.environ.get(KEY)
+    try:
+        return Path(file).read_text(encoding="utf-8").strip()
+    except OSError as error:
+        raise ServiceError(f"{KEY}_FILE: {file}: {error.strerror}") from error
 
 
 def _told(found: Imported | Unusable) -> bool:

@@ -26,6 +26,7 @@ MAX_BYTES: Final = 64 << 10
 MAX_DEPTH: Final = 20
 """What the arguments of a session's call may have."""
 MAX_SEED: Final = 2**53 - 1
+UNKNOWN: Final = 404
 CONFLICT: Final = 409
 UNPROCESSABLE: Final = 422
 SAME: Final = 1e-6
@@ -125,6 +126,8 @@ def _hindrance(sample: LoggedSample, service: Service) -> str:
     try:
         task = service.get(f"/v1/tasks/{conditions.task}")
     except RefusedError as error:
+        if error.status != UNKNOWN:
+            raise
         return str(error)
     if task["version"] != sample.task_version:
         return (
@@ -166,7 +169,7 @@ def _brought_before(wanted: dict[str, Any], service: Service) -> str | None:
     model = f"agent/{wanted['agent']}"
     cursor: dict[str, str] = {}
     while True:
-        page = service.get("/v1/jobs", task=wanted["task"], model=model, limit="200", **cursor)
+        page = service.get("/v1/jobs", task=wanted["task"], model=model, limit="1000", **cursor)
         for job in page["jobs"]:
             if job["seed"] == wanted["seed"] and f"/{wanted['simulator']}-" in job["track"]:
                 return str(job["id"])
