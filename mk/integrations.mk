@@ -3,8 +3,8 @@
 # Adapters to frameworks, each with an environment of its own: the frameworks exclude each other.
 INTEGRATIONS := inspect verifiers openenv gymnasium
 LIBRARIES := libs/geometry libs/simulation libs/benchmark libs/environment
-# What one of them needs besides: our workflows, which Inspect's models can play.
-LIBRARIES_inspect := libs/besiege libs/store libs/pipeline services/worker
+# What one of them needs besides: our workflows, which Inspect's models can play, and the client.
+LIBRARIES_inspect := clients/python libs/besiege libs/store libs/pipeline services/worker
 INTEGRATION_STAMPS := $(foreach name,$(INTEGRATIONS),.venv-integrations/$(name)/.installed)
 
 test-integrations: check-integrations ## Each adapter against its real framework

@@ -48,7 +48,7 @@ lock() {
     # shellcheck disable=SC2046 # libraries are words
     uv pip compile --quiet --universal --generate-hashes --no-annotate -c "$physics" \
         --custom-compile-command "make lock" \
-        $(printf -- '--no-emit-package buildarena-%s ' $(basename -a "$@") "$name") \
+        $(printf -- '--no-emit-package buildarena-%s ' $(basename -a "$@") client "$name") \
         -o "integrations/$name/requirements.lock" \
         integrations/tests.in "integrations/$name/pyproject.toml" \
         $(printf '%s/pyproject.toml ' "$@")

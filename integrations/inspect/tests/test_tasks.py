@@ -30,10 +30,9 @@ from scripted_models import (
 )
 
 from buildarena_benchmark import builtin_tasks
-from buildarena_environment import UnknownChoiceError
+from buildarena_environment import TrialPool, UnknownChoiceError
 from buildarena_environment.workbench import tools_of_models
 from buildarena_geometry import Machine
-from buildarena_inspect import trial_processes
 from buildarena_inspect.errors import ChoiceError
 from buildarena_inspect.keeping import MACHINE, TRAJECTORY
 from buildarena_inspect.scorers import indicator, machine_hash, success
@@ -205,14 +204,14 @@ def test_epochs_and_samples_side_by_side_share_nothing(run) -> None:
 
 
 def test_a_trial_does_not_hold_up_another_samples_requests(run, monkeypatch) -> None:
-    usual = trial_processes.Evaluator.evaluate
+    usual = TrialPool.try_machine
     trying, asked = threading.Event(), threading.Event()
 
-    def evaluate(self, machine):
-        if self.task.name == "lift-1":
+    def tries(self, task, *given, **named):
+        if task.name == "lift-1":
             trying.set()
             assert asked.wait(30), "the other sample's model was not asked meanwhile"
-        return usual(self, machine)
+        return usual(self, task, *given, **named)
 
     async def answer(messages, *_):
         if task_in(messages) == "support-1":
@@ -222,7 +221,7 @@ def test_a_trial_does_not_hold_up_another_samples_requests(run, monkeypatch) -> 
         output.usage = USAGE
         return output
 
-    monkeypatch.setattr(trial_processes.Evaluator, "evaluate", evaluate)
+    monkeypatch.setattr(TrialPool, "try_machine", tries)
     model = get_model("mockllm/model", custom_outputs=answer, memoize=False)
     log = run("buildarena/all", model=model, sample_id=["lift-1", "support-1"], max_samples=2)
     assert [sample.scores["success"].value for sample in log.samples] == ["C", "C"]
@@ -256,16 +255,16 @@ def test_calls_that_nobody_approves_do_not_reach_the_machine(run) -> None:
 def test_a_machine_that_ends_its_process_costs_one_sample_and_only_that_is_run_again(
     run, monkeypatch
 ) -> None:
-    usual = trial_processes.Evaluator.evaluate
+    usual = TrialPool.try_machine
 
-    def evaluate(self, machine):
-        if self.task.name != "support-1":
-            return usual(self, machine)
+    def tries(self, task, *given, **named):
+        if task.name != "support-1":
+            return usual(self, task, *given, **named)
         with killing_children():
-            return usual(self, machine)
+            return usual(self, task, *given, **named)
 
     with monkeypatch.context() as patched:
-        patched.setattr(trial_processes.Evaluator, "evaluate", evaluate)
+        patched.setattr(TrialPool, "try_machine", tries)
         log = run("buildarena/all", sample_id=["lift-1", "support-1"], max_samples=1)
     before = {sample.id: sample for sample in log.samples}
     assert log.status == "error"

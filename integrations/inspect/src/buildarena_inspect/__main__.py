@@ -3,22 +3,16 @@
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 from collections.abc import Sequence
 from itertools import islice
 from pathlib import Path
-from typing import Final
 
-from buildarena_inspect.errors import BuildarenaInspectError, ServiceError
+from buildarena_client import Client, ClientError
+from buildarena_inspect.errors import BuildarenaInspectError
 from buildarena_inspect.importing import Imported, bring
 from buildarena_inspect.logs import LoggedSample, Unusable, logged_samples
 from buildarena_inspect.ranking import ranked
-from buildarena_inspect.service import Service
-
-KEY: Final = "BUILDARENA_KEY"
-URL: Final = "BUILDARENA_URL"
-HERE: Final = "http://127.0.0.1:8321"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -26,7 +20,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = _parser().parse_args(arguments)
     try:
         return int(given.command(given))
-    except BuildarenaInspectError as error:
+    except (BuildarenaInspectError, ClientError) as error:
         sys.stderr.write(f"{error}\n")
         return 2
 
@@ -36,7 +30,7 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(required=True)
     one = commands.add_parser("import", help="make the calls of logs again in a service")
     one.add_argument("logs", nargs="+", type=Path, metavar="LOG")
-    one.add_argument("--url", default=os.environ.get(URL, HERE), help=f"the service; or {URL}")
+    one.add_argument("--url", help="the service; by default BUILDARENA_URL, or this machine's")
     one.add_argument("--agent", help="name behind `inspect-`; the model's by default")
     one.add_argument("--limit", type=int, help="only so many samples of each log")
     one.add_argument("--wait", type=float, default=600.0, help="seconds for a job to end")
@@ -49,7 +43,7 @@ def _parser() -> argparse.ArgumentParser:
 
 def _import(given: argparse.Namespace) -> int:
     clean = True
-    with Service(given.url, _key()) as service:
+    with Client(given.url) as service:
         for path in _files(given.logs):
             for sample in islice(logged_samples(path), given.limit):
                 found: Imported | Unusable = (
@@ -59,17 +53,6 @@ def _import(given: argparse.Namespace) -> int:
                 )
                 clean &= _told(found)
     return 0 if clean else 1
-
-
-def _key() -> str | None:
-    """The key, or what the file that is named has; on a command line, others could read it."""
-    file = os.environ.get(f"{KEY}_FILE")
-    if not file:
-        return os.environ.get(KEY)
-    try:
-        return Path(file).read_text(encoding="utf-8").strip()
-    except OSError as error:
-        raise ServiceError(f"{KEY}_FILE: {file}: {error.strerror}") from error
 
 
 def _told(found: Imported | Unusable) -> bool:

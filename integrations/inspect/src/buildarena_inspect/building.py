@@ -22,7 +22,7 @@ from buildarena_environment import (
 )
 from buildarena_geometry import Machine
 from buildarena_inspect.errors import LogError
-from buildarena_inspect.trial_processes import trial_processes
+from buildarena_inspect.trial_processes import try_machine
 
 STATE: Final = "buildarena:state"
 """Where a sample's store keeps how its episode stood when it was scored."""
@@ -64,7 +64,7 @@ class Conditions:
             rounds=self.rounds,
             limits=Limits(steps=self.steps),
             rewards=self.rewards,
-            tries=trial_processes(),
+            tries=try_machine,
         )
 
     def as_metadata(self) -> dict[str, Any]:

@@ -13,9 +13,5 @@ class ChoiceError(BuildarenaInspectError, ValueError):
     """A task argument does not exist; the message lists the choices."""
 
 
-class ServiceError(BuildarenaInspectError):
-    """The service refused something, or does not answer."""
-
-
 class UnguardedProgramError(BuildarenaInspectError):
     """A program that starts evaluations is run again by the processes that they start."""

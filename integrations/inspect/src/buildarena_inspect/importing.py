@@ -11,11 +11,11 @@ from hashlib import sha256
 from itertools import islice
 from typing import Any, Final
 
+from buildarena_client import Client, RefusedError, TimedOutError
 from buildarena_environment import ASSEMBLY, MAIN
 from buildarena_environment.workbench import NAME
 from buildarena_geometry.json_values import levels
 from buildarena_inspect.logs import LoggedSample, Unusable
-from buildarena_inspect.service import RefusedError, Service
 
 PREFIX: Final = "inspect-"
 """Begins the name of every imported builder, so that a leaderboard says where it comes from."""
@@ -57,7 +57,7 @@ class Imported:
 
 
 def bring(
-    sample: LoggedSample, service: Service, *, agent: str | None = None, within_s: float
+    sample: LoggedSample, service: Client, *, agent: str | None = None, within_s: float
 ) -> Imported | Unusable:
     """Makes a sample's calls again in a session, and compares what the service finds.
 
@@ -71,20 +71,20 @@ def bring(
         within_s: Seconds to wait for the job's end.
 
     Raises:
-        ServiceError: The service does not answer, or refuses what it should not.
+        ClientError: The service does not answer, or refuses what it should not.
     """
     why = _hindrance(sample, service)
     if why:
         return Unusable(sample=sample.sample, epoch=sample.epoch, why=why)
     name = (PREFIX + (agent or sample.agent))[:MAX_NAME]
-    wanted = {
+    wanted: dict[str, Any] = {
         "task": sample.conditions.task,
         "agent": name,
         "seed": seed_of(sample),
         "simulator": sample.conditions.simulator,
     }
     try:
-        opened = service.post("/v1/sessions", wanted)
+        opened = service.open_session(**wanted)
     except RefusedError as error:
         found = None
         if error.status == UNPROCESSABLE:
@@ -96,7 +96,7 @@ def bring(
     else:
         job_id, again = str(opened["id"]), False
         _play(sample, service, job_id, made=int(opened["calls"]))
-    job = service.ended(job_id, within_s)
+    job = _ended(job_id, service, within_s)
     return Imported(
         sample=sample.sample,
         epoch=sample.epoch,
@@ -114,7 +114,7 @@ def seed_of(sample: LoggedSample) -> int:
     return int.from_bytes(digest[:8], "big") % (MAX_SEED + 1)
 
 
-def _hindrance(sample: LoggedSample, service: Service) -> str:
+def _hindrance(sample: LoggedSample, service: Client) -> str:
     """Why the service could not judge a sample as its log did; "" where it can."""
     conditions = sample.conditions
     if len(sample.calls) > MAX_CALLS:
@@ -137,23 +137,29 @@ def _hindrance(sample: LoggedSample, service: Service) -> str:
     return ""
 
 
-def _play(sample: LoggedSample, service: Service, session: str, *, made: int) -> None:
-    calls = f"/v1/sessions/{session}/calls"
+def _play(sample: LoggedSample, service: Client, session: str, *, made: int) -> None:
     # What a session does not even read was refused in the log too, and changed nothing.
     sent = [call for call in sample.calls if _readable(call)]
     for call in sent[made:]:
-        service.post(calls, dict(call))
-    submit = f"/v1/sessions/{session}/submit"
+        service.call_tool(session, call["tool"], call["arguments"], machine=call["machine"])
     try:
-        service.post(submit)
+        service.submit_session(session)
     except RefusedError as error:
         if error.status != CONFLICT:
             raise
         # Nothing to submit is a failure in the log, so it is one here: of an empty machine.
         machines = {call["machine"] for call in sent}
         machine = ASSEMBLY if len(machines) > 1 else MAIN
-        service.post(calls, {"machine": machine, "tool": "get_machine_summary"})
-        service.post(submit)
+        service.call_tool(session, "get_machine_summary", machine=machine)
+        service.submit_session(session)
+
+
+def _ended(job_id: str, service: Client, within_s: float) -> Mapping[str, Any]:
+    """A job once it has ended, or as it is when the time is over."""
+    try:
+        return service.wait_for_job(job_id, timeout_s=within_s)
+    except TimedOutError:
+        return service.job(job_id)
 
 
 def _readable(call: Mapping[str, Any]) -> bool:
@@ -164,7 +170,7 @@ def _readable(call: Mapping[str, Any]) -> bool:
     return len(json.dumps(arguments).encode()) <= MAX_BYTES
 
 
-def _brought_before(wanted: dict[str, Any], service: Service) -> str | None:
+def _brought_before(wanted: dict[str, Any], service: Client) -> str | None:
     """The job that an earlier import made of a sample, if there is one."""
     model = f"agent/{wanted['agent']}"
     cursor: dict[str, str] = {}
@@ -178,7 +184,7 @@ def _brought_before(wanted: dict[str, Any], service: Service) -> str | None:
         cursor = {"cursor": str(page["next_cursor"])}
 
 
-def _differences(sample: LoggedSample, job: dict[str, Any]) -> Iterator[str]:
+def _differences(sample: LoggedSample, job: Mapping[str, Any]) -> Iterator[str]:
     """Where the service's figures are others than the log's."""
     there = {"success": sample.success, "flags": sorted(sample.flags)}
     here = {"success": bool(job["success"]), "flags": sorted(job["flags"] or [])}

@@ -28,7 +28,7 @@ from inspect_ai.tool import ToolInfo
 from buildarena_inspect.building import Building
 from buildarena_inspect.scorers import machine_hash
 from buildarena_inspect.tools import parameters_of
-from buildarena_inspect.trial_processes import trial_processes
+from buildarena_inspect.trial_processes import try_machine
 from buildarena_pipeline.runtime.trial_books import tracked_at_1_hz
 from buildarena_store import JournalEntry, RolloutRecord, Usage
 from buildarena_worker.session.messages import Message, Reply, Request, ToolCall
@@ -94,9 +94,7 @@ class RoleHost:
         del controls  # a copy of the machine's own
         building = self._building
         environment = building.environment
-        trial = trial_processes()(
-            environment.task, machine, environment.simulator, seed=environment.seed
-        )
+        trial = try_machine(environment.task, machine, environment.simulator, seed=environment.seed)
         building.adopt(machine, trial)
         number = len(environment.trials) - 1
         return _record(trial, number, environment.simulator, machine_hash(machine), final=final)
