@@ -39,6 +39,7 @@ test: check check-web-if-it-can-be ## Lints, types, import rules and all tests
 
 test-long: $(WEB_STAMP) ## Further variants and larger sizes of what make test tries
 	@BUILDARENA_TEST_LONG=1 $(BIN)/pytest -n $(WORKERS) --dist loadgroup -rs -m "long or sized"
+	@BUILDARENA_TEST_LONG=1 $(MAKE) --no-print-directory test-integrations
 
 check: $(STAMP) ## Lints, types and import rules alone
 	@echo "== 1/7 format"

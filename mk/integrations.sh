@@ -34,7 +34,8 @@ run_tests() {
     local name failed=0
     for name in "$@"; do
         echo "-- $name"
-        "$environments/$name/bin/pytest" "integrations/$name/tests" -n "${WORKERS:-2}" --dist loadgroup -rs || failed=1
+        "$environments/$name/bin/pytest" "integrations/$name/tests" -n "${WORKERS:-2}" --dist loadgroup -rs \
+            -m "${BUILDARENA_TEST_LONG:+long or }not long" || failed=1
     done
     return "$failed"
 }
