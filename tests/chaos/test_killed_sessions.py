@@ -16,9 +16,9 @@ from long_tests import LONG
 from provider_standin import ProviderStandIn
 from running import wait_until
 
+from buildarena_geometry.machine_files import machine_bytes
 from buildarena_pipeline.catalog.models import load_registry
 from buildarena_pipeline.catalog.specs import JobSpec
-from buildarena_pipeline.runtime.machine_documents import machine_bytes
 from buildarena_pipeline.runtime.reaper import Reaper
 from buildarena_pipeline.submission.submission import Submissions
 

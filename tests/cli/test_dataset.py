@@ -28,8 +28,8 @@ from buildarena_cli.defaults import KEY_VARIABLE
 from buildarena_cli.errors import CommandError
 from buildarena_geometry import Machine
 from buildarena_geometry import replay as done_again
+from buildarena_geometry.machine_files import machine_bytes
 from buildarena_pipeline.runtime.context import open_context
-from buildarena_pipeline.runtime.machine_documents import machine_bytes
 
 MODELS = ["builtin/expert", "builtin/random", "builtin/idle"]
 SWEEP = {

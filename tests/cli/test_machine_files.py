@@ -11,8 +11,8 @@ from working import work
 
 from buildarena_cli.errors import CommandError
 from buildarena_cli.main import app
+from buildarena_geometry.machine_files import machine_bytes
 from buildarena_pipeline.catalog.specs import JobSpec
-from buildarena_pipeline.runtime.machine_documents import machine_bytes
 
 SUSPENSION_BRIDGE = Path(__file__).parents[2] / "examples" / "tasks" / "suspension-bridge.yaml"
 

@@ -15,7 +15,7 @@ from provider_standin import ProviderStandIn
 from sqlalchemy import Connection, text
 
 from buildarena_benchmark import builtin_tasks, score
-from buildarena_pipeline.runtime.machine_documents import machine_bytes
+from buildarena_geometry.machine_files import machine_bytes
 from buildarena_simulation import simulate
 from buildarena_store import Database
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from buildarena_pipeline.runtime.machine_documents import machine_bytes
+from buildarena_geometry.machine_files import machine_bytes
 from buildarena_store import JournalEntry, RolloutRecord, Usage
 from buildarena_worker.session.results import Failed, Finished, LimitReached, Suspended
 from buildarena_worker.workflow.rounds import Loop

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from hashlib import sha256
 from importlib.metadata import version
 from typing import Any, Final
@@ -15,6 +14,7 @@ from buildarena_benchmark.tasks.task import SCORER_VERSION
 from buildarena_environment import Trial
 from buildarena_environment.trials import told
 from buildarena_geometry import Machine
+from buildarena_geometry.machine_files import machine_bytes
 from buildarena_inspect.building import Building, building_of
 from buildarena_inspect.metrics import indicator_by_task, mean_rank, success_interval
 from buildarena_simulation import SIMULATION_VERSION
@@ -110,7 +110,4 @@ def described(building: Building, trial: Trial) -> dict[str, Any]:
 
 def machine_hash(machine: Machine) -> str:
     """The hash by which the service keeps a machine's document."""
-    text = json.dumps(
-        machine.to_document(), ensure_ascii=False, sort_keys=True, separators=(",", ":")
-    )
-    return sha256(text.encode()).hexdigest()
+    return sha256(machine_bytes(machine)).hexdigest()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import TYPE_CHECKING
 
 from buildarena_geometry.errors import DocumentError
@@ -36,6 +37,13 @@ def machine_of(content: object, *, where: str, catalogue: Catalogue | None = Non
         raise DocumentError(f"{where}: sub_structures is an object of action logs by name")
     built = {name: _built(log, {}, f"{where}, {name}", catalogue) for name, log in parts.items()}
     return _built(actions, built, where, catalogue)
+
+
+def machine_bytes(machine: Machine) -> bytes:
+    """A machine's document in one spelling, so that equal ones share a hash: UTF-8 JSON."""
+    return json.dumps(
+        machine.to_document(), ensure_ascii=False, sort_keys=True, separators=(",", ":")
+    ).encode()
 
 
 def _built(

@@ -5,13 +5,13 @@ from __future__ import annotations
 from decimal import Decimal
 from typing import assert_never
 
+from buildarena_geometry.machine_files import machine_bytes
 from buildarena_pipeline.catalog.models import ModelRegistry
 from buildarena_pipeline.catalog.prices import price_usd
 from buildarena_pipeline.catalog.prompt_packs import PromptPacks
 from buildarena_pipeline.catalog.tasks import TaskCatalog
 from buildarena_pipeline.errors import PermanentError
 from buildarena_pipeline.runtime.active_lease import ActiveLease
-from buildarena_pipeline.runtime.machine_documents import machine_bytes
 from buildarena_pipeline.runtime.notify import Notifier
 from buildarena_pipeline.runtime.scoring import failure_score, rollout_score, task_of
 from buildarena_simulation import read_trajectory

@@ -22,13 +22,13 @@ from sqlalchemy.exc import OperationalError
 from buildarena_benchmark import Task, broken_constraint, failed_score, score
 from buildarena_besiege import LogIncompleteError, MachineNotPlayableError, prepare_run
 from buildarena_geometry import KeyPress, Machine
+from buildarena_geometry.machine_files import machine_bytes
 from buildarena_pipeline.agents.workbench import Workbench
 from buildarena_pipeline.catalog.prompt_packs import PromptPacks
 from buildarena_pipeline.catalog.simulators import BESIEGE
 from buildarena_pipeline.catalog.tasks import TaskCatalog
 from buildarena_pipeline.catalog.tracks import EXTERNAL_WORKFLOW, FILE_WORKFLOW
 from buildarena_pipeline.errors import PermanentError
-from buildarena_pipeline.runtime.machine_documents import machine_bytes
 from buildarena_pipeline.runtime.scoring import best_rollout, task_of
 from buildarena_simulation import (
     SIMULATION_VERSION,

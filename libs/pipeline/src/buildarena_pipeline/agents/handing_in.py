@@ -9,10 +9,10 @@ from sqlalchemy import Connection
 
 from buildarena_benchmark import Task, ValidationIssue, broken_constraint
 from buildarena_geometry import Machine
+from buildarena_geometry.machine_files import machine_bytes
 from buildarena_pipeline.catalog.simulators import simulator_issues
 from buildarena_pipeline.errors import SubmissionError
 from buildarena_pipeline.runtime.context import Context
-from buildarena_pipeline.runtime.machine_documents import machine_bytes
 from buildarena_pipeline.runtime.scoring import failure_score, task_of
 from buildarena_pipeline.transcript import Transcript
 from buildarena_store import Lease, Outcome, RolloutRequest, Stage

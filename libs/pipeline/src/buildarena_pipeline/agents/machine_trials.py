@@ -6,12 +6,12 @@ from hashlib import sha256
 from typing import Final
 
 from buildarena_geometry import Machine
+from buildarena_geometry.machine_files import machine_bytes
 from buildarena_pipeline.agents.handing_in import chosen_task, hand_in
 from buildarena_pipeline.catalog.simulators import simulation_version
 from buildarena_pipeline.catalog.tracks import file_track
 from buildarena_pipeline.errors import PipelineError
 from buildarena_pipeline.runtime.context import Context
-from buildarena_pipeline.runtime.machine_documents import machine_bytes
 from buildarena_store import Job, JobKey, NewJob
 from buildarena_store.jobs.files import files_under_way
 from buildarena_store.jobs.job import configuration_hash

@@ -105,7 +105,7 @@ def export(
         elif out.suffix == ".svg":
             out.write_text(machine_svg(machine), encoding="utf-8")
         elif out.suffix == ".json":
-            from buildarena_pipeline.runtime.machine_documents import machine_bytes
+            from buildarena_geometry.machine_files import machine_bytes
 
             out.write_bytes(machine_bytes(machine))
         else:
@@ -139,7 +139,7 @@ def import_file(
     with shown_errors():
         found = read_imported(file)
         if out is not None:
-            from buildarena_pipeline.runtime.machine_documents import machine_bytes
+            from buildarena_geometry.machine_files import machine_bytes
 
             out.write_bytes(machine_bytes(found.machine))
         facts = {
