@@ -31,7 +31,7 @@ demo: $(STAMP) ## One small sweep from start to leaderboard; stops everything at
 up: $(STAMP) ## The whole service on this machine until Ctrl-C
 	@$(BIN)/buildarena up
 
-test: check check-web-if-it-can-be ## Lints, types, import rules and all tests
+test: check check-integrations check-web-if-it-can-be ## Lints, types, import rules and all tests
 	@echo "== 6/7 tests, $(WORKERS) at once (left out: make test-long, chaos, peer and bench-*)"
 	@$(BIN)/pytest -n $(WORKERS) --dist loadgroup -rs
 	@echo "== 7/7 adapters, each in its own environment"

@@ -23,7 +23,7 @@ IN_CONTAINERS = (
     "+net_bind_service,+net_raw,+sys_chroot,+mknod,+audit_write,+setfcap"
 )
 """Capabilities that root has in a container by default; mounting is not among them."""
-SOURCES = ["libs/*/src", "services/*/src", "clients/cli/src", "tests/support"]
+SOURCES = ["libs/*/src", "services/*/src", "clients/cli/src", "clients/python/src", "tests/support"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
