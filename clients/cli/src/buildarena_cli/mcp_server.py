@@ -20,23 +20,18 @@ from mcp.server.stdio import stdio_server
 from buildarena_cli.client import Client, at
 from buildarena_cli.errors import CommandError
 from buildarena_cli.ids import checked_id
-from buildarena_geometry import tool_definitions
+from buildarena_environment import MAIN
+from buildarena_environment.workbench import MACHINE, building_tools
 from buildarena_geometry.modules.names import CaselessNames
 from buildarena_pipeline.catalog.simulators import SIMULATORS
 
-GROUPS = ("build", "refine", "assemble", "control", "query")
 INSTRUCTIONS = """Build a machine for a BuildArena task. Call list_tasks, then open_session for one
 task; read its answer: the task, the rules and the modules; call start and the other tools with the
 session's id until the machine is finished; then call submit, and get_result until the job has
 ended. Calls of a session are carried out one at a time, in the order in which they arrive."""
 SESSION = {
     "session": {"type": "string", "description": "Id that open_session gave."},
-    "machine": {
-        "type": "string",
-        "description": "Sub-structure it is meant for, a new one if there is none of this name; "
-        "'assembly' joins copies of all others.",
-        "default": "main",
-    },
+    "machine": MACHINE,
 }
 
 Arguments = Mapping[str, Any]
@@ -49,7 +44,7 @@ def make_server(client: Client) -> Server[Any]:
         client: The API.
     """
     tools = _tools()
-    machine_tools = CaselessNames(tool.name for tool in tool_definitions(GROUPS))
+    machine_tools = CaselessNames(tool.name for tool in building_tools())
     # Threads would carry out calls that were sent side by side in any order.
     turns: defaultdict[object, asyncio.Lock] = defaultdict(asyncio.Lock)
 
@@ -147,7 +142,7 @@ def _tools() -> list[types.Tool]:
                 ["session", *tool.parameters.get("required", [])],
             ),
         )
-        for tool in tool_definitions(GROUPS)
+        for tool in building_tools()
     ]
     return managing + building
 
@@ -157,7 +152,7 @@ def _object(properties: Mapping[str, Any], required: list[str]) -> dict[str, Any
 
 
 def _act(client: Client, tool: str, given: dict[str, Any]) -> types.CallToolResult:
-    session, machine = given.pop("session"), given.pop("machine", "main")
+    session, machine = given.pop("session"), given.pop("machine", MAIN)
     body = {"tool": tool, "arguments": given, "machine": machine}
     done = client.post(at("sessions", checked_id("job", session), "calls"), body)
     return _result(done["feedback"], failed=not done["ok"])
