@@ -38,12 +38,11 @@ ASSEMBLE = (
     "flip_spin",
     *QUERIES,
 )
-GROUPS = ("build", "refine", "assemble", "control", "query")
 
 
 def tools_named(names: Sequence[str]) -> list[Tool]:
     """The library's tool definitions with these names, in this order."""
-    known = {tool.name: tool for tool in tool_definitions(GROUPS)}
+    known = {tool.name: tool for tool in tool_definitions()}
     return [
         Tool(
             name=name,
