@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import threading
 from collections.abc import Mapping
 from typing import Any
 
 from buildarena_environment import Answer, Environment, NothingToSubmitError, best_trial, call
+from buildarena_geometry.json_texts import read_json
 from buildarena_verifiers.trial_runners import TrialRunner
 
 
@@ -97,6 +97,6 @@ def _read(arguments: str) -> object:
     if not arguments.strip():
         return None
     try:
-        return json.loads(arguments)
-    except (ValueError, RecursionError):
+        return read_json(arguments)
+    except ValueError:
         return arguments

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from typing import Final
 
 from buildarena_besiege.importing.machine import ImportedMachine, read_machine_file
 from buildarena_geometry import KeyPress
 from buildarena_geometry.errors import DocumentError
+from buildarena_geometry.json_texts import read_json
 from buildarena_geometry.keys import KEYS
 from buildarena_geometry.machine_files import machine_of
 from buildarena_geometry.reading import Reader
@@ -61,7 +61,7 @@ def read_presses(data: bytes, *, where: str) -> tuple[KeyPress, ...]:
 
 def _json(data: bytes, where: str) -> object:
     try:
-        content: object = json.loads(data.decode("utf-8-sig"))
-    except (ValueError, RecursionError) as error:
+        content: object = read_json(data.decode("utf-8-sig"))
+    except ValueError as error:
         raise DocumentError(f"{where}: not valid JSON: {error}") from error
     return content

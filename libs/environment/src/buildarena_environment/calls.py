@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -10,6 +9,7 @@ from buildarena_environment.environment import Environment, Submission
 from buildarena_environment.errors import CallError, NothingToSubmitError
 from buildarena_environment.trials import Trial
 from buildarena_environment.workbench import MAIN, SUBMIT
+from buildarena_geometry.json_texts import read_json
 
 EXAMPLE: Final = '{"tool": "start", "arguments": {}}'
 """A call as text."""
@@ -105,8 +105,8 @@ def read_call(text: str, *, longest: int | None = None) -> tuple[str, dict[str, 
     if longest is not None and len(text) > longest:
         raise CallError(f"the call has {len(text):,} characters: at most {longest:,} are read")
     try:
-        found = json.loads(text)
-    except (ValueError, RecursionError) as error:
+        found = read_json(text)
+    except ValueError as error:
         raise CallError(f"this is not valid JSON ({error}): write {EXAMPLE}") from None
     if not isinstance(found, dict):
         raise CallError(f"a call is an object: write {EXAMPLE}")

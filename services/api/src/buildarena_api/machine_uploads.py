@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import json
 from typing import Any, Final
 
 from fastapi import Request
 
-from buildarena_api.http.limits import is_too_deep
 from buildarena_api.http.problems import ProblemError
 from buildarena_benchmark import ValidationIssue
 from buildarena_besiege import ImportedMachine, MachineFileError, read_machine_file
 from buildarena_geometry import DocumentError, Machine
+from buildarena_geometry.json_texts import TooDeepError, read_json
 from buildarena_simulation.constants import MAX_PARTS
 
 MAX_BYTES: Final = 2 << 20
@@ -68,10 +67,10 @@ def refused(message: str) -> ProblemError:
 def _document(data: bytes) -> object:
     if data.startswith(_GLB):
         raise refused("a GLB file has shapes only: it can be looked at, not checked or tried")
-    if is_too_deep(data):
-        raise refused("the file has too many arrays or objects inside each other")
     try:
-        content: object = json.loads(data.decode("utf-8-sig"))
+        content: object = read_json(data.decode("utf-8-sig"))
+    except TooDeepError as error:
+        raise refused(f"the file has {error}") from error
     except ValueError as error:
         raise refused(
             f"neither a machine document (JSON) nor a machine file of the game (.bsg): {error}"

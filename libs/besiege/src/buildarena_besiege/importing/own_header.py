@@ -5,13 +5,13 @@ Nothing in it is believed unless every word of it fits the blocks of the file.
 
 from __future__ import annotations
 
-import json
 from typing import TYPE_CHECKING, Any, Final
 
 from buildarena_besiege.exporting.header import HEADER_VERSION, MARK, places_digest
 from buildarena_geometry.documents.log import LoggedState
 from buildarena_geometry.documents.read import read_machine
 from buildarena_geometry.errors import DocumentError
+from buildarena_geometry.json_texts import read_json
 from buildarena_geometry.rotations import distance
 
 if TYPE_CHECKING:
@@ -40,8 +40,8 @@ def header_of(script: str) -> dict[str, Any] | None:
     for line in script.splitlines()[:10]:
         if line.startswith(mark):
             try:
-                content = json.loads(line[len(mark) :])
-            except (ValueError, RecursionError) as error:
+                content = read_json(line[len(mark) :])
+            except ValueError as error:
                 raise HeaderError("it is not valid JSON") from error
             if not isinstance(content, dict) or content.get("version") != HEADER_VERSION:
                 raise HeaderError(f"it is not of version {HEADER_VERSION}")

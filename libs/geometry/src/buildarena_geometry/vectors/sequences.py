@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import gzip
-import json
 import zlib
 from typing import TYPE_CHECKING, Any
 
 from buildarena_geometry.errors import SequenceError
+from buildarena_geometry.json_texts import read_json
 from buildarena_geometry.machine import Machine
 from buildarena_geometry.outcomes import Cause, Refused
 from buildarena_geometry.reading import Reader
@@ -60,10 +60,10 @@ def parse(data: bytes) -> object:
     """
     try:
         plain = gzip.decompress(data) if data.startswith(_GZIP_MAGIC) else data
-        content: object = json.loads(plain)
+        content: object = read_json(plain)
     except (OSError, EOFError, zlib.error) as error:
         raise SequenceError(f"input: not gzip: {error}") from error
-    except (ValueError, RecursionError) as error:
+    except ValueError as error:
         raise SequenceError(f"input: not JSON: {error}") from error
     return content
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Collection
 
 import structlog
@@ -10,13 +9,10 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from buildarena_api.http.problems import send_problem
+from buildarena_geometry.json_texts import MAX_DEPTH, is_too_deep
 
 MAX_BYTES = 4 * 1024 * 1024
 """Largest request body: a sweep of 100,000 seeds has less than a megabyte."""
-MAX_DEPTH = 64
-"""Arrays and objects inside each other: what the API reads has less than ten."""
-STRINGS = re.compile(rb'"[^"\\]*(?:\\.[^"\\]*)*"', re.DOTALL)
-NO_BRACKETS = bytes(set(range(256)) - set(b"[]{}"))
 SECURITY_HEADERS = {
     "X-Content-Type-Options": "nosniff",
     "X-Frame-Options": "DENY",
@@ -102,22 +98,6 @@ class BodyLimitMiddleware:
     async def _refuse(self, send: Send) -> None:
         detail = f"the request is larger than {self._max_bytes:,} bytes"
         await send_problem(send, 413, detail, headers={"Connection": "close"})
-
-
-def is_too_deep(body: bytes, max_depth: int = MAX_DEPTH) -> bool:
-    """Whether a JSON text has more arrays and objects inside each other than that.
-
-    A text that is not JSON may be taken for too deep; it would be refused anyway.
-    """
-    if body.count(b"[") + body.count(b"{") <= max_depth:
-        return False
-    rest = STRINGS.sub(b"", body).translate(None, NO_BRACKETS)
-    # Each round removes the innermost level.
-    for _ in range(max_depth):
-        if not rest:
-            return False
-        rest = rest.replace(b"[]", b"").replace(b"{}", b"")
-    return bool(rest)
 
 
 def _with_headers(send: Send) -> Send:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -11,6 +10,7 @@ from typing import Any
 
 import httpx2
 
+from buildarena_geometry.json_texts import is_too_deep, read_json
 from buildarena_worker.providers.answered import TokenCounts
 from buildarena_worker.providers.bounds import MAX_BODY
 from buildarena_worker.providers.failures import Failure, ProviderError, redirected
@@ -40,7 +40,7 @@ class Received:
         """Checks what the libraries do not.
 
         Raises:
-            ProviderError: It is a redirect, or too long.
+            ProviderError: It is a redirect, too long, or nests too deep.
         """
         if self.status is None:
             return
@@ -48,6 +48,8 @@ class Received:
             raise redirected(self.status, self.location)
         if self.succeeded and len(self.body) > MAX_BODY:
             raise ProviderError(f"the answer is longer than {MAX_BODY:,} bytes", Failure.GARBAGE)
+        if self.succeeded and is_too_deep(self.body):
+            raise ProviderError("the answer nests too deep to be read", Failure.GARBAGE)
 
     @property
     def succeeded(self) -> bool:
@@ -57,8 +59,8 @@ class Received:
     def tokens(self) -> TokenCounts:
         """What the answer says it used, as far as that can be read."""
         try:
-            answer = json.loads(self.body)
-        except (ValueError, RecursionError):
+            answer = read_json(self.body)
+        except ValueError:
             return TokenCounts()
         for name, (sent, received, cached) in USAGE.items():
             usage = answer.get(name) if isinstance(answer, dict) else None

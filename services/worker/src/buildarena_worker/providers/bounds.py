@@ -6,6 +6,7 @@ import json
 import math
 from typing import Any
 
+from buildarena_geometry.json_texts import read_json
 from buildarena_geometry.json_values import levels
 from buildarena_worker.session.messages import Reply, ToolCall
 
@@ -57,8 +58,8 @@ def arguments_of(raw: Any) -> Any:
     if len(raw) > MAX_ARGUMENTS:
         return raw[:MAX_ARGUMENTS]
     try:
-        return json.loads(raw) if raw.strip() else {}
-    except (ValueError, RecursionError):
+        return read_json(raw) if raw.strip() else {}
+    except ValueError:
         return raw
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from buildarena_geometry import KeyPress, Machine
+from buildarena_geometry.json_texts import read_json
 from buildarena_pipeline.runtime.scoring import best_rollout
 from buildarena_store import RolloutRecord
 from buildarena_worker.session.dialogue import Dialogue, Role
@@ -194,8 +194,8 @@ def _json_object(text: str) -> dict[str, Any]:
     if start < 0 or end < start:
         raise _ProgramError("the answer holds no JSON object")
     try:
-        data = json.loads(text[start : end + 1])
-    except (ValueError, RecursionError) as error:
+        data = read_json(text[start : end + 1])
+    except ValueError as error:
         raise _ProgramError(f"the answer's JSON can't be read: {error}") from error
     if not isinstance(data, dict):
         raise _ProgramError("the answer must be one JSON object")

@@ -6,7 +6,6 @@ each answer means is compared with kept ones in ``tests/worker/providers/openai/
 
 from __future__ import annotations
 
-import json
 import uuid
 from collections.abc import Mapping
 from contextlib import suppress
@@ -15,6 +14,7 @@ from typing import Any
 
 from genai_prices.data_snapshot import get_snapshot
 
+from buildarena_geometry.json_texts import read_json
 from buildarena_worker.providers.answered import Answered, TokenCounts
 from buildarena_worker.providers.bounds import MAX_CALLS, MAX_NAME, arguments_of, bounded
 from buildarena_worker.providers.failures import (
@@ -25,7 +25,7 @@ from buildarena_worker.providers.failures import (
 )
 from buildarena_worker.session.messages import Reply, ToolCall
 
-UNREADABLE = (ValueError, KeyError, IndexError, TypeError, AttributeError, RecursionError)
+UNREADABLE = (ValueError, KeyError, IndexError, TypeError, AttributeError)
 FINISH = {"length": "length", "content_filter": "content_filter"}
 """Reasons to stop that say more than that the model was done."""
 THINKING, THOUGHT = "<think>", "</think>"
@@ -78,7 +78,7 @@ class AnswerReader:
             raise read_error(status, headers, text)
         answer = None
         try:
-            answer = json.loads(text)
+            answer = read_json(text)
             return self._answered(answer)
         except UNREADABLE as error:
             raise ProviderError(
@@ -183,8 +183,8 @@ def read_error(status: int, headers: Mapping[str, str], text: bytes) -> Provider
     """What an error answer means: by its code, its words, or its status."""
     words = text.decode(errors="replace")
     try:
-        body = json.loads(words)
-    except (ValueError, RecursionError):
+        body = read_json(words)
+    except ValueError:
         body = None
     error = body.get("error", body) if isinstance(body, dict) else None
     error = error if isinstance(error, dict) else {}
