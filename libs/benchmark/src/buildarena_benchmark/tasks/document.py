@@ -8,9 +8,11 @@ and what nobody could ever pass is refused.
 import unicodedata
 from typing import Annotated, Final, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationInfo, field_validator
+from pydantic import AfterValidator, Field, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
+from buildarena_benchmark.tasks.fields import Coordinate, Count, Document, Threshold
+from buildarena_benchmark.tasks.workshop_scoring import WorkshopScoring, hopeless
 from buildarena_geometry import load_catalogue
 from buildarena_simulation import Scenario
 
@@ -37,20 +39,13 @@ def _known_module(name: str) -> str:
 
 
 Weight = Annotated[int, Field(ge=1, le=3)]
-Coordinate = Annotated[float, Field(ge=-1e4, le=1e4)]
-Threshold = Annotated[float, Field(ge=0, le=1e6)]
-Count = Annotated[int, Field(ge=0, le=1000)]
 Text = Annotated[str, AfterValidator(_plain)]
 Word = Annotated[str, Field(pattern=r"^[\w .,/²³·%°-]+$", min_length=1, max_length=60)]
 """Stands in tables, plots and TeX: no sign that means something there."""
 ModuleName = Annotated[str, AfterValidator(_known_module)]
 
 
-class _Document(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class Constraints(_Document):
+class Constraints(Document):
     """What a machine for the task may be made of.
 
     Attributes:
@@ -67,7 +62,7 @@ class Constraints(_Document):
     max_sub_structures: Annotated[int, Field(ge=1, le=20, validate_default=True)] = 1
     max_blocks: Annotated[int, Field(ge=2, le=1000)] = 200
     modules: Annotated[tuple[ModuleName, ...], Field(min_length=1, max_length=50)] | None = None
-    min_modules: dict[ModuleName, Annotated[int, Field(ge=1, le=1000)]] = {}
+    min_modules: dict[ModuleName, Annotated[int, Field(ge=1, le=1000)]] = Field(default={})
     min_wheels: Count = 0
 
     @property
@@ -95,7 +90,7 @@ class Constraints(_Document):
         return wanted
 
 
-class TransportScoring(_Document):
+class TransportScoring(Document):
     """How far something is moved over the ground.
 
     Attributes:
@@ -114,7 +109,7 @@ class TransportScoring(_Document):
     target: tuple[Coordinate, Coordinate] = (10.0, 10.0)
 
 
-class SupportScoring(_Document):
+class SupportScoring(Document):
     """How heavy a cargo is carried over a gap.
 
     Attributes:
@@ -129,7 +124,7 @@ class SupportScoring(_Document):
     max_start_height: Threshold = 20.0
 
 
-class ThrustScoring(_Document):
+class ThrustScoring(Document):
     """Thrust over weight.
 
     Attributes:
@@ -140,7 +135,7 @@ class ThrustScoring(_Document):
     min_ratio: Threshold = 1.0
 
 
-class HeightScoring(_Document):
+class HeightScoring(Document):
     """How high a rocket rises.
 
     Attributes:
@@ -158,12 +153,12 @@ class HeightScoring(_Document):
 
 
 Scoring = Annotated[
-    TransportScoring | SupportScoring | ThrustScoring | HeightScoring,
+    TransportScoring | SupportScoring | ThrustScoring | HeightScoring | WorkshopScoring,
     Field(discriminator="name"),
 ]
 
 
-class Indicator(_Document):
+class Indicator(Document):
     """The one figure a task is ranked by.
 
     Attributes:
@@ -175,7 +170,7 @@ class Indicator(_Document):
     unit: Word
 
 
-class Difficulty(_Document):
+class Difficulty(Document):
     """Weight of each difficulty dimension, 1 (low) to 3 (high)."""
 
     quantification: Weight
@@ -186,7 +181,7 @@ class Difficulty(_Document):
     ambiguity: Weight
 
 
-class TaskDocument(_Document):
+class TaskDocument(Document):
     """A task file; see `Task` for what the fields mean."""
 
     name: Annotated[str, Field(pattern=r"^[a-z0-9]+(-[a-z0-9]+)*$", max_length=60)]
@@ -219,7 +214,12 @@ class TaskDocument(_Document):
     @classmethod
     def _somebody_could_pass(cls, scoring: Scoring, info: ValidationInfo) -> Scoring:
         scenario: Scenario | None = info.data.get("scenario")
-        problem = None if scenario is None else _hopeless(scoring, scenario)
+        if scenario is None:
+            return scoring
+        if isinstance(scoring, WorkshopScoring):
+            problem = hopeless(scoring, scenario)
+        else:
+            problem = _hopeless(scoring, scenario)
         if problem is not None:
             raise ValueError(problem)
         return scoring
