@@ -50,7 +50,7 @@ def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict
     rules: dict[str, Mask] = {
         "not_carried": bears_cargo(trajectory, share=0.8),
         "not_standing": stands(machine, trajectory, joined),
-        "came_apart": joined.all(axis=1),
+        "came_apart": np.asarray(joined.all(axis=1)),
     }
     held = _held(scoring, height, free & np.all(list(rules.values()), axis=0))
     passes = held >= scoring.min_rise
