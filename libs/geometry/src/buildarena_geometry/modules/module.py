@@ -251,6 +251,7 @@ class Module:
         link: what a connector is: a rigid strut, or a rope that pulls and never pushes.
         description: what models read about it.
         besiege_data: further entries of its block in Besiege's machine files: type, key, value.
+        besiege_keys: the entry there that holds the keys of an action, by the action.
     """
 
     name: str
@@ -274,6 +275,7 @@ class Module:
     link: Link = "rigid"
     description: str = ""
     besiege_data: tuple[tuple[str, str, str | int | float | bool], ...] = ()
+    besiege_keys: Mapping[str, str] = field(default_factory=dict)
     face_of_label: Mapping[str, Face] = field(init=False, repr=False, compare=False)
     root_face: str | None = field(init=False, repr=False, compare=False)
 
