@@ -173,7 +173,7 @@ def _module(entry: Reader, usual_of: Mapping[Kind, _Usual]) -> Module:
     entry = Reader(value=entry.value, where=f"{entry.where} ({name})", error=entry.error)
     fields = entry.fields(required=_REQUIRED, optional=_OPTIONAL)
     kind = cast("Kind", fields["kind"].choice(KINDS))
-    besiege = fields["besiege"].fields(required=("id", "data"))
+    besiege = fields["besiege"].fields(required=("id", "data"), optional=("keys",))
     usual = usual_of.get(kind, _Usual())
     landmarks = tuple(map(_landmark, fields.items("landmarks")))
     actions = tuple(action.text(longest=60) for action in fields.items("actions"))
@@ -207,6 +207,7 @@ def _module(entry: Reader, usual_of: Mapping[Kind, _Usual]) -> Module:
         link=cast("Link", fields["link"].choice(LINKS)) if fields.has("link") else "rigid",
         description=fields["description"].text(),
         besiege_data=tuple(map(_besiege_entry, besiege["data"].items())),
+        besiege_keys=_besiege_keys(besiege["keys"], actions) if "keys" in besiege else {},
         root_offset=fields["root_offset"].number(least=0) if "root_offset" in fields else 0.0,
         overlaps_base=fields["overlaps_base"].truth() if "overlaps_base" in fields else False,
         spin=cast("Sense", fields["spin"].choice(SENSES)) if fields.has("spin") else None,
@@ -348,3 +349,8 @@ def _besiege_entry(entry: Reader) -> tuple[str, str, str | int | float | bool]:
     if not isinstance(value.value, str | int | float):
         value.fail("a text, a number, or true or false")
     return (fields["type"].text(), fields["key"].text(), value.value)
+
+
+def _besiege_keys(entry: Reader, actions: tuple[str, ...]) -> dict[str, str]:
+    fields = entry.fields(required=(), optional=actions)
+    return {action: fields[action].text(longest=60) for action in actions if action in fields}

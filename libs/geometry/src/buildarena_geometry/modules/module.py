@@ -203,6 +203,7 @@ class Module:
         link: what a connector is: a rigid strut, or a rope that pulls and never pushes.
         description: what models read about it.
         besiege_data: further entries of its block in Besiege's machine files: type, key, value.
+        besiege_keys: the entry there that holds the keys of an action, by the action.
         root_offset: how far off the face it sits on its root point lies, along the face's normal,
             units.
         overlaps_base: whether its own shape reaches into the block it sits on by design, so that
@@ -235,6 +236,7 @@ class Module:
     link: Link = "rigid"
     description: str = ""
     besiege_data: tuple[tuple[str, str, str | int | float | bool], ...] = ()
+    besiege_keys: Mapping[str, str] = field(default_factory=dict)
     root_offset: float = 0.0
     overlaps_base: bool = False
     spin: Sense | None = None
