@@ -21,12 +21,12 @@ from typing import cast
 
 from buildarena_geometry.errors import CatalogueError
 from buildarena_geometry.modules.facts import FACT_FIELDS, read_facts
+from buildarena_geometry.modules.joints import SENSES, Sense, read_gear, read_joint
 from buildarena_geometry.modules.module import (
     KINDS,
     LINKS,
     MASS_PLACES,
     SEATS,
-    SENSES,
     Catalogue,
     Face,
     Kind,
@@ -37,7 +37,6 @@ from buildarena_geometry.modules.module import (
     Motor,
     Physics,
     Seat,
-    Sense,
     Sphere,
     Thrust,
 )
@@ -49,7 +48,7 @@ from buildarena_geometry.rotations import ORIGIN, dot, from_axes
 CATALOGUE_VERSION = 1
 _REQUIRED = ("name", "kind", "mass", "cost", "size", "description", "besiege")
 _SHAPE = ("center", "faces", "colliders", "body", "pointing", "landmarks")
-_USE = ("actions", "motor", "thrust", "physics", "grabs", "link")
+_USE = ("actions", "motor", "joint", "gear", "thrust", "physics", "grabs", "link")
 _RULES = ("root_offset", "overlaps_base", "spin")
 _OPTIONAL = (*_SHAPE, *_USE, *_RULES, *FACT_FIELDS)
 _MOTOR = ("speed_rpm", "lag_per_s", "torque", "forward", "backward", "forward_sense")
@@ -174,10 +173,14 @@ def _module(entry: Reader, usual_of: Mapping[Kind, _Usual]) -> Module:
     entry = Reader(value=entry.value, where=f"{entry.where} ({name})", error=entry.error)
     fields = entry.fields(required=_REQUIRED, optional=_OPTIONAL)
     kind = cast("Kind", fields["kind"].choice(KINDS))
-    besiege = fields["besiege"].fields(required=("id", "data"))
+    besiege = fields["besiege"].fields(required=("id", "data"), optional=("keys",))
     usual = usual_of.get(kind, _Usual())
     landmarks = tuple(map(_landmark, fields.items("landmarks")))
     actions = tuple(action.text(longest=60) for action in fields.items("actions"))
+    physics = _physics(fields["physics"]) if fields.has("physics") else usual.physics
+    seat = None if physics is None else physics.seat
+    # A joint says all of how its module turns: one without a motor is free of the usual one.
+    motor = None if fields.has("joint") else usual.motor
     module = Module(
         name=name,
         besiege_id=besiege["id"].integer(least=0),
@@ -193,13 +196,18 @@ def _module(entry: Reader, usual_of: Mapping[Kind, _Usual]) -> Module:
         landmarks=landmarks,
         flames=_flames(landmarks) or usual.flames,
         actions=actions,
-        motor=_motor(fields["motor"], actions) if fields.has("motor") else usual.motor,
+        motor=_motor(fields["motor"], actions) if fields.has("motor") else motor,
+        joint=read_joint(fields["joint"], seat=seat, actions=actions)
+        if fields.has("joint")
+        else None,
+        gear=read_gear(fields["gear"], seat=seat) if fields.has("gear") else None,
         thrust=_thrust(fields["thrust"], actions) if fields.has("thrust") else usual.thrust,
-        physics=_physics(fields["physics"]) if fields.has("physics") else usual.physics,
+        physics=physics,
         grabs=fields["grabs"].truth() if "grabs" in fields else False,
         link=cast("Link", fields["link"].choice(LINKS)) if fields.has("link") else "rigid",
         description=fields["description"].text(),
         besiege_data=tuple(map(_besiege_entry, besiege["data"].items())),
+        besiege_keys=_besiege_keys(besiege["keys"], actions) if "keys" in besiege else {},
         root_offset=fields["root_offset"].number(least=0) if "root_offset" in fields else 0.0,
         overlaps_base=fields["overlaps_base"].truth() if "overlaps_base" in fields else False,
         spin=cast("Sense", fields["spin"].choice(SENSES)) if fields.has("spin") else None,
@@ -237,10 +245,11 @@ def _check_use(module: Module, fields: Fields) -> None:
         fields["spin"].fail(f"{module.spin_sense}, as its motor's forward_sense")
     if fields.has("thrust") and module.pointing is None:
         fields["thrust"].fail("no thrust: it acts along `pointing`, which is missing")
-    seat = None if module.physics is None else module.physics.seat
-    if (module.motor is not None) != (seat == "axle"):
-        place = fields.reader.where
-        raise CatalogueError(f"{place}: a motor needs the seat axle, and the seat axle a motor")
+    seat, place = None if module.physics is None else module.physics.seat, fields.reader.where
+    if module.motor is not None and seat != "axle":
+        raise CatalogueError(f"{place}: a motor needs the seat axle")
+    if seat == "axle" and (module.motor is None) == (module.joint is None):
+        raise CatalogueError(f"{place}: the seat axle needs either a motor or a joint")
 
 
 def _face(entry: Reader) -> Face:
@@ -340,3 +349,8 @@ def _besiege_entry(entry: Reader) -> tuple[str, str, str | int | float | bool]:
     if not isinstance(value.value, str | int | float):
         value.fail("a text, a number, or true or false")
     return (fields["type"].text(), fields["key"].text(), value.value)
+
+
+def _besiege_keys(entry: Reader, actions: tuple[str, ...]) -> dict[str, str]:
+    fields = entry.fields(required=(), optional=actions)
+    return {action: fields[action].text(longest=60) for action in actions if action in fields}

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Literal, get_args
 
 from buildarena_geometry.modules.facts import NO_FACTS, Facts
+from buildarena_geometry.modules.joints import Gear, Joint, Sense
 from buildarena_geometry.modules.names import CaselessNames
 from buildarena_geometry.modules.solids import Solid
 from buildarena_geometry.poses import Pose
@@ -27,14 +28,12 @@ Kind = Literal[
 ]
 KINDS: tuple[str, ...] = get_args(Kind)
 ATTACHABLE_KINDS = ("block", "joint", "wheel", "flight", "cannon", "torch", "device")
-Seat = Literal["attachment", "axle", "mount"]
+Seat = Literal["attachment", "axle", "mount", "hinge", "slider", "ball", "constant_velocity"]
 SEATS: tuple[str, ...] = get_args(Seat)
 MassPlace = Literal["center", "body"]
 MASS_PLACES: tuple[str, ...] = get_args(MassPlace)
 Link = Literal["rigid", "rope"]
 LINKS: tuple[str, ...] = get_args(Link)
-Sense = Literal["clockwise", "counterclockwise"]
-SENSES: tuple[str, ...] = get_args(Sense)
 FLUSH_TOLERANCE = 1e-6  # units; faces nearer than this are the same place
 
 
@@ -148,8 +147,9 @@ class Physics:
     """How a block behaves as a body, whatever simulates it.
 
     Attributes:
-        seat: what holds it to the face it sits on: an ordinary attachment, an axle it turns on, or
-            a mount that practically never breaks.
+        seat: what holds it to the face it sits on: an ordinary attachment, a mount that practically
+            never breaks, or a joint it moves on: an axle, a hinge, a slider, a ball, or a
+            constant-velocity joint.
         mass_at: where its mass lies: at the point shown as its position, or in the middle of its
             body.
         structural: whether it is part of the frame that bears loads: what a far end can grab, and
@@ -194,12 +194,16 @@ class Module:
         flames: spheres of fire, which heat what they touch.
         actions: what its keys can make it do.
         motor: what turns it on its axle; None for blocks that do not turn.
+        joint: how it moves on its seat; None for one that does not, and for an axle whose motor
+            says all there is to say.
+        gear: its teeth; None for all but cogs.
         thrust: what pushes it; None for blocks that do not push.
         physics: how it behaves as a body; None for connectors and cargo, which a task describes.
         grabs: whether its far end, opposite to the face it sits on, holds what it touches.
         link: what a connector is: a rigid strut, or a rope that pulls and never pushes.
         description: what models read about it.
         besiege_data: further entries of its block in Besiege's machine files: type, key, value.
+        besiege_keys: the entry there that holds the keys of an action, by the action.
         root_offset: how far off the face it sits on its root point lies, along the face's normal,
             units.
         overlaps_base: whether its own shape reaches into the block it sits on by design, so that
@@ -224,12 +228,15 @@ class Module:
     flames: tuple[Sphere, ...] = ()
     actions: tuple[str, ...] = ()
     motor: Motor | None = None
+    joint: Joint | None = None
+    gear: Gear | None = None
     thrust: Thrust | None = None
     physics: Physics | None = None
     grabs: bool = False
     link: Link = "rigid"
     description: str = ""
     besiege_data: tuple[tuple[str, str, str | int | float | bool], ...] = ()
+    besiege_keys: Mapping[str, str] = field(default_factory=dict)
     root_offset: float = 0.0
     overlaps_base: bool = False
     spin: Sense | None = None
@@ -257,7 +264,10 @@ class Module:
     @property
     def spin_sense(self) -> Sense | None:
         """Which way it turns until its spin is flipped, seen from outside; None without a spin."""
-        return self.spin if self.motor is None else self.motor.forward_sense
+        if self.motor is not None:
+            return self.motor.forward_sense
+        drive = None if self.joint is None else self.joint.drive
+        return self.spin if drive is None else drive.forward_sense
 
 
 class Catalogue(Mapping[str, Module]):
