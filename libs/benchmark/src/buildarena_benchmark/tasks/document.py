@@ -8,12 +8,12 @@ and what nobody could ever pass is refused.
 import unicodedata
 from typing import Annotated, Final, Literal
 
-from pydantic import AfterValidator, Field, ValidationInfo, field_validator
+from pydantic import AfterValidator, Discriminator, Field, Tag, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
 from buildarena_benchmark.tasks.fields import Coordinate, Count, Document, Threshold
 from buildarena_benchmark.tasks.workshop_scoring import WorkshopScoring, hopeless
-from buildarena_geometry import load_catalogue
+from buildarena_geometry import MODULE_SETS, module_set, modules_named
 from buildarena_simulation import Scenario
 
 MAX_BLOCK_SECONDS: Final = 20_000
@@ -31,11 +31,24 @@ def _plain(text: str) -> str:
 
 def _known_module(name: str) -> str:
     # Cargo is placed by the scenario, never by a builder.
-    known = [module.name for module in load_catalogue().values() if module.kind != "cargo"]
-    if name not in known:
+    simulated = module_set("workshop")
+    if name not in simulated:
         message = f"there is no module {name!r}"
-        raise PydanticCustomError("unknown_module", message, {"choices": sorted(known)})
+        if name in module_set("all"):
+            message = f"{name!r} can be built, but is not simulated"
+        known = sorted(module.name for module in simulated.values())
+        raise PydanticCustomError("unknown_module", message, {"choices": known})
     return name
+
+
+def _known_set(chosen: str) -> str:
+    simulated = [name for name in MODULE_SETS if name != "all"]
+    if chosen not in simulated:
+        message = f"there is no module set {chosen!r}"
+        if chosen in MODULE_SETS:
+            message = f"the module set {chosen!r} has modules that are not simulated"
+        raise PydanticCustomError("unknown_set", message, {"choices": simulated})
+    return chosen
 
 
 Weight = Annotated[int, Field(ge=1, le=3)]
@@ -43,6 +56,8 @@ Text = Annotated[str, AfterValidator(_plain)]
 Word = Annotated[str, Field(pattern=r"^[\w .,/²³·%°-]+$", min_length=1, max_length=60)]
 """Stands in tables, plots and TeX: no sign that means something there."""
 ModuleName = Annotated[str, AfterValidator(_known_module)]
+ModuleSet = Annotated[str, AfterValidator(_known_set)]
+ModuleNames = Annotated[tuple[ModuleName, ...], Field(min_length=1, max_length=50)]
 
 
 class Constraints(Document):
@@ -53,7 +68,8 @@ class Constraints(Document):
         max_sub_structures: Most sub-structures.
         max_blocks: Most blocks per sub-structure, connectors not counted; the whole machine may
             have as many for each sub-structure that is allowed.
-        modules: Names of the modules that may be used; None for all.
+        modules: Which modules may be used: a set's name, or names of modules; None for the basic
+            set.
         min_modules: Fewest blocks or connectors of a module, by its name.
         min_wheels: Fewest powered wheels; shown to builders, judged by the scorer.
     """
@@ -61,7 +77,13 @@ class Constraints(Document):
     min_sub_structures: Annotated[int, Field(ge=1, le=20)] = 1
     max_sub_structures: Annotated[int, Field(ge=1, le=20, validate_default=True)] = 1
     max_blocks: Annotated[int, Field(ge=2, le=1000)] = 200
-    modules: Annotated[tuple[ModuleName, ...], Field(min_length=1, max_length=50)] | None = None
+    modules: (
+        Annotated[
+            Annotated[ModuleSet, Tag("set")] | Annotated[ModuleNames, Tag("names")],
+            Discriminator(lambda given: "set" if isinstance(given, str) else "names"),
+        ]
+        | None
+    ) = None
     min_modules: dict[ModuleName, Annotated[int, Field(ge=1, le=1000)]] = Field(default={})
     min_wheels: Count = 0
 
@@ -83,9 +105,9 @@ class Constraints(Document):
     def _wanted_modules_are_allowed(
         cls, wanted: dict[str, int], info: ValidationInfo
     ) -> dict[str, int]:
-        allowed = info.data.get("modules")
+        allowed = modules_named(info.data.get("modules"))
         for name in wanted:
-            if allowed is not None and name not in allowed:
+            if name not in allowed:
                 raise ValueError(f"{name} is not among the task's modules")
         return wanted
 
