@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import cast
 
 from buildarena_geometry.errors import CatalogueError
+from buildarena_geometry.modules.forces import FORCE_FIELDS, read_forces
 from buildarena_geometry.modules.module import (
     KINDS,
     LINKS,
@@ -51,7 +52,7 @@ CATALOGUE_VERSION = 1
 _REQUIRED = ("name", "kind", "mass", "cost", "size", "description", "besiege")
 _SHAPE = ("center", "faces", "colliders", "body", "pointing", "landmarks")
 _USE = ("actions", "motor", "thrust", "physics", "grabs", "link")
-_OPTIONAL = (*_SHAPE, *_USE)
+_OPTIONAL = (*_SHAPE, *_USE, *FORCE_FIELDS)
 _MOTOR = ("speed_rpm", "lag_per_s", "torque", "forward", "backward", "forward_sense")
 _THRUST = ("action", "along", "cold", "heated", "spheres")
 _PHYSICS = ("seat", "mass_at", "structural", "friction", "linear_drag", "angular_drag")
@@ -190,6 +191,7 @@ def _module(entry: Reader, usual_of: Mapping[Kind, _Usual]) -> Module:
         link=cast("Link", fields["link"].choice(LINKS)) if fields.has("link") else "rigid",
         description=fields["description"].text(),
         besiege_data=tuple(map(_besiege_entry, besiege["data"].items())),
+        forces=read_forces(fields, actions),
     )
     _check_sense(module, entry)
     _check_use(module, fields)

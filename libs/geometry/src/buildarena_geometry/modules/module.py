@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Literal, get_args
 
+from buildarena_geometry.modules.forces import NO_FORCES, Forces
 from buildarena_geometry.modules.names import CaselessNames
 from buildarena_geometry.poses import Pose
 from buildarena_geometry.rotations import ORIGIN, Vector, distance, from_axes
@@ -251,6 +252,7 @@ class Module:
         link: what a connector is: a rigid strut, or a rope that pulls and never pushes.
         description: what models read about it.
         besiege_data: further entries of its block in Besiege's machine files: type, key, value.
+        forces: what it exerts by itself: fans, wings, balloons, springs and what lets go.
     """
 
     name: str
@@ -274,6 +276,7 @@ class Module:
     link: Link = "rigid"
     description: str = ""
     besiege_data: tuple[tuple[str, str, str | int | float | bool], ...] = ()
+    forces: Forces = NO_FORCES
     face_of_label: Mapping[str, Face] = field(init=False, repr=False, compare=False)
     root_face: str | None = field(init=False, repr=False, compare=False)
 
