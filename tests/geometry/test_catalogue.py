@@ -226,7 +226,7 @@ SENSELESS = [
     ),
     (other(CARGO, thrust=CANNON["thrust"]), "action: expected one of "),
     (edit(link="rope"), "link: expected no link: a block is not a connector"),
-    (edit(physics=WHEEL["physics"]), "a motor needs the seat axle, and the seat axle a motor"),
+    (edit(physics=WHEEL["physics"]), "the seat axle needs either a motor or a joint"),
 ]
 
 

@@ -84,9 +84,9 @@ class Block:
 
     @property
     def forward_is_clockwise(self) -> bool:
-        """Whether its motor turns it clockwise, seen from outside, when it runs forward."""
-        motor = self.module.motor
-        return motor is not None and (motor.forward_sense == "clockwise") != self.flipped
+        """Whether it turns clockwise, seen from outside, when it runs forward."""
+        sense = self.module.spin_sense
+        return sense is not None and (sense == "clockwise") != self.flipped
 
     def world_from_face(self, label: str) -> Pose:
         """The frame of one of its faces: origin at the face's centre, +z outwards.

@@ -7,22 +7,34 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Literal, get_args
 
+from buildarena_geometry.modules.facts import NO_FACTS, Facts
 from buildarena_geometry.modules.forces import NO_FORCES, Forces
+from buildarena_geometry.modules.joints import Gear, Joint, Sense
 from buildarena_geometry.modules.names import CaselessNames
+from buildarena_geometry.modules.solids import Solid
 from buildarena_geometry.poses import Pose
-from buildarena_geometry.rotations import ORIGIN, Vector, distance, from_axes
+from buildarena_geometry.rotations import ORIGIN, Vector, distance
 
-Kind = Literal["start", "block", "wheel", "cannon", "torch", "connector", "cargo"]
+Kind = Literal[
+    "start",
+    "block",
+    "joint",
+    "wheel",
+    "flight",
+    "cannon",
+    "torch",
+    "device",
+    "connector",
+    "cargo",
+]
 KINDS: tuple[str, ...] = get_args(Kind)
-ATTACHABLE_KINDS = ("block", "wheel", "cannon", "torch")
-Seat = Literal["attachment", "axle", "mount"]
+ATTACHABLE_KINDS = ("block", "joint", "wheel", "flight", "cannon", "torch", "device")
+Seat = Literal["attachment", "axle", "mount", "hinge", "slider", "ball", "constant_velocity"]
 SEATS: tuple[str, ...] = get_args(Seat)
 MassPlace = Literal["center", "body"]
 MASS_PLACES: tuple[str, ...] = get_args(MassPlace)
 Link = Literal["rigid", "rope"]
 LINKS: tuple[str, ...] = get_args(Link)
-Sense = Literal["clockwise", "counterclockwise"]
-SENSES: tuple[str, ...] = get_args(Sense)
 FLUSH_TOLERANCE = 1e-6  # units; faces nearer than this are the same place
 
 
@@ -48,70 +60,6 @@ class Face:
     def normal(self) -> Vector:
         """(3,) the outward normal, block frame, unit length."""
         return self.block_from_face.direction((0.0, 0.0, 1.0))
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Box:
-    """A box with its edges along the block's axes.
-
-    Attributes:
-        lowest: (3,) its corner with the smallest coordinates, block frame, units.
-        highest: (3,) the corner opposite.
-    """
-
-    lowest: Vector
-    highest: Vector
-
-    @property
-    def center(self) -> Vector:
-        """(3,) its middle, block frame, units."""
-        return _middle(self.lowest, self.highest)
-
-    @property
-    def size(self) -> Vector:
-        """(3,) its edges along x, y and z, units."""
-        (a, b, c), (x, y, z) = self.lowest, self.highest
-        return (x - a, y - b, z - c)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Cylinder:
-    """A right circular cylinder.
-
-    Attributes:
-        radius: units.
-        base: (3,) centre of the one end, block frame, units.
-        top: (3,) centre of the other.
-    """
-
-    radius: float
-    base: Vector
-    top: Vector
-
-    @property
-    def length(self) -> float:
-        """Distance between its ends, units."""
-        return distance(self.base, self.top)
-
-    @property
-    def center(self) -> Vector:
-        """(3,) its middle, block frame, units."""
-        return _middle(self.base, self.top)
-
-    @property
-    def block_from_axis(self) -> Pose:
-        """The frame of its middle in the block's, +z along its axis."""
-        scale = 1 / self.length
-        x, y, z = (scale * (end - start) for start, end in zip(self.base, self.top, strict=True))
-        # Any x axis will do: a cylinder looks the same all round.
-        across = (0.0, -z, y) if abs(x) < max(abs(y), abs(z)) else (-y, x, 0.0)
-        norm = distance(across, ORIGIN)
-        x_axis = (across[0] / norm, across[1] / norm, across[2] / norm)
-        turn = from_axes(x_axis, (x, y, z))
-        return Pose(position=self.center, quaternion=turn)
-
-
-Solid = Box | Cylinder
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -200,8 +148,9 @@ class Physics:
     """How a block behaves as a body, whatever simulates it.
 
     Attributes:
-        seat: what holds it to the face it sits on: an ordinary attachment, an axle it turns on, or
-            a mount that practically never breaks.
+        seat: what holds it to the face it sits on: an ordinary attachment, a mount that practically
+            never breaks, or a joint it moves on: an axle, a hinge, a slider, a ball, or a
+            constant-velocity joint.
         mass_at: where its mass lies: at the point shown as its position, or in the middle of its
             body.
         structural: whether it is part of the frame that bears loads: what a far end can grab, and
@@ -246,12 +195,23 @@ class Module:
         flames: spheres of fire, which heat what they touch.
         actions: what its keys can make it do.
         motor: what turns it on its axle; None for blocks that do not turn.
+        joint: how it moves on its seat; None for one that does not, and for an axle whose motor
+            says all there is to say.
+        gear: its teeth; None for all but cogs.
         thrust: what pushes it; None for blocks that do not push.
         physics: how it behaves as a body; None for connectors and cargo, which a task describes.
         grabs: whether its far end, opposite to the face it sits on, holds what it touches.
         link: what a connector is: a rigid strut, or a rope that pulls and never pushes.
         description: what models read about it.
         besiege_data: further entries of its block in Besiege's machine files: type, key, value.
+        besiege_keys: the entry there that holds the keys of an action, by the action.
+        root_offset: how far off the face it sits on its root point lies, along the face's normal,
+            units.
+        overlaps_base: whether its own shape reaches into the block it sits on by design, so that
+            the two are never compared.
+        spin: which way it turns as it is, seen from outside against its axis; None where it has no
+            spin of its own, or the one of its motor.
+        facts: what is known about it besides, and from where.
         forces: what it exerts by itself: fans, wings, balloons, springs and what lets go.
     """
 
@@ -270,12 +230,19 @@ class Module:
     flames: tuple[Sphere, ...] = ()
     actions: tuple[str, ...] = ()
     motor: Motor | None = None
+    joint: Joint | None = None
+    gear: Gear | None = None
     thrust: Thrust | None = None
     physics: Physics | None = None
     grabs: bool = False
     link: Link = "rigid"
     description: str = ""
     besiege_data: tuple[tuple[str, str, str | int | float | bool], ...] = ()
+    besiege_keys: Mapping[str, str] = field(default_factory=dict)
+    root_offset: float = 0.0
+    overlaps_base: bool = False
+    spin: Sense | None = None
+    facts: Facts = NO_FACTS
     forces: Forces = NO_FORCES
     face_of_label: Mapping[str, Face] = field(init=False, repr=False, compare=False)
     root_face: str | None = field(init=False, repr=False, compare=False)
@@ -295,7 +262,15 @@ class Module:
     @property
     def spins(self) -> bool:
         """Whether it has a spin that can be flipped."""
-        return self.motor is not None
+        return self.spin_sense is not None
+
+    @property
+    def spin_sense(self) -> Sense | None:
+        """Which way it turns until its spin is flipped, seen from outside; None without a spin."""
+        if self.motor is not None:
+            return self.motor.forward_sense
+        drive = None if self.joint is None else self.joint.drive
+        return self.spin if drive is None else drive.forward_sense
 
 
 class Catalogue(Mapping[str, Module]):
@@ -346,7 +321,3 @@ class Catalogue(Mapping[str, Module]):
 
 def _is_root(face: Face) -> bool:
     return distance(face.center, ORIGIN) < FLUSH_TOLERANCE and face.normal[2] < FLUSH_TOLERANCE - 1
-
-
-def _middle(left: Vector, right: Vector) -> Vector:
-    return ((left[0] + right[0]) / 2, (left[1] + right[1]) / 2, (left[2] + right[2]) / 2)
