@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Literal, get_args
 
 from buildarena_geometry.modules.facts import NO_FACTS, Facts
+from buildarena_geometry.modules.forces import NO_FORCES, Forces
 from buildarena_geometry.modules.joints import Gear, Joint, Sense
 from buildarena_geometry.modules.names import CaselessNames
 from buildarena_geometry.modules.solids import Solid
@@ -211,6 +212,7 @@ class Module:
         spin: which way it turns as it is, seen from outside against its axis; None where it has no
             spin of its own, or the one of its motor.
         facts: what is known about it besides, and from where.
+        forces: what it exerts by itself: fans, wings, balloons, springs and what lets go.
     """
 
     name: str
@@ -241,6 +243,7 @@ class Module:
     overlaps_base: bool = False
     spin: Sense | None = None
     facts: Facts = NO_FACTS
+    forces: Forces = NO_FORCES
     face_of_label: Mapping[str, Face] = field(init=False, repr=False, compare=False)
     root_face: str | None = field(init=False, repr=False, compare=False)
 

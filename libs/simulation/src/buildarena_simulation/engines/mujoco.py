@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from buildarena_simulation.constants import MAX_SPIN
+from buildarena_simulation.constants import FORCES_EVERY_S, MAX_SPIN
 from buildarena_simulation.engines.base import CargoPose, World, principal_frames
 from buildarena_simulation.engines.closest_points import ShapeTable, shape_table
 from buildarena_simulation.engines.hinges import hinge_rate
@@ -17,7 +17,7 @@ from buildarena_simulation.structure.contacts import CARGO, WORLD, ContactForces
 from buildarena_simulation.structure.model import BoolArray, FloatArray, IntArray
 from buildarena_simulation.structure.motion import Motion
 from buildarena_simulation.structure.solids import Solid, Solids
-from buildarena_simulation.structure.vectors import cross, turned
+from buildarena_simulation.structure.vectors import cross, turned, turned_wrenches
 
 _TIME_STEP_S = 1 / 500
 _STEPS_PER_EVALUATION = 20
@@ -141,7 +141,8 @@ class MujocoEngine:
             len(wheel_speeds), gravity=self._world.gravity, time_step_s=self.time_step_s
         )
         velocity = data.qvel[at.free_dofs]
-        for row in wheel_speeds:
+        for step, row in enumerate(wheel_speeds):
+            self._apply_own_forces(step)
             if len(at.hinge_wheels):
                 data.ctrl[at.hinge_actuators] = row[at.hinge_wheels] * at.hinge_signs
             mujoco.mj_step(model, data)
@@ -152,10 +153,7 @@ class MujocoEngine:
         self._keep_cargo_state()
         self._impacts = impacts
         self._tensions = self._read_tensions()
-        # A step leaves the kinematics of its beginning behind; bring them up to its end.
-        mujoco.mj_kinematics(model, data)
-        mujoco.mj_comPos(model, data)
-        mujoco.mj_comVel(model, data)
+        self._bring_up()
 
     def contacts(self) -> ContactForces:
         """See `Engine`."""
@@ -191,6 +189,22 @@ class MujocoEngine:
     def close(self) -> None:
         """See `Engine`."""
         del self._data, self._model
+
+    def _apply_own_forces(self, step: int) -> None:
+        field, every = self._world.field, round(FORCES_EVERY_S / self.time_step_s)
+        if field is None or step % every:
+            return
+        if step:
+            self._bring_up()
+        motion, data = self.motion(), self._data
+        wrenches = field.wrenches(self._clusters, motion)
+        data.xfrc_applied[self._addresses.bodies] = turned_wrenches(motion.rotation, wrenches)
+
+    def _bring_up(self) -> None:
+        """Brings the kinematics up to the end of the last step, which leaves its start's behind."""
+        mujoco.mj_kinematics(self._model, self._data)
+        mujoco.mj_comPos(self._model, self._data)
+        mujoco.mj_comVel(self._model, self._data)
 
     def _keep_cargo_state(self) -> None:
         if self._world.cargo is not None:

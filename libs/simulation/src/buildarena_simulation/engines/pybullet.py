@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from buildarena_simulation.constants import FRICTION_TERRAIN, MAX_SPIN
+from buildarena_simulation.constants import FORCES_EVERY_S, FRICTION_TERRAIN, MAX_SPIN
 from buildarena_simulation.engines.base import (
     CargoPose,
     World,
@@ -27,7 +27,12 @@ from buildarena_simulation.engines.base import (
 )
 from buildarena_simulation.engines.bullet_contacts import read_contacts
 from buildarena_simulation.engines.closest_points import shape_table
-from buildarena_simulation.engines.external_forces import Force, drag_forces, thrust_forces
+from buildarena_simulation.engines.external_forces import (
+    Force,
+    body_wrenches,
+    drag_forces,
+    thrust_forces,
+)
 from buildarena_simulation.engines.hinges import HingedPiece, hinge_frames, hinge_rate
 from buildarena_simulation.engines.impacts import ImpactWatch
 from buildarena_simulation.engines.quiet_output import quiet_output
@@ -76,6 +81,7 @@ class PyBulletEngine:
         self._solids = Solids(world.structure)
         self._surfaces: dict[int, int] = {}
         self._cargo: int | None = None
+        self._own: list[tuple[int, Force]] = []
         self._start_world()
 
     @property
@@ -136,11 +142,11 @@ class PyBulletEngine:
         )
         velocity = self._free_velocities()
         driven: FloatArray | None = None
-        for row in wheel_speeds:
+        for step, row in enumerate(wheel_speeds):
             if len(row) and (driven is None or (row != driven).any()):
                 self._drive(row)
                 driven = row
-            self._apply_forces(external_forces, drags)
+            self._apply_forces(external_forces, [*drags, *self._own_forces(step)])
             pybullet.stepSimulation(**self._client)
             before, velocity = velocity, self._free_velocities()
             if impacts.is_impact(velocity - before):
@@ -321,6 +327,13 @@ class PyBulletEngine:
             pybullet.applyExternalTorque(*address[c], torque, frame, **client)
         if self._rope_alive.any():
             self._pull_ropes()
+
+    def _own_forces(self, step: int) -> list[tuple[int, Force]]:
+        field, every = self._world.field, round(FORCES_EVERY_S / self.time_step_s)
+        if field is not None and step % every == 0:
+            wrenches = field.wrenches(self._clusters, self._read_motion())
+            self._own = body_wrenches(wrenches, self._axes)
+        return self._own
 
     def _pull_ropes(self) -> None:
         structure, clusters = self._structure, self._clusters
