@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from xml.etree import ElementTree
+from xml.etree import ElementTree as ET
 
 import pytest
 from tests.besiege.test_reading_files import assert_alike, contents
@@ -13,7 +13,7 @@ from buildarena_geometry import Machine, module_set
 from buildarena_geometry.modules.module import Module
 
 ALL = module_set("all")
-BLOCKS = [name for name in ALL.attachable]
+BLOCKS = list(ALL.attachable)
 CONNECTORS = list(ALL.connectors)
 CARGO = builtin_tasks()["support-1"].scenario
 
@@ -54,7 +54,7 @@ def test_every_type_comes_back_as_it_was(name: str) -> None:
 @pytest.mark.parametrize("name", BLOCKS)
 def test_the_keys_of_every_action_stand_in_the_file(name: str) -> None:
     module = ALL[name]
-    file = ElementTree.fromstring(plain_machine_file(built_with(module), name="m"))
+    file = ET.fromstring(plain_machine_file(built_with(module), name="m"))
     block = next(one for one in file.iter("Block") if one.get("id") == str(module.besiege_id))
     lists = {
         entry.get("key"): [one.text for one in entry.iter("String")]
@@ -74,16 +74,16 @@ def test_a_ballast_of_the_machine_is_told_from_the_cargo() -> None:
 
 
 def test_in_files_of_others_the_ballast_that_sits_on_nothing_is_cargo() -> None:
-    file = ElementTree.fromstring(plain_machine_file(built_with(ALL["Ballast"]), name="m"))
+    file = ET.fromstring(plain_machine_file(built_with(ALL["Ballast"]), name="m"))
     for script in [one for one in file.iter("StringArray") if one.get("key") == "lua_data"]:
         script.text = ""
-    attached = read_machine_file(ElementTree.tostring(file))
+    attached = read_machine_file(ET.tostring(file))
     assert [block.module.name for block in attached.machine.blocks.values()] == [
         "Starting Block",
         "Ballast",
     ]
     ballast = next(one for one in file.iter("Block") if one.get("id") == "35")
     ballast.find("Transform/Position").set("y", "9")
-    loose = read_machine_file(ElementTree.tostring(file))
+    loose = read_machine_file(ET.tostring(file))
     assert [block.module.name for block in loose.machine.blocks.values()] == ["Starting Block"]
     assert any("a cargo is the task's" in one for one in loose.not_understood)
