@@ -9,7 +9,7 @@ from buildarena_geometry.modules.catalogue import basic_modules, extended_module
 from buildarena_geometry.modules.module import Catalogue
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
 MODULE_SETS = ("basic", "workshop", "all")
 
@@ -51,6 +51,19 @@ def modules_named(chosen: str | Sequence[str] | None) -> tuple[str, ...]:
         return tuple(chosen)
     catalogue = module_set(chosen or "basic")
     return (*catalogue.attachable, *catalogue.connectors)
+
+
+def smallest_set(names: Iterable[str]) -> Catalogue:
+    """The first of the sets that has all of these modules; the largest if none has.
+
+    Args:
+        names: modules' names.
+    """
+    wanted = set(names)
+    for name in MODULE_SETS:
+        if wanted <= module_set(name).keys():
+            return module_set(name)
+    return module_set(MODULE_SETS[-1])
 
 
 @cache
