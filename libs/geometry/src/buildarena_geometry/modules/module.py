@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Literal, get_args
 
-from buildarena_geometry.modules.joints import Gear, Joint, Sense
+from buildarena_geometry.modules.joints import Gear, SeatJoint, Sense
 from buildarena_geometry.modules.names import CaselessNames
 from buildarena_geometry.poses import Pose
 from buildarena_geometry.rotations import ORIGIN, Vector, distance, from_axes
@@ -271,7 +271,7 @@ class Module:
     flames: tuple[Sphere, ...] = ()
     actions: tuple[str, ...] = ()
     motor: Motor | None = None
-    joint: Joint | None = None
+    joint: SeatJoint | None = None
     gear: Gear | None = None
     thrust: Thrust | None = None
     physics: Physics | None = None
