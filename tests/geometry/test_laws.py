@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from buildarena_geometry import Machine, replay
-from buildarena_geometry.modules.module import Box
+from buildarena_geometry.modules.solids import Box
 
 ids = st.integers(1, 12).map(str)
 labels = st.sampled_from("ABCDEF")

@@ -1,4 +1,4 @@
-import { BoxGeometry, CylinderGeometry, Quaternion, Vector3, type BufferGeometry } from "three";
+import { BoxGeometry, CylinderGeometry, Quaternion, SphereGeometry, Vector3, type BufferGeometry } from "three";
 import { mergeGeometries } from "three/examples/jsm/utils/BufferGeometryUtils.js";
 import { moduleShape, type Solid } from "./modules";
 
@@ -6,6 +6,7 @@ const SIDES = 24;
 const Y = new Vector3(0, 1, 0);
 
 function solidGeometry(solid: Solid): BufferGeometry {
+  if (solid.shape === "sphere") return new SphereGeometry(solid.radius, SIDES, SIDES / 2).translate(...solid.center);
   const from = new Vector3(...solid.from);
   const to = new Vector3(...solid.to);
   const middle = from.clone().add(to).multiplyScalar(0.5);

@@ -4,7 +4,8 @@ export type Vector = readonly [number, number, number];
 
 export type Solid =
   | { shape: "box"; from: Vector; to: Vector }
-  | { shape: "cylinder"; radius: number; from: Vector; to: Vector };
+  | { shape: "cylinder"; radius: number; from: Vector; to: Vector }
+  | { shape: "sphere"; radius: number; center: Vector };
 
 export interface ModuleShape {
   name: string;
@@ -26,7 +27,7 @@ const BY_NAME = new Map(found.map((module) => [module.name, module]));
 const UNKNOWN: readonly Solid[] = [{ shape: "box", from: [-0.5, -0.5, 0], to: [0.5, 0.5, 1] }];
 
 interface BodyView {
-  shape: "box" | "cylinder";
+  shape: "box" | "cylinder" | "sphere";
   center: readonly number[];
   quaternion: readonly number[];
   size: readonly number[];
@@ -40,6 +41,7 @@ export function learnShapes(modules: Readonly<Record<string, { kind: string; cen
 }
 
 function solidOf({ shape, center, quaternion, size }: BodyView): Solid {
+  if (shape === "sphere") return { shape, radius: (size[0] ?? 0) / 2, center: [center[0] ?? 0, center[1] ?? 0, center[2] ?? 0] };
   const [w, x, y, z] = [quaternion[0] ?? 1, quaternion[1] ?? 0, quaternion[2] ?? 0, quaternion[3] ?? 0];
   const half = (size[2] ?? 0) / 2;
   // A cylinder's axis is its own z, turned.

@@ -36,6 +36,8 @@ def type_name(module: Module) -> str:
 
 def key_entries(module: Module) -> dict[str, str]:
     """The entry that holds the keys of each of a module's actions."""
+    if module.besiege_keys:
+        return dict(module.besiege_keys)
     entries: dict[str, str] = {}
     if module.motor is not None:
         entries[module.motor.forward] = "bmt-forward"

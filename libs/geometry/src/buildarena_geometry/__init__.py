@@ -8,7 +8,9 @@ from buildarena_geometry.feedback import FEEDBACK_VERSION
 from buildarena_geometry.keys import KEYS
 from buildarena_geometry.machine import Machine, replay
 from buildarena_geometry.modules.catalogue import load_catalogue
-from buildarena_geometry.modules.module import Box, Catalogue, Cylinder, Face, Landmark, Module
+from buildarena_geometry.modules.module import Catalogue, Face, Landmark, Module
+from buildarena_geometry.modules.sets import MODULE_SETS, catalogue_of, module_set, modules_named
+from buildarena_geometry.modules.solids import Ball, Box, Cylinder
 from buildarena_geometry.outcomes import (
     Accepted,
     AttemptedBlock,
@@ -28,10 +30,12 @@ __all__ = [
     "FEEDBACK_VERSION",
     "GROUPS",
     "KEYS",
+    "MODULE_SETS",
     "Accepted",
     "ActionLog",
     "ActionRecord",
     "AttemptedBlock",
+    "Ball",
     "Block",
     "Box",
     "Catalogue",
@@ -56,7 +60,10 @@ __all__ = [
     "Step",
     "ToolDefinition",
     "__version__",
+    "catalogue_of",
     "load_catalogue",
+    "module_set",
+    "modules_named",
     "replay",
     "step",
     "tool_definitions",

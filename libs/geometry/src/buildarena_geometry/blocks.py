@@ -84,8 +84,8 @@ class Block:
 
     @property
     def forward_is_clockwise(self) -> bool:
-        """Whether its motor turns it clockwise, seen from outside, when it runs forward."""
-        sense = self.module.forward_sense
+        """Whether it turns clockwise, seen from outside, when it runs forward."""
+        sense = self.module.spin_sense
         return sense is not None and (sense == "clockwise") != self.flipped
 
     def world_from_face(self, label: str) -> Pose:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import fcl
 import numpy as np
 
-from buildarena_geometry.modules.module import Box, Solid
+from buildarena_geometry.modules.solids import Ball, Box, Cylinder, Solid
 from buildarena_geometry.poses import Pose
 
 if TYPE_CHECKING:
@@ -116,9 +116,31 @@ class CollisionWorld:
         return touched
 
 
+def unwanted(
+    pairs: Iterable[tuple[str, str]], blocks: Mapping[str, Block]
+) -> list[tuple[str, str]]:
+    """Those of some overlaps that no module has by design.
+
+    Args:
+        pairs: ids of blocks that overlap.
+        blocks: all blocks by id, with those of the pairs where they overlap.
+    """
+    return [
+        (one, other)
+        for one, other in pairs
+        if not (_reaches_into(blocks[one], other) or _reaches_into(blocks[other], one))
+    ]
+
+
+def _reaches_into(block: Block, other: str) -> bool:
+    return block.module.overlaps_base and block.mount is not None and block.mount[0] == other
+
+
 def _geometry(solid: Solid) -> fcl.CollisionGeometry:
     if isinstance(solid, Box):
         return fcl.Box(*solid.size)
+    if isinstance(solid, Ball):
+        return fcl.Sphere(solid.radius)
     return fcl.Cylinder(solid.radius, solid.length)
 
 
@@ -131,7 +153,7 @@ def _probe(solid: Solid) -> fcl.CollisionGeometry:
 @cache
 def _block_from_solid(solid: Solid) -> Pose:
     """FCL's solids lie around their own middle, with a cylinder's axis along z."""
-    return Pose(position=solid.center) if isinstance(solid, Box) else solid.block_from_axis
+    return solid.block_from_axis if isinstance(solid, Cylinder) else Pose(position=solid.center)
 
 
 def _transform(solid: Solid, world_from_block: Pose) -> fcl.Transform:

@@ -6,7 +6,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Self
 
 from buildarena_geometry.changes import Change, attempted
-from buildarena_geometry.collision import CollisionWorld
+from buildarena_geometry.collision import CollisionWorld, unwanted
 from buildarena_geometry.documents.log import ActionLog, ActionRecord, LoggedState
 from buildarena_geometry.documents.read import read_machine
 from buildarena_geometry.documents.write import machine_document
@@ -271,7 +271,7 @@ class Machine:
         world = self._collision_world()
         placed = [change.after.blocks[block] for block in change.placed]
         _require_reach(placed)
-        pairs = world.overlaps(placed)
+        pairs = unwanted(world.overlaps(placed), change.after.blocks)
         if pairs:
             raise _overlap(change, pairs)
         world.remove(change.removed)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from buildarena_geometry.modules.module import Box, Solid
+from buildarena_geometry.modules.solids import Ball, Box, Solid
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -57,6 +57,9 @@ def _extent(block: Block, solid: Solid) -> tuple[NDArray[np.float64], NDArray[np
         middle = block.world_from_block.apply(solid.center)
         reach = np.abs(rotation) @ (np.array(solid.size) / 2)
         return middle - reach, middle + reach
+    if isinstance(solid, Ball):
+        middle = block.world_from_block.apply(solid.center)
+        return middle - solid.radius, middle + solid.radius
     ends = block.world_from_block.apply([solid.base, solid.top])
     axis = (ends[1] - ends[0]) / solid.length
     reach = solid.radius * np.sqrt(np.clip(1 - axis**2, 0, None))

@@ -53,6 +53,27 @@ def varied_presses(
     return holds, control.model_copy(update={"from_s": control.from_s + float(delays[0])})
 
 
+def ended_presses(keys: Sequence[KeyHold], control: Control) -> Sequence[KeyHold]:
+    """The presses of a trial that lets go of every key at a time; all of them in others.
+
+    Args:
+        keys: The control sequence.
+        control: Says when.
+    """
+    end_s = control.until_s
+    if end_s is None:
+        return keys
+    return [
+        KeyPress(
+            time_s=press.time_s,
+            key=press.key,
+            hold_for_s=min(press.hold_for_s, end_s - press.time_s),
+        )
+        for press in keys
+        if press.time_s < end_s
+    ]
+
+
 Bindings = Sequence[Mapping[str, Sequence[str]]]
 """Per block: the keys bound to each of its actions."""
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, TypedDict
 import numpy as np
 
 from buildarena_geometry.modules.joints import MOVING_SEATS, UP, SeatJoint
-from buildarena_geometry.modules.module import Cylinder
+from buildarena_geometry.modules.solids import Cylinder
 from buildarena_simulation.constants import MAX_PARTS, JointKind
 from buildarena_simulation.control import Bindings
 from buildarena_simulation.errors import MachineNotSimulable
@@ -22,7 +22,7 @@ from buildarena_simulation.structure.model import (
 if TYPE_CHECKING:
     from buildarena_geometry import Block, Connector, Joint, Machine
     from buildarena_geometry.blocks import FaceRef
-    from buildarena_geometry.modules.module import Solid
+    from buildarena_geometry.modules.solids import Solid
 
 
 def structure_of(machine: "Machine") -> Structure:

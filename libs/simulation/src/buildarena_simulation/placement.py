@@ -2,13 +2,19 @@
 
 import hashlib
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from buildarena_simulation.constants import CARGO_SHIFT, START_DROP, START_SHIFT, START_YAW_DEG
 from buildarena_simulation.engines.base import CargoBox
-from buildarena_simulation.scenario import Cargo, GroundPlacement, Scenario, SpanPlacement
+from buildarena_simulation.scenario import (
+    Cargo,
+    Placement,
+    ReleasedPlacement,
+    Scenario,
+    SpanPlacement,
+)
 from buildarena_simulation.structure.model import FloatArray, Structure
 
 _CLEARANCE = 0.005
@@ -25,11 +31,13 @@ class Start:
         position: (3,) of the machine frame, world frame, units.
         rotation: (3, 3) world_from_machine.
         cargo: The cargo, if there is one.
+        velocity: (3,) of every block, world frame, units/s.
     """
 
     position: FloatArray
     rotation: FloatArray
     cargo: CargoBox | None
+    velocity: FloatArray = field(default_factory=lambda: np.zeros(3))
 
 
 def start_of(structure: Structure, scenario: Scenario, seed: int | None = None) -> Start:
@@ -55,6 +63,7 @@ def start_of(structure: Structure, scenario: Scenario, seed: int | None = None) 
         position=position,
         rotation=rotation,
         cargo=_cargo_at_start(structure, scenario.cargo, position, rotation, cargo_shift),
+        velocity=_velocity_of(scenario.placement),
     )
 
 
@@ -63,13 +72,17 @@ def start_digest(start: Start) -> str:
     arrays = [start.position, start.rotation]
     if start.cargo is not None:
         arrays += [start.cargo.size, start.cargo.position]
+    if start.velocity.any():
+        arrays.append(start.velocity)
     figures = np.concatenate([np.asarray(array, np.float64).ravel() for array in arrays])
     return hashlib.sha256(figures.tobytes()).hexdigest()[:16]
 
 
-def place(
-    structure: Structure, placement: GroundPlacement | SpanPlacement
-) -> tuple[FloatArray, FloatArray]:
+def _velocity_of(placement: Placement) -> FloatArray:
+    return np.array(placement.velocity if isinstance(placement, ReleasedPlacement) else [0.0] * 3)
+
+
+def place(structure: Structure, placement: Placement) -> tuple[FloatArray, FloatArray]:
     """The pose world_from_machine at the start.
 
     Args:
@@ -80,12 +93,13 @@ def place(
         The position (3,), units, and the rotation (3, 3).
     """
     bounds = structure.bounds()
-    if isinstance(placement, GroundPlacement):
+    if not isinstance(placement, SpanPlacement):
         start = next(
             (part.shown for part in structure.parts if part.module.kind == "start"),
             structure.shown[0],
         )
-        return np.array([-start[0], -start[1], _CLEARANCE - bounds[0, 2]]), np.eye(3)
+        height = placement.height if isinstance(placement, ReleasedPlacement) else _CLEARANCE
+        return np.array([-start[0], -start[1], height - bounds[0, 2]]), np.eye(3)
     extent = bounds[1] - bounds[0]
     turned = extent[1] <= placement.gap < extent[0]
     rotation = _QUARTER_TURN if turned else np.eye(3)
@@ -101,7 +115,7 @@ def _cargo_at_start(
     rotation: FloatArray,
     shift: FloatArray,
 ) -> CargoBox | None:
-    """The cargo above the machine's top, over (0, 0); None without cargo.
+    """The cargo at its place, or above the machine's top, over (0, 0); None without cargo.
 
     Args:
         structure: The machine.
@@ -112,10 +126,13 @@ def _cargo_at_start(
     """
     if cargo is None:
         return None
-    top = float((structure.bounds()[1] @ rotation.T + position)[2])
-    height = top + cargo.drop_height + cargo.size[2] / 2
+    if cargo.at is not None:
+        middle = np.array(cargo.at) + np.array([0.0, 0.0, cargo.size[2] / 2 + _CLEARANCE])
+    else:
+        top = float((structure.bounds()[1] @ rotation.T + position)[2])
+        middle = np.array([0.0, 0.0, top + cargo.drop_height + cargo.size[2] / 2])
     return CargoBox(
         size=np.array(cargo.size),
-        position=np.array([0.0, 0.0, height]) + shift,
+        position=middle + shift,
         mass=cargo.mass_at(0.0),
     )

@@ -2,16 +2,19 @@
 
 import hashlib
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from buildarena_simulation.breaking import BreakingModel
+from buildarena_simulation.clearance import require_clear_start
 from buildarena_simulation.constants import GRAVITY, SAMPLE_RATE_HZ
 from buildarena_simulation.control import (
     Bindings,
     KeyHold,
     effective_presses,
+    ended_presses,
     plan_schedule,
     recoil,
     varied_presses,
@@ -124,6 +127,7 @@ def simulate_structure(
         start = start_of(structure, scenario, seed)
     else:
         _check_start(start, scenario, seed)
+    require_clear_start(structure, scenario, start)
     world = World(
         structure=structure,
         ground=True,
@@ -135,10 +139,11 @@ def simulate_structure(
     if seed is not None:
         controls, control = varied_presses(controls, scenario.control, seed)
         scenario = scenario.model_copy(update={"control": control})
+    controls = ended_presses(controls, scenario.control)
     adapter = create_engine(engine, world)
     try:
         with single_threaded():
-            trial = _Trial(world, scenario, adapter, at=(start.position, start.rotation))
+            trial = _Trial(world, scenario, adapter, start)
             trial.run(bindings or [{}] * len(structure), controls, until, on_progress)
         return trial.recorder.finished(
             breaking=trial.breaking,
@@ -178,14 +183,15 @@ class _Trial:
         world: World,
         scenario: Scenario,
         engine: Engine,
-        *,
-        at: tuple[np.ndarray, np.ndarray],
+        start: Start,
     ) -> None:
         structure = world.structure
         self._structure, self._scenario, self._engine = structure, scenario, engine
         holds = np.ones(len(structure.members), dtype=bool)
         clusters = find_clusters(structure, holds)
-        motion = at_rest(clusters, *at)
+        motion = at_rest(clusters, start.position, start.rotation)
+        if start.velocity.any():
+            motion = replace(motion, velocity=motion.velocity + start.velocity)
         engine.enter(clusters, motion)
         self._interval_s = engine.time_step_s * engine.steps_per_evaluation
         self.breaking = BreakingModel(world, clusters, motion, interval_s=self._interval_s)

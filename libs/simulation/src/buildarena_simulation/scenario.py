@@ -6,7 +6,7 @@ may come from strangers, so every number has bounds within which the engines sta
 """
 
 import math
-from typing import Annotated, Final, Literal, Self
+from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
@@ -20,7 +20,14 @@ TerrainExtent = Annotated[float, Field(ge=0.1, le=1000)]
 CargoExtent = Annotated[float, Field(ge=0.1, le=100)]
 Mass = Annotated[float, Field(ge=0.01, le=100_000)]
 Instant = Annotated[float, Field(ge=0, le=MAX_DURATION_S)]
+Speed = Annotated[float, Field(allow_inf_nan=False, ge=-100, le=100)]
+Label = Annotated[str, Field(pattern=r"^[\w -]+$", min_length=1, max_length=40)]
 BlockId = Annotated[str, Field(min_length=1, max_length=40)]
+
+
+def _is_default(value: Any) -> bool:
+    """Whether an addition to the format is unused; then older texts and hashes stay as they were."""
+    return value is None or value is False or value == ()
 
 
 class _Document(BaseModel):
@@ -43,15 +50,18 @@ class TerrainBox(_Document):
 
 
 class Cargo(_Document):
-    """A loose box that is dropped onto the machine and grows heavier.
+    """A loose box that is dropped onto the machine, or stands at a place, and may grow heavier.
 
     Attributes:
         size: (3,) full extents along east, north and up, units.
-        drop_height: Height of its underside above the machine's top at the start, units.
+        drop_height: Height of its underside above the machine's top at the start, units; of no
+            effect where `at` is given.
         initial_mass: Mass from which the ramp starts, mass units.
         final_mass: Mass at the ramp's end, mass units.
         ramp_start_s: When the ramp starts, seconds.
         ramp_s: How long the ramp lasts, seconds.
+        at: (3,) the middle of its underside at the start, world frame, units; None above the
+            machine, over (0, 0).
     """
 
     size: tuple[CargoExtent, CargoExtent, CargoExtent]
@@ -60,6 +70,10 @@ class Cargo(_Document):
     final_mass: Mass
     ramp_start_s: Instant = 0.5
     ramp_s: Annotated[float, Field(gt=0, le=MAX_DURATION_S)]
+    at: Annotated[
+        tuple[Coordinate, Coordinate, Annotated[float, Field(ge=0, le=1000)]] | None,
+        Field(exclude_if=_is_default),
+    ] = None
 
     def mass_at(self, time_s: float) -> float:
         """Mass of the cargo at a time, mass units.
@@ -90,6 +104,52 @@ class SpanPlacement(_Document):
     lowest_center: Distance = 6.0
 
 
+class ReleasedPlacement(_Document):
+    """The machine is let go in the air, its starting block above (0, 0), and moves already.
+
+    Attributes:
+        height: Of its lowest point above the ground at the start, units.
+        velocity: (3,) of every block at the start, world frame, units/s.
+    """
+
+    kind: Literal["released"] = "released"
+    height: Distance
+    velocity: tuple[Speed, Speed, Speed] = (0.0, 0.0, 0.0)
+
+
+Placement = GroundPlacement | SpanPlacement | ReleasedPlacement
+
+
+class Gate(_Document):
+    """A line on the ground to be crossed; it is shown and nothing can touch it.
+
+    Attributes:
+        name: What it is called.
+        center: (2,) its middle, world frame, units.
+        half_width: From its middle to either end, units.
+        heading_deg: Direction in which it is crossed, from north towards east, degrees.
+    """
+
+    name: Label
+    center: tuple[Coordinate, Coordinate]
+    half_width: Distance
+    heading_deg: Annotated[float, Field(ge=-180, le=180)] = 0.0
+
+
+class Mark(_Document):
+    """A place; it is shown and nothing can touch it.
+
+    Attributes:
+        name: What it is called.
+        center: (3,) world frame, units.
+        radius: Around its centre, units.
+    """
+
+    name: Label
+    center: tuple[Coordinate, Coordinate, Coordinate]
+    radius: Distance
+
+
 class Control(_Document):
     """Who presses the keys.
 
@@ -97,10 +157,12 @@ class Control(_Document):
         mode: "agent": the machine's control sequence; "held": every cannon fires from `from_s` on;
             "none": nothing is pressed.
         from_s: When held cannons start to fire, seconds.
+        until_s: When every key is let go for good, seconds; None never.
     """
 
     mode: Literal["agent", "held", "none"] = "none"
     from_s: Instant = 0.0
+    until_s: Annotated[Instant | None, Field(exclude_if=_is_default)] = None
 
 
 class Scenario(_Document):
@@ -115,18 +177,31 @@ class Scenario(_Document):
         placement: Where the machine is put.
         control: Who presses the keys.
         tracked_blocks: Ids of the blocks whose poses are recorded, or "all".
+        gates: Lines to be crossed, in order.
+        marks: Places.
+        clear_start: Whether a machine that overlaps terrain or cargo at the start is refused.
     """
 
     duration_s: Annotated[float, Field(gt=0, le=MAX_DURATION_S)]
     terrain: Annotated[tuple[TerrainBox, ...], Field(max_length=64)] = ()
     cargo: Cargo | None = None
-    placement: Annotated[GroundPlacement | SpanPlacement, Field(discriminator="kind")] = (
-        GroundPlacement()
-    )
+    placement: Annotated[Placement, Field(discriminator="kind")] = GroundPlacement()
     control: Control = Control()
     tracked_blocks: (
         Literal["all"] | Annotated[tuple[BlockId, ...], Field(min_length=1, max_length=1000)]
     ) = "all"
+    gates: Annotated[tuple[Gate, ...], Field(max_length=64, exclude_if=_is_default)] = ()
+    marks: Annotated[tuple[Mark, ...], Field(max_length=64, exclude_if=_is_default)] = ()
+    clear_start: Annotated[bool, Field(exclude_if=_is_default)] = False
+
+    @model_validator(mode="after")
+    def _names_are_unique(self) -> Self:
+        for named in (self.gates, self.marks):
+            names = [place.name for place in named]
+            twice = next((name for name in names if names.count(name) > 1), None)
+            if twice is not None:
+                raise ValueError(f"the name {twice!r} stands for two places")
+        return self
 
     @model_validator(mode="after")
     def _duration_is_whole_samples(self) -> Self:

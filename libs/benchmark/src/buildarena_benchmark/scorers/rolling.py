@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from buildarena_benchmark.scorers.pieces import Mask
-from buildarena_geometry.modules.module import Cylinder
+from buildarena_geometry.modules.solids import Cylinder
 from buildarena_simulation.constants import GRAVITY
 
 if TYPE_CHECKING:

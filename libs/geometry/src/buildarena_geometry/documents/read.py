@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from buildarena_geometry.blocks import Block, Connector, FaceRef, KeyPress
-from buildarena_geometry.collision import CollisionWorld
+from buildarena_geometry.collision import CollisionWorld, unwanted
 from buildarena_geometry.documents.log import ActionRecord, LoggedState
 from buildarena_geometry.documents.write import DOCUMENT_VERSION
 from buildarena_geometry.errors import DocumentError
@@ -208,7 +208,7 @@ def _check_apart(state: MachineState, fields: Fields) -> None:
     where = fields["blocks"].where
     world = CollisionWorld()
     for block in state.blocks.values():
-        pairs = world.overlaps([block])
+        pairs = unwanted(world.overlaps([block]), state.blocks)
         if pairs:
             raise DocumentError(f"{where}: blocks {pairs[0][1]} and {pairs[0][0]} overlap")
         world.place([block])

@@ -4,24 +4,29 @@ from __future__ import annotations
 
 import math
 from functools import cache
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from buildarena_geometry.modules.module import Box, Solid
+from buildarena_geometry.modules.solids import Ball, Box, Solid
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 CYLINDER_SIDES = 24
+BALL_RINGS = 8  # from pole to pole
 CONNECTOR_RADIUS = 0.06  # units; connectors have no volume, this is for the eye alone
 
 COLOURS = {
     "start": (0.80, 0.36, 0.27),
     "block": (0.78, 0.62, 0.42),
+    "joint": (0.60, 0.45, 0.62),
     "wheel": (0.33, 0.35, 0.40),
+    "flight": (0.86, 0.80, 0.66),
     "cannon": (0.30, 0.55, 0.73),
     "torch": (0.91, 0.64, 0.22),
+    "device": (0.55, 0.60, 0.64),
     "connector": (0.45, 0.42, 0.40),
     "cargo": (0.52, 0.60, 0.40),
 }  # red, green and blue of each kind of module, 0 to 1
@@ -40,6 +45,8 @@ def polygons(solid: Solid) -> tuple[NDArray[np.float64], ...]:
     if isinstance(solid, Box):
         corners = np.array(solid.lowest) + _CORNERS * np.array(solid.size)
         return tuple(corners[list(face)] for face in _BOX_FACES)
+    if isinstance(solid, Ball):
+        return _ball(solid)
     angles = np.arange(CYLINDER_SIDES) * (2 * math.pi / CYLINDER_SIDES)
     circle = np.stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)], axis=1)
     axis = solid.block_from_axis
@@ -50,6 +57,35 @@ def polygons(solid: Solid) -> tuple[NDArray[np.float64], ...]:
         for side in range(CYLINDER_SIDES)
     ]
     return (base[::-1], top, *around)
+
+
+def _ball(solid: Ball) -> tuple[NDArray[np.float64], ...]:
+    """Rings of quads from pole to pole; those at the poles are triangles."""
+    angles = np.arange(CYLINDER_SIDES) * (2 * math.pi / CYLINDER_SIDES)
+    falls = np.arange(BALL_RINGS + 1) * (math.pi / BALL_RINGS)
+    rings = [
+        np.array(solid.center)
+        + solid.radius
+        * np.stack(
+            [
+                math.sin(fall) * np.cos(angles),
+                math.sin(fall) * np.sin(angles),
+                np.full_like(angles, math.cos(fall)),
+            ],
+            axis=1,
+        )
+        for fall in falls
+    ]
+    faces = []
+    for index, (upper, lower) in enumerate(pairwise(rings)):
+        for side in range(CYLINDER_SIDES):
+            corners = [upper[side - 1], lower[side - 1], lower[side], upper[side]]
+            if index == 0:
+                del corners[3]
+            elif index == BALL_RINGS - 1:
+                del corners[2]
+            faces.append(np.array(corners))
+    return tuple(faces)
 
 
 def normal(polygon: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -10,7 +10,7 @@ from xml.sax.saxutils import escape
 import numpy as np
 
 from buildarena_geometry.export.meshes import COLOURS, CYLINDER_SIDES, normal, polygons
-from buildarena_geometry.modules.module import Box
+from buildarena_geometry.modules.solids import Box
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

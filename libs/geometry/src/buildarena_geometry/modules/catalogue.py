@@ -20,15 +20,14 @@ from pathlib import Path
 from typing import cast
 
 from buildarena_geometry.errors import CatalogueError
+from buildarena_geometry.modules.facts import FACT_FIELDS, read_facts
 from buildarena_geometry.modules.joints import SENSES, Sense, read_gear, read_joint
 from buildarena_geometry.modules.module import (
     KINDS,
     LINKS,
     MASS_PLACES,
     SEATS,
-    Box,
     Catalogue,
-    Cylinder,
     Face,
     Kind,
     Landmark,
@@ -38,10 +37,10 @@ from buildarena_geometry.modules.module import (
     Motor,
     Physics,
     Seat,
-    Solid,
     Sphere,
     Thrust,
 )
+from buildarena_geometry.modules.solids import Ball, Box, Cylinder, Solid
 from buildarena_geometry.poses import Pose
 from buildarena_geometry.reading import Fields, Reader
 from buildarena_geometry.rotations import ORIGIN, dot, from_axes
@@ -50,7 +49,8 @@ CATALOGUE_VERSION = 1
 _REQUIRED = ("name", "kind", "mass", "cost", "size", "description", "besiege")
 _SHAPE = ("center", "faces", "colliders", "body", "pointing", "landmarks")
 _USE = ("actions", "motor", "joint", "gear", "thrust", "physics", "grabs", "link")
-_OPTIONAL = (*_SHAPE, *_USE)
+_RULES = ("root_offset", "overlaps_base", "spin")
+_OPTIONAL = (*_SHAPE, *_USE, *_RULES, *FACT_FIELDS)
 _MOTOR = ("speed_rpm", "lag_per_s", "torque", "forward", "backward", "forward_sense")
 _THRUST = ("action", "along", "cold", "heated", "spheres")
 _PHYSICS = ("seat", "mass_at", "structural", "friction", "linear_drag", "angular_drag")
@@ -97,8 +97,18 @@ def load_catalogue(*files: str | Path) -> Catalogue:
 @cache
 def basic_modules() -> tuple[Module, ...]:
     """The paper's six modules, the starting block and the cargo."""
-    text = resources.files(__package__).joinpath("modules.yaml").read_text(encoding="utf-8")
-    return read_modules(json.loads(text), where="modules.yaml")
+    return _own_file("modules.yaml")
+
+
+@cache
+def extended_modules() -> tuple[Module, ...]:
+    """The further types: what the game Besiege has besides the paper's modules."""
+    return _own_file("extended.yaml")
+
+
+def _own_file(name: str) -> tuple[Module, ...]:
+    text = resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
+    return read_modules(json.loads(text), where=name)
 
 
 def read_modules(
@@ -163,7 +173,7 @@ def _module(entry: Reader, usual_of: Mapping[Kind, _Usual]) -> Module:
     entry = Reader(value=entry.value, where=f"{entry.where} ({name})", error=entry.error)
     fields = entry.fields(required=_REQUIRED, optional=_OPTIONAL)
     kind = cast("Kind", fields["kind"].choice(KINDS))
-    besiege = fields["besiege"].fields(required=("id", "data"))
+    besiege = fields["besiege"].fields(required=("id", "data"), optional=("keys",))
     usual = usual_of.get(kind, _Usual())
     landmarks = tuple(map(_landmark, fields.items("landmarks")))
     actions = tuple(action.text(longest=60) for action in fields.items("actions"))
@@ -197,6 +207,11 @@ def _module(entry: Reader, usual_of: Mapping[Kind, _Usual]) -> Module:
         link=cast("Link", fields["link"].choice(LINKS)) if fields.has("link") else "rigid",
         description=fields["description"].text(),
         besiege_data=tuple(map(_besiege_entry, besiege["data"].items())),
+        besiege_keys=_besiege_keys(besiege["keys"], actions) if "keys" in besiege else {},
+        root_offset=fields["root_offset"].number(least=0) if "root_offset" in fields else 0.0,
+        overlaps_base=fields["overlaps_base"].truth() if "overlaps_base" in fields else False,
+        spin=cast("Sense", fields["spin"].choice(SENSES)) if fields.has("spin") else None,
+        facts=read_facts(fields, actions),
     )
     _check_sense(module, entry)
     _check_use(module, fields)
@@ -226,6 +241,8 @@ def _check_use(module: Module, fields: Fields) -> None:
         fields["physics"].fail(f"no physics: a {module.kind} is not a body of its own")
     if fields.has("link") and module.kind != "connector":
         fields["link"].fail(f"no link: a {module.kind} is not a connector")
+    if fields.has("spin") and module.motor is not None and module.spin != module.spin_sense:
+        fields["spin"].fail(f"{module.spin_sense}, as its motor's forward_sense")
     if fields.has("thrust") and module.pointing is None:
         fields["thrust"].fail("no thrust: it acts along `pointing`, which is missing")
     seat, place = None if module.physics is None else module.physics.seat, fields.reader.where
@@ -245,9 +262,12 @@ def _face(entry: Reader) -> Face:
 
 
 def _solid(entry: Reader) -> Solid:
+    if isinstance(entry.value, dict) and entry.value.get("shape") == "sphere":
+        ball = entry.fields(required=("shape", "radius", "center"))
+        return Ball(radius=ball["radius"].number(above=0), center=ball["center"].vector())
     shape = entry.fields(required=("shape", "from", "to"), optional=("radius",))
     start, end = shape["from"].vector(), shape["to"].vector()
-    if shape["shape"].choice(("box", "cylinder")) == "box":
+    if shape["shape"].choice(("box", "cylinder", "sphere")) == "box":
         if not all(low < high for low, high in zip(start, end, strict=True)):
             shape["to"].fail(f"three numbers, each larger than in {list(start)}")
         if "radius" in shape:
@@ -329,3 +349,8 @@ def _besiege_entry(entry: Reader) -> tuple[str, str, str | int | float | bool]:
     if not isinstance(value.value, str | int | float):
         value.fail("a text, a number, or true or false")
     return (fields["type"].text(), fields["key"].text(), value.value)
+
+
+def _besiege_keys(entry: Reader, actions: tuple[str, ...]) -> dict[str, str]:
+    fields = entry.fields(required=(), optional=actions)
+    return {action: fields[action].text(longest=60) for action in actions if action in fields}

@@ -7,14 +7,27 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Literal, get_args
 
+from buildarena_geometry.modules.facts import NO_FACTS, Facts
 from buildarena_geometry.modules.joints import Gear, SeatJoint, Sense
 from buildarena_geometry.modules.names import CaselessNames
+from buildarena_geometry.modules.solids import Solid
 from buildarena_geometry.poses import Pose
-from buildarena_geometry.rotations import ORIGIN, Vector, distance, from_axes
+from buildarena_geometry.rotations import ORIGIN, Vector, distance
 
-Kind = Literal["start", "block", "wheel", "cannon", "torch", "connector", "cargo"]
+Kind = Literal[
+    "start",
+    "block",
+    "joint",
+    "wheel",
+    "flight",
+    "cannon",
+    "torch",
+    "device",
+    "connector",
+    "cargo",
+]
 KINDS: tuple[str, ...] = get_args(Kind)
-ATTACHABLE_KINDS = ("block", "wheel", "cannon", "torch")
+ATTACHABLE_KINDS = ("block", "joint", "wheel", "flight", "cannon", "torch", "device")
 Seat = Literal["attachment", "axle", "mount", "hinge", "slider", "ball", "constant_velocity"]
 SEATS: tuple[str, ...] = get_args(Seat)
 MassPlace = Literal["center", "body"]
@@ -46,70 +59,6 @@ class Face:
     def normal(self) -> Vector:
         """(3,) the outward normal, block frame, unit length."""
         return self.block_from_face.direction((0.0, 0.0, 1.0))
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Box:
-    """A box with its edges along the block's axes.
-
-    Attributes:
-        lowest: (3,) its corner with the smallest coordinates, block frame, units.
-        highest: (3,) the corner opposite.
-    """
-
-    lowest: Vector
-    highest: Vector
-
-    @property
-    def center(self) -> Vector:
-        """(3,) its middle, block frame, units."""
-        return _middle(self.lowest, self.highest)
-
-    @property
-    def size(self) -> Vector:
-        """(3,) its edges along x, y and z, units."""
-        (a, b, c), (x, y, z) = self.lowest, self.highest
-        return (x - a, y - b, z - c)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Cylinder:
-    """A right circular cylinder.
-
-    Attributes:
-        radius: units.
-        base: (3,) centre of the one end, block frame, units.
-        top: (3,) centre of the other.
-    """
-
-    radius: float
-    base: Vector
-    top: Vector
-
-    @property
-    def length(self) -> float:
-        """Distance between its ends, units."""
-        return distance(self.base, self.top)
-
-    @property
-    def center(self) -> Vector:
-        """(3,) its middle, block frame, units."""
-        return _middle(self.base, self.top)
-
-    @property
-    def block_from_axis(self) -> Pose:
-        """The frame of its middle in the block's, +z along its axis."""
-        scale = 1 / self.length
-        x, y, z = (scale * (end - start) for start, end in zip(self.base, self.top, strict=True))
-        # Any x axis will do: a cylinder looks the same all round.
-        across = (0.0, -z, y) if abs(x) < max(abs(y), abs(z)) else (-y, x, 0.0)
-        norm = distance(across, ORIGIN)
-        x_axis = (across[0] / norm, across[1] / norm, across[2] / norm)
-        turn = from_axes(x_axis, (x, y, z))
-        return Pose(position=self.center, quaternion=turn)
-
-
-Solid = Box | Cylinder
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -254,6 +203,14 @@ class Module:
         link: what a connector is: a rigid strut, or a rope that pulls and never pushes.
         description: what models read about it.
         besiege_data: further entries of its block in Besiege's machine files: type, key, value.
+        besiege_keys: the entry there that holds the keys of an action, by the action.
+        root_offset: how far off the face it sits on its root point lies, along the face's normal,
+            units.
+        overlaps_base: whether its own shape reaches into the block it sits on by design, so that
+            the two are never compared.
+        spin: which way it turns as it is, seen from outside against its axis; None where it has no
+            spin of its own, or the one of its motor.
+        facts: what is known about it besides, and from where.
     """
 
     name: str
@@ -279,6 +236,11 @@ class Module:
     link: Link = "rigid"
     description: str = ""
     besiege_data: tuple[tuple[str, str, str | int | float | bool], ...] = ()
+    besiege_keys: Mapping[str, str] = field(default_factory=dict)
+    root_offset: float = 0.0
+    overlaps_base: bool = False
+    spin: Sense | None = None
+    facts: Facts = NO_FACTS
     face_of_label: Mapping[str, Face] = field(init=False, repr=False, compare=False)
     root_face: str | None = field(init=False, repr=False, compare=False)
 
@@ -297,15 +259,15 @@ class Module:
     @property
     def spins(self) -> bool:
         """Whether it has a spin that can be flipped."""
-        return self.forward_sense is not None
+        return self.spin_sense is not None
 
     @property
-    def forward_sense(self) -> Sense | None:
-        """Which way forward turns it, seen from outside; None if its spin cannot be flipped."""
+    def spin_sense(self) -> Sense | None:
+        """Which way it turns until its spin is flipped, seen from outside; None without a spin."""
         if self.motor is not None:
             return self.motor.forward_sense
         drive = None if self.joint is None else self.joint.drive
-        return None if drive is None else drive.forward_sense
+        return self.spin if drive is None else drive.forward_sense
 
 
 class Catalogue(Mapping[str, Module]):
@@ -356,7 +318,3 @@ class Catalogue(Mapping[str, Module]):
 
 def _is_root(face: Face) -> bool:
     return distance(face.center, ORIGIN) < FLUSH_TOLERANCE and face.normal[2] < FLUSH_TOLERANCE - 1
-
-
-def _middle(left: Vector, right: Vector) -> Vector:
-    return ((left[0] + right[0]) / 2, (left[1] + right[1]) / 2, (left[2] + right[2]) / 2)

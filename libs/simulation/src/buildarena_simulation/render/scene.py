@@ -23,6 +23,9 @@ _COLORS: Final[dict[str, Color]] = {
     "wheel": (82, 84, 92),
     "cannon": (86, 132, 178),
     "torch": (140, 96, 60),
+    "joint": (150, 112, 158),
+    "flight": (222, 208, 170),
+    "device": (140, 152, 164),
 }
 _HEATED: Final[Color] = (230, 120, 50)
 _CARGO: Final[Color] = (120, 124, 132)

@@ -1,0 +1,95 @@
+"""The solids that modules are made of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from buildarena_geometry.poses import Pose
+from buildarena_geometry.rotations import ORIGIN, Vector, distance, from_axes
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Box:
+    """A box with its edges along the block's axes.
+
+    Attributes:
+        lowest: (3,) its corner with the smallest coordinates, block frame, units.
+        highest: (3,) the corner opposite.
+    """
+
+    lowest: Vector
+    highest: Vector
+
+    @property
+    def center(self) -> Vector:
+        """(3,) its middle, block frame, units."""
+        return _middle(self.lowest, self.highest)
+
+    @property
+    def size(self) -> Vector:
+        """(3,) its edges along x, y and z, units."""
+        (a, b, c), (x, y, z) = self.lowest, self.highest
+        return (x - a, y - b, z - c)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cylinder:
+    """A right circular cylinder.
+
+    Attributes:
+        radius: units.
+        base: (3,) centre of the one end, block frame, units.
+        top: (3,) centre of the other.
+    """
+
+    radius: float
+    base: Vector
+    top: Vector
+
+    @property
+    def length(self) -> float:
+        """Distance between its ends, units."""
+        return distance(self.base, self.top)
+
+    @property
+    def center(self) -> Vector:
+        """(3,) its middle, block frame, units."""
+        return _middle(self.base, self.top)
+
+    @property
+    def block_from_axis(self) -> Pose:
+        """The frame of its middle in the block's, +z along its axis."""
+        scale = 1 / self.length
+        x, y, z = (scale * (end - start) for start, end in zip(self.base, self.top, strict=True))
+        # Any x axis will do: a cylinder looks the same all round.
+        across = (0.0, -z, y) if abs(x) < max(abs(y), abs(z)) else (-y, x, 0.0)
+        norm = distance(across, ORIGIN)
+        x_axis = (across[0] / norm, across[1] / norm, across[2] / norm)
+        turn = from_axes(x_axis, (x, y, z))
+        return Pose(position=self.center, quaternion=turn)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ball:
+    """A solid sphere.
+
+    Attributes:
+        radius: units.
+        center: (3,) its middle, block frame, units.
+    """
+
+    radius: float
+    center: Vector
+
+    @property
+    def size(self) -> Vector:
+        """(3,) its extent along x, y and z, units."""
+        across = 2.0 * self.radius
+        return (across, across, across)
+
+
+Solid = Box | Cylinder | Ball
+
+
+def _middle(left: Vector, right: Vector) -> Vector:
+    return ((left[0] + right[0]) / 2, (left[1] + right[1]) / 2, (left[2] + right[2]) / 2)

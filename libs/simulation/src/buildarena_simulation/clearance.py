@@ -1,0 +1,100 @@
+"""Whether a machine's place is clear at the start: nothing of it inside terrain or cargo."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from buildarena_simulation.errors import MachineNotSimulable
+from buildarena_simulation.placement import Start
+from buildarena_simulation.scenario import Scenario, TerrainBox
+from buildarena_simulation.structure.model import FloatArray, Shape, ShapeKind, Structure
+
+_ALLOWED = 0.05
+"""Overlap that the engines take as a touch, units."""
+
+_NO_LENGTH = 1e-9
+
+
+def require_clear_start(structure: Structure, scenario: Scenario, start: Start) -> None:
+    """Refuses a machine whose blocks overlap terrain or cargo where the trial starts.
+
+    Args:
+        structure: The machine.
+        scenario: What it is put through; nothing is checked unless it asks for it.
+        start: Where machine and cargo start.
+
+    Raises:
+        MachineNotSimulable: Blocks overlap; names the first block, and with what.
+    """
+    if not scenario.clear_start:
+        return
+    boxes = list(_obstacles(scenario, start))
+    for part in structure.parts:
+        for shape in part.shapes:
+            placed = Shape(
+                kind=shape.kind,
+                center=start.position + start.rotation @ shape.center,
+                rotation=start.rotation @ shape.rotation,
+                half_extents=shape.half_extents,
+            )
+            for named, box in boxes:
+                if _overlap(placed, box):
+                    raise MachineNotSimulable(
+                        f"block {part.id} ({part.module.name}) overlaps {named} at the start"
+                    )
+
+
+def _obstacles(scenario: Scenario, start: Start) -> Iterator[tuple[str, Shape]]:
+    for number, terrain in enumerate(scenario.terrain, start=1):
+        yield f"terrain {number}", _shape_of(terrain)
+    if start.cargo is not None:
+        yield (
+            "the cargo",
+            Shape(
+                kind=ShapeKind.BOX,
+                center=start.cargo.position,
+                rotation=np.eye(3),
+                half_extents=start.cargo.size / 2,
+            ),
+        )
+
+
+def _shape_of(terrain: TerrainBox) -> Shape:
+    tilt = np.radians(terrain.slope_deg)
+    cosine, sine = np.cos(tilt), np.sin(tilt)
+    return Shape(
+        kind=ShapeKind.BOX,
+        center=np.array(terrain.center),
+        rotation=np.array([[1.0, 0.0, 0.0], [0.0, cosine, -sine], [0.0, sine, cosine]]),
+        half_extents=np.array(terrain.size) / 2,
+    )
+
+
+def _overlap(shape: Shape, box: Shape) -> bool:
+    """Whether no plane parts a shape from a box.
+
+    Exact for boxes, and for a round shape beside a face, an edge or a corner of the box.
+    """
+    apart = shape.center - box.center
+    local = box.rotation.T @ apart
+    nearest = box.rotation @ np.clip(local, -box.half_extents, box.half_extents)
+    edges = [np.cross(a, b) for a in shape.rotation.T for b in box.rotation.T]
+    for axis in [*shape.rotation.T, *box.rotation.T, apart - nearest, *edges]:
+        length = np.linalg.norm(axis)
+        if length < _NO_LENGTH:
+            continue
+        way = axis / length
+        if _radius(shape, way) + _radius(box, way) - abs(apart @ way) < _ALLOWED:
+            return False
+    return True
+
+
+def _radius(shape: Shape, way: FloatArray) -> float:
+    """How far a shape reaches from its centre along a direction, units."""
+    along = np.abs(shape.rotation.T @ way)
+    half = shape.half_extents
+    if shape.kind is ShapeKind.BOX:
+        return float(along @ half)
+    if shape.kind is ShapeKind.CYLINDER:
+        return float(half[2] * along[2] + half[0] * np.sqrt(max(0.0, 1.0 - along[2] ** 2)))
+    return float(half.max())
