@@ -238,14 +238,14 @@ class _Trial:
                 rows = slice(first, first + engine.steps_per_evaluation)
                 if forces is not None and self._field is not None:
                     self._field.commands = forces.at(first)
-                self._advance(schedule.wheel_speeds[rows], schedule.firing[first], first)
+                self._advance(schedule.targets[rows], schedule.firing[first], first)
             self._sample((sample + 1) / SAMPLE_RATE_HZ)
             if until is not None and until(self.recorder.cargo_now):
                 return
             if on_progress and (sample % _PROGRESS_EVERY == 0 or sample + 1 == samples):
                 on_progress((sample + 1) / samples)
 
-    def _advance(self, wheel_speeds: np.ndarray, firing: np.ndarray, step: int) -> None:
+    def _advance(self, targets: np.ndarray, firing: np.ndarray, step: int) -> None:
         if self._blown_up:
             return
         engine, cargo = self._engine, self._scenario.cargo
@@ -254,7 +254,7 @@ class _Trial:
         if mass is not None:
             engine.set_cargo_mass(mass)
         thrusts = recoil(self._structure, firing, self.recorder.heated_now)
-        engine.advance(wheel_speeds, thrusts)
+        engine.advance(targets, thrusts)
         motion = engine.motion()
         if not (np.isfinite(motion.position).all() and np.isfinite(motion.rotation).all()):
             # Nothing more can be known; the samples say so and the scorer flags them.

@@ -9,7 +9,7 @@ from typing import Literal, get_args
 
 from buildarena_geometry.modules.facts import NO_FACTS, Facts
 from buildarena_geometry.modules.forces import NO_FORCES, Forces
-from buildarena_geometry.modules.joints import Gear, Joint, Sense
+from buildarena_geometry.modules.joints import Gear, SeatJoint, Sense
 from buildarena_geometry.modules.names import CaselessNames
 from buildarena_geometry.modules.solids import Solid
 from buildarena_geometry.poses import Pose
@@ -231,7 +231,7 @@ class Module:
     flames: tuple[Sphere, ...] = ()
     actions: tuple[str, ...] = ()
     motor: Motor | None = None
-    joint: Joint | None = None
+    joint: SeatJoint | None = None
     gear: Gear | None = None
     thrust: Thrust | None = None
     physics: Physics | None = None
