@@ -39,6 +39,7 @@ class BreakingModel:
         self, world: World, clusters: Clusters, motion: Motion, *, interval_s: float
     ) -> None:
         structure = self._structure = world.structure
+        self._field = world.field
         self._faces, self._has_cargo = FaceFinder(world), world.cargo is not None
         self.bearing = BearingMeter(structure, len(world.terrain))
         self._loads = LoadModel(structure, clusters, motion)
@@ -157,6 +158,8 @@ class BreakingModel:
         faces = self._faces.find(clusters, motion, cargo)
         contacts = faces.joined_to(engine.contacts(), clusters.cluster_of)
         others = [self._pushes(thrusts), self._pulls(tensions)]
+        if self._field is not None:
+            others.append(self._field.taken(clusters, motion))
         contacts, shared = self._supports.settled(
             contacts,
             self._sharing.shared(contacts),
@@ -234,5 +237,5 @@ def _same(before: Clusters, after: Clusters) -> bool:
     return (
         len(before) == len(after)
         and bool((before.cluster_of == after.cluster_of).all())
-        and bool((before.axle == after.axle).all())
+        and bool((before.joint == after.joint).all())
     )
