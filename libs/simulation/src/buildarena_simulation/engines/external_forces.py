@@ -6,6 +6,7 @@ between; given in a body's own principal frame, they turn with it.
 
 import numpy as np
 
+from buildarena_simulation.engines.joint_places import is_simple_piece
 from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.model import FloatArray, Structure
 from buildarena_simulation.structure.motion import Motion
@@ -37,11 +38,15 @@ def thrust_forces(
 
 
 def drag_forces(
-    clusters: Clusters, motion: Motion, axes: FloatArray, moments: FloatArray
+    structure: Structure, clusters: Clusters, motion: Motion, axes: FloatArray, moments: FloatArray
 ) -> list[tuple[int, Force]]:
-    """Root cluster, force and torque of each piece's drag: Unity's v *= 1 - drag·dt as a force.
+    """Cluster, force and torque of drag: Unity's v *= 1 - drag·dt as a force.
+
+    A piece with no joints but wheels' axles moves as its root does, which takes the drag of all; in
+    any other each cluster has its own.
 
     Args:
+        structure: The machine.
         clusters: The clusters.
         motion: Their motion.
         axes: (C, 3, 3) machine_from_principal.
@@ -49,6 +54,9 @@ def drag_forces(
     """
     found = []
     for piece in clusters.pieces:
+        if not is_simple_piece(structure, clusters, piece):
+            found += [(c, _own_drag(clusters, motion, axes, moments, c=c)) for c in piece]
+            continue
         root, inside = piece[0], list(piece)
         to_body = (motion.rotation[root] @ axes[root]).T
         drag = float(clusters.linear_drag[inside] @ clusters.mass[inside])
@@ -56,3 +64,13 @@ def drag_forces(
         torque = -clusters.angular_drag[root] * moments[root] * (to_body @ motion.spin[root])
         found.append((root, (force.tolist(), torque.tolist())))
     return found
+
+
+def _own_drag(
+    clusters: Clusters, motion: Motion, axes: FloatArray, moments: FloatArray, *, c: int
+) -> Force:
+    to_body = (motion.rotation[c] @ axes[c]).T
+    drag = clusters.linear_drag[c] * clusters.mass[c]
+    force = -drag * (to_body @ motion.velocity[c])
+    torque = -clusters.angular_drag[c] * moments[c] * (to_body @ motion.spin[c])
+    return force.tolist(), torque.tolist()
