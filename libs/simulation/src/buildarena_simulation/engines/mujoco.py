@@ -10,8 +10,14 @@ from buildarena_simulation.constants import FORCES_EVERY_S, MAX_SPIN
 from buildarena_simulation.engines.base import CargoPose, World, principal_frames
 from buildarena_simulation.engines.closest_points import ShapeTable, shape_table
 from buildarena_simulation.engines.impacts import ImpactWatch
+from buildarena_simulation.engines.joint_places import is_simple_piece
 from buildarena_simulation.engines.mjcf import MjcfSettings, MjcfState, mjcf_of
-from buildarena_simulation.engines.mujoco_joints import JointAddresses, enter_joint, joint_addresses
+from buildarena_simulation.engines.mujoco_joints import (
+    JointAddresses,
+    drag_apart,
+    enter_joint,
+    joint_addresses,
+)
 from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.contacts import CARGO, WORLD, ContactForces
 from buildarena_simulation.structure.model import BoolArray, FloatArray, IntArray
@@ -138,6 +144,8 @@ class MujocoEngine:
         """See `Engine`."""
         model, data, at = self._model, self._data, self._addresses
         self._targets = targets[-1]
+        if self._apart:
+            drag_apart(model, data, (self._clusters, at.bodies), self.motion(), self._apart)
         data.ctrl[at.thrust_actuators] = thrusts
         impacts = ImpactWatch(
             len(targets), gravity=self._world.gravity, time_step_s=self.time_step_s
@@ -218,9 +226,16 @@ class MujocoEngine:
         self._dof_invweight_times_mass = model.dof_invweight0[:6] * mass
 
     def _set_drag(self, moments: FloatArray) -> None:
-        """Damping of each piece's free joint: Unity's v *= 1 - drag·dt, as a force."""
+        """Damping of each piece's free joint: Unity's v *= 1 - drag·dt, as a force.
+
+        The clusters of a piece with other joints than wheels' axles have each its own drag.
+        """
         model, clusters = self._model, self._clusters
+        self._apart: list[tuple[int, ...]] = []
         for piece in clusters.pieces:
+            if not is_simple_piece(self._structure, clusters, piece):
+                self._apart.append(piece)
+                continue
             root, inside = piece[0], list(piece)
             dof = model.joint(f"free {root}").dofadr[0]
             drag = clusters.linear_drag[inside] @ clusters.mass[inside]
