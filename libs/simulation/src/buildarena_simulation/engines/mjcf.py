@@ -263,13 +263,14 @@ def _surface_pairs(world: World, state: MjcfState, settings: MjcfSettings) -> It
 
 
 def _ropes(structure: Structure, state: MjcfState) -> Iterator[str]:
+    ropes = structure.ropes
     for r in state.ropes:
-        yield _opened(
-            "spatial",
-            name=f"rope {r}",
-            limited="true",
-            range=(0.0, structure.ropes.length[r]),
-        )
+        length = ropes.length[r]
+        if ropes.stiffness[r]:
+            spring = {"stiffness": ropes.stiffness[r], "damping": ropes.damping[r]}
+            yield _opened("spatial", name=f"rope {r}", springlength=length, **spring)
+        else:
+            yield _opened("spatial", name=f"rope {r}", limited="true", range=(0.0, length))
         yield _tag("site", site=f"rope {r} 0")
         yield _tag("site", site=f"rope {r} 1")
         yield "</spatial>"
