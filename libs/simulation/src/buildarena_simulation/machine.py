@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, TypedDict
 
 import numpy as np
 
-from buildarena_geometry.modules.solids import Cylinder
+from buildarena_geometry.modules.solids import Ball, Cylinder
 from buildarena_simulation.constants import MAX_PARTS, JointKind
 from buildarena_simulation.control import Bindings
 from buildarena_simulation.errors import MachineNotSimulable
@@ -177,7 +177,7 @@ def _shape(solid: "Solid", position: FloatArray, rotation: FloatArray) -> Shape:
             half_extents=half,
         )
     return Shape(
-        kind=ShapeKind.BOX,
+        kind=ShapeKind.SPHERE if isinstance(solid, Ball) else ShapeKind.BOX,
         center=position + rotation @ np.array(solid.center),
         rotation=rotation,
         half_extents=np.array(solid.size) / 2,

@@ -11,8 +11,8 @@ from buildarena_geometry.documents.write import DOCUMENT_VERSION
 from buildarena_geometry.errors import DocumentError
 from buildarena_geometry.feedback.words import listing
 from buildarena_geometry.keys import KEYS
-from buildarena_geometry.modules.catalogue import load_catalogue
 from buildarena_geometry.modules.parameters import LARGEST_NUMBER, LONGEST_TEXT
+from buildarena_geometry.modules.sets import smallest_set
 from buildarena_geometry.outcomes import RefusalClass
 from buildarena_geometry.poses import Pose
 from buildarena_geometry.reading import Fields, Reader
@@ -52,7 +52,7 @@ def read_machine(
 
     Args:
         document: JSON values.
-        catalogue: the modules it is made of; the basic ones if left out.
+        catalogue: the modules it is made of; the smallest set that has them if left out.
         where: what messages call the document.
         overlaps: whether blocks may overlap, as those of other programs' machines do; the actions
             of this library never make such a machine.
@@ -60,7 +60,7 @@ def read_machine(
     Raises:
         DocumentError: it is not a machine; the message names the entry.
     """
-    catalogue = load_catalogue() if catalogue is None else catalogue
+    catalogue = smallest_set(_modules_in(document)) if catalogue is None else catalogue
     fields = Reader(value=document, where=where, error=DocumentError).fields(required=_FIELDS)
     if fields["version"].integer() != DOCUMENT_VERSION:
         fields["version"].fail(f"version {DOCUMENT_VERSION}")
@@ -87,6 +87,23 @@ def read_machine(
         _check_apart(state, fields)
     records = tuple(_record(entry) for entry in fields["log"].items())
     return LoggedState(state=state, records=records, available=available)
+
+
+def _modules_in(document: object) -> set[str]:
+    """The modules that a document names, which may be no sound document."""
+    if not isinstance(document, dict):
+        return set()
+    entries = [
+        entry
+        for field in ("blocks", "connectors")
+        if isinstance(listed := document.get(field), list)
+        for entry in listed
+        if isinstance(entry, dict)
+    ]
+    named = {name for entry in entries if isinstance(name := entry.get("module"), str)}
+    available = document.get("available")
+    sources = available.values() if isinstance(available, dict) else ()
+    return named.union(*map(_modules_in, sources))
 
 
 def _read_blocks(entries: Reader, catalogue: Catalogue) -> dict[str, Block]:

@@ -9,7 +9,7 @@ from buildarena_geometry.modules.catalogue import basic_modules, extended_module
 from buildarena_geometry.modules.module import Catalogue
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Collection, Iterator, Sequence
 
 MODULE_SETS = ("basic", "workshop", "all")
 
@@ -36,6 +36,20 @@ def module_set(name: str) -> Catalogue:
     built = [module for module in basic_modules() if module.kind != "cargo"]
     further = [one for one in extended_modules() if name == "all" or one.facts.simulated]
     return Catalogue((*built, *further))
+
+
+def smallest_set(names: Collection[str]) -> Catalogue:
+    """The first set that knows all of some modules, as far as any does.
+
+    Args:
+        names: modules' names; those that no set knows are passed over.
+    """
+    known = [name for name in names if name in module_set("all")]
+    return next(one for one in map(module_set, MODULE_SETS) if all(_builds(one, known)))
+
+
+def _builds(catalogue: Catalogue, names: Collection[str]) -> Iterator[bool]:
+    return (name in catalogue and catalogue[name].kind != "cargo" for name in names)
 
 
 def modules_named(chosen: str | Sequence[str] | None) -> tuple[str, ...]:

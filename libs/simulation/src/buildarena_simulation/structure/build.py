@@ -189,6 +189,8 @@ def _own_inertia(part: Part) -> FloatArray:
         if shape.kind is ShapeKind.CYLINDER:
             across = (3 * a**2 + (2 * c) ** 2) / 12
             principal = np.array([across, across, a**2 / 2])
+        elif shape.kind is ShapeKind.SPHERE:
+            principal = np.full(3, 2 * a**2 / 5)
         else:
             principal = np.array([b**2 + c**2, a**2 + c**2, a**2 + b**2]) / 3
         inertia += share * part.mass * (shape.rotation * principal) @ shape.rotation.T

@@ -24,6 +24,14 @@ class ShapeKind(StrEnum):
 
     BOX = "box"
     CYLINDER = "cylinder"
+    SPHERE = "sphere"
+
+
+_SHARE_OF_BOX: Final = {
+    ShapeKind.BOX: 1.0,
+    ShapeKind.CYLINDER: math.pi / 4,
+    ShapeKind.SPHERE: math.pi / 6,
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,7 +42,8 @@ class Shape:
         kind: Its form.
         center: (3,) machine frame, units.
         rotation: (3, 3) machine_from_shape; a cylinder's axis is the third column.
-        half_extents: (3,) along its axes; a cylinder's radius, radius and half length, units.
+        half_extents: (3,) along its axes; a cylinder's radius, radius and half length;
+            a sphere's radius three times; units.
     """
 
     kind: ShapeKind
@@ -45,7 +54,7 @@ class Shape:
     @property
     def volume(self) -> float:
         """Units³."""
-        share = math.pi / 4 if self.kind is ShapeKind.CYLINDER else 1.0
+        share = _SHARE_OF_BOX[self.kind]
         return float(8.0 * share * np.prod(self.half_extents))
 
     def reach(self) -> FloatArray:
@@ -54,6 +63,8 @@ class Shape:
             radius, half_length = self.half_extents[0], self.half_extents[2]
             axis = np.abs(self.rotation[:, 2])
             return np.asarray(half_length * axis + radius * np.sqrt(np.maximum(0.0, 1 - axis**2)))
+        if self.kind is ShapeKind.SPHERE:
+            return self.half_extents
         return np.asarray(np.abs(self.rotation) @ self.half_extents)
 
 
