@@ -120,7 +120,7 @@ class BreakingModel:
         return self._loads_now if seen is None else seen
 
     def _follow_loads(self, ratio: FloatArray, tensions: FloatArray) -> None:
-        ropes = tensions / GRAVITY / self._structure.ropes.limit
+        ropes = np.maximum(tensions, 0.0) / GRAVITY / self._structure.ropes.limit
         now = self._loads_now = np.concatenate([ratio, ropes])
         self._loads_since = now if self._loads_since is None else np.maximum(self._loads_since, now)
 

@@ -138,7 +138,9 @@ class MujocoEngine:
     def drop_rope(self, index: int) -> None:
         """See `Engine`."""
         self._rope_alive[index] = False
-        self._model.tendon_limited[self._addresses.tendons[index]] = 0
+        tendon, model = self._addresses.tendons[index], self._model
+        model.tendon_limited[tendon] = 0
+        model.tendon_stiffness[tendon] = model.tendon_damping[tendon] = 0.0
 
     def advance(self, targets: FloatArray, thrusts: FloatArray) -> None:
         """See `Engine`."""
@@ -151,6 +153,7 @@ class MujocoEngine:
             len(targets), gravity=self._world.gravity, time_step_s=self.time_step_s
         )
         velocity = data.qvel[at.free_dofs]
+        self._set_springs()
         for step, row in enumerate(targets):
             self._apply_own_forces(step)
             at.joints.follow(model, data, row)
@@ -324,7 +327,26 @@ class MujocoEngine:
             force_of = {int(data.efc_id[k]): data.efc_force[k] for k in np.flatnonzero(limits)}
             for rope, tendon in tendons.items():
                 tensions[rope] = force_of.get(tendon, 0.0)
+            for rope in self._springs():
+                tensions[rope] = self._spring_tension(tendons[rope])
         return tensions
+
+    def _springs(self) -> list[int]:
+        return [int(r) for r in self._structure.ropes.springs if self._rope_alive[r]]
+
+    def _spring_tension(self, tendon: int) -> float:
+        model, data = self._model, self._data
+        stretch = data.ten_length[tendon] - model.tendon_lengthspring[tendon, 0]
+        pull = model.tendon_stiffness[tendon] * stretch
+        return float(pull + model.tendon_damping[tendon] * data.ten_velocity[tendon])
+
+    def _set_springs(self) -> None:
+        """Gives the springs the lengths at rest that the keys ask for."""
+        springs, field = self._springs(), self._world.field
+        if springs and field is not None:
+            lengths = field.rest_lengths()
+            for rope in springs:
+                self._model.tendon_lengthspring[self._addresses.tendons[rope]] = lengths[rope]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -321,9 +321,14 @@ class PyBulletEngine:
 
     def _pull_ropes(self) -> None:
         structure, clusters = self._structure, self._clusters
-        motion = self._read_motion()
+        motion, field = self._read_motion(), self._world.field
         pulls = rope_forces(
-            structure, clusters, motion, alive=self._rope_alive, time_step_s=self.time_step_s
+            structure,
+            clusters,
+            motion,
+            alive=self._rope_alive,
+            rest=structure.ropes.length if field is None else field.rest_lengths(),
+            time_step_s=self.time_step_s,
         )
         self._tensions = pulls.tension
         ends = pulls.forces
