@@ -67,7 +67,6 @@ def drag_forces(
     return found
 
 
-<<<<<<< HEAD
 def body_wrenches(wrenches: FloatArray, axes: FloatArray) -> list[tuple[int, Force]]:
     """Cluster, force and torque of each cluster that a wrench acts on.
 
@@ -78,7 +77,8 @@ def body_wrenches(wrenches: FloatArray, axes: FloatArray) -> list[tuple[int, For
     local = turned_wrenches(axes.transpose(0, 2, 1), wrenches)
     acted_on = np.flatnonzero(wrenches.any(axis=1))
     return [(int(c), (local[c, :3].tolist(), local[c, 3:].tolist())) for c in acted_on]
-=======
+
+
 def _own_drag(
     clusters: Clusters, motion: Motion, axes: FloatArray, moments: FloatArray, *, c: int
 ) -> Force:
@@ -87,4 +87,3 @@ def _own_drag(
     force = -drag * (to_body @ motion.velocity[c])
     torque = -clusters.angular_drag[c] * moments[c] * (to_body @ motion.spin[c])
     return force.tolist(), torque.tolist()
->>>>>>> joints
