@@ -121,7 +121,7 @@ class MachineState:
             return None
         base, label = part.mount
         face = self.blocks[base].face_center(label)
-        root = part.world_from_block.xyz
+        root = part.seat_xyz
         return Joint(
             base=base,
             part=part.id,

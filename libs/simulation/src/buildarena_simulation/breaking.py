@@ -258,5 +258,5 @@ def _same(before: Clusters, after: Clusters) -> bool:
     return (
         len(before) == len(after)
         and bool((before.cluster_of == after.cluster_of).all())
-        and bool((before.axle == after.axle).all())
+        and bool((before.joint == after.joint).all())
     )

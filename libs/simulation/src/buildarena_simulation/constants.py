@@ -51,7 +51,7 @@ MAX_PARTS: Final = 2000
 class JointKind(StrEnum):
     """How two blocks are held together; each kind has its own strength.
 
-    A module's seat is an attachment, a mount or an axle.
+    A module's seat is one of them: an attachment, a mount, or a joint it moves on.
     """
 
     ATTACHMENT = "attachment"
@@ -59,6 +59,10 @@ class JointKind(StrEnum):
     MOUNT = "mount"
     AXLE = "axle"
     BRACE = "brace"
+    HINGE = "hinge"
+    SLIDER = "slider"
+    BALL = "ball"
+    CONSTANT_VELOCITY = "constant_velocity"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,6 +97,18 @@ JOINT_STRENGTH: Final = MappingProxyType(
         ),
         JointKind.AXLE: Strength(force=600.0, moment=200.0, origin="fitted, as an attachment"),
         JointKind.BRACE: Strength(force=600.0, moment=200.0, origin="fitted, as an attachment"),
+        JointKind.HINGE: Strength(
+            force=600.0, moment=200.0, origin="chosen: as an axle; the game's value is not public"
+        ),
+        JointKind.SLIDER: Strength(
+            force=600.0, moment=200.0, origin="chosen: as an axle; the game's value is not public"
+        ),
+        JointKind.BALL: Strength(
+            force=600.0, moment=200.0, origin="chosen: as an axle; it bears no moment but at a stop"
+        ),
+        JointKind.CONSTANT_VELOCITY: Strength(
+            force=600.0, moment=200.0, origin="chosen: as an axle; the moment is the shaft's torque"
+        ),
     }
 )
 ROPE_STRENGTH: Final = 1000.0

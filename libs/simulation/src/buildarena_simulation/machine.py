@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, TypedDict
 
 import numpy as np
 
+from buildarena_geometry.modules.joints import MOVING_SEATS, UP, SeatJoint
 from buildarena_geometry.modules.solids import Ball, Cylinder
 from buildarena_simulation.constants import MAX_PARTS, JointKind
 from buildarena_simulation.control import Bindings
@@ -148,21 +149,32 @@ def _part(block: "Block") -> Part:
     if physics is None:
         raise MachineNotSimulable(f"block {block.id}: the module {module.name} has no physics")
     shown = np.array(block.center)
+    center = shapes[0].center if physics.mass_at == "body" else shown
+    axis, pivot = np.zeros(3), center
+    if physics.seat in MOVING_SEATS:
+        joint = module.joint or SeatJoint()
+        axis = rotation[:, 2] if joint.axis == UP else rotation @ np.array(joint.axis)
+        if joint.point is not None:
+            pivot = np.array(pose.position) + rotation @ np.array(joint.point)
+        elif module.motor is None:
+            pivot = shapes[0].center
     direction = None
     if physics.seat == "axle":
-        direction = rotation[:, 2]
+        direction = axis
     elif block.pointing is not None:
         direction = np.array(block.pointing)
     return Part(
         id=block.id,
         module=module,
         physics=physics,
-        center=shapes[0].center if physics.mass_at == "body" else shown,
+        center=center,
         shown=shown,
         rotation=rotation,
         shapes=shapes,
         direction=direction,
         forward_is_clockwise=block.forward_is_clockwise,
+        axis=axis,
+        pivot=pivot,
     )
 
 

@@ -239,7 +239,7 @@ class _Trial:
                 rows = slice(first, first + engine.steps_per_evaluation)
                 if forces is not None:
                     self._command(forces, first)
-                self._advance(schedule.wheel_speeds[rows], schedule.firing[first], first)
+                self._advance(schedule.targets[rows], schedule.firing[first], first)
             self._sample((sample + 1) / SAMPLE_RATE_HZ)
             if until is not None and until(self.recorder.cargo_now):
                 return
@@ -263,7 +263,7 @@ class _Trial:
             kicks[asked] = held * table.impulse[asked] / self._interval_s
         field.commands = schedule.at(step, kicks)
 
-    def _advance(self, wheel_speeds: np.ndarray, firing: np.ndarray, step: int) -> None:
+    def _advance(self, targets: np.ndarray, firing: np.ndarray, step: int) -> None:
         if self._blown_up:
             return
         engine, cargo = self._engine, self._scenario.cargo
@@ -272,7 +272,7 @@ class _Trial:
         if mass is not None:
             engine.set_cargo_mass(mass)
         thrusts = recoil(self._structure, firing, self.recorder.heated_now)
-        engine.advance(wheel_speeds, thrusts)
+        engine.advance(targets, thrusts)
         motion = engine.motion()
         if not (np.isfinite(motion.position).all() and np.isfinite(motion.rotation).all()):
             # Nothing more can be known; the samples say so and the scorer flags them.

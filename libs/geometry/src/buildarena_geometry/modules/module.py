@@ -9,7 +9,7 @@ from typing import Literal, get_args
 
 from buildarena_geometry.modules.facts import NO_FACTS, Facts
 from buildarena_geometry.modules.forces import NO_FORCES, Forces
-from buildarena_geometry.modules.joints import Gear, Joint, Sense
+from buildarena_geometry.modules.joints import Gear, SeatJoint, Sense
 from buildarena_geometry.modules.names import CaselessNames
 from buildarena_geometry.modules.solids import Solid
 from buildarena_geometry.poses import Pose
@@ -36,6 +36,7 @@ MASS_PLACES: tuple[str, ...] = get_args(MassPlace)
 Link = Literal["rigid", "rope", "spring"]
 LINKS: tuple[str, ...] = get_args(Link)
 FLUSH_TOLERANCE = 1e-6  # units; faces nearer than this are the same place
+_FACING = -0.9  # cosine; a face that looks this way looks at the block it sits on
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -230,7 +231,7 @@ class Module:
     flames: tuple[Sphere, ...] = ()
     actions: tuple[str, ...] = ()
     motor: Motor | None = None
-    joint: Joint | None = None
+    joint: SeatJoint | None = None
     gear: Gear | None = None
     thrust: Thrust | None = None
     physics: Physics | None = None
@@ -250,8 +251,7 @@ class Module:
     def __post_init__(self) -> None:
         """Derives the lookups of faces: by label, and the one the block sits on."""
         object.__setattr__(self, "face_of_label", {face.label: face for face in self.faces})
-        at_root = [face.label for face in self.faces if _is_root(face)]
-        root_face = at_root[0] if at_root and self.kind != "start" else None
+        root_face = None if self.kind == "start" else _mount_face(self.faces, self.root_offset)
         object.__setattr__(self, "root_face", root_face)
 
     @property
@@ -319,5 +319,15 @@ class Catalogue(Mapping[str, Module]):
         return tuple(name for name, module in self._modules.items() if module.kind == "connector")
 
 
-def _is_root(face: Face) -> bool:
-    return distance(face.center, ORIGIN) < FLUSH_TOLERANCE and face.normal[2] < FLUSH_TOLERANCE - 1
+def _mount_face(faces: tuple[Face, ...], root_offset: float) -> str | None:
+    """The face that a block uses up by sitting on it.
+
+    It is the one that coincides with the face it sits on, else the lowest that looks there.
+    """
+    seat = (0.0, 0.0, -root_offset)
+    facing = [face for face in faces if face.normal[2] < _FACING]
+    for face in facing:
+        flush = distance(face.center, seat) < FLUSH_TOLERANCE
+        if flush and face.normal[2] < FLUSH_TOLERANCE - 1:
+            return face.label
+    return min(facing, key=lambda face: face.center[2]).label if facing else None

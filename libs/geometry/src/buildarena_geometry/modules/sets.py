@@ -9,7 +9,7 @@ from buildarena_geometry.modules.catalogue import basic_modules, extended_module
 from buildarena_geometry.modules.module import Catalogue
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Sequence
+    from collections.abc import Iterable, Sequence
 
 MODULE_SETS = ("basic", "workshop", "all")
 
@@ -38,20 +38,6 @@ def module_set(name: str) -> Catalogue:
     return Catalogue((*built, *further))
 
 
-def smallest_set(names: Collection[str]) -> Catalogue:
-    """The first set that knows all of some modules, as far as any does.
-
-    Args:
-        names: modules' names; those that no set knows are passed over.
-    """
-    known = [name for name in names if name in module_set("all")]
-    return next(one for one in map(module_set, MODULE_SETS) if all(_builds(one, known)))
-
-
-def _builds(catalogue: Catalogue, names: Collection[str]) -> Iterator[bool]:
-    return (name in catalogue and catalogue[name].kind != "cargo" for name in names)
-
-
 def modules_named(chosen: str | Sequence[str] | None) -> tuple[str, ...]:
     """The names of the modules that a choice allows, the starting block and cargo left out.
 
@@ -65,6 +51,21 @@ def modules_named(chosen: str | Sequence[str] | None) -> tuple[str, ...]:
         return tuple(chosen)
     catalogue = module_set(chosen or "basic")
     return (*catalogue.attachable, *catalogue.connectors)
+
+
+def smallest_set(names: Iterable[str]) -> Catalogue:
+    """The first of the sets that has all of these modules; the largest if none has.
+
+    Args:
+        names: modules' names.
+    """
+    wanted = set(names)
+    for name in MODULE_SETS:
+        # A ballast of the basic set is a task's cargo, which is no part of a machine.
+        placed = {one.name for one in module_set(name).values() if one.kind != "cargo"}
+        if wanted <= placed:
+            return module_set(name)
+    return module_set(MODULE_SETS[-1])
 
 
 @cache

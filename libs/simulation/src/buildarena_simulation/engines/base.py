@@ -95,12 +95,12 @@ class Engine(Protocol):
     def drop_rope(self, index: int) -> None:
         """Removes a rope that gave way from the world."""
 
-    def advance(self, wheel_speeds: FloatArray, thrusts: FloatArray) -> None:
+    def advance(self, targets: FloatArray, thrusts: FloatArray) -> None:
         """Steps the world.
 
         Args:
-            wheel_speeds: (S, W) target of each wheel in each of S steps, rad/s about its outward
-                axis, relative to what it is mounted on.
+            targets: (S, D) target of each driven joint in each of S steps, as in
+                `Schedule.targets`, relative to what its block sits on.
             thrusts: (C,) recoil of each cannon during these steps, mass·unit/s².
         """
 

@@ -10,6 +10,7 @@ import numpy as np
 from buildarena_geometry.modules.forces import Spring
 from buildarena_geometry.modules.module import Sphere
 from buildarena_simulation.constants import GRAVITY, JOINT_STRENGTH, ROPE_STRENGTH, JointKind
+from buildarena_simulation.structure.joints import joints_of
 from buildarena_simulation.structure.model import (
     JOINT_KINDS,
     FloatArray,
@@ -21,6 +22,7 @@ from buildarena_simulation.structure.model import (
     Spheres,
     Structure,
 )
+from buildarena_simulation.structure.vectors import axis_frame
 
 _UNIT_STIFFNESS: Final = 1e4
 """Only ratios of stiffness matter to the loads; this one keeps the matrix well scaled."""
@@ -122,6 +124,7 @@ def build_structure(
         centers_of_mass=np.array([center for _, center, _ in lumped]),
         inertias=np.array([inertia for _, _, inertia in lumped]),
         members=_members(parts, [*links, *_far_joints(parts, links)]),
+        joints=joints_of(parts),
         ropes=_ropes(ropes),
         wheels=_indices(i for i, part in enumerate(parts) if part.is_wheel),
         cannons=cannons,
@@ -141,15 +144,6 @@ def build_structure(
         ),
         angular_drag=np.array([part.physics.angular_drag for part in parts]),
     )
-
-
-def axis_frame(direction: FloatArray) -> FloatArray:
-    """A right-handed frame whose first axis points along a vector, (3, 3), columns are the axes."""
-    first = direction / np.linalg.norm(direction)
-    helper = np.array([0.0, 0.0, 1.0]) if abs(first[2]) < 0.9 else np.array([0.0, 1.0, 0.0])  # noqa: PLR2004 - any vector well off the axis will do
-    second = np.cross(helper, first)
-    second /= np.linalg.norm(second)
-    return np.column_stack([first, second, np.cross(first, second)])
 
 
 def _indices(blocks: Iterable[int]) -> IntArray:

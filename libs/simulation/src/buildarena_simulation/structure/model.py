@@ -1,7 +1,7 @@
 """The arrays of one machine: what does not change while it is simulated."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Final
 
@@ -82,6 +82,9 @@ class Part:
         shapes: Its collision shapes.
         direction: (3,) unit vector, machine frame: a cannon's spray, a torch's flame, a wheel's
             outward axis; None for the others.
+        axis: (3,) unit vector, machine frame: what it turns about or slides along on its seat;
+            zero for blocks that do not move there.
+        pivot: (3,) a point of that axis, machine frame, units.
         forward_is_clockwise: Whether its motor turns it clockwise, seen from outside, when it runs
             forward.
     """
@@ -95,6 +98,8 @@ class Part:
     shapes: tuple[Shape, ...]
     direction: FloatArray | None = None
     forward_is_clockwise: bool = False
+    axis: FloatArray = field(default_factory=lambda: np.zeros(3))
+    pivot: FloatArray = field(default_factory=lambda: np.zeros(3))
 
     @property
     def mass(self) -> float:
@@ -103,7 +108,7 @@ class Part:
 
     @property
     def is_wheel(self) -> bool:
-        """Whether it turns on the face it sits on."""
+        """Whether it turns on an axle on the face it sits on."""
         return self.physics.seat == "axle"
 
 
@@ -206,6 +211,42 @@ class Ropes:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Mesh:
+    """Two cogs whose teeth engage.
+
+    Attributes:
+        first: Block index of one.
+        second: Block index of the other.
+        ratio: Speed of the second about its own axis over that of the first, both seen from what
+            they are mounted on.
+    """
+
+    first: int
+    second: int
+    ratio: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Joints:
+    """How blocks move on what they sit on.
+
+    Attributes:
+        axes: (N, 3) as `Part.axis`.
+        points: (N, 3) as `Part.pivot`.
+        simple: (N,) whether a block turns on its axle without limits, spring or a further drive,
+            so that the angle it has turned through does not matter.
+        driven: (D,) blocks that follow a target: the wheels, then other driven joints.
+        meshes: The cogs that engage.
+    """
+
+    axes: FloatArray
+    points: FloatArray
+    simple: BoolArray
+    driven: IntArray
+    meshes: tuple[Mesh, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Structure:
     """A machine of N blocks at rest in the machine frame, as arrays.
 
@@ -221,6 +262,7 @@ class Structure:
         centers_of_mass: (N, 3) of block and brace halves together, machine frame, units.
         inertias: (N, 3, 3) of block and brace halves about that point, machine frame axes.
         members: The joints.
+        joints: How blocks move on what they sit on.
         ropes: The winches' ropes.
         wheels: (W,) indices of the wheels.
         cannons: (C,) indices of the cannons.
@@ -244,6 +286,7 @@ class Structure:
     centers_of_mass: FloatArray
     inertias: FloatArray
     members: Members
+    joints: Joints
     ropes: Ropes
     wheels: IntArray
     cannons: IntArray
