@@ -29,12 +29,17 @@ class ForceSchedule:
     let_go: BoolArray
     rests: FloatArray
 
-    def at(self, step: int) -> Commands:
-        """What is asked for from a step on."""
+    def at(self, step: int, kicks: FloatArray) -> Commands:
+        """What is asked for from a step on.
+
+        Args:
+            step: The step.
+            kicks: (D,) as in `Commands`.
+        """
         return Commands(
             pushing=self.pushing[step],
             heights=self.heights[step],
-            kicks=np.zeros(self.let_go.shape[1]),
+            kicks=kicks,
             rests=self.rests[step],
         )
 

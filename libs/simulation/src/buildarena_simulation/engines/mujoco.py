@@ -18,6 +18,7 @@ from buildarena_simulation.engines.mujoco_joints import (
     enter_joint,
     joint_addresses,
 )
+from buildarena_simulation.engines.tendons import Tendons
 from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.contacts import CARGO, WORLD, ContactForces
 from buildarena_simulation.structure.model import BoolArray, FloatArray, IntArray
@@ -113,6 +114,12 @@ class MujocoEngine:
         self._addresses = _addresses_in(
             self._model, self._world, clusters, solids, self._rope_alive
         )
+        self._tendons = Tendons(
+            model=self._model,
+            data=self._data,
+            ropes=self._structure.ropes,
+            of=self._addresses.tendons,
+        )
         self._shapes: dict[int, ShapeTable] = {}
         if self._world.cargo is not None:
             self._cargo_body = self._model.body("cargo").id
@@ -138,9 +145,7 @@ class MujocoEngine:
     def drop_rope(self, index: int) -> None:
         """See `Engine`."""
         self._rope_alive[index] = False
-        tendon, model = self._addresses.tendons[index], self._model
-        model.tendon_limited[tendon] = 0
-        model.tendon_stiffness[tendon] = model.tendon_damping[tendon] = 0.0
+        self._tendons.drop(index)
 
     def advance(self, targets: FloatArray, thrusts: FloatArray) -> None:
         """See `Engine`."""
@@ -153,7 +158,8 @@ class MujocoEngine:
             len(targets), gravity=self._world.gravity, time_step_s=self.time_step_s
         )
         velocity = data.qvel[at.free_dofs]
-        self._set_springs()
+        if self._world.field is not None:
+            self._tendons.set_lengths(self._world.field.rest_lengths())
         for step, row in enumerate(targets):
             self._apply_own_forces(step)
             at.joints.follow(model, data, row)
@@ -164,7 +170,7 @@ class MujocoEngine:
         self._limit_spin()
         self._keep_cargo_state()
         self._impacts = impacts
-        self._tensions = self._read_tensions()
+        self._tensions = self._tendons.tensions()
         self._bring_up()
 
     def contacts(self) -> ContactForces:
@@ -200,7 +206,7 @@ class MujocoEngine:
 
     def close(self) -> None:
         """See `Engine`."""
-        del self._data, self._model
+        del self._tendons, self._data, self._model
 
     def _apply_own_forces(self, step: int) -> None:
         field, every = self._world.field, round(FORCES_EVERY_S / self.time_step_s)
@@ -318,35 +324,6 @@ class MujocoEngine:
                 blocks.append(found)
                 weights.append(weight)
         return np.concatenate(rows), np.concatenate(blocks), np.concatenate(weights)
-
-    def _read_tensions(self) -> FloatArray:
-        tendons, tensions = self._addresses.tendons, np.zeros(len(self._rope_alive))
-        if tendons:
-            data = self._data
-            limits = data.efc_type[: data.nefc] == mujoco.mjtConstraint.mjCNSTR_LIMIT_TENDON
-            force_of = {int(data.efc_id[k]): data.efc_force[k] for k in np.flatnonzero(limits)}
-            for rope, tendon in tendons.items():
-                tensions[rope] = force_of.get(tendon, 0.0)
-            for rope in self._springs():
-                tensions[rope] = self._spring_tension(tendons[rope])
-        return tensions
-
-    def _springs(self) -> list[int]:
-        return [int(r) for r in self._structure.ropes.springs if self._rope_alive[r]]
-
-    def _spring_tension(self, tendon: int) -> float:
-        model, data = self._model, self._data
-        stretch = data.ten_length[tendon] - model.tendon_lengthspring[tendon, 0]
-        pull = model.tendon_stiffness[tendon] * stretch
-        return float(pull + model.tendon_damping[tendon] * data.ten_velocity[tendon])
-
-    def _set_springs(self) -> None:
-        """Gives the springs the lengths at rest that the keys ask for."""
-        springs, field = self._springs(), self._world.field
-        if springs and field is not None:
-            lengths = field.rest_lengths()
-            for rope in springs:
-                self._model.tendon_lengthspring[self._addresses.tendons[rope]] = lengths[rope]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
