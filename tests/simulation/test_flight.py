@@ -171,7 +171,11 @@ def test_bowls_fall_as_fast_as_their_drag_says(engine: str, y_axis: Direction) -
     def braked(v: np.ndarray) -> np.ndarray:
         return np.array([0.0, 0.0, coefficient * v[2] ** 2])
 
-    assert -_way(trajectory)[2] == pytest.approx(-_path(machine, braked, (0, 0, 0), 3.0)[2], rel=0.02)
+    assert -_way(trajectory)[2] == pytest.approx(
+        -_path(machine, braked, (0, 0, 0), 3.0)[2], rel=0.02
+    )
     if coefficient:
-        terminal = (math.sqrt(drag**2 + 4 * coefficient * mass * GRAVITY) - drag) / (2 * coefficient)
+        terminal = (math.sqrt(drag**2 + 4 * coefficient * mass * GRAVITY) - drag) / (
+            2 * coefficient
+        )
         assert speed == pytest.approx(terminal, rel=0.02)

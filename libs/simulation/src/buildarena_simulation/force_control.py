@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from buildarena_geometry.modules.forces import Spring
 from buildarena_simulation.control import Bindings, KeyHold
 from buildarena_simulation.scenario import Control
 from buildarena_simulation.structure.force_field import Commands
@@ -20,18 +21,26 @@ class ForceSchedule:
         pushing: (S, P) whether each fan's key is held.
         heights: (S, A) by how much each held height was moved, units.
         let_go: (S, D) whether each decoupler's key was pressed by then.
+        rests: (S, K) length of each spring at rest, as a share of its built length.
     """
 
     pushing: BoolArray
     heights: FloatArray
     let_go: BoolArray
+    rests: FloatArray
 
-    def at(self, step: int) -> Commands:
-        """What is asked for from a step on."""
+    def at(self, step: int, kicks: FloatArray) -> Commands:
+        """What is asked for from a step on.
+
+        Args:
+            step: The step.
+            kicks: (D,) as in `Commands`.
+        """
         return Commands(
             pushing=self.pushing[step],
             heights=self.heights[step],
-            kicks=np.zeros(self.let_go.shape[1]),
+            kicks=kicks,
+            rests=self.rests[step],
         )
 
 
@@ -51,7 +60,7 @@ def plan_forces(
     Args:
         structure: The machine.
         forces: What its blocks exert.
-        bindings: (N,) the keys of each block's actions.
+        bindings: (N + K,) the keys of each block's actions, then of each spring's.
         keys: The control sequence; read in mode "agent" only.
         control: Who presses the keys.
         times: (S,) when each engine step begins, seconds, evenly spaced from 0.
@@ -77,7 +86,24 @@ def plan_forces(
         if decoupling is not None:
             held = held_during(pressed, bindings[block].get(decoupling.action, ()), times)
             let_go[:, k] = np.logical_or.accumulate(held)
-    return ForceSchedule(pushing=pushing, heights=heights, let_go=let_go)
+    rests = np.ones((len(times), len(structure.ropes.spring_of)))
+    for k, spring in enumerate(structure.ropes.spring_of):
+        bound = bindings[len(structure) + k] if len(structure) + k < len(bindings) else {}
+        held = held_during(pressed, bound.get(spring.contract or "", ()), times)
+        if held.any():
+            rests[:, k] = _drawn(held, spring, time_step_s)
+    return ForceSchedule(pushing=pushing, heights=heights, let_go=let_go, rests=rests)
+
+
+def _drawn(held: BoolArray, spring: Spring, time_step_s: float) -> FloatArray:
+    """Share of its built length that a spring has at rest, (S,): it goes to and fro evenly."""
+    step, share = spring.rate * time_step_s, 1.0
+    shares = np.ones(len(held))
+    for k, contracts in enumerate(held.tolist()):
+        shares[k] = share = (
+            max(spring.shortest, share - step) if contracts else min(1.0, share + step)
+        )
+    return shares
 
 
 def held_during(keys: Sequence[KeyHold], names: Sequence[str], times: FloatArray) -> BoolArray:

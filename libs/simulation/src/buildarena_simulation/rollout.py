@@ -22,7 +22,7 @@ from buildarena_simulation.control import (
 from buildarena_simulation.engines import ENGINES, create_engine, engine_version
 from buildarena_simulation.engines.base import Engine, World
 from buildarena_simulation.errors import BuildarenaSimulationError, SimulationError
-from buildarena_simulation.force_control import plan_forces
+from buildarena_simulation.force_control import ForceSchedule, plan_forces
 from buildarena_simulation.machine import bindings_of, structure_of
 from buildarena_simulation.placement import Start, start_digest, start_of
 from buildarena_simulation.recording import Recorder
@@ -191,6 +191,7 @@ class _Trial:
         structure = world.structure
         self._structure, self._scenario, self._engine = structure, scenario, engine
         self._field = world.field
+        self._let_go = np.zeros(0 if world.field is None else len(world.field.table.seats), bool)
         holds = np.ones(len(structure.members), dtype=bool)
         clusters = find_clusters(structure, holds)
         motion = at_rest(clusters, start.position, start.rotation)
@@ -236,14 +237,31 @@ class _Trial:
             for offset in chunks:
                 first = sample * per_sample + offset
                 rows = slice(first, first + engine.steps_per_evaluation)
-                if forces is not None and self._field is not None:
-                    self._field.commands = forces.at(first)
+                if forces is not None:
+                    self._command(forces, first)
                 self._advance(schedule.targets[rows], schedule.firing[first], first)
             self._sample((sample + 1) / SAMPLE_RATE_HZ)
             if until is not None and until(self.recorder.cargo_now):
                 return
             if on_progress and (sample % _PROGRESS_EVERY == 0 or sample + 1 == samples):
                 on_progress((sample + 1) / samples)
+
+    def _command(self, schedule: ForceSchedule, step: int) -> None:
+        """Tells the blocks that exert forces by themselves what the keys ask for."""
+        field = self._field
+        if field is None:
+            return
+        table = field.table
+        asked = schedule.let_go[step] & ~self._let_go
+        kicks = np.zeros(len(asked))
+        if asked.any() and not self._blown_up:
+            self._let_go |= asked
+            held = self.breaking.let_go(
+                self._engine, table.seats[asked], time_s=step * self._engine.time_step_s
+            )
+            # The push lasts one interval, so that the loads that it makes are seen.
+            kicks[asked] = held * table.impulse[asked] / self._interval_s
+        field.commands = schedule.at(step, kicks)
 
     def _advance(self, targets: np.ndarray, firing: np.ndarray, step: int) -> None:
         if self._blown_up:

@@ -229,6 +229,9 @@ def read_forces(fields: Fields, actions: tuple[str, ...]) -> Forces:
                 f"no {name}: a connector has no force but a spring's, "
                 "and only connectors have a spring"
             )
+    springs = fields.has("link") and fields["link"].value == "spring"
+    if fields.has("spring") != springs:
+        fields["spring"].fail("a spring with the link spring, and none with another link")
     return Forces(
         push=_push(fields["push"], actions) if fields.has("push") else None,
         wing=_wing(fields["wing"]) if fields.has("wing") else None,

@@ -33,7 +33,7 @@ Seat = Literal["attachment", "axle", "mount", "hinge", "slider", "ball", "consta
 SEATS: tuple[str, ...] = get_args(Seat)
 MassPlace = Literal["center", "body"]
 MASS_PLACES: tuple[str, ...] = get_args(MassPlace)
-Link = Literal["rigid", "rope"]
+Link = Literal["rigid", "rope", "spring"]
 LINKS: tuple[str, ...] = get_args(Link)
 FLUSH_TOLERANCE = 1e-6  # units; faces nearer than this are the same place
 _FACING = -0.9  # cosine; a face that looks this way looks at the block it sits on
@@ -202,7 +202,7 @@ class Module:
         thrust: what pushes it; None for blocks that do not push.
         physics: how it behaves as a body; None for connectors and cargo, which a task describes.
         grabs: whether its far end, opposite to the face it sits on, holds what it touches.
-        link: what a connector is: a rigid strut, or a rope that pulls and never pushes.
+        link: what a connector is: a rigid strut, a rope that pulls and never pushes, or a spring.
         description: what models read about it.
         besiege_data: further entries of its block in Besiege's machine files: type, key, value.
         besiege_keys: the entry there that holds the keys of an action, by the action.

@@ -276,13 +276,14 @@ def _surface_pairs(world: World, state: MjcfState, settings: MjcfSettings) -> It
 
 
 def _ropes(structure: Structure, state: MjcfState) -> Iterator[str]:
+    ropes = structure.ropes
     for r in state.ropes:
-        yield opened(
-            "spatial",
-            name=f"rope {r}",
-            limited="true",
-            range=(0.0, structure.ropes.length[r]),
-        )
+        length = ropes.length[r]
+        if ropes.stiffness[r]:
+            spring = {"stiffness": ropes.stiffness[r], "damping": ropes.damping[r]}
+            yield opened("spatial", name=f"rope {r}", springlength=length, **spring)
+        else:
+            yield opened("spatial", name=f"rope {r}", limited="true", range=(0.0, length))
         yield tag("site", site=f"rope {r} 0")
         yield tag("site", site=f"rope {r} 1")
         yield "</spatial>"

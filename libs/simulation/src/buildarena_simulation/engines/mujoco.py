@@ -10,8 +10,15 @@ from buildarena_simulation.constants import FORCES_EVERY_S, MAX_SPIN
 from buildarena_simulation.engines.base import CargoPose, World, principal_frames
 from buildarena_simulation.engines.closest_points import ShapeTable, shape_table
 from buildarena_simulation.engines.impacts import ImpactWatch
+from buildarena_simulation.engines.joint_places import is_simple_piece
 from buildarena_simulation.engines.mjcf import MjcfSettings, MjcfState, mjcf_of
-from buildarena_simulation.engines.mujoco_joints import JointAddresses, enter_joint, joint_addresses
+from buildarena_simulation.engines.mujoco_joints import (
+    JointAddresses,
+    drag_apart,
+    enter_joint,
+    joint_addresses,
+)
+from buildarena_simulation.engines.tendons import Tendons
 from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.contacts import CARGO, WORLD, ContactForces
 from buildarena_simulation.structure.model import BoolArray, FloatArray, IntArray
@@ -107,6 +114,12 @@ class MujocoEngine:
         self._addresses = _addresses_in(
             self._model, self._world, clusters, solids, self._rope_alive
         )
+        self._tendons = Tendons(
+            model=self._model,
+            data=self._data,
+            ropes=self._structure.ropes,
+            of=self._addresses.tendons,
+        )
         self._shapes: dict[int, ShapeTable] = {}
         if self._world.cargo is not None:
             self._cargo_body = self._model.body("cargo").id
@@ -132,17 +145,21 @@ class MujocoEngine:
     def drop_rope(self, index: int) -> None:
         """See `Engine`."""
         self._rope_alive[index] = False
-        self._model.tendon_limited[self._addresses.tendons[index]] = 0
+        self._tendons.drop(index)
 
     def advance(self, targets: FloatArray, thrusts: FloatArray) -> None:
         """See `Engine`."""
         model, data, at = self._model, self._data, self._addresses
         self._targets = targets[-1]
+        if self._apart:
+            drag_apart(model, data, (self._clusters, at.bodies), self.motion(), self._apart)
         data.ctrl[at.thrust_actuators] = thrusts
         impacts = ImpactWatch(
             len(targets), gravity=self._world.gravity, time_step_s=self.time_step_s
         )
         velocity = data.qvel[at.free_dofs]
+        if self._world.field is not None:
+            self._tendons.set_lengths(self._world.field.rest_lengths())
         for step, row in enumerate(targets):
             self._apply_own_forces(step)
             at.joints.follow(model, data, row)
@@ -153,7 +170,7 @@ class MujocoEngine:
         self._limit_spin()
         self._keep_cargo_state()
         self._impacts = impacts
-        self._tensions = self._read_tensions()
+        self._tensions = self._tendons.tensions()
         self._bring_up()
 
     def contacts(self) -> ContactForces:
@@ -189,7 +206,7 @@ class MujocoEngine:
 
     def close(self) -> None:
         """See `Engine`."""
-        del self._data, self._model
+        del self._tendons, self._data, self._model
 
     def _apply_own_forces(self, step: int) -> None:
         field, every = self._world.field, round(FORCES_EVERY_S / self.time_step_s)
@@ -218,9 +235,16 @@ class MujocoEngine:
         self._dof_invweight_times_mass = model.dof_invweight0[:6] * mass
 
     def _set_drag(self, moments: FloatArray) -> None:
-        """Damping of each piece's free joint: Unity's v *= 1 - drag·dt, as a force."""
+        """Damping of each piece's free joint: Unity's v *= 1 - drag·dt, as a force.
+
+        The clusters of a piece with other joints than wheels' axles have each its own drag.
+        """
         model, clusters = self._model, self._clusters
+        self._apart: list[tuple[int, ...]] = []
         for piece in clusters.pieces:
+            if not is_simple_piece(self._structure, clusters, piece):
+                self._apart.append(piece)
+                continue
             root, inside = piece[0], list(piece)
             dof = model.joint(f"free {root}").dofadr[0]
             drag = clusters.linear_drag[inside] @ clusters.mass[inside]
@@ -300,16 +324,6 @@ class MujocoEngine:
                 blocks.append(found)
                 weights.append(weight)
         return np.concatenate(rows), np.concatenate(blocks), np.concatenate(weights)
-
-    def _read_tensions(self) -> FloatArray:
-        tendons, tensions = self._addresses.tendons, np.zeros(len(self._rope_alive))
-        if tendons:
-            data = self._data
-            limits = data.efc_type[: data.nefc] == mujoco.mjtConstraint.mjCNSTR_LIMIT_TENDON
-            force_of = {int(data.efc_id[k]): data.efc_force[k] for k in np.flatnonzero(limits)}
-            for rope, tendon in tendons.items():
-                tensions[rope] = force_of.get(tendon, 0.0)
-        return tensions
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

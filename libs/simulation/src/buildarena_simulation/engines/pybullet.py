@@ -37,7 +37,7 @@ from buildarena_simulation.engines.external_forces import (
 )
 from buildarena_simulation.engines.hinges import HingedPiece, hinge_frames
 from buildarena_simulation.engines.impacts import ImpactWatch
-from buildarena_simulation.engines.joint_places import is_simple, joint_rate
+from buildarena_simulation.engines.joint_places import is_simple_piece, joint_rate
 from buildarena_simulation.engines.quiet_output import quiet_output
 from buildarena_simulation.engines.ropes import rope_forces
 from buildarena_simulation.engines.urdf import urdf_of
@@ -139,7 +139,9 @@ class PyBulletEngine:
     def advance(self, targets: FloatArray, thrusts: FloatArray) -> None:
         """See `Engine`."""
         external_forces = thrust_forces(self._structure, self._clusters, self._axes, thrusts)
-        drags = drag_forces(self._clusters, self._motion, self._axes, self._moments)
+        drags = drag_forces(
+            self._structure, self._clusters, self._motion, self._axes, self._moments
+        )
         impacts = ImpactWatch(
             len(targets), gravity=self._world.gravity, time_step_s=self.time_step_s
         )
@@ -235,7 +237,7 @@ class PyBulletEngine:
         )
         for c, link in articulation.links.items():
             set_friction(self._client, body, link, self._friction_of(c))
-        simple = all(is_simple(structure, clusters, c) for c in inside[1:])
+        simple = is_simple_piece(structure, clusters, inside)
         if simple:
             for link, c in enumerate(inside[1:]):
                 rate = joint_rate(structure, clusters, motion, c)
@@ -319,9 +321,14 @@ class PyBulletEngine:
 
     def _pull_ropes(self) -> None:
         structure, clusters = self._structure, self._clusters
-        motion = self._read_motion()
+        motion, field = self._read_motion(), self._world.field
         pulls = rope_forces(
-            structure, clusters, motion, alive=self._rope_alive, time_step_s=self.time_step_s
+            structure,
+            clusters,
+            motion,
+            alive=self._rope_alive,
+            rest=structure.ropes.length if field is None else field.rest_lengths(),
+            time_step_s=self.time_step_s,
         )
         self._tensions = pulls.tension
         ends = pulls.forces

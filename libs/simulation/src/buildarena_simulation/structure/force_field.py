@@ -7,7 +7,7 @@ import numpy as np
 from buildarena_simulation.constants import GRAVITY
 from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.contacts import PointForces
-from buildarena_simulation.structure.model import BoolArray, FloatArray, Structure
+from buildarena_simulation.structure.model import BoolArray, FloatArray, Ropes, Structure
 from buildarena_simulation.structure.motion import Motion
 from buildarena_simulation.structure.own_forces import OwnForces, own_forces_of
 from buildarena_simulation.structure.vectors import cross, summed_by, turned
@@ -21,11 +21,13 @@ class Commands:
         pushing: (P,) whether each fan's key is held.
         heights: (A,) by how much each held height was moved from where it began, units.
         kicks: (D,) force with which each block that let go pushes off, mass·unit/s².
+        rests: (K,) length of each spring at rest, as a share of its built length.
     """
 
     pushing: BoolArray
     heights: FloatArray
     kicks: FloatArray
+    rests: FloatArray
 
 
 @dataclass(slots=True)
@@ -34,10 +36,12 @@ class ForceField:
 
     Attributes:
         table: Who exerts what.
+        ropes: The ropes and springs.
         commands: What the keys ask for now.
     """
 
     table: OwnForces
+    ropes: Ropes
     commands: Commands = field(init=False)
     _targets: FloatArray | None = field(init=False, default=None)
     _sum: FloatArray = field(init=False)
@@ -51,9 +55,16 @@ class ForceField:
             pushing=np.zeros(len(table.pushes), dtype=bool),
             heights=np.zeros(len(table.altitudes)),
             kicks=np.zeros(len(table.decouplers)),
+            rests=np.ones(len(self.ropes.springs)),
         )
         self._sum = np.zeros((len(table), 3))
         self._arms = (None, table.point)
+
+    def rest_lengths(self) -> FloatArray:
+        """Length at rest of every rope and spring, (R,), units."""
+        lengths = self.ropes.length.copy()
+        lengths[self.ropes.springs] *= self.commands.rests
+        return lengths
 
     def wrenches(self, clusters: Clusters, motion: Motion) -> FloatArray:
         """The wrench on each cluster about its centre of mass, (C, 6), machine frame axes.
@@ -135,4 +146,5 @@ class ForceField:
 def field_of(structure: Structure) -> ForceField | None:
     """What a structure's blocks exert by themselves; None where none does."""
     table = own_forces_of(structure)
-    return ForceField(table) if len(table) else None
+    exerted = len(table) or len(structure.ropes.springs)
+    return ForceField(table, structure.ropes) if exerted else None

@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from buildarena_geometry.modules.forces import Spring
 from buildarena_geometry.modules.module import Module, Physics
 from buildarena_simulation.constants import JointKind
 
@@ -174,7 +175,7 @@ class Members:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ropes:
-    """The winches' ropes, tension only; one row each.
+    """The winches' ropes, tension only, and the springs; one row each.
 
     Attributes:
         names: What each joins, fit to be shown.
@@ -184,6 +185,9 @@ class Ropes:
         second_point: (R, 3) where it ends, machine frame, units.
         length: (R,) its length, units.
         limit: (R,) tension at which it gives way, mass·g.
+        stiffness: (R,) of a spring, mass/s²; 0 of a rope.
+        damping: (R,) of a spring, mass/s; 0 of a rope.
+        spring_of: What each spring does, in the order of `springs`.
     """
 
     names: tuple[str, ...]
@@ -193,9 +197,17 @@ class Ropes:
     second_point: FloatArray
     length: FloatArray
     limit: FloatArray
+    stiffness: FloatArray
+    damping: FloatArray
+    spring_of: tuple[Spring, ...] = ()
 
     def __len__(self) -> int:
         return len(self.names)
+
+    @property
+    def springs(self) -> IntArray:
+        """Which rows are springs."""
+        return np.flatnonzero(self.stiffness)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
