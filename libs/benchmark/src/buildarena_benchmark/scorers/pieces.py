@@ -71,6 +71,15 @@ def mass_of(machine: "Machine", trajectory: "Trajectory", members: Mask) -> floa
     return math.fsum([*blocks, *halves])
 
 
+def masses_of(machine: "Machine", trajectory: "Trajectory", members: Mask) -> NDArray[np.float64]:
+    """`mass_of` at each sample, (T,), for members (T, N)."""
+    masses = np.empty(len(members))
+    changed = np.flatnonzero(np.any(members[1:] != members[:-1], axis=1)) + 1
+    for first, last in pairwise([0, *changed.tolist(), len(members)]):
+        masses[first:last] = mass_of(machine, trajectory, members[first])
+    return masses
+
+
 def _ropes(machine: "Machine", trajectory: "Trajectory") -> list[tuple[int, int, float]]:
     """Tracked blocks that a rope ties, and when it gives way, seconds."""
     index = {block: i for i, block in enumerate(trajectory.block_ids)}
