@@ -1,7 +1,8 @@
 """Rigid clusters, the moving joints between them, and their mass properties.
 
 Blocks joined rigidly form a *cluster*; clusters joined by moving joints (axles, hinges, sliders, …)
-form an articulated *piece*, a tree whose root is its largest cluster.
+form an articulated *piece*, a tree whose root is its largest cluster, or its heaviest where more
+than wheels moves.
 """
 
 from collections.abc import Iterable, Sequence
@@ -140,7 +141,8 @@ def _grow_trees(
     tree: _Tree = []
     via: dict[int, int] = {}
     for piece in components(len(groups), edges):
-        root = max(piece, key=lambda g: (len(groups[g]), -g))
+        inside = [k for k, (a, _) in zip(joints, edges, strict=True) if a in piece]
+        root = _root(structure, groups, piece, inside)
         reached = {root}
         tree.append((root, -1, -1))
         waiting = [root]
@@ -164,6 +166,24 @@ def _grow_trees(
         if doubled is None or not _collinear(structure, k, doubled):
             locked.extend([k, *_path(parent, via, a, b)])
     return tree, locked
+
+
+def _root(
+    structure: Structure,
+    groups: Sequence[Sequence[int]],
+    piece: Sequence[int],
+    joints: Sequence[int],
+) -> int:
+    """The group that a piece's tree grows from.
+
+    Where wheels are all that moves, it is the one of most blocks. Elsewhere it is the heaviest:
+    what a joint bears follows from the motion of the outer side, and an error of the heavier side's
+    would outweigh the lighter one's loads.
+    """
+    simple = structure.joints.simple[structure.members.second[list(joints)]].all()
+    if simple:
+        return max(piece, key=lambda g: (len(groups[g]), -g))
+    return max(piece, key=lambda g: (round(float(structure.masses[groups[g]].sum()), 9), -g))
 
 
 def _path(parent: dict[int, int], via: dict[int, int], a: int, b: int) -> list[int]:
