@@ -93,9 +93,23 @@ def find_clusters(structure: Structure, holds: BoolArray) -> Clusters:
         label = _labels(len(structure), groups)
         free = [k for k in joints if label[members.first[k]] != label[members.second[k]]]
         tree, locked = _grow_trees(structure, groups, label, free)
+        locked += _held_by_teeth(structure, label, free)
         if not locked:
             return _collect(structure, groups, tree)
         rigid.extend(locked)
+
+
+def _held_by_teeth(structure: Structure, label: Sequence[int], free: Sequence[int]) -> list[int]:
+    """Joints of cogs that engage with one which is fast to what both are mounted on."""
+    members = structure.members
+    seat_of = {int(members.second[k]): k for k in free}
+    held = []
+    for mesh in structure.joints.meshes:
+        for cog, other in ((mesh.first, mesh.second), (mesh.second, mesh.first)):
+            k = seat_of.get(cog)
+            if k is not None and other not in seat_of and label[members.first[k]] == label[other]:
+                held.append(k)
+    return held
 
 
 def components(count: int, edges: Iterable[tuple[int, int]]) -> list[list[int]]:
