@@ -6,19 +6,19 @@ import { defineConfig } from "vitest/config";
 
 export const here = (path: string): string => fileURLToPath(new URL(path, import.meta.url));
 
-const MODULES = here("../../libs/geometry/src/buildarena_geometry/modules/modules.yaml");
+const MODULES = ["modules.yaml", "extended.yaml"].map((file) => here(`../../libs/geometry/src/buildarena_geometry/modules/${file}`));
 
 interface ModulesFile {
   modules: { name: string; kind: string; center?: number[]; body?: unknown[] }[];
 }
 
-/** What of the geometry library's modules a page draws; the file is JSON, whatever its ending says. */
+/** What of the geometry library's modules a page draws; the files are JSON, whatever their endings say. */
 export const moduleShapes: Plugin = {
   name: "module-shapes",
   resolveId: (id) => (id === "virtual:modules" ? "\0modules" : null),
   load(id) {
     if (id !== "\0modules") return null;
-    const { modules } = JSON.parse(readFileSync(MODULES, "utf8")) as ModulesFile;
+    const modules = MODULES.flatMap((file) => (JSON.parse(readFileSync(file, "utf8")) as ModulesFile).modules);
     const shapes = modules.map(({ name, kind, center, body }) => ({ name, kind, center, body }));
     return `export default ${JSON.stringify(shapes)};`;
   },

@@ -176,7 +176,20 @@ def test_more_terrain_than_is_simulated_is_refused() -> None:
     ("old", "new", "says"),
     [
         ("  max_blocks: 100", "  min_sub_structures: 6", "constraints.max_sub_structures: is 5"),
-        ("  max_blocks: 100", "  modules: [Winch, Rocket]", "modules[1]: there is no module 'Roc"),
+        (
+            "  max_blocks: 100",
+            "  modules: [Winch, Roket]",
+            "8: constraints.modules[1]: there is no",
+        ),
+        ("  max_blocks: 100", "  modules: [Rocket]", "'Rocket' can be built, but is not simulated"),
+        (
+            "  max_blocks: 100",
+            "  modules: garage",
+            "no module set 'garage'; choose from basic, work",
+        ),
+        ("  max_blocks: 100", "  modules: all", "'all' has modules that are not simulated; choose"),
+        ("  max_blocks: 100", "  modules: 5", "constraints.modules: Input should be a valid tuple"),
+        ("  max_blocks: 100", "  min_modules: {Hinge: 1}", "Hinge is not among the task's modules"),
         ("  max_blocks: 100", "  min_modules: {Rope: 2}", "min_modules.Rope: there is no module"),
         ("  max_blocks: 100", "  modules: []", "constraints.modules"),
         (

@@ -172,7 +172,7 @@ class BodyView(TypedDict):
 
     center: list[float]
     quaternion: list[float]
-    shape: Literal["box", "cylinder"]
+    shape: Literal["box", "cylinder", "sphere"]
     size: list[float]
 
 

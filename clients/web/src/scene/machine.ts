@@ -79,6 +79,7 @@ export function machineOf(parts: Iterable<PartView>): Machine {
 }
 
 function solidBox(solid: Solid): Box3 {
+  if (solid.shape === "sphere") return new Box3(vector(solid.center), vector(solid.center)).expandByScalar(solid.radius);
   const box = new Box3().setFromPoints([vector(solid.from), vector(solid.to)]);
   // A cylinder's corners lie within its radius around its axis, whichever way that points.
   return solid.shape === "box" ? box : box.expandByScalar(solid.radius);

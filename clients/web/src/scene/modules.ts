@@ -60,9 +60,12 @@ export function moduleShape(name: string): ModuleShape {
 export const KIND_COLOURS: Readonly<Record<string, string>> = {
   start: "#cc5c45",
   block: "#c79e6b",
+  joint: "#99739e",
   wheel: "#545966",
+  flight: "#dbcca8",
   cannon: "#4d8cba",
   torch: "#e8a338",
+  device: "#8c99a3",
   connector: "#736b66",
   cargo: "#859966",
 };

@@ -32,8 +32,9 @@ describe("readScene", () => {
     const solid = moduleShape("Own Wheel").body[0];
     // Its axis, the z of its own frame, is turned a quarter about y and lies along x.
     expect(solid).toMatchObject({ shape: "cylinder", radius: 1.5 });
+    const from = solid !== undefined && "from" in solid ? solid.from : [];
     [-1, 0, 1].forEach((value, axis) => {
-      expect(solid?.from[axis]).toBeCloseTo(value);
+      expect(from[axis]).toBeCloseTo(value);
     });
   });
 

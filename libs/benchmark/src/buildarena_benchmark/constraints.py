@@ -11,7 +11,7 @@ from collections.abc import Callable
 from typing import Final
 
 from buildarena_benchmark.tasks.task import Task
-from buildarena_geometry import Machine
+from buildarena_geometry import Machine, modules_named
 
 _MAX_NAMED = 10
 
@@ -81,10 +81,9 @@ def _wrong_modules(task: Task, machine: Machine) -> str | None:
     constraints = task.constraints
     used = Counter(block.module.name for block in machine.blocks.values())
     used.update(connector.module.name for connector in machine.connectors.values())
-    if constraints.modules is not None:
-        foreign = set(used) - {*constraints.modules, machine.catalogue.start.name}
-        if foreign:
-            return f"{min(foreign)} is not among the task's modules"
+    foreign = set(used) - {*modules_named(constraints.modules), machine.catalogue.start.name}
+    if foreign:
+        return f"{min(foreign)} is not among the task's modules"
     for name, least in constraints.min_modules.items():
         if used[name] < least:
             return f"the machine has {used[name]} of {name}, the task asks for {least} or more"

@@ -16,6 +16,13 @@ DISQUALIFYING: Final[Mapping[str, str]] = MappingProxyType(
         "no_wheels": "A vehicle got far without a single wheel.",
         "start_too_high": "Something started at or above the height that the task allows.",
         "twr_below_one": "A rocket rose although its thrust is less than its weight.",
+        "not_carried": "The cargo got there, but the machine did not bear it on its way.",
+        "not_standing": "The ground did not bear machine and cargo while the cargo was held.",
+        "not_airborne": "The machine was at its height, but touched the ground.",
+        "base_moved": "The starting block did not stay where it was.",
+        "came_apart": "Parts came off the machine before its work was done.",
+        "forces_not_measured": "The trial has no contact forces, without which mechanisms and "
+        "flight cannot be judged.",
         "unstable": "The simulation blew up: its figures are not those of a machine.",
     }
 )

@@ -6,7 +6,18 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
-from buildarena_benchmark.scorers import height, support, thrust, transport
+from buildarena_benchmark.scorers import (
+    glide,
+    height,
+    hover,
+    placing,
+    road,
+    slalom,
+    support,
+    thrust,
+    transport,
+    winch,
+)
 from buildarena_benchmark.scorers.stability import is_unstable
 from buildarena_benchmark.scorers.verdict import Metric, Verdict
 
@@ -22,6 +33,12 @@ _SCORERS: Final[Mapping[str, Callable[..., Verdict]]] = MappingProxyType(
         "support": support.judge,
         "thrust": thrust.judge,
         "height": height.judge,
+        "road": road.judge,
+        "slalom": slalom.judge,
+        "winch": winch.judge,
+        "place": placing.judge,
+        "hover": hover.judge,
+        "glide": glide.judge,
     }
 )
 

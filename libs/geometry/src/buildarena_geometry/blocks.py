@@ -83,6 +83,13 @@ class Block:
         return self.world_from_block.direction((0.0, 0.0, 1.0))
 
     @property
+    def seat_xyz(self) -> Vector:
+        """Where it touches the face it sits on, world frame, units."""
+        if not self.module.root_offset:
+            return self.world_from_block.xyz
+        return self.world_from_block.point((0.0, 0.0, -self.module.root_offset))
+
+    @property
     def forward_is_clockwise(self) -> bool:
         """Whether it turns clockwise, seen from outside, when it runs forward."""
         sense = self.module.spin_sense
@@ -125,6 +132,7 @@ class Connector:
             made. Later twists and shifts of the connector turn and move this frame, not the ends.
         span: (3,) from start to end in that frame, when the connector was made or last moved as
             part of a sub-structure.
+        bindings: the keys bound to each of its actions.
         structure: the sub-structure its start belongs to in an assembly; "" elsewhere.
         note: the builder's own words about it.
     """
@@ -137,6 +145,7 @@ class Connector:
     end_xyz: Vector
     world_from_connector: Pose
     span: Vector
+    bindings: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     structure: str = ""
     note: str = ""
 
@@ -159,7 +168,7 @@ class Joint:
         base: id of the block it sits on.
         part: id of the block that sits.
         face: label of the base's face.
-        part_xyz: the part's root point, world frame, units.
+        part_xyz: where the part touches that face when flush, world frame, units.
         base_xyz: the face's centre, world frame, units.
         offset: how far these two were moved apart since they were joined, units.
     """
@@ -173,7 +182,7 @@ class Joint:
 
     @property
     def point(self) -> NDArray[np.float64]:
-        """(3,) where it acts: the part's root point, world frame, units."""
+        """(3,) where it acts: where the part touches its face, world frame, units."""
         return _array(self.part_xyz)
 
     @property
@@ -190,6 +199,18 @@ class KeyPress:
     time_s: float
     key: str
     hold_for_s: float
+
+
+def seated(world_from_face: Pose, module: Module) -> Pose:
+    """The pose of a new block on a face.
+
+    Args:
+        world_from_face: the face's frame.
+        module: what the block is.
+    """
+    if not module.root_offset:
+        return world_from_face
+    return world_from_face @ Pose(position=(0.0, 0.0, module.root_offset))
 
 
 def _array(vector: Vector) -> NDArray[np.float64]:

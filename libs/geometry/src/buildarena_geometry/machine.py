@@ -251,7 +251,7 @@ class Machine:
 
         Args:
             document: what `to_document` made, as JSON values.
-            catalogue: the modules it is made of; the basic ones if left out.
+            catalogue: the modules it is made of; all types are known if left out.
 
         Raises:
             DocumentError: it is not a machine; the message names the entry.

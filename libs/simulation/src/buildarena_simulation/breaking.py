@@ -39,6 +39,7 @@ class BreakingModel:
         self, world: World, clusters: Clusters, motion: Motion, *, interval_s: float
     ) -> None:
         structure = self._structure = world.structure
+        self._field = world.field
         self._faces, self._has_cargo = FaceFinder(world), world.cargo is not None
         self.bearing = BearingMeter(structure, len(world.terrain))
         self._loads = LoadModel(structure, clusters, motion)
@@ -119,7 +120,7 @@ class BreakingModel:
         return self._loads_now if seen is None else seen
 
     def _follow_loads(self, ratio: FloatArray, tensions: FloatArray) -> None:
-        ropes = tensions / GRAVITY / self._structure.ropes.limit
+        ropes = np.maximum(tensions, 0.0) / GRAVITY / self._structure.ropes.limit
         now = self._loads_now = np.concatenate([ratio, ropes])
         self._loads_since = now if self._loads_since is None else np.maximum(self._loads_since, now)
 
@@ -157,6 +158,8 @@ class BreakingModel:
         faces = self._faces.find(clusters, motion, cargo)
         contacts = faces.joined_to(engine.contacts(), clusters.cluster_of)
         others = [self._pushes(thrusts), self._pulls(tensions)]
+        if self._field is not None:
+            others.append(self._field.taken(clusters, motion))
         contacts, shared = self._supports.settled(
             contacts,
             self._sharing.shared(contacts),

@@ -34,6 +34,13 @@ from gaining energy.
 FRICTION_TERRAIN: Final = 1.0
 """Neutral, so that a contact with terrain or cargo takes the other body's coefficient."""
 
+FORCES_EVERY_S: Final = 0.008
+"""Time between two evaluations of wings, fans and balloons, s.
+
+Ours: air slows a block at a rate of at most coefficient · cap² / mass, 45/s for a propeller,
+whatever it is fixed to; an explicit step is stable below 2/45 s.
+"""
+
 LOAD_FILTER_S: Final = 0.16
 """Time constant of the low-pass filter on block wrenches, s. Fitted at g = 32.81."""
 

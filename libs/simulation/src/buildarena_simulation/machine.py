@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, TypedDict
 import numpy as np
 
 from buildarena_geometry.modules.joints import MOVING_SEATS, UP, SeatJoint
-from buildarena_geometry.modules.solids import Cylinder
+from buildarena_geometry.modules.solids import Ball, Cylinder
 from buildarena_simulation.constants import MAX_PARTS, JointKind
 from buildarena_simulation.control import Bindings
 from buildarena_simulation.errors import MachineNotSimulable
@@ -44,11 +44,18 @@ def structure_of(machine: "Machine") -> Structure:
         )
     parts = [_part(block) for block in machine.blocks.values()]
     index = {part.id: i for i, part in enumerate(parts)}
-    links = [_link(joint, index, parts) for joint in machine.joints if joint.holds]
-    ropes = []
+    links, ropes = [], []
+    for joint in machine.joints:
+        if joint.holds:
+            tether = parts[index[joint.part]].module.forces.tether
+            if tether is None:
+                links.append(_link(joint, index, parts))
+            else:
+                ropes.append(_tether(joint, index, tether.length))
     connectors = list(machine.connectors.values())
-    braces = [c for c in connectors if c.module.link != "rope"]
+    braces = [c for c in connectors if c.module.link == "rigid"]
     winches = [c for c in connectors if c.module.link == "rope"]
+    springs = [c for c in connectors if c.module.link == "spring"]
     for connector, share in zip(braces, _shares(braces), strict=True):
         links.append(
             Link(
@@ -70,6 +77,15 @@ def structure_of(machine: "Machine") -> Structure:
                 **_span(connector, index),
                 mass=sum(one.module.mass for one in alike),
                 share=share,
+            )
+        )
+    for connector, share in zip(springs, _shares(springs), strict=True):
+        ropes.append(
+            Rope(
+                **_span(connector, index),
+                mass=connector.module.mass,
+                share=share,
+                spring=connector.module.forces.spring,
             )
         )
     return build_structure(parts, links, ropes)
@@ -118,8 +134,9 @@ def _shares(connectors: "Sequence[Connector]") -> list[float]:
 
 
 def bindings_of(machine: "Machine") -> Bindings:
-    """The keys of each block's actions, in the order of the machine's blocks."""
-    return [block.bindings for block in machine.blocks.values()]
+    """The keys of each part's actions: the machine's blocks in order, then its springs."""
+    springs = [c for c in machine.connectors.values() if c.module.link == "spring"]
+    return [*(block.bindings for block in machine.blocks.values()), *(s.bindings for s in springs)]
 
 
 def _part(block: "Block") -> Part:
@@ -172,7 +189,7 @@ def _shape(solid: "Solid", position: FloatArray, rotation: FloatArray) -> Shape:
             half_extents=half,
         )
     return Shape(
-        kind=ShapeKind.BOX,
+        kind=ShapeKind.SPHERE if isinstance(solid, Ball) else ShapeKind.BOX,
         center=position + rotation @ np.array(solid.center),
         rotation=rotation,
         half_extents=np.array(solid.size) / 2,
@@ -189,4 +206,17 @@ def _link(joint: "Joint", index: dict[str, int], parts: list[Part]) -> Link:
         kind=JointKind(parts[part].physics.seat),
         start=point,
         end=point,
+    )
+
+
+def _tether(joint: "Joint", index: dict[str, int], length: float) -> Rope:
+    point = np.array(joint.point)
+    return Rope(
+        name=f"{joint.base}-{joint.part}",
+        first=index[joint.base],
+        second=index[joint.part],
+        start=point,
+        end=point,
+        mass=0.0,
+        length=length,
     )

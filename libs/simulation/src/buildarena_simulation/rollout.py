@@ -22,11 +22,13 @@ from buildarena_simulation.control import (
 from buildarena_simulation.engines import ENGINES, create_engine, engine_version
 from buildarena_simulation.engines.base import Engine, World
 from buildarena_simulation.errors import BuildarenaSimulationError, SimulationError
+from buildarena_simulation.force_control import plan_forces
 from buildarena_simulation.machine import bindings_of, structure_of
 from buildarena_simulation.placement import Start, start_digest, start_of
 from buildarena_simulation.recording import Recorder
 from buildarena_simulation.scenario import Scenario
 from buildarena_simulation.structure.clusters import find_clusters
+from buildarena_simulation.structure.force_field import field_of
 from buildarena_simulation.structure.model import Structure
 from buildarena_simulation.structure.motion import at_rest
 from buildarena_simulation.threads import single_threaded
@@ -135,6 +137,7 @@ def simulate_structure(
         cargo=start.cargo,
         gravity=GRAVITY,
         finer=finer,
+        field=field_of(structure),
     )
     if seed is not None:
         controls, control = varied_presses(controls, scenario.control, seed)
@@ -187,6 +190,7 @@ class _Trial:
     ) -> None:
         structure = world.structure
         self._structure, self._scenario, self._engine = structure, scenario, engine
+        self._field = world.field
         holds = np.ones(len(structure.members), dtype=bool)
         clusters = find_clusters(structure, holds)
         motion = at_rest(clusters, start.position, start.rotation)
@@ -217,11 +221,23 @@ class _Trial:
             step_count=samples * per_sample,
             time_step_s=engine.time_step_s,
         )
+        forces = None
+        if self._field is not None:
+            forces = plan_forces(
+                self._structure,
+                self._field.table,
+                bindings,
+                controls,
+                control=scenario.control,
+                times=engine.time_step_s * np.arange(samples * per_sample, dtype=np.float64),
+            )
         self._sample(0.0)
         for sample in range(samples):
             for offset in chunks:
                 first = sample * per_sample + offset
                 rows = slice(first, first + engine.steps_per_evaluation)
+                if forces is not None and self._field is not None:
+                    self._field.commands = forces.at(first)
                 self._advance(schedule.targets[rows], schedule.firing[first], first)
             self._sample((sample + 1) / SAMPLE_RATE_HZ)
             if until is not None and until(self.recorder.cargo_now):

@@ -26,7 +26,7 @@ BlockId = Annotated[str, Field(min_length=1, max_length=40)]
 
 
 def _is_default(value: Any) -> bool:
-    """Whether an addition to the format is unused; then older texts and hashes stay as they were."""
+    """Whether an addition to the format is unused: older texts and hashes stay as they were."""
     return value is None or value is False or value == ()
 
 

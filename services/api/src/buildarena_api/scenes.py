@@ -17,7 +17,7 @@ Quaternion = tuple[float, float, float, float]
 class BodyView(BaseModel):
     """A solid of a module, in the block's frame, units."""
 
-    shape: Literal["box", "cylinder"]
+    shape: Literal["box", "cylinder", "sphere"]
     center: Vector
     quaternion: Quaternion = Field(
         description="Block from solid, (w, x, y, z); a cylinder's axis is its z"
@@ -128,11 +128,12 @@ def _module(module: Module) -> ModuleShape:
 
 def _bodies(module: Module) -> Iterable[BodyView]:
     for solid in module.body:
-        if isinstance(solid, Box):
-            unturned = (1.0, 0.0, 0.0, 0.0)
-            yield BodyView(shape="box", center=solid.center, quaternion=unturned, size=solid.size)
-        else:
+        if isinstance(solid, Cylinder):
             yield _cylinder(solid)
+            continue
+        shape: Literal["box", "sphere"] = "box" if isinstance(solid, Box) else "sphere"
+        unturned = (1.0, 0.0, 0.0, 0.0)
+        yield BodyView(shape=shape, center=solid.center, quaternion=unturned, size=solid.size)
 
 
 def _cylinder(solid: Cylinder) -> BodyView:

@@ -79,6 +79,24 @@ def driven_distances(
     return np.asarray(explained * (1.0 + ERROR) + SLACK)
 
 
+def moved_upright(trajectory: "Trajectory", joined: Mask, path: Floats) -> Floats:
+    """How far a subject can have got with every joined block had the machine only turned, (T,).
+
+    A machine that moves and turns on the ground takes no block farther than another by more than
+    twice the horizontal distance between them; one that falls over does.
+
+    Args:
+        trajectory: The trial.
+        joined: (T, N) as `joined_to_start` says.
+        path: (T, 2) or (T, 3) of the subject.
+    """
+    positions = trajectory.positions[:, :, :2].astype(np.float64)
+    apart = np.linalg.norm(positions[0] - path[0, :2], axis=1)
+    moved = np.linalg.norm(positions - positions[0], axis=2)
+    reach = np.where(joined, moved + 2.0 * apart, np.inf)
+    return np.asarray(reach.min(axis=1, initial=np.inf) + SLACK)
+
+
 def radius_of(wheel: "Block") -> float:
     """A wheel's radius, units."""
     radii = [solid.radius for solid in wheel.module.body if isinstance(solid, Cylinder)]

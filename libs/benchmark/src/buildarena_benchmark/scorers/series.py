@@ -24,3 +24,15 @@ def speeds(time_s: Series, positions: Series) -> Series:
     """Mean speed of each block between samples, (T - 1, N), units/s."""
     steps = np.diff(time_s)[:, None]
     return np.asarray(np.linalg.norm(np.diff(positions, axis=0), axis=2) / steps)
+
+
+def rotations(quaternions: NDArray[np.floating]) -> Series:
+    """Rotation matrices, (T, 3, 3), of quaternions (T, 4) as (w, x, y, z)."""
+    given = quaternions.astype(np.float64)
+    w, x, y, z = (given / np.maximum(np.linalg.norm(given, axis=1), 1e-9)[:, None]).T
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), 2, 0)

@@ -5,8 +5,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from buildarena_benchmark.scorers.pieces import Mask, joined_to_start
-from buildarena_benchmark.scorers.rolling import SLACK, driven_distances
+from buildarena_benchmark.scorers.carrying import bears_cargo
+from buildarena_benchmark.scorers.pieces import joined_to_start
+from buildarena_benchmark.scorers.rolling import driven_distances, moved_upright
 from buildarena_benchmark.scorers.series import Series, speeds, starting_block
 from buildarena_benchmark.scorers.verdict import Deciding, Metric, Verdict, rounded
 from buildarena_benchmark.tasks.document import TransportScoring
@@ -21,11 +22,6 @@ _SETTLED_S = 2.0
 
 _INTACT_SPREAD = 1.0
 """Wheel-to-wheel distances of an intact vehicle vary by no more, units."""
-
-_BORNE_SAMPLES = 12
-"""Half a second: whether a machine bears its cargo is judged over so long."""
-
-_BORNE_SHARE = 0.5
 
 _RESTING = 1e-3
 """Slower movement has no direction worth judging, units/s."""
@@ -65,9 +61,9 @@ def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict
     driven = driven_distances(machine, trajectory, joined, path)
     counted = moved
     if driven is not None:
-        counted = np.minimum(moved, np.minimum(driven, _moved_upright(trajectory, joined, path)))
+        counted = np.minimum(moved, np.minimum(driven, moved_upright(trajectory, joined, path)))
     if driven is not None and scoring.subject == "cargo":
-        counted = np.where(_is_borne(trajectory), counted, 0.0)
+        counted = np.where(bears_cargo(trajectory), counted, 0.0)
     distance, indicator = float(moved.max()), float(counted.max())
     start_height = (
         float(path[0, 2])
@@ -102,32 +98,6 @@ def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict
         flags=tuple(flag for flag, holds in flags.items() if holds),
         deciding=Deciding(samples=len(path), members=joined, cargo=scoring.subject == "cargo"),
     )
-
-
-def _moved_upright(trajectory: "Trajectory", joined: Mask, path: Series) -> Series:
-    """How far the subject can have got with every joined block had the machine only turned, (T,).
-
-    A machine that moves and turns on the ground takes no block farther than another by more than
-    twice the horizontal distance between them; one that falls over does.
-    """
-    positions = trajectory.positions[:, :, :2].astype(np.float64)
-    apart = np.linalg.norm(positions[0] - path[0, :2], axis=1)
-    moved = np.linalg.norm(positions - positions[0], axis=2)
-    reach = np.where(joined, moved + 2.0 * apart, np.inf)
-    return np.asarray(reach.min(axis=1, initial=np.inf) + SLACK)
-
-
-def _is_borne(trajectory: "Trajectory") -> Mask:
-    """At which samples the machine bears at least half of the cargo, over the last moments, (T,).
-
-    A cargo that hops on its deck is borne; one that was thrown, or lies on the ground, is not.
-    """
-    assert trajectory.bearing is not None  # noqa: S101 - the caller looked
-    assert trajectory.cargo_mass is not None  # noqa: S101
-    load = trajectory.bearing.cargo.astype(np.float64)
-    sums = np.cumsum([load, trajectory.cargo_mass], axis=1)
-    sums[:, _BORNE_SAMPLES:] -= sums[:, :-_BORNE_SAMPLES].copy()
-    return np.asarray(sums[0] >= _BORNE_SHARE * sums[1])
 
 
 def _subject_path(

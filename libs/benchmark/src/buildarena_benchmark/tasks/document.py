@@ -8,10 +8,12 @@ and what nobody could ever pass is refused.
 import unicodedata
 from typing import Annotated, Final, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationInfo, field_validator
+from pydantic import AfterValidator, Discriminator, Field, Tag, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
-from buildarena_geometry import load_catalogue
+from buildarena_benchmark.tasks.fields import Coordinate, Count, Document, Threshold
+from buildarena_benchmark.tasks.workshop_scoring import WorkshopScoring, hopeless
+from buildarena_geometry import MODULE_SETS, module_set, modules_named
 from buildarena_simulation import Scenario
 
 MAX_BLOCK_SECONDS: Final = 20_000
@@ -29,28 +31,36 @@ def _plain(text: str) -> str:
 
 def _known_module(name: str) -> str:
     # Cargo is placed by the scenario, never by a builder.
-    known = [module.name for module in load_catalogue().values() if module.kind != "cargo"]
-    if name not in known:
+    simulated = module_set("workshop")
+    if name not in simulated:
         message = f"there is no module {name!r}"
-        raise PydanticCustomError("unknown_module", message, {"choices": sorted(known)})
+        if name in module_set("all"):
+            message = f"{name!r} can be built, but is not simulated"
+        known = sorted(module.name for module in simulated.values())
+        raise PydanticCustomError("unknown_module", message, {"choices": known})
     return name
 
 
+def _known_set(chosen: str) -> str:
+    simulated = [name for name in MODULE_SETS if name != "all"]
+    if chosen not in simulated:
+        message = f"there is no module set {chosen!r}"
+        if chosen in MODULE_SETS:
+            message = f"the module set {chosen!r} has modules that are not simulated"
+        raise PydanticCustomError("unknown_set", message, {"choices": simulated})
+    return chosen
+
+
 Weight = Annotated[int, Field(ge=1, le=3)]
-Coordinate = Annotated[float, Field(ge=-1e4, le=1e4)]
-Threshold = Annotated[float, Field(ge=0, le=1e6)]
-Count = Annotated[int, Field(ge=0, le=1000)]
 Text = Annotated[str, AfterValidator(_plain)]
 Word = Annotated[str, Field(pattern=r"^[\w .,/²³·%°-]+$", min_length=1, max_length=60)]
 """Stands in tables, plots and TeX: no sign that means something there."""
 ModuleName = Annotated[str, AfterValidator(_known_module)]
+ModuleSet = Annotated[str, AfterValidator(_known_set)]
+ModuleNames = Annotated[tuple[ModuleName, ...], Field(min_length=1, max_length=50)]
 
 
-class _Document(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class Constraints(_Document):
+class Constraints(Document):
     """What a machine for the task may be made of.
 
     Attributes:
@@ -58,7 +68,8 @@ class Constraints(_Document):
         max_sub_structures: Most sub-structures.
         max_blocks: Most blocks per sub-structure, connectors not counted; the whole machine may
             have as many for each sub-structure that is allowed.
-        modules: Names of the modules that may be used; None for all.
+        modules: Which modules may be used: a set's name, or names of modules; None for the basic
+            set.
         min_modules: Fewest blocks or connectors of a module, by its name.
         min_wheels: Fewest powered wheels; shown to builders, judged by the scorer.
     """
@@ -66,8 +77,14 @@ class Constraints(_Document):
     min_sub_structures: Annotated[int, Field(ge=1, le=20)] = 1
     max_sub_structures: Annotated[int, Field(ge=1, le=20, validate_default=True)] = 1
     max_blocks: Annotated[int, Field(ge=2, le=1000)] = 200
-    modules: Annotated[tuple[ModuleName, ...], Field(min_length=1, max_length=50)] | None = None
-    min_modules: dict[ModuleName, Annotated[int, Field(ge=1, le=1000)]] = {}
+    modules: (
+        Annotated[
+            Annotated[ModuleSet, Tag("set")] | Annotated[ModuleNames, Tag("names")],
+            Discriminator(lambda given: "set" if isinstance(given, str) else "names"),
+        ]
+        | None
+    ) = None
+    min_modules: dict[ModuleName, Annotated[int, Field(ge=1, le=1000)]] = Field(default={})
     min_wheels: Count = 0
 
     @property
@@ -88,14 +105,14 @@ class Constraints(_Document):
     def _wanted_modules_are_allowed(
         cls, wanted: dict[str, int], info: ValidationInfo
     ) -> dict[str, int]:
-        allowed = info.data.get("modules")
+        allowed = modules_named(info.data.get("modules"))
         for name in wanted:
-            if allowed is not None and name not in allowed:
+            if name not in allowed:
                 raise ValueError(f"{name} is not among the task's modules")
         return wanted
 
 
-class TransportScoring(_Document):
+class TransportScoring(Document):
     """How far something is moved over the ground.
 
     Attributes:
@@ -114,7 +131,7 @@ class TransportScoring(_Document):
     target: tuple[Coordinate, Coordinate] = (10.0, 10.0)
 
 
-class SupportScoring(_Document):
+class SupportScoring(Document):
     """How heavy a cargo is carried over a gap.
 
     Attributes:
@@ -129,7 +146,7 @@ class SupportScoring(_Document):
     max_start_height: Threshold = 20.0
 
 
-class ThrustScoring(_Document):
+class ThrustScoring(Document):
     """Thrust over weight.
 
     Attributes:
@@ -140,7 +157,7 @@ class ThrustScoring(_Document):
     min_ratio: Threshold = 1.0
 
 
-class HeightScoring(_Document):
+class HeightScoring(Document):
     """How high a rocket rises.
 
     Attributes:
@@ -158,12 +175,12 @@ class HeightScoring(_Document):
 
 
 Scoring = Annotated[
-    TransportScoring | SupportScoring | ThrustScoring | HeightScoring,
+    TransportScoring | SupportScoring | ThrustScoring | HeightScoring | WorkshopScoring,
     Field(discriminator="name"),
 ]
 
 
-class Indicator(_Document):
+class Indicator(Document):
     """The one figure a task is ranked by.
 
     Attributes:
@@ -175,7 +192,7 @@ class Indicator(_Document):
     unit: Word
 
 
-class Difficulty(_Document):
+class Difficulty(Document):
     """Weight of each difficulty dimension, 1 (low) to 3 (high)."""
 
     quantification: Weight
@@ -186,7 +203,7 @@ class Difficulty(_Document):
     ambiguity: Weight
 
 
-class TaskDocument(_Document):
+class TaskDocument(Document):
     """A task file; see `Task` for what the fields mean."""
 
     name: Annotated[str, Field(pattern=r"^[a-z0-9]+(-[a-z0-9]+)*$", max_length=60)]
@@ -219,7 +236,12 @@ class TaskDocument(_Document):
     @classmethod
     def _somebody_could_pass(cls, scoring: Scoring, info: ValidationInfo) -> Scoring:
         scenario: Scenario | None = info.data.get("scenario")
-        problem = None if scenario is None else _hopeless(scoring, scenario)
+        if scenario is None:
+            return scoring
+        if isinstance(scoring, WorkshopScoring):
+            problem = hopeless(scoring, scenario)
+        else:
+            problem = _hopeless(scoring, scenario)
         if problem is not None:
             raise ValueError(problem)
         return scoring

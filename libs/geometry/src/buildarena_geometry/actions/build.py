@@ -10,7 +10,7 @@ from buildarena_geometry.actions.lookups import (
     require_started,
 )
 from buildarena_geometry.actions.motions import turned
-from buildarena_geometry.blocks import Block, Connector
+from buildarena_geometry.blocks import Block, Connector, seated
 from buildarena_geometry.changes import Change, attempted
 from buildarena_geometry.feedback import state as words
 from buildarena_geometry.feedback.words import listing
@@ -84,7 +84,7 @@ def attach_block_to(
         Block(
             id="",
             module=module,
-            world_from_block=base.world_from_face(face),
+            world_from_block=seated(base.world_from_face(face), module),
             mount=(base.id, face),
             structure=base.structure,
         ),
@@ -149,6 +149,7 @@ def connect_blocks(
         end_xyz=end_xyz,
         world_from_connector=pose,
         span=ORIGIN,
+        bindings=dict.fromkeys(module.actions, ()),
         structure=start_block.structure,
         note=note,
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from difflib import get_close_matches
 from typing import TYPE_CHECKING
 
 from buildarena_geometry.feedback.state import heading
@@ -11,13 +12,15 @@ from buildarena_geometry.modules.parameters import RefusalError, shown
 from buildarena_geometry.outcomes import Cause
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     from buildarena_geometry.blocks import Block, Connector
     from buildarena_geometry.modules.module import Module
     from buildarena_geometry.state import MachineState, SubStructure
 
 _MAX_NAMED = 12  # a refusal names so many choices and counts the rest
+_NEAREST = 5  # of more choices, so many that are most like what was written
+_LONGEST_NAME = 60  # characters; longer names are compared by their beginning
 
 
 def require_started(state: MachineState) -> None:
@@ -47,16 +50,16 @@ def part(state: MachineState, part_id: str) -> Block | Connector:
     return found
 
 
-def powered(state: MachineState, block_id: str, written: str) -> tuple[Block, str]:
-    """The block with an id and the action of it that is meant, if it has one that takes keys.
+def powered(state: MachineState, block_id: str, written: str) -> tuple[Block | Connector, str]:
+    """The part with an id and the action of it that is meant, if it takes keys.
 
     Raises:
         RefusalError: no such block, a block without keys, or one without this action.
     """
     found = part(state, block_id)
     actions = found.module.actions
-    if not actions or block_id not in state.blocks:
-        keyed = named(block.id for block in state.blocks.values() if block.module.actions)
+    if not actions:
+        keyed = named(one.id for one in state.powered())
         raise RefusalError(
             Cause.NO_LOCOMOTION,
             f"{heading(found)} takes no keys. Blocks that do: {keyed}.",
@@ -67,7 +70,7 @@ def powered(state: MachineState, block_id: str, written: str) -> tuple[Block, st
             Cause.BAD_ACTION,
             f"{heading(found)} has no action {shown(written)}; its actions: {listing(actions)}.",
         )
-    return state.blocks[block_id], action
+    return found, action
 
 
 def attachable_module(state: MachineState, name: str) -> Module:
@@ -83,7 +86,7 @@ def attachable_module(state: MachineState, name: str) -> Module:
             f"A {module.name} joins two faces and can't be attached to one; use connect_blocks.",
         )
     if module is None or not module.attachable:
-        choices = listing(state.catalogue.attachable)
+        choices = nearest(name, state.catalogue.attachable)
         raise RefusalError(
             Cause.UNKNOWN_MODULE, f"{shown(name)} can't be attached. Modules: {choices}."
         )
@@ -99,7 +102,7 @@ def connector_module(state: MachineState, name: str) -> Module:
     module = state.catalogue.named(name)
     if module is None or module.kind != "connector":
         cause = Cause.UNKNOWN_CONNECTOR if module is None else Cause.BASIC_AS_CONNECTOR
-        choices = listing(state.catalogue.connectors)
+        choices = nearest(name, state.catalogue.connectors)
         raise RefusalError(cause, f"{shown(name)} is no connector. Connectors: {choices}.")
     return module
 
@@ -117,6 +120,19 @@ def structure(state: MachineState, letter: str) -> SubStructure:
             Cause.NO_SUCH_MACHINE, f"There is no sub-structure {shown(letter)}. {there}"
         )
     return found
+
+
+def nearest(written: str, choices: Sequence[str]) -> str:
+    """All of some choices, or of many those that are most like what was written."""
+    if len(choices) <= _MAX_NAMED:
+        return listing(choices)
+    folded = {choice.casefold(): choice for choice in choices}
+    words = " ".join(written[:_LONGEST_NAME].split()).casefold()
+    # Whoever writes "wheel" means one of the wheels, however long their names are.
+    within = [choice for fold, choice in folded.items() if words and words in fold]
+    alike = get_close_matches(words, folded, n=_NEAREST, cutoff=0.0)
+    found = list(dict.fromkeys([*within, *(folded[fold] for fold in alike)]))[:_NEAREST]
+    return f"{listing(found)} and {len(choices) - len(found)} more"
 
 
 def named(choices: Iterable[str]) -> str:

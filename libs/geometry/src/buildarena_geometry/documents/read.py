@@ -11,8 +11,8 @@ from buildarena_geometry.documents.write import DOCUMENT_VERSION
 from buildarena_geometry.errors import DocumentError
 from buildarena_geometry.feedback.words import listing
 from buildarena_geometry.keys import KEYS
-from buildarena_geometry.modules.catalogue import load_catalogue
 from buildarena_geometry.modules.parameters import LARGEST_NUMBER, LONGEST_TEXT
+from buildarena_geometry.modules.sets import module_set, smallest_set
 from buildarena_geometry.outcomes import RefusalClass
 from buildarena_geometry.poses import Pose
 from buildarena_geometry.reading import Fields, Reader
@@ -20,7 +20,7 @@ from buildarena_geometry.rotations import SHORTEST_QUATERNION
 from buildarena_geometry.state import MachineState, SubStructure
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Iterator, Mapping
 
     from buildarena_geometry.modules.module import Catalogue, Module
 
@@ -52,7 +52,8 @@ def read_machine(
 
     Args:
         document: JSON values.
-        catalogue: the modules it is made of; the basic ones if left out.
+        catalogue: the modules it is made of; if left out, all types are known, and the machine goes
+            on with the smallest set that has those it is made of.
         where: what messages call the document.
         overlaps: whether blocks may overlap, as those of other programs' machines do; the actions
             of this library never make such a machine.
@@ -60,7 +61,7 @@ def read_machine(
     Raises:
         DocumentError: it is not a machine; the message names the entry.
     """
-    catalogue = load_catalogue() if catalogue is None else catalogue
+    known = module_set("all") if catalogue is None else catalogue
     fields = Reader(value=document, where=where, error=DocumentError).fields(required=_FIELDS)
     if fields["version"].integer() != DOCUMENT_VERSION:
         fields["version"].fail(f"version {DOCUMENT_VERSION}")
@@ -68,9 +69,12 @@ def read_machine(
         name: read_machine(entry.value, catalogue=catalogue, where=entry.where, overlaps=overlaps)
         for name, entry in fields["available"].entries()
     }
-    blocks = _read_blocks(fields["blocks"], catalogue)
-    connectors = _read_connectors(fields["connectors"], catalogue, blocks)
+    blocks = _read_blocks(fields["blocks"], known)
+    connectors = _read_connectors(fields["connectors"], known, blocks)
     structures = _read_structures(fields["structures"], blocks)
+    records = tuple(_record(entry) for entry in fields["log"].items())
+    if catalogue is None:
+        catalogue = smallest_set(_used(known, blocks, connectors, available, records))
     state = MachineState(
         catalogue=catalogue,
         available={name: machine.state for name, machine in available.items()},
@@ -85,8 +89,28 @@ def read_machine(
     _check_whole(state, fields)
     if not overlaps:
         _check_apart(state, fields)
-    records = tuple(_record(entry) for entry in fields["log"].items())
     return LoggedState(state=state, records=records, available=available)
+
+
+def _used(
+    known: Catalogue,
+    blocks: Mapping[str, Block],
+    connectors: Mapping[str, Connector],
+    available: Mapping[str, LoggedState],
+    records: Iterable[ActionRecord],
+) -> Iterator[str]:
+    """The modules that a machine is made of, was made of, and may be assembled from."""
+    yield from (block.module.name for block in blocks.values())
+    yield from (link.module.name for link in connectors.values())
+    for machine in available.values():
+        yield from (part.module.name for part in machine.state.parts)
+    for record in records:
+        if record.reason is None and isinstance(record.arguments, dict):
+            for argument in ("new_block", "connector"):
+                written = record.arguments.get(argument)
+                module = known.named(written) if isinstance(written, str) else None
+                if module is not None:
+                    yield module.name
 
 
 def _read_blocks(entries: Reader, catalogue: Catalogue) -> dict[str, Block]:
@@ -152,19 +176,21 @@ def _read_connectors(
 ) -> dict[str, Connector]:
     connectors: dict[str, Connector] = {}
     for entry in entries.items():
-        fields = entry.fields(required=_CONNECTOR, optional=("structure", "note"))
+        fields = entry.fields(required=_CONNECTOR, optional=("bindings", "structure", "note"))
         start, end = _face(fields["start"]), _face(fields["end"])
         for face, name in ((start, "start"), (end, "end")):
             _check_face(face, blocks, f"{entry.where}.{name}")
+        module = catalogue[fields["module"].choice(catalogue.connectors)]
         link = Connector(
             id=fields["id"].text(longest=LONGEST_TEXT),
-            module=catalogue[fields["module"].choice(catalogue.connectors)],
+            module=module,
             start=start,
             end=end,
             start_xyz=blocks[start[0]].face_center(start[1]),
             end_xyz=blocks[end[0]].face_center(end[1]),
             world_from_connector=_pose(fields),
             span=fields["span"].vector(),
+            bindings=_bindings(fields, module),
             structure=_optional_text(fields, "structure"),
             note=_optional_text(fields, "note"),
         )

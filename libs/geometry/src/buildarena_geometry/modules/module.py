@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Literal, get_args
 
 from buildarena_geometry.modules.facts import NO_FACTS, Facts
+from buildarena_geometry.modules.forces import NO_FORCES, Forces
 from buildarena_geometry.modules.joints import Gear, SeatJoint, Sense
 from buildarena_geometry.modules.names import CaselessNames
 from buildarena_geometry.modules.solids import Solid
@@ -32,9 +33,10 @@ Seat = Literal["attachment", "axle", "mount", "hinge", "slider", "ball", "consta
 SEATS: tuple[str, ...] = get_args(Seat)
 MassPlace = Literal["center", "body"]
 MASS_PLACES: tuple[str, ...] = get_args(MassPlace)
-Link = Literal["rigid", "rope"]
+Link = Literal["rigid", "rope", "spring"]
 LINKS: tuple[str, ...] = get_args(Link)
 FLUSH_TOLERANCE = 1e-6  # units; faces nearer than this are the same place
+_FACING = -0.9  # cosine; a face that looks this way looks at the block it sits on
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -200,7 +202,7 @@ class Module:
         thrust: what pushes it; None for blocks that do not push.
         physics: how it behaves as a body; None for connectors and cargo, which a task describes.
         grabs: whether its far end, opposite to the face it sits on, holds what it touches.
-        link: what a connector is: a rigid strut, or a rope that pulls and never pushes.
+        link: what a connector is: a rigid strut, a rope that pulls and never pushes, or a spring.
         description: what models read about it.
         besiege_data: further entries of its block in Besiege's machine files: type, key, value.
         besiege_keys: the entry there that holds the keys of an action, by the action.
@@ -211,6 +213,7 @@ class Module:
         spin: which way it turns as it is, seen from outside against its axis; None where it has no
             spin of its own, or the one of its motor.
         facts: what is known about it besides, and from where.
+        forces: what it exerts by itself: fans, wings, balloons, springs and what lets go.
     """
 
     name: str
@@ -241,14 +244,14 @@ class Module:
     overlaps_base: bool = False
     spin: Sense | None = None
     facts: Facts = NO_FACTS
+    forces: Forces = NO_FORCES
     face_of_label: Mapping[str, Face] = field(init=False, repr=False, compare=False)
     root_face: str | None = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         """Derives the lookups of faces: by label, and the one the block sits on."""
         object.__setattr__(self, "face_of_label", {face.label: face for face in self.faces})
-        at_root = [face.label for face in self.faces if _is_root(face)]
-        root_face = at_root[0] if at_root and self.kind != "start" else None
+        root_face = None if self.kind == "start" else _mount_face(self.faces, self.root_offset)
         object.__setattr__(self, "root_face", root_face)
 
     @property
@@ -316,5 +319,15 @@ class Catalogue(Mapping[str, Module]):
         return tuple(name for name, module in self._modules.items() if module.kind == "connector")
 
 
-def _is_root(face: Face) -> bool:
-    return distance(face.center, ORIGIN) < FLUSH_TOLERANCE and face.normal[2] < FLUSH_TOLERANCE - 1
+def _mount_face(faces: tuple[Face, ...], root_offset: float) -> str | None:
+    """The face that a block uses up by sitting on it.
+
+    It is the one that coincides with the face it sits on, else the lowest that looks there.
+    """
+    seat = (0.0, 0.0, -root_offset)
+    facing = [face for face in faces if face.normal[2] < _FACING]
+    for face in facing:
+        flush = distance(face.center, seat) < FLUSH_TOLERANCE
+        if flush and face.normal[2] < FLUSH_TOLERANCE - 1:
+            return face.label
+    return min(facing, key=lambda face: face.center[2]).label if facing else None

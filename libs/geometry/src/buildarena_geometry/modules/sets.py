@@ -9,7 +9,7 @@ from buildarena_geometry.modules.catalogue import basic_modules, extended_module
 from buildarena_geometry.modules.module import Catalogue
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
 MODULE_SETS = ("basic", "workshop", "all")
 
@@ -51,6 +51,21 @@ def modules_named(chosen: str | Sequence[str] | None) -> tuple[str, ...]:
         return tuple(chosen)
     catalogue = module_set(chosen or "basic")
     return (*catalogue.attachable, *catalogue.connectors)
+
+
+def smallest_set(names: Iterable[str]) -> Catalogue:
+    """The first of the sets that has all of these modules; the largest if none has.
+
+    Args:
+        names: modules' names.
+    """
+    wanted = set(names)
+    for name in MODULE_SETS:
+        # A ballast of the basic set is a task's cargo, which is no part of a machine.
+        placed = {one.name for one in module_set(name).values() if one.kind != "cargo"}
+        if wanted <= placed:
+            return module_set(name)
+    return module_set(MODULE_SETS[-1])
 
 
 @cache

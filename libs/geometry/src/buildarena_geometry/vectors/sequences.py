@@ -11,6 +11,7 @@ from buildarena_geometry.json_texts import read_json
 from buildarena_geometry.machine import Machine
 from buildarena_geometry.outcomes import Cause, Refused
 from buildarena_geometry.reading import Reader
+from buildarena_geometry.vectors.dialects import Dialect
 from buildarena_geometry.vectors.state import kind_of, state_entry
 
 if TYPE_CHECKING:
@@ -23,14 +24,19 @@ _GZIP_MAGIC = b"\x1f\x8b"
 
 
 def run_sequences(
-    content: object, *, every_state: bool = True, catalogue: Catalogue | None = None
+    content: object,
+    *,
+    every_state: bool = True,
+    catalogue: Catalogue | None = None,
+    speaking: Dialect | None = None,
 ) -> Iterator[dict[str, Any]]:
     """Builds the machines of some sequences.
 
     Args:
         content: JSON values: a list of sequences, one sequence, or a bare list of {op, params}.
         every_state: whether each step holds the state after it, or the last step only.
-        catalogue: the modules to build with; the basic ones if left out.
+        catalogue: the modules to build with; the dialect's if left out, or else the basic ones.
+        speaking: the dialect of the sequences; ours if left out.
 
     Yields:
         {"seed", "steps": [{"ok", "kind", "state"}]} for each sequence.
@@ -38,16 +44,18 @@ def run_sequences(
     Raises:
         SequenceError: the content has another form.
     """
+    words = Dialect() if speaking is None else speaking
+    catalogue = words.catalogue if catalogue is None else catalogue
     for sequence in _sequences(Reader(value=content, where="input", error=SequenceError)):
         run, steps = _prepare(sequence, catalogue)
         done: list[dict[str, Any]] = []
         for step in steps:
             outcome = run.act(step)
-            done.append({"ok": outcome.ok, "kind": kind_of(outcome)})
+            done.append({"ok": outcome.ok, "kind": kind_of(outcome, words.kinds)})
             if every_state:
-                done[-1]["state"] = run.state()
+                done[-1]["state"] = run.state(words)
         if done and not every_state:
-            done[-1]["state"] = run.state()
+            done[-1]["state"] = run.state(words)
         seed = sequence.value.get("seed") if isinstance(sequence.value, dict) else None
         yield {"seed": seed, "steps": done}
 
@@ -89,8 +97,8 @@ class _Run:
         self._put_in_order(name, arguments, outcome)
         return outcome
 
-    def state(self) -> dict[str, Any]:
-        return state_entry(self.machine.state, self.order)
+    def state(self, words: Dialect) -> dict[str, Any]:
+        return state_entry(self.machine.state, self.order, words)
 
     def _put_in_order(self, name: object, arguments: object, outcome: Outcome) -> None:
         parts = [part.id for part in self.machine.state.parts]

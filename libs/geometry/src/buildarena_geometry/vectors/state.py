@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any
 from buildarena_geometry.besiege_components import besiege_point, besiege_rotation, besiege_span
 from buildarena_geometry.outcomes import Cause, Refused
 from buildarena_geometry.rotations import scaled
+from buildarena_geometry.vectors.dialects import Dialect
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping
 
     from buildarena_geometry.blocks import Block, Connector, FaceRef
     from buildarena_geometry.outcomes import Outcome
@@ -22,25 +23,35 @@ _KIND_OF_CAUSE = {
 }
 
 
-def kind_of(outcome: Outcome) -> str:
-    """What the vectors call an outcome."""
-    if isinstance(outcome, Refused):
-        return _KIND_OF_CAUSE.get(outcome.cause, outcome.cause.value)
-    return "ok"
+def kind_of(outcome: Outcome, kinds: Mapping[str, str] | None = None) -> str:
+    """What the vectors call an outcome.
+
+    Args:
+        outcome: what an action came back with.
+        kinds: what a dialect calls a kind, where it differs.
+    """
+    if not isinstance(outcome, Refused):
+        return "ok"
+    kind = _KIND_OF_CAUSE.get(outcome.cause, outcome.cause.value)
+    return (kinds or {}).get(kind, kind)
 
 
-def state_entry(state: MachineState, order: Iterable[str]) -> dict[str, Any]:
+def state_entry(
+    state: MachineState, order: Iterable[str], words: Dialect | None = None
+) -> dict[str, Any]:
     """A state in the vectors' field names; positions are east, north, up.
 
     Args:
         state: what to write.
         order: the ids of all its parts in the order to write them in.
+        words: the dialect it is written in; ours if left out.
     """
+    words = words or Dialect()
     return {
         "blocks": [
-            _block_entry(state, state.blocks[part])
+            _block_entry(state, state.blocks[part], words)
             if part in state.blocks
-            else _connector_entry(state.connectors[part])
+            else _connector_entry(state.connectors[part], words.connector_center)
             for part in order
         ],
         "n": len(state.blocks) + len(state.connectors),
@@ -54,7 +65,7 @@ def state_entry(state: MachineState, order: Iterable[str]) -> dict[str, Any]:
     }
 
 
-def _block_entry(state: MachineState, block: Block) -> dict[str, Any]:
+def _block_entry(state: MachineState, block: Block, words: Dialect) -> dict[str, Any]:
     center = list(block.center_xyz)
     entry: dict[str, Any] = {
         "id": block.id,
@@ -78,7 +89,8 @@ def _block_entry(state: MachineState, block: Block) -> dict[str, Any]:
     if block.mount is not None:
         entry["root_face"] = _seat(block, block.mount)
     elif block.lost_mount is not None:
-        entry["root_face"] = [None, block.lost_mount[1], block.lost_mount[0]]
+        base, label = block.lost_mount
+        entry["root_face"] = [base, label] if words.keeps_lost_mounts else [None, label, base]
     if block.pointing_xyz is not None:
         entry["pointing"] = list(block.pointing_xyz)
     if block.module.spins:
@@ -89,15 +101,16 @@ def _block_entry(state: MachineState, block: Block) -> dict[str, Any]:
     return entry
 
 
-def _connector_entry(link: Connector) -> dict[str, Any]:
+def _connector_entry(link: Connector, shift: float) -> dict[str, Any]:
     root = list(link.world_from_connector.xyz)
+    shown = list(link.world_from_connector.point((0.0, 0.0, shift))) if shift else root
     return {
         "id": link.id,
         "name": link.module.name,
         "pos": root,
         "virtual": list(besiege_point(link.world_from_connector.xyz)),
-        "center": root,
-        "center_follow": root,
+        "center": shown,
+        "center_follow": shown,
         "quat": list(besiege_rotation(link)),
         "flipped": False,
         "connector": {

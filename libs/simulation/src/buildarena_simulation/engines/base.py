@@ -13,6 +13,7 @@ import numpy as np
 from buildarena_simulation.scenario import TerrainBox
 from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.contacts import ContactForces
+from buildarena_simulation.structure.force_field import ForceField
 from buildarena_simulation.structure.model import FloatArray, Structure
 from buildarena_simulation.structure.motion import Motion
 
@@ -43,6 +44,7 @@ class World:
         cargo: The cargo, if there is one.
         gravity: Downward acceleration, units/s².
         finer: By how much an engine's steps are shorter than usual.
+        field: What the blocks exert by themselves; None where none does.
     """
 
     structure: Structure
@@ -51,6 +53,7 @@ class World:
     cargo: CargoBox | None
     gravity: float
     finer: int = 1
+    field: ForceField | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

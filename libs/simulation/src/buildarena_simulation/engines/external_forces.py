@@ -1,4 +1,4 @@
-"""Thrust and drag as steady forces in the frames of an engine's bodies.
+"""Thrust, drag and the blocks' own forces as steady ones in the frames of an engine's bodies.
 
 Both change little from one evaluation to the next, so they are worked out once for the steps
 between; given in a body's own principal frame, they turn with it.
@@ -10,6 +10,7 @@ from buildarena_simulation.engines.joint_places import is_simple_piece
 from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.model import FloatArray, Structure
 from buildarena_simulation.structure.motion import Motion
+from buildarena_simulation.structure.vectors import turned_wrenches
 
 Force = tuple[list[float], list[float]]
 """A force and the point it acts on, or a force and a torque about the centre of mass."""
@@ -64,6 +65,18 @@ def drag_forces(
         torque = -clusters.angular_drag[root] * moments[root] * (to_body @ motion.spin[root])
         found.append((root, (force.tolist(), torque.tolist())))
     return found
+
+
+def body_wrenches(wrenches: FloatArray, axes: FloatArray) -> list[tuple[int, Force]]:
+    """Cluster, force and torque of each cluster that a wrench acts on.
+
+    Args:
+        wrenches: (C, 6) about the centres of mass, machine frame axes.
+        axes: (C, 3, 3) machine_from_principal.
+    """
+    local = turned_wrenches(axes.transpose(0, 2, 1), wrenches)
+    acted_on = np.flatnonzero(wrenches.any(axis=1))
+    return [(int(c), (local[c, :3].tolist(), local[c, 3:].tolist())) for c in acted_on]
 
 
 def _own_drag(

@@ -7,6 +7,7 @@ filled in by the compiler from the collision shapes.
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
@@ -20,6 +21,11 @@ from buildarena_simulation.structure.model import FloatArray, ShapeKind, Structu
 from buildarena_simulation.structure.motion import Motion
 from buildarena_simulation.structure.solids import Solid
 
+_SIZE_OF_FORM: Final = {
+    ShapeKind.BOX: [0, 1, 2],
+    ShapeKind.CYLINDER: [0, 2],
+    ShapeKind.SPHERE: [0],
+}
 _TERRAIN_PRIORITY, _CARGO_PRIORITY, _BLOCK_PRIORITY, _WHEEL_PRIORITY = 0, 1, 2, 3
 """A contact takes its friction from the geom of higher priority."""
 
@@ -207,12 +213,11 @@ def _solids(state: MjcfState, c: int) -> Iterator[str]:
     quaternions = quaternion_of(np.array([state.axes[c].T @ solid.rotation for solid in solids]))
     for k, solid in enumerate(solids):
         half = solid.half_extents
-        cylinder = solid.kind is ShapeKind.CYLINDER
         yield tag(
             "geom",
             name=f"solid {c} {k}",
-            type="cylinder" if cylinder else "box",
-            size=half[[0, 2]] if cylinder else half,
+            type=str(solid.kind),
+            size=half[_SIZE_OF_FORM[solid.kind]],
             pos=state.in_body(c, solid.center),
             quat=quaternions[k],
             friction=_friction(solid.friction),
@@ -271,13 +276,14 @@ def _surface_pairs(world: World, state: MjcfState, settings: MjcfSettings) -> It
 
 
 def _ropes(structure: Structure, state: MjcfState) -> Iterator[str]:
+    ropes = structure.ropes
     for r in state.ropes:
-        yield opened(
-            "spatial",
-            name=f"rope {r}",
-            limited="true",
-            range=(0.0, structure.ropes.length[r]),
-        )
+        length = ropes.length[r]
+        if ropes.stiffness[r]:
+            spring = {"stiffness": ropes.stiffness[r], "damping": ropes.damping[r]}
+            yield opened("spatial", name=f"rope {r}", springlength=length, **spring)
+        else:
+            yield opened("spatial", name=f"rope {r}", limited="true", range=(0.0, length))
         yield tag("site", site=f"rope {r} 0")
         yield tag("site", site=f"rope {r} 1")
         yield "</spatial>"

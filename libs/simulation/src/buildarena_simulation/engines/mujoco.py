@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from buildarena_simulation.constants import MAX_SPIN
+from buildarena_simulation.constants import FORCES_EVERY_S, MAX_SPIN
 from buildarena_simulation.engines.base import CargoPose, World, principal_frames
 from buildarena_simulation.engines.closest_points import ShapeTable, shape_table
 from buildarena_simulation.engines.impacts import ImpactWatch
@@ -23,7 +23,7 @@ from buildarena_simulation.structure.contacts import CARGO, WORLD, ContactForces
 from buildarena_simulation.structure.model import BoolArray, FloatArray, IntArray
 from buildarena_simulation.structure.motion import Motion
 from buildarena_simulation.structure.solids import Solid, Solids
-from buildarena_simulation.structure.vectors import cross, turned
+from buildarena_simulation.structure.vectors import cross, turned, turned_wrenches
 
 _TIME_STEP_S = 1 / 500
 _STEPS_PER_EVALUATION = 20
@@ -138,7 +138,9 @@ class MujocoEngine:
     def drop_rope(self, index: int) -> None:
         """See `Engine`."""
         self._rope_alive[index] = False
-        self._model.tendon_limited[self._addresses.tendons[index]] = 0
+        tendon, model = self._addresses.tendons[index], self._model
+        model.tendon_limited[tendon] = 0
+        model.tendon_stiffness[tendon] = model.tendon_damping[tendon] = 0.0
 
     def advance(self, targets: FloatArray, thrusts: FloatArray) -> None:
         """See `Engine`."""
@@ -151,7 +153,9 @@ class MujocoEngine:
             len(targets), gravity=self._world.gravity, time_step_s=self.time_step_s
         )
         velocity = data.qvel[at.free_dofs]
-        for row in targets:
+        self._set_springs()
+        for step, row in enumerate(targets):
+            self._apply_own_forces(step)
             at.joints.follow(model, data, row)
             mujoco.mj_step(model, data)
             before, velocity = velocity, data.qvel[at.free_dofs]
@@ -161,10 +165,7 @@ class MujocoEngine:
         self._keep_cargo_state()
         self._impacts = impacts
         self._tensions = self._read_tensions()
-        # A step leaves the kinematics of its beginning behind; bring them up to its end.
-        mujoco.mj_kinematics(model, data)
-        mujoco.mj_comPos(model, data)
-        mujoco.mj_comVel(model, data)
+        self._bring_up()
 
     def contacts(self) -> ContactForces:
         """See `Engine`."""
@@ -200,6 +201,22 @@ class MujocoEngine:
     def close(self) -> None:
         """See `Engine`."""
         del self._data, self._model
+
+    def _apply_own_forces(self, step: int) -> None:
+        field, every = self._world.field, round(FORCES_EVERY_S / self.time_step_s)
+        if field is None or step % every:
+            return
+        if step:
+            self._bring_up()
+        motion, data = self.motion(), self._data
+        wrenches = field.wrenches(self._clusters, motion)
+        data.xfrc_applied[self._addresses.bodies] = turned_wrenches(motion.rotation, wrenches)
+
+    def _bring_up(self) -> None:
+        """Brings the kinematics up to the end of the last step, which leaves its start's behind."""
+        mujoco.mj_kinematics(self._model, self._data)
+        mujoco.mj_comPos(self._model, self._data)
+        mujoco.mj_comVel(self._model, self._data)
 
     def _keep_cargo_state(self) -> None:
         if self._world.cargo is not None:
@@ -310,7 +327,26 @@ class MujocoEngine:
             force_of = {int(data.efc_id[k]): data.efc_force[k] for k in np.flatnonzero(limits)}
             for rope, tendon in tendons.items():
                 tensions[rope] = force_of.get(tendon, 0.0)
+            for rope in self._springs():
+                tensions[rope] = self._spring_tension(tendons[rope])
         return tensions
+
+    def _springs(self) -> list[int]:
+        return [int(r) for r in self._structure.ropes.springs if self._rope_alive[r]]
+
+    def _spring_tension(self, tendon: int) -> float:
+        model, data = self._model, self._data
+        stretch = data.ten_length[tendon] - model.tendon_lengthspring[tendon, 0]
+        pull = model.tendon_stiffness[tendon] * stretch
+        return float(pull + model.tendon_damping[tendon] * data.ten_velocity[tendon])
+
+    def _set_springs(self) -> None:
+        """Gives the springs the lengths at rest that the keys ask for."""
+        springs, field = self._springs(), self._world.field
+        if springs and field is not None:
+            lengths = field.rest_lengths()
+            for rope in springs:
+                self._model.tendon_lengthspring[self._addresses.tendons[rope]] = lengths[rope]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from buildarena_simulation.constants import MAX_SPIN
+from buildarena_simulation.constants import FORCES_EVERY_S, MAX_SPIN
 from buildarena_simulation.engines.base import (
     CargoPose,
     World,
@@ -29,7 +29,12 @@ from buildarena_simulation.engines.bullet_bodies import add_box, free_of_damping
 from buildarena_simulation.engines.bullet_contacts import read_contacts
 from buildarena_simulation.engines.bullet_joints import articulated
 from buildarena_simulation.engines.closest_points import shape_table
-from buildarena_simulation.engines.external_forces import Force, drag_forces, thrust_forces
+from buildarena_simulation.engines.external_forces import (
+    Force,
+    body_wrenches,
+    drag_forces,
+    thrust_forces,
+)
 from buildarena_simulation.engines.hinges import HingedPiece, hinge_frames
 from buildarena_simulation.engines.impacts import ImpactWatch
 from buildarena_simulation.engines.joint_places import is_simple_piece, joint_rate
@@ -79,6 +84,7 @@ class PyBulletEngine:
         self._solids = Solids(world.structure)
         self._surfaces: dict[int, int] = {}
         self._cargo: int | None = None
+        self._own: list[tuple[int, Force]] = []
         self._start_world()
 
     @property
@@ -141,11 +147,11 @@ class PyBulletEngine:
         )
         velocity = self._free_velocities()
         driven: FloatArray | None = None
-        for row in targets:
+        for step, row in enumerate(targets):
             if len(row) and (driven is None or (row != driven).any()):
                 self._drive(row)
                 driven = row
-            self._apply_forces(external_forces, drags)
+            self._apply_forces(external_forces, [*drags, *self._own_forces(step)])
             pybullet.stepSimulation(**self._client)
             before, velocity = velocity, self._free_velocities()
             if impacts.is_impact(velocity - before):
@@ -306,11 +312,23 @@ class PyBulletEngine:
         if self._rope_alive.any():
             self._pull_ropes()
 
+    def _own_forces(self, step: int) -> list[tuple[int, Force]]:
+        field, every = self._world.field, round(FORCES_EVERY_S / self.time_step_s)
+        if field is not None and step % every == 0:
+            wrenches = field.wrenches(self._clusters, self._read_motion())
+            self._own = body_wrenches(wrenches, self._axes)
+        return self._own
+
     def _pull_ropes(self) -> None:
         structure, clusters = self._structure, self._clusters
-        motion = self._read_motion()
+        motion, field = self._read_motion(), self._world.field
         pulls = rope_forces(
-            structure, clusters, motion, alive=self._rope_alive, time_step_s=self.time_step_s
+            structure,
+            clusters,
+            motion,
+            alive=self._rope_alive,
+            rest=structure.ropes.length if field is None else field.rest_lengths(),
+            time_step_s=self.time_step_s,
         )
         self._tensions = pulls.tension
         ends = pulls.forces

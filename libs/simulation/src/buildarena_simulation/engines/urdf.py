@@ -76,6 +76,8 @@ def _collision(solid: Solid, place: FloatArray, rotation: FloatArray) -> list[st
     half = solid.half_extents
     if solid.kind is ShapeKind.CYLINDER:
         form = f'<cylinder radius="{float(half[0])!r}" length="{float(2 * half[2])!r}"/>'
+    elif solid.kind is ShapeKind.SPHERE:
+        form = f'<sphere radius="{float(half[0])!r}"/>'
     else:
         form = f'<box size="{numbers(2 * half)}"/>'
     return [

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -164,6 +165,8 @@ def _faces(
     rotation = turn @ shape.rotation
     if shape.kind is ShapeKind.BOX:
         return _box(center, rotation, shape.half_extents, color)
+    if shape.kind is ShapeKind.SPHERE:
+        return _ball(center, rotation, float(shape.half_extents[0]), color)
     return _cylinder(center, rotation, shape.half_extents, color)
 
 
@@ -190,6 +193,34 @@ def _cylinder(
         # One spoke-like darker patch shows that a wheel turns.
         shade = color if k else (200, 200, 200)
         yield _shaded(np.array([low[k], low[after], high[after], high[k]]), center, shade)
+
+
+def _ball(
+    center: FloatArray, rotation: FloatArray, radius: float, color: Color
+) -> Iterator[tuple[FloatArray, Color]]:
+    around = np.linspace(0.0, 2 * np.pi, _ROUND_SIDES, endpoint=False)
+    falls = np.linspace(0.0, np.pi, _ROUND_SIDES // 2 + 1)
+    rings = [
+        center
+        + radius
+        * np.stack(
+            [
+                np.sin(fall) * np.cos(around),
+                np.sin(fall) * np.sin(around),
+                np.full(_ROUND_SIDES, np.cos(fall)),
+            ],
+            axis=1,
+        )
+        @ rotation.T
+        for fall in falls
+    ]
+    for ring, (upper, lower) in enumerate(pairwise(rings)):
+        # Quads touch the poles with two corners at one place: the ring's other edge has their turn.
+        first, second = (lower, upper) if ring == 0 else (upper, lower)
+        for k in range(_ROUND_SIDES):
+            after = (k + 1) % _ROUND_SIDES
+            corners = np.array([first[after], first[k], second[k], second[after]])
+            yield _shaded(corners, center, color)
 
 
 def _shaded(corners: FloatArray, center: FloatArray, color: Color) -> tuple[FloatArray, Color]:

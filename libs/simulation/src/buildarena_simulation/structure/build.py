@@ -3,12 +3,13 @@
 from collections import Counter
 from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 
+from buildarena_geometry.modules.forces import Spring
 from buildarena_geometry.modules.module import Sphere
-from buildarena_simulation.constants import JOINT_STRENGTH, ROPE_STRENGTH, JointKind
+from buildarena_simulation.constants import GRAVITY, JOINT_STRENGTH, ROPE_STRENGTH, JointKind
 from buildarena_simulation.structure.joints import joints_of
 from buildarena_simulation.structure.model import (
     JOINT_KINDS,
@@ -65,7 +66,13 @@ class Link:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rope:
-    """A winch between two blocks; fields as in `Link`, its share that of a rope's strength."""
+    """A winch, tether or spring between two blocks; fields as in `Link`.
+
+    Attributes:
+        share: Its share of a rope's strength, or of a spring's strength, stiffness and damping.
+        length: Of a tether, units; None for as long as it is built.
+        spring: What it does as a spring; None for a rope.
+    """
 
     name: str
     first: int
@@ -74,6 +81,8 @@ class Rope:
     end: FloatArray
     mass: float
     share: float = 1.0
+    length: float | None = None
+    spring: Spring | None = None
 
 
 def build_structure(
@@ -174,6 +183,8 @@ def _own_inertia(part: Part) -> FloatArray:
         if shape.kind is ShapeKind.CYLINDER:
             across = (3 * a**2 + (2 * c) ** 2) / 12
             principal = np.array([across, across, a**2 / 2])
+        elif shape.kind is ShapeKind.SPHERE:
+            principal = np.full(3, 2 * a**2 / 5)
         else:
             principal = np.array([b**2 + c**2, a**2 + c**2, a**2 + b**2]) / 3
         inertia += share * part.mass * (shape.rotation * principal) @ shape.rotation.T
@@ -288,6 +299,13 @@ def _brace_springs(length: float) -> FloatArray:
     )
 
 
+def _of_springs(ropes: Sequence[Rope], figure: Literal["stiffness", "damping"]) -> FloatArray:
+    """A figure of each rope's spring, times g; 0 where there is none."""
+    return GRAVITY * np.array(
+        [getattr(rope.spring, figure) * rope.share if rope.spring else 0.0 for rope in ropes]
+    )
+
+
 def _ropes(ropes: Sequence[Rope]) -> Ropes:
     first_point = np.array([rope.start for rope in ropes]).reshape(-1, 3)
     second_point = np.array([rope.end for rope in ropes]).reshape(-1, 3)
@@ -297,6 +315,18 @@ def _ropes(ropes: Sequence[Rope]) -> Ropes:
         second=np.array([rope.second for rope in ropes], dtype=np.int64),
         first_point=first_point,
         second_point=second_point,
-        length=np.linalg.norm(second_point - first_point, axis=1),
-        limit=np.array([rope.share * ROPE_STRENGTH for rope in ropes]),
+        length=np.array(
+            [
+                built if rope.length is None else rope.length
+                for rope, built in zip(
+                    ropes, np.linalg.norm(second_point - first_point, axis=1), strict=True
+                )
+            ]
+        ),
+        limit=np.array(
+            [rope.share * (rope.spring.limit if rope.spring else ROPE_STRENGTH) for rope in ropes]
+        ),
+        stiffness=_of_springs(ropes, "stiffness"),
+        damping=_of_springs(ropes, "damping"),
+        spring_of=tuple(rope.spring for rope in ropes if rope.spring),
     )

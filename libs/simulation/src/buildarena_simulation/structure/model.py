@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from buildarena_geometry.modules.forces import Spring
 from buildarena_geometry.modules.module import Module, Physics
 from buildarena_simulation.constants import JointKind
 
@@ -23,6 +24,14 @@ class ShapeKind(StrEnum):
 
     BOX = "box"
     CYLINDER = "cylinder"
+    SPHERE = "sphere"
+
+
+_SHARE_OF_BOX: Final = {
+    ShapeKind.BOX: 1.0,
+    ShapeKind.CYLINDER: math.pi / 4,
+    ShapeKind.SPHERE: math.pi / 6,
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,7 +42,8 @@ class Shape:
         kind: Its form.
         center: (3,) machine frame, units.
         rotation: (3, 3) machine_from_shape; a cylinder's axis is the third column.
-        half_extents: (3,) along its axes; a cylinder's radius, radius and half length, units.
+        half_extents: (3,) along its axes; a cylinder's radius, radius and half length;
+            a sphere's radius three times; units.
     """
 
     kind: ShapeKind
@@ -44,7 +54,7 @@ class Shape:
     @property
     def volume(self) -> float:
         """Units³."""
-        share = math.pi / 4 if self.kind is ShapeKind.CYLINDER else 1.0
+        share = _SHARE_OF_BOX[self.kind]
         return float(8.0 * share * np.prod(self.half_extents))
 
     def reach(self) -> FloatArray:
@@ -53,6 +63,8 @@ class Shape:
             radius, half_length = self.half_extents[0], self.half_extents[2]
             axis = np.abs(self.rotation[:, 2])
             return np.asarray(half_length * axis + radius * np.sqrt(np.maximum(0.0, 1 - axis**2)))
+        if self.kind is ShapeKind.SPHERE:
+            return self.half_extents
         return np.asarray(np.abs(self.rotation) @ self.half_extents)
 
 
@@ -163,7 +175,7 @@ class Members:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ropes:
-    """The winches' ropes, tension only; one row each.
+    """The winches' ropes, tension only, and the springs; one row each.
 
     Attributes:
         names: What each joins, fit to be shown.
@@ -173,6 +185,9 @@ class Ropes:
         second_point: (R, 3) where it ends, machine frame, units.
         length: (R,) its length, units.
         limit: (R,) tension at which it gives way, mass·g.
+        stiffness: (R,) of a spring, mass/s²; 0 of a rope.
+        damping: (R,) of a spring, mass/s; 0 of a rope.
+        spring_of: What each spring does, in the order of `springs`.
     """
 
     names: tuple[str, ...]
@@ -182,9 +197,17 @@ class Ropes:
     second_point: FloatArray
     length: FloatArray
     limit: FloatArray
+    stiffness: FloatArray
+    damping: FloatArray
+    spring_of: tuple[Spring, ...] = ()
 
     def __len__(self) -> int:
         return len(self.names)
+
+    @property
+    def springs(self) -> IntArray:
+        """Which rows are springs."""
+        return np.flatnonzero(self.stiffness)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

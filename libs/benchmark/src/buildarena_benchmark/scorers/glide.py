@@ -1,0 +1,78 @@
+"""Glide: how far a machine flies that is let go in the air, and how gently it lands."""
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from buildarena_benchmark.scorers.carrying import from_below
+from buildarena_benchmark.scorers.pieces import Mask, joined_to_start, masses_of
+from buildarena_benchmark.scorers.series import starting_block
+from buildarena_benchmark.scorers.unmeasured import unmeasured
+from buildarena_benchmark.scorers.verdict import Deciding, Metric, Verdict, rounded
+from buildarena_benchmark.tasks.workshop_scoring import GlideScoring
+from buildarena_simulation.scenario import ReleasedPlacement
+
+if TYPE_CHECKING:
+    from buildarena_benchmark.tasks.task import Task
+    from buildarena_geometry import Machine
+    from buildarena_simulation import Trajectory
+
+_TOUCH: Final = 0.02
+"""Smallest share of the machine's weight that the ground bears when it is touched."""
+
+_LAST_SAMPLES: Final = 3
+"""The speed at landing is the greatest over so many steps before the ground is touched."""
+
+
+def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict:
+    """The indicator is the horizontal distance flown over the height of release.
+
+    The flight ends when anything of the machine touches ground or terrain. The distance is the
+    starting block's; the speed at landing is that of everything that is still joined to it.
+
+    Args:
+        task: Thresholds.
+        machine: The machine.
+        trajectory: The trial.
+
+    Flags:
+        `forces_not_measured`: cannot be judged.
+    """
+    scoring, placement = task.scoring, task.scenario.placement
+    assert isinstance(scoring, GlideScoring)  # noqa: S101 - the scorer is chosen by it
+    assert isinstance(placement, ReleasedPlacement)  # noqa: S101 - the task was checked for it
+    lacking = unmeasured(trajectory, cargo=False)
+    if lacking is not None:
+        return lacking
+    joined = joined_to_start(machine, trajectory)
+    path = trajectory.positions[:, starting_block(machine, trajectory)].astype(np.float64)
+    touching = from_below(trajectory) > _TOUCH * masses_of(machine, trajectory, joined)
+    landed = bool(touching.any())
+    last = int(touching.argmax()) if landed else len(path) - 1
+    flown = float(np.linalg.norm(path[last, :2] - path[0, :2]))
+    sink = _sink(machine, trajectory, joined, last)
+    metrics: dict[str, Metric] = {
+        "range": rounded(flown),
+        "landed": landed,
+        "landing_s": rounded(trajectory.time_s[last]) if landed else None,
+        "sink_at_landing": rounded(sink),
+        "broken_joints": len(trajectory.breaks),
+    }
+    return Verdict(
+        success=landed and flown > scoring.min_range and sink < scoring.max_sink,
+        indicator=rounded(flown / placement.height),
+        metrics=metrics,
+        deciding=Deciding(samples=last + 1, members=joined, cargo=False),
+    )
+
+
+def _sink(machine: "Machine", trajectory: "Trajectory", joined: Mask, last: int) -> float:
+    """How fast the machine's mass falls in the last steps before a sample, units/s."""
+    # The step into the sample that touches may be braked by the ground already.
+    end = max(last, 2)
+    rows = slice(max(end - _LAST_SAMPLES - 1, 0), end)
+    masses = np.array([machine.blocks[block].module.mass for block in trajectory.block_ids])
+    weights = masses * joined[last]
+    height = trajectory.positions[rows, :, 2].astype(np.float64) @ weights
+    falls = -np.diff(height / max(float(weights.sum()), 1e-9)) / np.diff(trajectory.time_s[rows])
+    return float(falls.max(initial=0.0))

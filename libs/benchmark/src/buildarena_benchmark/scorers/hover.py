@@ -1,0 +1,90 @@
+"""Hover: how long a machine holds its height in the air with its cargo."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from buildarena_benchmark.scorers.carrying import bears_cargo, is_airborne
+from buildarena_benchmark.scorers.pieces import Mask, joined_to_start
+from buildarena_benchmark.scorers.series import Series, rotations, starting_block
+from buildarena_benchmark.scorers.unmeasured import unmeasured
+from buildarena_benchmark.scorers.verdict import Deciding, Metric, Verdict, rounded
+from buildarena_benchmark.tasks.workshop_scoring import HoverScoring
+from buildarena_simulation.constants import SAMPLE_RATE_HZ
+
+if TYPE_CHECKING:
+    from buildarena_benchmark.tasks.task import Task
+    from buildarena_geometry import Machine
+    from buildarena_simulation import Trajectory
+
+_BORNE_SHARE = 0.8
+_BORNE_SAMPLES = 25
+"""Whether the cargo is borne is judged over a second: forces swing while a machine settles."""
+
+
+def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict:
+    """The indicator is the longest time in a row within the band, seconds.
+
+    At each moment the starting block must be within the band, nearly upright and near where it
+    started, the machine must bear its cargo, and nothing of it may touch the ground.
+
+    Args:
+        task: Thresholds.
+        machine: The machine.
+        trajectory: The trial.
+
+    Flags:
+        `not_airborne`: it would have passed, but touches the ground. `not_carried`: it would have
+        passed, but without the cargo. `forces_not_measured`: cannot be judged.
+    """
+    scoring = task.scoring
+    assert isinstance(scoring, HoverScoring)  # noqa: S101 - the scorer is chosen by it
+    lacking = unmeasured(trajectory, cargo=True)
+    if lacking is not None:
+        return lacking
+    joined = joined_to_start(machine, trajectory)
+    start = starting_block(machine, trajectory)
+    path = trajectory.positions[:, start].astype(np.float64)
+    tilt = _tilt_deg(trajectory, start)
+    drift = np.linalg.norm(path[:, :2] - path[0, :2], axis=1)
+    steady = (
+        (np.abs(path[:, 2] - scoring.height) <= scoring.band)
+        & (tilt < scoring.max_tilt_deg)
+        & (drift < scoring.max_drift)
+    )
+    borne = bears_cargo(trajectory, share=_BORNE_SHARE, samples=_BORNE_SAMPLES)
+    airborne = is_airborne(machine, trajectory, joined)
+    longest = _longest_s(steady & borne & airborne)
+    passes = longest >= scoring.hold_s
+    flags = {
+        "not_airborne": not passes and _longest_s(steady & borne) >= scoring.hold_s,
+        "not_carried": not passes and _longest_s(steady & airborne) >= scoring.hold_s,
+    }
+    metrics: dict[str, Metric] = {
+        "max_height": rounded(path[:, 2].max()),
+        "max_tilt": rounded(tilt.max(initial=0.0, where=steady)),
+        "drift": rounded(drift.max(initial=0.0, where=steady)),
+        "broken_joints": len(trajectory.breaks),
+    }
+    return Verdict(
+        success=passes,
+        indicator=rounded(longest),
+        metrics=metrics,
+        flags=tuple(flag for flag, holds in flags.items() if holds),
+        deciding=Deciding(samples=len(path), members=joined, cargo=True),
+    )
+
+
+def _tilt_deg(trajectory: "Trajectory", start: int) -> Series:
+    """Angle of the starting block's upward axis from the vertical, (T,), degrees."""
+    turns = rotations(trajectory.quaternions[:, start])
+    up_at_start = turns[0].T @ np.array([0.0, 0.0, 1.0])
+    cosine = (turns @ up_at_start)[:, 2]
+    return np.asarray(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
+
+
+def _longest_s(holds: Mask) -> float:
+    """Length of the longest run of samples, seconds."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], holds, [False]]).astype(int)))
+    runs = edges[1::2] - edges[::2] - 1
+    return float(runs.max(initial=0)) / SAMPLE_RATE_HZ

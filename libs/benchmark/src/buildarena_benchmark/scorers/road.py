@@ -1,0 +1,113 @@
+"""Rough road: how far, and how gently, a cargo is driven over bumps."""
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from buildarena_benchmark.scorers.carrying import bears_cargo
+from buildarena_benchmark.scorers.pieces import Mask, joined_to_start
+from buildarena_benchmark.scorers.rolling import driven_distances, moved_upright
+from buildarena_benchmark.scorers.series import Series, rotations, starting_block
+from buildarena_benchmark.scorers.unmeasured import unmeasured
+from buildarena_benchmark.scorers.verdict import Deciding, Metric, Verdict, rounded
+from buildarena_benchmark.tasks.workshop_scoring import RoadScoring
+from buildarena_simulation.constants import GRAVITY, SAMPLE_RATE_HZ
+
+if TYPE_CHECKING:
+    from buildarena_benchmark.tasks.task import Task
+    from buildarena_geometry import Machine
+    from buildarena_simulation import Trajectory
+
+_MOVING: Final = 0.5
+"""Slower machines stand, units/s: waiting makes no ride gentler."""
+
+_MOVING_SAMPLES: Final = 12
+"""Speed is judged over so many samples, half a second."""
+
+_BORNE_SAMPLES: Final = 25
+"""Whether the cargo is borne is judged over a second: it may hop."""
+
+
+def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict:
+    """The indicator is the distance northwards over 1 + the RMS of the cargo's acceleration in g.
+
+    The distance is the starting block's, as far as wheels drove it (see `driven_distances`), on the
+    road, and while the cargo stays near its place on the machine, which bears it. The acceleration
+    is vertical, and counts while the machine moves, from when the cargo has settled until the
+    machine has got farthest.
+
+    Args:
+        task: Thresholds.
+        machine: The machine.
+        trajectory: The trial.
+
+    Flags:
+        `not_driven`: far enough, but not by wheels. `not_carried`: far enough, but without the
+        cargo. `forces_not_measured`: cannot be judged.
+    """
+    scoring = task.scoring
+    assert isinstance(scoring, RoadScoring)  # noqa: S101 - the scorer is chosen by it
+    lacking = unmeasured(trajectory, cargo=True)
+    if lacking is not None:
+        return lacking
+    joined = joined_to_start(machine, trajectory)
+    path = trajectory.positions[:, starting_block(machine, trajectory)].astype(np.float64)
+    on_road = np.logical_and.accumulate(np.abs(path[:, 0]) <= scoring.half_width)
+    ahead = np.where(on_road, path[:, 1] - path[0, 1], 0.0)
+    driven = driven_distances(machine, trajectory, joined, path)
+    reach = np.zeros_like(ahead) if driven is None else driven
+    counted = np.minimum(ahead, np.minimum(reach, moved_upright(trajectory, joined, path)))
+    keeps, shift = _keeps_cargo(scoring, machine, trajectory, path)
+    kept = np.where(keeps, counted, 0.0)
+    distance, farthest = float(kept.max(initial=0.0)), int(kept.argmax())
+    rms = _ride(scoring, trajectory, path, farthest)
+    far = distance > scoring.min_distance
+    flags = {
+        "not_driven": ahead.max() > scoring.min_distance >= counted.max(),
+        "not_carried": counted.max() > scoring.min_distance and not far,
+    }
+    metrics: dict[str, Metric] = {
+        "distance": rounded(distance),
+        "rms_acceleration": rounded(rms),
+        "cargo_shift": rounded(shift[: farthest + 1].max(initial=0.0)),
+        "broken_joints": len(trajectory.breaks),
+    }
+    return Verdict(
+        success=far and rms < scoring.max_rms,
+        indicator=rounded(distance / (1.0 + rms)),
+        metrics=metrics,
+        flags=tuple(flag for flag, holds in flags.items() if holds),
+        deciding=Deciding(samples=len(path), members=joined, cargo=True),
+    )
+
+
+def _keeps_cargo(
+    scoring: RoadScoring, machine: "Machine", trajectory: "Trajectory", path: Series
+) -> tuple[Mask, Series]:
+    """Until when the machine has its cargo, (T,), and how far from its place, (T,) units."""
+    assert trajectory.cargo_position is not None  # noqa: S101 - the caller looked
+    turns = rotations(trajectory.quaternions[:, starting_block(machine, trajectory)])
+    apart = trajectory.cargo_position.astype(np.float64) - path
+    place = np.einsum("tji,tj->ti", turns, apart)
+    settled = int(np.searchsorted(trajectory.time_s, scoring.settle_s - 1e-9))
+    settled = min(settled, len(place) - 1)
+    shift = np.linalg.norm(place - place[settled], axis=1)
+    shift[:settled] = 0.0
+    keeps = (shift <= scoring.max_shift) & bears_cargo(trajectory, samples=_BORNE_SAMPLES)
+    keeps[:settled] = True
+    return np.logical_and.accumulate(keeps), shift
+
+
+def _ride(scoring: RoadScoring, trajectory: "Trajectory", path: Series, farthest: int) -> float:
+    """RMS of the cargo's vertical acceleration on its way, g."""
+    assert trajectory.cargo_position is not None  # noqa: S101 - the caller looked
+    height = trajectory.cargo_position[:, 2].astype(np.float64)
+    pull = np.zeros(len(height))
+    pull[1:-1] = np.diff(height, 2) * SAMPLE_RATE_HZ**2 / GRAVITY
+    before = np.maximum(np.arange(len(path)) - _MOVING_SAMPLES, 0)
+    moved = np.linalg.norm(path[:, :2] - path[before, :2], axis=1)
+    counts = (moved > _MOVING * _MOVING_SAMPLES / SAMPLE_RATE_HZ) & (
+        trajectory.time_s >= scoring.settle_s
+    )
+    counts[farthest + 1 :] = False
+    return float(np.sqrt(np.mean(pull[counts] ** 2))) if counts.any() else 0.0

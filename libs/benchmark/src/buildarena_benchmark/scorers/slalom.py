@@ -1,0 +1,109 @@
+"""Slalom: gates passed in order by a vehicle that keeps its wheels."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from buildarena_benchmark.scorers.pieces import Mask, joined_to_start
+from buildarena_benchmark.scorers.rolling import driven_distances, moved_upright
+from buildarena_benchmark.scorers.series import Series, starting_block
+from buildarena_benchmark.scorers.unmeasured import unmeasured
+from buildarena_benchmark.scorers.verdict import Deciding, Metric, Verdict, rounded
+from buildarena_benchmark.tasks.workshop_scoring import SlalomScoring
+
+if TYPE_CHECKING:
+    from buildarena_benchmark.tasks.task import Task
+    from buildarena_geometry import Machine
+    from buildarena_simulation import Trajectory
+    from buildarena_simulation.scenario import Gate
+
+
+def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict:
+    """The indicator is the number of gates passed, and the share of the time that was left then.
+
+    A gate is passed when the starting block crosses its line in its direction, on its wheels, with
+    all of them, and no later gate was passed before. So more gates are always better, and of
+    trials with as many gates the faster one.
+
+    Args:
+        task: Gates and thresholds.
+        machine: Gives the wheels.
+        trajectory: The trial.
+
+    Flags:
+        `not_driven`: gates enough, but not by wheels. `forces_not_measured`: cannot be judged.
+    """
+    scoring, scenario = task.scoring, task.scenario
+    assert isinstance(scoring, SlalomScoring)  # noqa: S101 - the scorer is chosen by it
+    lacking = unmeasured(trajectory, cargo=False)
+    if lacking is not None:
+        return lacking
+    joined = joined_to_start(machine, trajectory)
+    path = trajectory.positions[:, starting_block(machine, trajectory)].astype(np.float64)
+    crossings = sorted(
+        (sample, number)
+        for number, gate in enumerate(scenario.gates)
+        for sample in _crossings(path, gate)
+    )
+    drives = _drives(machine, trajectory, joined, path)
+    whole = _has_wheels(machine, trajectory, joined)
+    passed = _in_order([c for c in crossings if whole[c[0]] and drives[c[0]]])
+    anyhow = _in_order([c for c in crossings if whole[c[0]]])
+    gates = len(passed)
+    last_s = float(trajectory.time_s[passed[-1]]) if passed else scenario.duration_s
+    indicator = gates + (1.0 - last_s / scenario.duration_s if gates else 0.0)
+    metrics: dict[str, Metric] = {
+        "gates": gates,
+        "last_gate_s": rounded(last_s) if passed else None,
+        "wheels_lost": not bool(whole[-1]),
+        "broken_joints": len(trajectory.breaks),
+    }
+    return Verdict(
+        success=gates >= scoring.min_gates,
+        indicator=rounded(indicator),
+        metrics=metrics,
+        flags=("not_driven",) if len(anyhow) >= scoring.min_gates > gates else (),
+        deciding=Deciding(samples=len(path), members=joined, cargo=False),
+    )
+
+
+def _crossings(path: Series, gate: "Gate") -> list[int]:
+    """Samples after which a gate's line has been crossed in its direction."""
+    heading = np.radians(gate.heading_deg)
+    ahead = np.array([np.sin(heading), np.cos(heading)])
+    right = np.array([ahead[1], -ahead[0]])
+    apart = path[:, :2] - np.array(gate.center)
+    along, aside = apart @ ahead, apart @ right
+    steps = np.flatnonzero((along[:-1] < 0.0) & (along[1:] >= 0.0))
+    share = -along[steps] / (along[steps + 1] - along[steps])
+    at = aside[steps] + share * (aside[steps + 1] - aside[steps])
+    return [int(step) + 1 for step in steps[np.abs(at) <= gate.half_width]]
+
+
+def _in_order(crossings: list[tuple[int, int]]) -> list[int]:
+    """Samples of the gates that count, of crossings (sample, gate) in order of time."""
+    samples, last = [], -1
+    for sample, gate in crossings:
+        if gate > last:
+            samples.append(sample)
+            last = gate
+    return samples
+
+
+def _drives(machine: "Machine", trajectory: "Trajectory", joined: Mask, path: Series) -> Mask:
+    """At which samples wheels explain where the machine is, (T,)."""
+    driven = driven_distances(machine, trajectory, joined, path)
+    if driven is None:
+        return np.zeros(len(path), dtype=bool)
+    moved = np.linalg.norm(path[:, :2] - path[0, :2], axis=1)
+    return np.asarray(moved <= np.minimum(driven, moved_upright(trajectory, joined, path)))
+
+
+def _has_wheels(machine: "Machine", trajectory: "Trajectory", joined: Mask) -> Mask:
+    """Until when every wheel is joined to the starting block, (T,)."""
+    assert trajectory.bearing is not None  # noqa: S101 - the caller looked
+    wheels = set(trajectory.bearing.wheel_ids)
+    wheels |= {block.id for block in machine.blocks.values() if block.module.spins}
+    columns = [k for k, block in enumerate(trajectory.block_ids) if block in wheels]
+    whole = joined[:, columns].all(axis=1) if columns else np.zeros(len(joined), dtype=bool)
+    return np.asarray(np.logical_and.accumulate(whole))

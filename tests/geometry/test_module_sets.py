@@ -1,0 +1,311 @@
+"""The sets of modules, and the rules that further types bring."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import math
+import re
+from importlib import resources
+
+import fcl
+import numpy as np
+import pytest
+
+from buildarena_geometry import (
+    MODULE_SETS,
+    Ball,
+    CatalogueError,
+    Machine,
+    catalogue_of,
+    load_catalogue,
+    module_set,
+    modules_named,
+    replay,
+)
+from buildarena_geometry.modules.catalogue import read_modules
+
+FILE = resources.files("buildarena_geometry.modules").joinpath("modules.yaml")
+BLOCK = next(
+    module
+    for module in json.loads(FILE.read_text())["modules"]
+    if module["name"] == "Small Wooden Block"
+)
+EXTENDED = [name for name in module_set("all") if name not in load_catalogue()]
+
+
+def own(tmp_path, **fields):
+    """The basic modules and one of our own, "Own", like the small block but for some fields."""
+    file = tmp_path / "modules.json"
+    file.write_text(json.dumps({"version": 1, "modules": [{**BLOCK, "name": "Own", **fields}]}))
+    return load_catalogue(file)
+
+
+def built(catalogue, *parts):
+    machine = Machine(catalogue=catalogue)
+    assert machine.act("start").ok
+    for base, face, module in parts:
+        outcome = machine.act(
+            "attach_block_to", {"base_block": base, "face": face, "new_block": module}
+        )
+        assert outcome.ok, outcome.text
+    return machine
+
+
+def test_sets_hold_each_other():
+    basic, workshop, everything = (set(module_set(name)) for name in MODULE_SETS)
+    assert basic - {"Ballast"} < workshop < everything
+    assert (len(basic), len(workshop), len(everything)) == (8, 41, 86)
+
+
+def test_the_basic_set_is_the_catalogue_that_is_loaded():
+    assert list(module_set("basic").items()) == list(load_catalogue().items())
+
+
+def test_a_builder_gets_no_cargo_and_only_what_is_simulated():
+    assert [m.kind for m in module_set("basic").values()].count("cargo") == 1
+    for name in ("workshop", "all"):
+        assert all(module.kind != "cargo" for module in module_set(name).values())
+    assert all(module.facts.simulated for module in module_set("workshop").values())
+    left_out = set(module_set("all")) - set(module_set("workshop"))
+    assert not any(module_set("all")[name].facts.simulated for name in left_out)
+
+
+def test_a_choice_is_a_set_or_names():
+    assert modules_named(None) == modules_named("basic")
+    assert "Starting Block" not in modules_named("all")
+    assert modules_named(["Torch"]) == ("Torch",)
+    assert list(catalogue_of(("Hinge", "Torch"))) == ["Starting Block", "Hinge", "Torch"]
+    assert catalogue_of(None) == module_set("basic")
+    with pytest.raises(ValueError, match=r"no module set 'big'; the sets are basic, workshop, all"):
+        modules_named("big")
+    with pytest.raises(ValueError, match=r"no module 'Hinj'"):
+        catalogue_of(("Hinj",))
+
+
+@pytest.mark.parametrize("name", EXTENDED)
+def test_what_a_further_type_says_fits_together(name):
+    module = module_set("all")[name]
+    assert module.facts.categories
+    assert module.description
+    assert {"mass", "cost"} <= dict(module.facts.sources).keys()
+    if module.kind == "connector":
+        return
+    assert module.physics is not None
+    assert module.physics.origin
+    labels = [face.label for face in module.faces]
+    assert labels == [label(index) for index in range(len(labels))]
+    for one, other in itertools.combinations(module.faces, 2):
+        apart = math.dist(one.center, other.center)
+        assert apart > 0.3 or math.dist(one.normal, other.normal) > 0.5, (one.label, other.label)
+    size = np.array(extent(module.body))
+    np.testing.assert_allclose(module.size, size[1] - size[0], atol=1e-6)
+    drawn_in = np.array(extent(module.colliders))
+    assert (drawn_in[0] >= size[0] - 1e-9).all()
+    assert (drawn_in[1] <= size[1] + 1e-9).all()
+
+
+def label(index):
+    letters = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
+    return letters[index] if index < 26 else letters[index // 26 - 1] + letters[index % 26]
+
+
+def extent(solids):
+    corners = []
+    for solid in solids:
+        if isinstance(solid, Ball):
+            corners += [np.array(solid.center) + s * solid.radius for s in (-1, 1)]
+        elif hasattr(solid, "lowest"):
+            corners += [np.array(solid.lowest), np.array(solid.highest)]
+        else:
+            axis = (np.array(solid.top) - solid.base) / solid.length
+            across = solid.radius * np.sqrt(np.clip(1 - axis**2, 0, None))
+            corners += [np.array(p) + s * across for p in (solid.base, solid.top) for s in (-1, 1)]
+    return np.min(corners, axis=0), np.max(corners, axis=0)
+
+
+@pytest.mark.parametrize("name", module_set("all").attachable)
+def test_every_type_can_be_attached_and_comes_back_from_its_document(name):
+    machine = built(module_set("all"), ("1", "C", name))
+    document = json.loads(json.dumps(machine.to_document()))
+    again = Machine.from_document(document)
+    assert again == machine
+    assert again.mass == pytest.approx(0.25 + module_set("all")[name].mass)
+
+
+def test_documents_know_all_types_and_a_machine_only_its_own():
+    machine = built(module_set("workshop"), ("1", "A", "Hinge"), ("2", "E", "Wing Panel"))
+    assert Machine.from_document(machine.to_document()) == machine
+    outcome = built(None).act(
+        "attach_block_to", {"base_block": "1", "face": "A", "new_block": "Hinge"}
+    )
+    assert outcome.reason.value == "module_restriction"
+    assert "Hinge" not in outcome.text.partition("Modules:")[2]
+
+
+def test_a_machine_goes_on_with_what_it_was_made_of():
+    machine = built(module_set("workshop"), ("1", "A", "Hinge"))
+    assert machine.act("remove_block", {"block_id": "2"}).ok
+    again = Machine.from_document(machine.to_document())
+    assert again.catalogue is module_set("workshop")
+    assert replay(again.log) == machine
+    plain = built(None, ("1", "A", "Torch"))
+    plain.act("attach_block_to", {"base_block": "1", "face": "B", "new_block": "Hinge"})
+    assert Machine.from_document(plain.to_document()).catalogue is module_set("basic")
+    gate = Machine(catalogue=module_set("all"), available={"arm": built(module_set("all"))})
+    assert gate.act("add_machine", {"machine_id": "arm"}).ok
+    boosted = built(module_set("all"), ("1", "A", "Booster"))
+    gate = Machine(catalogue=module_set("all"), available={"arm": boosted})
+    assert Machine.from_document(gate.to_document()).catalogue is module_set("all")
+
+
+@pytest.mark.parametrize(
+    ("written", "meant"),
+    [
+        ("Hinj", "Hinge"),
+        ("steering", "Steering Hinge"),
+        ("wheel", "Large Wheel"),
+        ("Wooden Block", "Small Wooden Block"),
+        ("Baloon", "Balloon"),
+        ("Propellor", "Propeller"),
+        ("Powerd Wheel", "Powered Wheel"),
+    ],
+)
+def test_a_wrong_name_is_answered_with_the_nearest_ones(written, meant):
+    outcome = built(module_set("all")).act(
+        "attach_block_to", {"base_block": "1", "face": "A", "new_block": written}
+    )
+    assert outcome.reason.value == "module_restriction"
+    assert f'"{written}"' in outcome.text or repr(written) in outcome.text
+    named = re.split(r", | and ", outcome.text.partition("Modules: ")[2])
+    assert meant in named
+    assert len(named) == 6
+    assert named[-1] == f"{len(module_set('all').attachable) - 5} more."
+
+
+@pytest.mark.parametrize("written", ["", " ", "x" * 500, "\n"])
+def test_names_like_no_other_are_refused_in_short(written):
+    outcome = built(module_set("all")).act(
+        "attach_block_to", {"base_block": "1", "face": "A", "new_block": written}
+    )
+    assert not outcome.ok
+    assert len(outcome.text) < 400
+
+
+def test_a_root_offset_lifts_a_block_off_its_face(tmp_path):
+    down = {"label": "F", "center": [0, 0, -0.25], "normal": [0, 0, -1], "x_axis": [1, 0, 0]}
+    up = {"label": "E", "center": [0, 0, 1], "normal": [0, 0, 1], "x_axis": [1, 0, 0]}
+    catalogue = own(tmp_path, root_offset=0.25, faces=[up, down])
+    machine = built(catalogue, ("1", "C", "Own"), ("2", "E", "Own"))
+    np.testing.assert_allclose(machine.blocks["2"].world_from_block.xyz, (0, 0, 0.75))
+    np.testing.assert_allclose(machine.blocks["3"].world_from_block.xyz, (0, 0, 2.0))
+    assert [joint.offset for joint in machine.joints] == pytest.approx([0, 0], abs=1e-12)
+    assert machine.state.free_faces(machine.blocks["3"]) == ["E"]
+    machine.act("twist_block", {"block_id": "3", "angle": 45})
+    assert machine.joints[1].offset == pytest.approx(0, abs=1e-12)
+    machine.act("shift_block", {"block_id": "3", "shift_real": [0.1, 0, 0]})
+    assert machine.joints[1].offset == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize(
+    ("faces", "taken"),
+    [
+        ([((0, 0, 0), (0, 0, -1)), ((0.5, 0, 0), (0, 0, -1))], "A"),
+        ([((0.5, 0, 0.5), (0, 0, -1)), ((0, 0, 0.2), (0, 0, -1))], "B"),
+        ([((0, 0, 0), (1, 0, 0)), ((0, 0, 1), (0, 0, 1))], None),
+        ([((0, 0, 0.3), (0, 0.6, -0.8)), ((0, 0, 1), (0, 0, 1))], None),
+        ([((0, 0, 0.3), (0, math.sin(0.3), -math.cos(0.3))), ((0, 0, 1), (0, 0, 1))], "A"),
+    ],
+)
+def test_sitting_takes_the_face_at_the_root_or_else_the_lowest_that_looks_down(
+    tmp_path, faces, taken
+):
+    entries = [
+        {"label": name, "center": center, "normal": normal, "x_axis": across(normal)}
+        for name, (center, normal) in zip("AB", faces, strict=True)
+    ]
+    module = own(tmp_path, faces=entries)["Own"]
+    assert module.root_face == taken
+
+
+def across(normal):
+    return [1, 0, 0] if abs(normal[0]) < 0.5 else [0, 1, 0]
+
+
+def test_a_shape_that_reaches_into_its_base_is_compared_with_the_others_alone():
+    catalogue = module_set("workshop")
+    machine = built(catalogue, ("1", "A", "Piston"))
+    # Another piston's rod would not meet the first one's base from elsewhere.
+    refused = machine.act("twist_block", {"block_id": "2", "angle": 30})
+    assert refused.ok
+    machine = built(
+        catalogue,
+        ("1", "A", "Small Wooden Block"),
+        ("1", "C", "Small Wooden Block"),
+        ("2", "E", "Small Wooden Block"),
+    )
+    beside = {"base_block": "3", "face": "A", "new_block": "Piston"}
+    outcome = machine.act("attach_block_to", beside)
+    assert outcome.ok or ("5", "3") not in outcome.overlaps
+
+
+def test_what_reaches_into_its_base_still_meets_it_after_that_base_was_exchanged(tmp_path):
+    rod = {"shape": "cylinder", "radius": 0.2, "from": [0, 0, -0.4], "to": [0, 0, 0]}
+    catalogue = own(tmp_path, overlaps_base=True, colliders=[*BLOCK["colliders"], rod])
+    machine = built(catalogue, ("1", "A", "Small Wooden Block"), ("2", "E", "Own"))
+    assert machine.act("remove_block", {"block_id": "2"}).ok
+    again = {"base_block": "1", "face": "A", "new_block": "Small Wooden Block"}
+    outcome = machine.act("attach_block_to", again)
+    assert not outcome.ok, "a rod that sits nowhere is a shape like any other"
+    assert outcome.overlaps == (("4", "3"),)
+
+
+def test_what_reaches_into_its_base_may_be_met_from_either_side(tmp_path):
+    rod = {"shape": "cylinder", "radius": 0.2, "from": [0, 0, -0.4], "to": [0, 0, 0]}
+    catalogue = own(tmp_path, overlaps_base=True, colliders=[*BLOCK["colliders"], rod])
+    machine = built(catalogue, ("1", "A", "Small Wooden Block"), ("2", "E", "Own"))
+    # The base is what moves here: the two are compared the other way round.
+    assert machine.act("twist_block", {"block_id": "2", "angle": 20}).ok
+    assert Machine.from_document(machine.to_document(), catalogue=catalogue) == machine
+
+
+def test_balls_meet_as_balls(tmp_path):
+    ball = [{"shape": "sphere", "radius": 0.8, "center": [0, 0, 1]}]
+    catalogue = own(tmp_path, body=ball, colliders=ball, faces=[], size=[1.6, 1.6, 1.6])
+    machine = built(catalogue, ("1", "C", "Own"), ("1", "A", "Small Wooden Block"))
+    rising = {"base_block": "3", "face": "D", "new_block": "Own"}
+    assert machine.act("attach_block_to", rising).ok
+    middles = [np.array(b.world_from_block.point((0, 0, 1))) for b in machine.blocks.values()]
+    assert np.linalg.norm(middles[1] - middles[3]) > 1.6
+    near = {"block_id": "2", "shift_real": [0.5, 0, 0]}
+    for _ in range(3):
+        outcome = machine.act("shift_block", near)
+    world = [fcl.CollisionObject(fcl.Sphere(0.8), fcl.Transform(middles[i])) for i in (1, 3)]
+    assert fcl.distance(*world) > 0
+    assert outcome.ok or outcome.overlaps
+
+
+@pytest.mark.parametrize(
+    ("fields", "complaint"),
+    [
+        ({"spin": "left"}, r"spin: expected one of clockwise, counterclockwise"),
+        ({"root_offset": -1}, r"root_offset: expected a number of at least 0"),
+        ({"overlaps_base": "yes"}, r"overlaps_base: expected true or false"),
+        ({"simulated": 1}, r"simulated: expected true or false"),
+        ({"categories": "basic"}, r"categories: expected a list"),
+        ({"default_keys": {"fly": "H"}}, r"default_keys.fly: expected keys of the actions none"),
+        ({"sources": {"mass": "a book"}}, r"sources.mass: .* known, community, chosen, unknown"),
+        ({"body": [{"shape": "sphere", "radius": 1}]}, r"center is missing"),
+        ({"body": [{"shape": "sphere", "radius": 0, "center": [0, 0, 0]}]}, r"above 0"),
+        (
+            {"body": [{"shape": "sphere", "radius": 1, "center": [0, 0, 0], "to": [1, 1, 1]}]},
+            r"there is no field 'to'",
+        ),
+        ({"body": [{"shape": "cone", "from": [0, 0, 0], "to": [1, 1, 1]}]}, r"box, cylinder, sph"),
+        ({"kind": "gadget"}, r"kind: expected one of start, block, joint, wheel"),
+    ],
+)
+def test_bad_fields_are_named(fields, complaint):
+    content = {"version": 1, "modules": [{**BLOCK, "name": "Own", **fields}]}
+    with pytest.raises(CatalogueError, match=complaint):
+        read_modules(content, where="file")
