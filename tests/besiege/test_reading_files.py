@@ -175,8 +175,11 @@ def test_a_plain_foreign_file_is_understood() -> None:
 @pytest.mark.parametrize(
     ("given", "says"),
     [
-        ({"blocks": block(22)}, ["block 3: no module is of the game's type 22: left out"]),
-        ({"blocks": block(35)}, ["block 3 (Ballast): a cargo is the task's: left out"]),
+        ({"blocks": block(57)}, ["block 3: no module is of the game's type 57: left out"]),
+        (
+            {"blocks": block(35, 'x="0" y="0" z="9"')},
+            ["block 3 (Ballast): a cargo is the task's: left out"],
+        ),
         (
             {"blocks": block(2, data='<Boolean key="bmt-automatic">True</Boolean>')},
             ["block 3 (Powered Wheel): 'bmt-automatic' is 'True', read as False"],

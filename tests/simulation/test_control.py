@@ -42,7 +42,7 @@ def _speeds(machine: Machine, *keys: KeyPress) -> np.ndarray:
         control=Control(mode="agent"),
         step_count=300,
         time_step_s=0.01,
-    ).wheel_speeds
+    ).targets
 
 
 def test_a_wheel_follows_its_key_with_a_lag() -> None:

@@ -43,7 +43,7 @@ def test_a_beam_is_one_cluster_and_a_car_five() -> None:
     assert len(clusters) == 5
     assert len(clusters.pieces) == 1
     assert (clusters.parent[1:] == 0).all()
-    assert clusters.wheel_is_outer[1:].all()
+    assert clusters.seated_is_outer[1:].all()
 
 
 def test_a_block_on_a_wheels_outer_face_turns_with_it() -> None:
@@ -54,7 +54,7 @@ def test_a_block_on_a_wheels_outer_face_turns_with_it() -> None:
     clusters = _clusters(structure)
     assert sorted(map(len, clusters.blocks)) == [1, 2]
     # The larger cluster is the root, so the wheel's mount hangs on it.
-    assert not clusters.wheel_is_outer[1]
+    assert not clusters.seated_is_outer[1]
 
 
 def test_a_brace_across_an_axle_locks_it() -> None:

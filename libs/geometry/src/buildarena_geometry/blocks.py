@@ -132,6 +132,7 @@ class Connector:
             made. Later twists and shifts of the connector turn and move this frame, not the ends.
         span: (3,) from start to end in that frame, when the connector was made or last moved as
             part of a sub-structure.
+        bindings: the keys bound to each of its actions.
         structure: the sub-structure its start belongs to in an assembly; "" elsewhere.
         note: the builder's own words about it.
     """
@@ -144,6 +145,7 @@ class Connector:
     end_xyz: Vector
     world_from_connector: Pose
     span: Vector
+    bindings: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     structure: str = ""
     note: str = ""
 

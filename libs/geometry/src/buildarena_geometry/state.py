@@ -167,13 +167,13 @@ class MachineState:
 
     def keys_in_use(self) -> tuple[str, ...]:
         """The keys that are bound to some action, in the order of the blocks."""
-        bound = (
-            key
-            for block in self.blocks.values()
-            for keys in block.bindings.values()
-            for key in keys
-        )
+        bound = (key for one in self.powered() for keys in one.bindings.values() for key in keys)
         return tuple(dict.fromkeys(bound))
+
+    def powered(self) -> tuple[Block | Connector, ...]:
+        """The blocks, then the connectors, that take keys."""
+        parts: tuple[Block | Connector, ...] = (*self.blocks.values(), *self.connectors.values())
+        return tuple(one for one in parts if one.module.actions)
 
     def with_blocks(self, *changed: Block) -> MachineState:
         """The state in which these blocks are new or different, and connectors on them follow."""

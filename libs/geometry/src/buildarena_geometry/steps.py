@@ -23,14 +23,14 @@ class Difference:
     Attributes:
         added: new blocks, then new connectors.
         moved: those in another place; of a connector an end, or its own frame.
-        rebound: blocks whose keys or sense of rotation changed.
+        rebound: parts whose keys or sense of rotation changed.
         removed: ids of blocks and connectors that are gone.
         control_sequence: the key presses, where they changed; otherwise None.
     """
 
     added: tuple[Block | Connector, ...] = ()
     moved: tuple[Block | Connector, ...] = ()
-    rebound: tuple[Block, ...] = ()
+    rebound: tuple[Block | Connector, ...] = ()
     removed: tuple[str, ...] = ()
     control_sequence: tuple[KeyPress, ...] | None = None
 
@@ -78,7 +78,10 @@ def _difference(before: MachineState, after: MachineState, changed: Sequence[str
             *(now for was, now in blocks if was and was.world_from_block != now.world_from_block),
             *(now for was, now in links if was and _place(was) != _place(now)),
         ),
-        rebound=tuple(now for was, now in blocks if was and _use(was) != _use(now)),
+        rebound=(
+            *(now for was, now in blocks if was and _use(was) != _use(now)),
+            *(now for was, now in links if was and was.bindings != now.bindings),
+        ),
         removed=tuple(
             key for key in ids if key not in after.blocks and key not in after.connectors
         ),

@@ -14,7 +14,7 @@ from buildarena_simulation.errors import (
 from buildarena_simulation.parquet import read_trajectory, schema_of, write_trajectory
 from buildarena_simulation.rollout import SIMULATION_VERSION, simulate
 from buildarena_simulation.scenario import Scenario
-from buildarena_simulation.trajectory import Bearing, Break, JointPeak, Trajectory
+from buildarena_simulation.trajectory import Bearing, Break, Event, JointPeak, Trajectory
 
 __all__ = [
     "ENGINES",
@@ -22,6 +22,7 @@ __all__ = [
     "Bearing",
     "Break",
     "BuildarenaSimulationError",
+    "Event",
     "JointPeak",
     "MachineNotSimulable",
     "Scenario",

@@ -11,11 +11,11 @@ from buildarena_simulation.resting import FaceFinder
 from buildarena_simulation.structure.clusters import Clusters, find_clusters
 from buildarena_simulation.structure.contacts import EvenSharing, PointForces, together
 from buildarena_simulation.structure.loads import LoadModel
-from buildarena_simulation.structure.model import JOINT_KINDS, FloatArray
+from buildarena_simulation.structure.model import JOINT_KINDS, BoolArray, FloatArray, IntArray
 from buildarena_simulation.structure.motion import Motion, rope_ends
 from buildarena_simulation.structure.supports import EdgeSupports
 from buildarena_simulation.structure.vectors import turned
-from buildarena_simulation.trajectory import Break, JointPeak
+from buildarena_simulation.trajectory import Break, Event, JointPeak
 
 _CALM: Final = 0.5
 """Share of its strength below which no joint is in danger."""
@@ -39,6 +39,7 @@ class BreakingModel:
         self, world: World, clusters: Clusters, motion: Motion, *, interval_s: float
     ) -> None:
         structure = self._structure = world.structure
+        self._field = world.field
         self._faces, self._has_cargo = FaceFinder(world), world.cargo is not None
         self.bearing = BearingMeter(structure, len(world.terrain))
         self._loads = LoadModel(structure, clusters, motion)
@@ -51,6 +52,7 @@ class BreakingModel:
         self._rope_peaks = np.zeros(len(structure.ropes))
         self.motion = motion
         self.breaks: list[Break] = []
+        self.events: list[Event] = []
 
     def follow(
         self,
@@ -100,6 +102,26 @@ class BreakingModel:
                 self._loads.holds[broken] = False
             self._fall_apart(engine)
 
+    def let_go(self, engine: Engine, members: IntArray, *, time_s: float) -> BoolArray:
+        """Opens joints that are made to let go; no break.
+
+        Args:
+            engine: The engine, which is given new bodies if the machine comes apart.
+            members: (D,) the joints.
+            time_s: Time now, seconds.
+
+        Returns:
+            (D,) which of them held until now.
+        """
+        held = self._loads.holds[members]
+        self._loads.holds[members] = False
+        for member in members[held]:
+            joint = self._structure.members.names[member]
+            self.events.append(Event(time_s=round(time_s, 6), what="decoupled", joint=joint))
+        if held.any():
+            self._fall_apart(engine)
+        return held
+
     def _giving_way(self, ratio: FloatArray, worst: int) -> list[int]:
         """The worst joint and, where it is a connector, those that overload its face with it.
 
@@ -119,7 +141,7 @@ class BreakingModel:
         return self._loads_now if seen is None else seen
 
     def _follow_loads(self, ratio: FloatArray, tensions: FloatArray) -> None:
-        ropes = tensions / GRAVITY / self._structure.ropes.limit
+        ropes = np.maximum(tensions, 0.0) / GRAVITY / self._structure.ropes.limit
         now = self._loads_now = np.concatenate([ratio, ropes])
         self._loads_since = now if self._loads_since is None else np.maximum(self._loads_since, now)
 
@@ -157,6 +179,8 @@ class BreakingModel:
         faces = self._faces.find(clusters, motion, cargo)
         contacts = faces.joined_to(engine.contacts(), clusters.cluster_of)
         others = [self._pushes(thrusts), self._pulls(tensions)]
+        if self._field is not None:
+            others.append(self._field.taken(clusters, motion))
         contacts, shared = self._supports.settled(
             contacts,
             self._sharing.shared(contacts),
@@ -234,5 +258,5 @@ def _same(before: Clusters, after: Clusters) -> bool:
     return (
         len(before) == len(after)
         and bool((before.cluster_of == after.cluster_of).all())
-        and bool((before.axle == after.axle).all())
+        and bool((before.joint == after.joint).all())
     )

@@ -34,6 +34,13 @@ from gaining energy.
 FRICTION_TERRAIN: Final = 1.0
 """Neutral, so that a contact with terrain or cargo takes the other body's coefficient."""
 
+FORCES_EVERY_S: Final = 0.008
+"""Time between two evaluations of wings, fans and balloons, s.
+
+Ours: air slows a block at a rate of at most coefficient · cap² / mass, 45/s for a propeller,
+whatever it is fixed to; an explicit step is stable below 2/45 s.
+"""
+
 LOAD_FILTER_S: Final = 0.16
 """Time constant of the low-pass filter on block wrenches, s. Fitted at g = 32.81."""
 
@@ -44,7 +51,7 @@ MAX_PARTS: Final = 2000
 class JointKind(StrEnum):
     """How two blocks are held together; each kind has its own strength.
 
-    A module's seat is an attachment, a mount or an axle.
+    A module's seat is one of them: an attachment, a mount, or a joint it moves on.
     """
 
     ATTACHMENT = "attachment"
@@ -52,6 +59,10 @@ class JointKind(StrEnum):
     MOUNT = "mount"
     AXLE = "axle"
     BRACE = "brace"
+    HINGE = "hinge"
+    SLIDER = "slider"
+    BALL = "ball"
+    CONSTANT_VELOCITY = "constant_velocity"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,6 +97,18 @@ JOINT_STRENGTH: Final = MappingProxyType(
         ),
         JointKind.AXLE: Strength(force=600.0, moment=200.0, origin="fitted, as an attachment"),
         JointKind.BRACE: Strength(force=600.0, moment=200.0, origin="fitted, as an attachment"),
+        JointKind.HINGE: Strength(
+            force=600.0, moment=200.0, origin="chosen: as an axle; the game's value is not public"
+        ),
+        JointKind.SLIDER: Strength(
+            force=600.0, moment=200.0, origin="chosen: as an axle; the game's value is not public"
+        ),
+        JointKind.BALL: Strength(
+            force=600.0, moment=200.0, origin="chosen: as an axle; it bears no moment but at a stop"
+        ),
+        JointKind.CONSTANT_VELOCITY: Strength(
+            force=600.0, moment=200.0, origin="chosen: as an axle; the moment is the shaft's torque"
+        ),
     }
 )
 ROPE_STRENGTH: Final = 1000.0

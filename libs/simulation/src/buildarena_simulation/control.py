@@ -1,8 +1,8 @@
-"""What the keys make of a machine: wheel speeds, firing cannons, heated cannons."""
+"""What the keys make of a machine: targets of its drives, firing cannons, heated cannons."""
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Protocol
 
 import numpy as np
@@ -11,7 +11,8 @@ from buildarena_geometry.blocks import KeyPress
 from buildarena_geometry.flames import flames_touch
 from buildarena_simulation.constants import GRAVITY, KEY_DELAY_S
 from buildarena_simulation.scenario import Control
-from buildarena_simulation.structure.model import BoolArray, FloatArray, Structure
+from buildarena_simulation.structure.drives import lagged, place_targets, speed_targets
+from buildarena_simulation.structure.model import BoolArray, FloatArray, Part, Structure
 
 
 class KeyHold(Protocol):
@@ -82,11 +83,13 @@ class Schedule:
     """Commands of a whole trial, one row per engine step.
 
     Attributes:
-        wheel_speeds: (S, W) target of each wheel, rad/s about its outward axis.
+        targets: (S, D) target of each driven joint (`Joints.driven`): of a wheel its speed about
+            its outward axis, rad/s; of another what its drive holds, rad, rad/s, units or units/s,
+            NaN where it is free.
         firing: (S, C) whether each cannon's key is held.
     """
 
-    wheel_speeds: FloatArray
+    targets: FloatArray
     firing: BoolArray
 
 
@@ -113,11 +116,6 @@ def plan_schedule(
         time_step_s: Length of one, seconds.
     """
     times = np.arange(step_count) * time_step_s
-    if control.mode == "held":
-        firing = np.repeat(
-            (times >= control.from_s - 1e-9)[:, None], len(structure.cannons), axis=1
-        )
-        return Schedule(wheel_speeds=np.zeros((step_count, len(structure.wheels))), firing=firing)
     pressed = keys if control.mode == "agent" else ()
 
     def held(block: int, action: str) -> BoolArray:
@@ -129,25 +127,66 @@ def plan_schedule(
                 result |= (times >= start) & (times < end)
         return result
 
-    wheel_speeds = np.zeros((step_count, len(structure.wheels)))
-    lags = np.zeros(len(structure.wheels))
-    for w, block in enumerate(structure.wheels):
-        part = structure.parts[block]
-        motor = part.module.motor
-        if motor is None:
-            continue
-        forward = held(block, motor.forward).astype(np.float64)
-        backward = held(block, motor.backward).astype(np.float64)
-        # Clockwise seen from outside is against the outward axis.
-        sign = -1.0 if part.forward_is_clockwise else 1.0
-        wheel_speeds[:, w] = sign * motor.speed * (forward - backward)
-        lags[w] = motor.lag_per_s
+    targets = _targets(structure, held, step_count=step_count, time_step_s=time_step_s)
+    if control.mode == "held":
+        firing = np.repeat(
+            (times >= control.from_s - 1e-9)[:, None], len(structure.cannons), axis=1
+        )
+        return Schedule(targets=targets, firing=firing)
     firing = np.zeros((step_count, len(structure.cannons)), dtype=bool)
     for c, block in enumerate(structure.cannons):
         thrust = structure.parts[block].module.thrust
         if thrust is not None:
             firing[:, c] = held(block, thrust.action)
-    return Schedule(wheel_speeds=_lagged(wheel_speeds, lags, time_step_s), firing=firing)
+    return Schedule(targets=targets, firing=firing)
+
+
+def _targets(
+    structure: Structure,
+    held: Callable[[int, str], BoolArray],
+    *,
+    step_count: int,
+    time_step_s: float,
+) -> FloatArray:
+    """The targets of all driven joints, as in `Schedule.targets`."""
+    targets = np.zeros((step_count, len(structure.joints.driven)))
+    lags = np.zeros(len(structure.joints.driven))
+    for w, block in enumerate(structure.wheels):
+        part = structure.parts[block]
+        motor = part.module.motor
+        if motor is None:
+            continue
+        forward = held(int(block), motor.forward).astype(np.float64)
+        backward = held(int(block), motor.backward).astype(np.float64)
+        # Clockwise seen from outside is against the outward axis.
+        sign = -1.0 if part.forward_is_clockwise else 1.0
+        targets[:, w] = sign * motor.speed * (forward - backward)
+        lags[w] = motor.lag_per_s
+    targets = lagged(targets, lags, time_step_s)
+    for d, block in enumerate(structure.joints.driven):
+        found = _driven(structure.parts[block], partial(held, int(block)), step_count, time_step_s)
+        if found is not None:
+            targets[:, d] = found
+    return targets
+
+
+def _driven(
+    part: Part, held: Callable[[str], BoolArray], step_count: int, time_step_s: float
+) -> FloatArray | None:
+    """The targets of a joint's own drive, (S,); None if it has none."""
+    joint = part.module.joint
+    if joint is None or joint.drive is None:
+        return None
+    drive = joint.drive
+    none = np.zeros(step_count, dtype=bool)
+    forward = none if drive.forward is None else held(drive.forward)
+    backward = none if drive.backward is None else held(drive.backward)
+    sign = -1.0 if part.forward_is_clockwise else 1.0
+    if drive.kind == "speed":
+        return speed_targets(drive, forward, backward, sign=sign, time_step_s=time_step_s)
+    return place_targets(
+        drive, forward, backward, sign=sign, limits=joint.limits, time_step_s=time_step_s
+    )
 
 
 def effective_presses(bindings: Bindings, keys: Sequence[KeyHold]) -> int:
@@ -192,16 +231,3 @@ def recoil(structure: Structure, firing: BoolArray, heated: BoolArray) -> FloatA
     """
     thrusts = np.where(heated, structure.heated_thrusts, structure.cold_thrusts)
     return np.asarray(thrusts * firing * GRAVITY)
-
-
-def _lagged(targets: FloatArray, lags: FloatArray, time_step_s: float) -> FloatArray:
-    """Speeds that follow their targets, (S, W), by first-order lags of the rates (W,), 1/s."""
-    blend = np.array([1.0 - math.exp(-lag * time_step_s) for lag in lags])
-    speeds = np.zeros_like(targets)
-    if not targets.any():
-        return speeds
-    current = np.zeros(targets.shape[1])
-    for k, target in enumerate(targets):
-        current = current + blend * (target - current)
-        speeds[k] = current
-    return speeds

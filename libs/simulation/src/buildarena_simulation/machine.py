@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, TypedDict
 
 import numpy as np
 
+from buildarena_geometry.modules.joints import MOVING_SEATS, UP, SeatJoint
 from buildarena_geometry.modules.solids import Ball, Cylinder
 from buildarena_simulation.constants import MAX_PARTS, JointKind
 from buildarena_simulation.control import Bindings
@@ -43,11 +44,18 @@ def structure_of(machine: "Machine") -> Structure:
         )
     parts = [_part(block) for block in machine.blocks.values()]
     index = {part.id: i for i, part in enumerate(parts)}
-    links = [_link(joint, index, parts) for joint in machine.joints if joint.holds]
-    ropes = []
+    links, ropes = [], []
+    for joint in machine.joints:
+        if joint.holds:
+            tether = parts[index[joint.part]].module.forces.tether
+            if tether is None:
+                links.append(_link(joint, index, parts))
+            else:
+                ropes.append(_tether(joint, index, tether.length))
     connectors = list(machine.connectors.values())
-    braces = [c for c in connectors if c.module.link != "rope"]
+    braces = [c for c in connectors if c.module.link == "rigid"]
     winches = [c for c in connectors if c.module.link == "rope"]
+    springs = [c for c in connectors if c.module.link == "spring"]
     for connector, share in zip(braces, _shares(braces), strict=True):
         links.append(
             Link(
@@ -69,6 +77,15 @@ def structure_of(machine: "Machine") -> Structure:
                 **_span(connector, index),
                 mass=sum(one.module.mass for one in alike),
                 share=share,
+            )
+        )
+    for connector, share in zip(springs, _shares(springs), strict=True):
+        ropes.append(
+            Rope(
+                **_span(connector, index),
+                mass=connector.module.mass,
+                share=share,
+                spring=connector.module.forces.spring,
             )
         )
     return build_structure(parts, links, ropes)
@@ -117,8 +134,9 @@ def _shares(connectors: "Sequence[Connector]") -> list[float]:
 
 
 def bindings_of(machine: "Machine") -> Bindings:
-    """The keys of each block's actions, in the order of the machine's blocks."""
-    return [block.bindings for block in machine.blocks.values()]
+    """The keys of each part's actions: the machine's blocks in order, then its springs."""
+    springs = [c for c in machine.connectors.values() if c.module.link == "spring"]
+    return [*(block.bindings for block in machine.blocks.values()), *(s.bindings for s in springs)]
 
 
 def _part(block: "Block") -> Part:
@@ -131,21 +149,32 @@ def _part(block: "Block") -> Part:
     if physics is None:
         raise MachineNotSimulable(f"block {block.id}: the module {module.name} has no physics")
     shown = np.array(block.center)
+    center = shapes[0].center if physics.mass_at == "body" else shown
+    axis, pivot = np.zeros(3), center
+    if physics.seat in MOVING_SEATS:
+        joint = module.joint or SeatJoint()
+        axis = rotation[:, 2] if joint.axis == UP else rotation @ np.array(joint.axis)
+        if joint.point is not None:
+            pivot = np.array(pose.position) + rotation @ np.array(joint.point)
+        elif module.motor is None:
+            pivot = shapes[0].center
     direction = None
     if physics.seat == "axle":
-        direction = rotation[:, 2]
+        direction = axis
     elif block.pointing is not None:
         direction = np.array(block.pointing)
     return Part(
         id=block.id,
         module=module,
         physics=physics,
-        center=shapes[0].center if physics.mass_at == "body" else shown,
+        center=center,
         shown=shown,
         rotation=rotation,
         shapes=shapes,
         direction=direction,
         forward_is_clockwise=block.forward_is_clockwise,
+        axis=axis,
+        pivot=pivot,
     )
 
 
@@ -177,4 +206,17 @@ def _link(joint: "Joint", index: dict[str, int], parts: list[Part]) -> Link:
         kind=JointKind(parts[part].physics.seat),
         start=point,
         end=point,
+    )
+
+
+def _tether(joint: "Joint", index: dict[str, int], length: float) -> Rope:
+    point = np.array(joint.point)
+    return Rope(
+        name=f"{joint.base}-{joint.part}",
+        first=index[joint.base],
+        second=index[joint.part],
+        start=point,
+        end=point,
+        mass=0.0,
+        length=length,
     )

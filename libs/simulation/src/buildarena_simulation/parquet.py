@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from buildarena_simulation.errors import TrajectoryFormatError
-from buildarena_simulation.trajectory import Bearing, Break, JointPeak, Trajectory
+from buildarena_simulation.trajectory import Bearing, Break, Event, JointPeak, Trajectory
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -80,6 +80,8 @@ def write_trajectory(trajectory: Trajectory, *, schema: int = SCHEMA_VERSION) ->
         "simulation_version": trajectory.simulation_version,
         "settings": dict(trajectory.settings),
     }
+    if trajectory.events:
+        facts["events"] = [asdict(event) for event in trajectory.events]
     table = pa.table(columns).replace_schema_metadata({_KEY: json.dumps(facts).encode()})
     floats = [
         path
@@ -135,6 +137,7 @@ def read_trajectory(data: bytes) -> Trajectory:
         cargo_mass=columns["cargo_mass"].to_numpy() if "cargo_mass" in columns else None,
         joint_peaks=tuple(JointPeak(**peak) for peak in facts["joint_peaks"]),
         breaks=tuple(Break(**event) for event in facts["breaks"]),
+        events=tuple(Event(**event) for event in facts.get("events", ())),
         joint_loads=_matrix(columns["joint_loads"], count) if "joint_loads" in columns else None,
         pieces=_matrix(columns["pieces"], count) if "pieces" in columns else None,
         bearing=_bearing(columns, count, facts.pop("wheel_ids", None)),

@@ -22,11 +22,13 @@ from buildarena_simulation.control import (
 from buildarena_simulation.engines import ENGINES, create_engine, engine_version
 from buildarena_simulation.engines.base import Engine, World
 from buildarena_simulation.errors import BuildarenaSimulationError, SimulationError
+from buildarena_simulation.force_control import ForceSchedule, plan_forces
 from buildarena_simulation.machine import bindings_of, structure_of
 from buildarena_simulation.placement import Start, start_digest, start_of
 from buildarena_simulation.recording import Recorder
 from buildarena_simulation.scenario import Scenario
 from buildarena_simulation.structure.clusters import find_clusters
+from buildarena_simulation.structure.force_field import field_of
 from buildarena_simulation.structure.model import Structure
 from buildarena_simulation.structure.motion import at_rest
 from buildarena_simulation.threads import single_threaded
@@ -135,6 +137,7 @@ def simulate_structure(
         cargo=start.cargo,
         gravity=GRAVITY,
         finer=finer,
+        field=field_of(structure),
     )
     if seed is not None:
         controls, control = varied_presses(controls, scenario.control, seed)
@@ -187,6 +190,8 @@ class _Trial:
     ) -> None:
         structure = world.structure
         self._structure, self._scenario, self._engine = structure, scenario, engine
+        self._field = world.field
+        self._let_go = np.zeros(0 if world.field is None else len(world.field.table.seats), bool)
         holds = np.ones(len(structure.members), dtype=bool)
         clusters = find_clusters(structure, holds)
         motion = at_rest(clusters, start.position, start.rotation)
@@ -217,19 +222,48 @@ class _Trial:
             step_count=samples * per_sample,
             time_step_s=engine.time_step_s,
         )
+        forces = None
+        if self._field is not None:
+            forces = plan_forces(
+                self._structure,
+                self._field.table,
+                bindings,
+                controls,
+                control=scenario.control,
+                times=engine.time_step_s * np.arange(samples * per_sample, dtype=np.float64),
+            )
         self._sample(0.0)
         for sample in range(samples):
             for offset in chunks:
                 first = sample * per_sample + offset
                 rows = slice(first, first + engine.steps_per_evaluation)
-                self._advance(schedule.wheel_speeds[rows], schedule.firing[first], first)
+                if forces is not None:
+                    self._command(forces, first)
+                self._advance(schedule.targets[rows], schedule.firing[first], first)
             self._sample((sample + 1) / SAMPLE_RATE_HZ)
             if until is not None and until(self.recorder.cargo_now):
                 return
             if on_progress and (sample % _PROGRESS_EVERY == 0 or sample + 1 == samples):
                 on_progress((sample + 1) / samples)
 
-    def _advance(self, wheel_speeds: np.ndarray, firing: np.ndarray, step: int) -> None:
+    def _command(self, schedule: ForceSchedule, step: int) -> None:
+        """Tells the blocks that exert forces by themselves what the keys ask for."""
+        field = self._field
+        if field is None:
+            return
+        table = field.table
+        asked = schedule.let_go[step] & ~self._let_go
+        kicks = np.zeros(len(asked))
+        if asked.any() and not self._blown_up:
+            self._let_go |= asked
+            held = self.breaking.let_go(
+                self._engine, table.seats[asked], time_s=step * self._engine.time_step_s
+            )
+            # The push lasts one interval, so that the loads that it makes are seen.
+            kicks[asked] = held * table.impulse[asked] / self._interval_s
+        field.commands = schedule.at(step, kicks)
+
+    def _advance(self, targets: np.ndarray, firing: np.ndarray, step: int) -> None:
         if self._blown_up:
             return
         engine, cargo = self._engine, self._scenario.cargo
@@ -238,7 +272,7 @@ class _Trial:
         if mass is not None:
             engine.set_cargo_mass(mass)
         thrusts = recoil(self._structure, firing, self.recorder.heated_now)
-        engine.advance(wheel_speeds, thrusts)
+        engine.advance(targets, thrusts)
         motion = engine.motion()
         if not (np.isfinite(motion.position).all() and np.isfinite(motion.rotation).all()):
             # Nothing more can be known; the samples say so and the scorer flags them.

@@ -57,6 +57,23 @@ class Break:
     cargo_mass: float | None
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Event:
+    """Something that let go or took hold as it was made to; a break is none.
+
+    Attributes:
+        time_s: When, seconds.
+        what: "decoupled", "grabbed", "released", or "slipped" where a load tore a hold open.
+        joint: The joint that let go, or the id of the block that holds.
+        held: What is held: the id of a block, "cargo", "ground" or "terrain 1"; "" of a joint.
+    """
+
+    time_s: float
+    what: str
+    joint: str
+    held: str = ""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Bearing:
     """Vertical contact forces at T instants, each the mean over a moment before it, mass·g.
@@ -121,6 +138,7 @@ class Trajectory:
             the instant before, in the order of `joint_peaks`: above 1 where it broke, 0 from then
             on. None where no simulator of ours ran, and in files of schemas 1 and 2.
         breaks: In order of time.
+        events: What let go or took hold as it was made to, in order of time.
         engine: Name of the engine.
         engine_version: Version of the engine's library.
         simulation_version: Version of the shared model.
@@ -146,6 +164,7 @@ class Trajectory:
     pieces: NDArray[np.int16] | None = None
     bearing: Bearing | None = None
     joint_loads: NDArray[np.float32] | None = None
+    events: tuple[Event, ...] = ()
 
     def __post_init__(self) -> None:
         """Checks that the arrays fit together, and closes them."""

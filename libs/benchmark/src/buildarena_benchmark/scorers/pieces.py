@@ -81,13 +81,24 @@ def masses_of(machine: "Machine", trajectory: "Trajectory", members: Mask) -> ND
 
 
 def _ropes(machine: "Machine", trajectory: "Trajectory") -> list[tuple[int, int, float]]:
-    """Tracked blocks that a rope ties, and when it gives way, seconds."""
+    """Tracked blocks that a rope or spring ties, and when it gives way, seconds."""
     index = {block: i for i, block in enumerate(trajectory.block_ids)}
     broken = {event.joint: event.time_s for event in trajectory.breaks if event.kind == "rope"}
-    return [
-        (index[link.start[0]], index[link.end[0]], broken.get(f"{link.module.name} {key}", np.inf))
+    ties = [
+        (link.start[0], link.end[0], f"{link.module.name} {key}")
         for key, link in machine.connectors.items()
-        if link.module.link == "rope" and link.start[0] in index and link.end[0] in index
+        if link.module.link != "rigid"
+    ]
+    if any(block.module.forces.tether for block in machine.blocks.values()):
+        ties += [
+            (joint.base, joint.part, f"{joint.base}-{joint.part}")
+            for joint in machine.joints
+            if joint.holds and machine.blocks[joint.part].module.forces.tether
+        ]
+    return [
+        (index[first], index[second], broken.get(name, np.inf))
+        for first, second, name in ties
+        if first in index and second in index
     ]
 
 

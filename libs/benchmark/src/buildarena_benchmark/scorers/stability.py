@@ -92,7 +92,12 @@ def _bound(
         height = max(height, float(trajectory.cargo_position[0, 2]))
     fall = np.sqrt(2.0 * GRAVITY * height)
     modules = [machine.blocks[block].module for block in trajectory.block_ids]
-    thrusts = np.array([module.thrust.heated if module.thrust else 0.0 for module in modules])
+    thrusts = np.array(
+        [
+            (module.thrust.heated if module.thrust else 0.0) + module.forces.greatest
+            for module in modules
+        ]
+    )
     push = GRAVITY * (((weights > 0.0) @ thrusts) / np.maximum(weights.sum(axis=1), 1e-9))
     gained = np.concatenate([[0.0], np.cumsum(push[1:] * np.diff(trajectory.time_s[: len(push)]))])
     spin = max((module.motor.speed for module in modules if module.motor), default=0.0)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 from buildarena_besiege.errors import MachineFileError
 from buildarena_besiege.importing.xml_file import FileBlock, FileEntry, number_of, shown
-from buildarena_besiege.names import key_entries
+from buildarena_besiege.names import CARGO, key_entries
 from buildarena_geometry.besiege_components import besiege_offset, pose_from_besiege
 from buildarena_geometry.keys import KEYS
 from buildarena_geometry.rotations import ORIGIN
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from buildarena_geometry.poses import Pose
     from buildarena_geometry.rotations import Vector
 
+CARGO_LEFT_OUT: Final = "a cargo is the task's: left out"
 _SCRIPTING: Final = ("bmt-lua_module", "bmt-lua_ref_key")
 _ENDS: Final = ("start-position", "end-position")
 _END_ROTATIONS: Final = ("start-rotation", "end-rotation")
@@ -91,11 +92,12 @@ def part_of(block: FileBlock, catalogue: Catalogue, remarks: Remarks) -> Part | 
     if module is None:
         remarks.add(f"block {block.number}: no module is of the game's type {block.type}: left out")
         return None
-    if module.kind == "cargo":
-        remarks.add(f"block {block.number} ({module.name}): a cargo is the task's: left out")
-        return None
     where = f"block {block.number} ({module.name})"
-    if any(abs(one - 1.0) > _SAME for one in block.scale):
+    scaled = any(abs(one - 1.0) > _SAME for one in block.scale)
+    if module.kind == "cargo" or (module.besiege_id == CARGO and scaled):
+        remarks.add(f"{where}: {CARGO_LEFT_OUT}")
+        return None
+    if scaled:
         remarks.add(f"{where}: Scale {_numbers(block.scale)} is read as 1 1 1")
     try:
         pose = pose_from_besiege(module, block.position, block.rotation)

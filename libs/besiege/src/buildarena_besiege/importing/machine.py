@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from buildarena_besiege.errors import MachineFileError
-from buildarena_besiege.importing.blocks import Part, Remarks, part_of
+from buildarena_besiege.importing.blocks import CARGO_LEFT_OUT, Part, Remarks, part_of
 from buildarena_besiege.importing.own_header import (
     HeaderError,
     described_machine,
@@ -18,10 +18,12 @@ from buildarena_besiege.importing.own_header import (
 )
 from buildarena_besiege.importing.seats import Faces, Seat, ends_of, faces_of, mounts_of
 from buildarena_besiege.importing.xml_file import FileMachine, parse_file, shown
-from buildarena_geometry import Machine, load_catalogue
+from buildarena_besiege.names import CARGO
+from buildarena_geometry import Machine, module_set
 from buildarena_geometry.documents.read import read_machine
 from buildarena_geometry.errors import DocumentError
 from buildarena_geometry.keys import KEYS
+from buildarena_geometry.modules.sets import smallest_set
 from buildarena_geometry.rotations import NO_ROTATION, subtract
 from buildarena_geometry.state import sub_structure_letter
 
@@ -63,16 +65,16 @@ def read_machine_file(data: bytes, *, catalogue: Catalogue | None = None) -> Imp
 
     Args:
         data: The file.
-        catalogue: The modules it is made of; the basic ones if left out.
+        catalogue: The modules it is made of; every known one if left out.
 
     Raises:
         MachineFileError: It is not a machine file, or breaks a bound.
     """
-    catalogue = load_catalogue() if catalogue is None else catalogue
     file, remarks = parse_file(data), Remarks()
     header = _header(file, remarks)
-    found = [part_of(block, catalogue, remarks) for block in file.blocks]
-    parts = [part for part in found if part is not None]
+    found = [part_of(block, catalogue or module_set("all"), remarks) for block in file.blocks]
+    parts = _without_cargo([part for part in found if part is not None], header, remarks)
+    catalogue = catalogue or smallest_set({part.module.name for part in parts})
     if not any(part.module.kind == "start" for part in parts):
         raise MachineFileError("the file has no starting block (type 0)")
     machine = None
@@ -81,6 +83,30 @@ def read_machine_file(data: bytes, *, catalogue: Catalogue | None = None) -> Imp
     if machine is None:
         machine = _as_placed(parts, catalogue, header, remarks)
     return ImportedMachine(machine=machine, name=file.name, not_understood=remarks.all())
+
+
+def _without_cargo(
+    parts: list[Part], header: dict[str, Any] | None, remarks: Remarks
+) -> list[Part]:
+    """The parts without a task's cargo, which is a ballast as well.
+
+    Our own description names the blocks of the machine; in others' files a cargo is the ballast
+    that sits on nothing.
+    """
+    others = [part for part in parts if part.module.kind != "connector"]
+    if not any(part.module.besiege_id == CARGO for part in others):
+        return parts
+    told = None if header is None else header.get("parts")
+    if isinstance(told, dict):
+        loose = {part.number for part in others if part.guid not in told}
+    else:
+        mounts = mounts_of(others, faces_of(others))
+        loose = {one.number for one, mount in zip(others, mounts, strict=True) if mount is None}
+    for part in others:
+        if part.module.besiege_id == CARGO and part.number in loose:
+            remarks.add(f"{part.name}: {CARGO_LEFT_OUT}")
+            parts = [one for one in parts if one.number != part.number]
+    return parts
 
 
 def _header(file: FileMachine, remarks: Remarks) -> dict[str, Any] | None:

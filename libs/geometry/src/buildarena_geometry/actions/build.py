@@ -149,6 +149,7 @@ def connect_blocks(
         end_xyz=end_xyz,
         world_from_connector=pose,
         span=ORIGIN,
+        bindings=dict.fromkeys(module.actions, ()),
         structure=start_block.structure,
         note=note,
     )

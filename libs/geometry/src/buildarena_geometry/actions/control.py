@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from buildarena_geometry.actions.lookups import part, powered, require_started
-from buildarena_geometry.blocks import KeyPress
+from buildarena_geometry.blocks import Connector, KeyPress
 from buildarena_geometry.changes import Change
 from buildarena_geometry.feedback import state as words
 from buildarena_geometry.feedback.words import listing
@@ -97,13 +97,18 @@ def _bind(state: MachineState, block_id: str, written: str, key: str, *, keep: b
     part(state, block_id)
     if key not in KEYS:
         raise RefusalError(Cause.BAD_KEY, f"There is no key {shown(key)}. Keys: {KEYS_IN_WORDS}.")
-    block, action = powered(state, block_id, written)
-    had = block.bindings.get(action, ()) if keep else ()
+    found, action = powered(state, block_id, written)
+    had = found.bindings.get(action, ()) if keep else ()
     keys = had if key in had else (*had, key)
-    bound = replace(block, bindings={**block.bindings, action: keys})
-    after = replace(state, blocks={**state.blocks, block.id: bound})
+    bindings = {**found.bindings, action: keys}
+    if isinstance(found, Connector):
+        links = {**state.connectors, found.id: replace(found, bindings=bindings)}
+        after = replace(state, connectors=links)
+    else:
+        bound = replace(found, bindings=bindings)
+        after = replace(state, blocks={**state.blocks, found.id: bound})
     return Change(
         after=after,
-        touched=(block.id,),
-        render=lambda: f"Bound: {words.title(block)}, {action}: {listing(keys)}.",
+        touched=(found.id,),
+        render=lambda: f"Bound: {words.title(found)}, {action}: {listing(keys)}.",
     )

@@ -50,16 +50,16 @@ def part(state: MachineState, part_id: str) -> Block | Connector:
     return found
 
 
-def powered(state: MachineState, block_id: str, written: str) -> tuple[Block, str]:
-    """The block with an id and the action of it that is meant, if it has one that takes keys.
+def powered(state: MachineState, block_id: str, written: str) -> tuple[Block | Connector, str]:
+    """The part with an id and the action of it that is meant, if it takes keys.
 
     Raises:
         RefusalError: no such block, a block without keys, or one without this action.
     """
     found = part(state, block_id)
     actions = found.module.actions
-    if not actions or block_id not in state.blocks:
-        keyed = named(block.id for block in state.blocks.values() if block.module.actions)
+    if not actions:
+        keyed = named(one.id for one in state.powered())
         raise RefusalError(
             Cause.NO_LOCOMOTION,
             f"{heading(found)} takes no keys. Blocks that do: {keyed}.",
@@ -70,7 +70,7 @@ def powered(state: MachineState, block_id: str, written: str) -> tuple[Block, st
             Cause.BAD_ACTION,
             f"{heading(found)} has no action {shown(written)}; its actions: {listing(actions)}.",
         )
-    return state.blocks[block_id], action
+    return found, action
 
 
 def attachable_module(state: MachineState, name: str) -> Module:

@@ -171,19 +171,21 @@ def _read_connectors(
 ) -> dict[str, Connector]:
     connectors: dict[str, Connector] = {}
     for entry in entries.items():
-        fields = entry.fields(required=_CONNECTOR, optional=("structure", "note"))
+        fields = entry.fields(required=_CONNECTOR, optional=("bindings", "structure", "note"))
         start, end = _face(fields["start"]), _face(fields["end"])
         for face, name in ((start, "start"), (end, "end")):
             _check_face(face, blocks, f"{entry.where}.{name}")
+        module = catalogue[fields["module"].choice(catalogue.connectors)]
         link = Connector(
             id=fields["id"].text(longest=LONGEST_TEXT),
-            module=catalogue[fields["module"].choice(catalogue.connectors)],
+            module=module,
             start=start,
             end=end,
             start_xyz=blocks[start[0]].face_center(start[1]),
             end_xyz=blocks[end[0]].face_center(end[1]),
             world_from_connector=_pose(fields),
             span=fields["span"].vector(),
+            bindings=_bindings(fields, module),
             structure=_optional_text(fields, "structure"),
             note=_optional_text(fields, "note"),
         )

@@ -64,6 +64,8 @@ def _block_entry(block: Block) -> dict[str, Any]:
 
 
 def _connector_entry(link: Connector) -> dict[str, Any]:
+    # Braces and winches take no keys, and their documents keep their bytes.
+    keys = {action: list(keys) for action, keys in link.bindings.items()}
     return {
         "id": link.id,
         "module": link.module.name,
@@ -72,6 +74,7 @@ def _connector_entry(link: Connector) -> dict[str, Any]:
         "position": list(link.world_from_connector.xyz),
         "quaternion": list(link.world_from_connector.wxyz),
         "span": list(link.span),
+        **({"bindings": keys} if keys else {}),
         "structure": link.structure,
         "note": link.note,
     }

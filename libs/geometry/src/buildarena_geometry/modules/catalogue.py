@@ -21,6 +21,7 @@ from typing import cast
 
 from buildarena_geometry.errors import CatalogueError
 from buildarena_geometry.modules.facts import FACT_FIELDS, read_facts
+from buildarena_geometry.modules.forces import FORCE_FIELDS, read_forces
 from buildarena_geometry.modules.joints import SENSES, Sense, read_gear, read_joint
 from buildarena_geometry.modules.module import (
     KINDS,
@@ -50,7 +51,7 @@ _REQUIRED = ("name", "kind", "mass", "cost", "size", "description", "besiege")
 _SHAPE = ("center", "faces", "colliders", "body", "pointing", "landmarks")
 _USE = ("actions", "motor", "joint", "gear", "thrust", "physics", "grabs", "link")
 _RULES = ("root_offset", "overlaps_base", "spin")
-_OPTIONAL = (*_SHAPE, *_USE, *_RULES, *FACT_FIELDS)
+_OPTIONAL = (*_SHAPE, *_USE, *_RULES, *FACT_FIELDS, *FORCE_FIELDS)
 _MOTOR = ("speed_rpm", "lag_per_s", "torque", "forward", "backward", "forward_sense")
 _THRUST = ("action", "along", "cold", "heated", "spheres")
 _PHYSICS = ("seat", "mass_at", "structural", "friction", "linear_drag", "angular_drag")
@@ -212,6 +213,7 @@ def _module(entry: Reader, usual_of: Mapping[Kind, _Usual]) -> Module:
         overlaps_base=fields["overlaps_base"].truth() if "overlaps_base" in fields else False,
         spin=cast("Sense", fields["spin"].choice(SENSES)) if fields.has("spin") else None,
         facts=read_facts(fields, actions),
+        forces=read_forces(fields, actions),
     )
     _check_sense(module, entry)
     _check_use(module, fields)

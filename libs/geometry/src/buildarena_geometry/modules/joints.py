@@ -64,7 +64,7 @@ class Drive:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Joint:
+class SeatJoint:
     """How a block moves on the block it sits on.
 
     Angles are in radians and counted from how it was built, counterclockwise seen against the axis.
@@ -105,7 +105,7 @@ class Gear:
     origin: str = ""
 
 
-def read_joint(entry: Reader, *, seat: str | None, actions: Sequence[str]) -> Joint:
+def read_joint(entry: Reader, *, seat: str | None, actions: Sequence[str]) -> SeatJoint:
     """The joint of a module file's entry.
 
     Args:
@@ -120,7 +120,7 @@ def read_joint(entry: Reader, *, seat: str | None, actions: Sequence[str]) -> Jo
         entry.fail(f"no joint: only one of the seats {', '.join(MOVING_SEATS)} moves, not {seat}")
     fields = entry.fields(required=(), optional=_JOINT)
     turns = seat != "slider"
-    joint = Joint(
+    joint = SeatJoint(
         axis=fields["axis"].direction() if fields.has("axis") else UP,
         point=fields["point"].vector() if fields.has("point") else None,
         limits=_limits(fields["limits"], seat=seat) if fields.has("limits") else None,

@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 from typing import Literal, get_args
 
 from buildarena_geometry.modules.facts import NO_FACTS, Facts
-from buildarena_geometry.modules.joints import Gear, Joint, Sense
+from buildarena_geometry.modules.forces import NO_FORCES, Forces
+from buildarena_geometry.modules.joints import Gear, SeatJoint, Sense
 from buildarena_geometry.modules.names import CaselessNames
 from buildarena_geometry.modules.solids import Solid
 from buildarena_geometry.poses import Pose
@@ -32,7 +33,7 @@ Seat = Literal["attachment", "axle", "mount", "hinge", "slider", "ball", "consta
 SEATS: tuple[str, ...] = get_args(Seat)
 MassPlace = Literal["center", "body"]
 MASS_PLACES: tuple[str, ...] = get_args(MassPlace)
-Link = Literal["rigid", "rope"]
+Link = Literal["rigid", "rope", "spring"]
 LINKS: tuple[str, ...] = get_args(Link)
 FLUSH_TOLERANCE = 1e-6  # units; faces nearer than this are the same place
 _FACING = -0.9  # cosine; a face that looks this way looks at the block it sits on
@@ -201,7 +202,7 @@ class Module:
         thrust: what pushes it; None for blocks that do not push.
         physics: how it behaves as a body; None for connectors and cargo, which a task describes.
         grabs: whether its far end, opposite to the face it sits on, holds what it touches.
-        link: what a connector is: a rigid strut, or a rope that pulls and never pushes.
+        link: what a connector is: a rigid strut, a rope that pulls and never pushes, or a spring.
         description: what models read about it.
         besiege_data: further entries of its block in Besiege's machine files: type, key, value.
         besiege_keys: the entry there that holds the keys of an action, by the action.
@@ -212,6 +213,7 @@ class Module:
         spin: which way it turns as it is, seen from outside against its axis; None where it has no
             spin of its own, or the one of its motor.
         facts: what is known about it besides, and from where.
+        forces: what it exerts by itself: fans, wings, balloons, springs and what lets go.
     """
 
     name: str
@@ -229,7 +231,7 @@ class Module:
     flames: tuple[Sphere, ...] = ()
     actions: tuple[str, ...] = ()
     motor: Motor | None = None
-    joint: Joint | None = None
+    joint: SeatJoint | None = None
     gear: Gear | None = None
     thrust: Thrust | None = None
     physics: Physics | None = None
@@ -242,6 +244,7 @@ class Module:
     overlaps_base: bool = False
     spin: Sense | None = None
     facts: Facts = NO_FACTS
+    forces: Forces = NO_FORCES
     face_of_label: Mapping[str, Face] = field(init=False, repr=False, compare=False)
     root_face: str | None = field(init=False, repr=False, compare=False)
 

@@ -243,6 +243,9 @@ def _require_facts(trajectory: Trajectory) -> None:
     for event in trajectory.breaks:
         texts += [event.joint, event.kind]
         figures += [event.time_s, event.ratio, event.cargo_mass or 0.0]
+    for told in trajectory.events:
+        texts += [told.what, told.joint, told.held]
+        figures.append(told.time_s)
     settings = trajectory.settings
     _require(
         isinstance(settings, dict) and len(settings) <= MAX_SETTINGS, "its settings are too many"

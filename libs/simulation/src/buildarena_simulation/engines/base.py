@@ -13,6 +13,7 @@ import numpy as np
 from buildarena_simulation.scenario import TerrainBox
 from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.contacts import ContactForces
+from buildarena_simulation.structure.force_field import ForceField
 from buildarena_simulation.structure.model import FloatArray, Structure
 from buildarena_simulation.structure.motion import Motion
 
@@ -43,6 +44,7 @@ class World:
         cargo: The cargo, if there is one.
         gravity: Downward acceleration, units/s².
         finer: By how much an engine's steps are shorter than usual.
+        field: What the blocks exert by themselves; None where none does.
     """
 
     structure: Structure
@@ -51,6 +53,7 @@ class World:
     cargo: CargoBox | None
     gravity: float
     finer: int = 1
+    field: ForceField | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,12 +95,12 @@ class Engine(Protocol):
     def drop_rope(self, index: int) -> None:
         """Removes a rope that gave way from the world."""
 
-    def advance(self, wheel_speeds: FloatArray, thrusts: FloatArray) -> None:
+    def advance(self, targets: FloatArray, thrusts: FloatArray) -> None:
         """Steps the world.
 
         Args:
-            wheel_speeds: (S, W) target of each wheel in each of S steps, rad/s about its outward
-                axis, relative to what it is mounted on.
+            targets: (S, D) target of each driven joint in each of S steps, as in
+                `Schedule.targets`, relative to what its block sits on.
             thrusts: (C,) recoil of each cannon during these steps, mass·unit/s².
         """
 

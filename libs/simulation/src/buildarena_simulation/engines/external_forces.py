@@ -1,4 +1,4 @@
-"""Thrust and drag as steady forces in the frames of an engine's bodies.
+"""Thrust, drag and the blocks' own forces as steady ones in the frames of an engine's bodies.
 
 Both change little from one evaluation to the next, so they are worked out once for the steps
 between; given in a body's own principal frame, they turn with it.
@@ -6,9 +6,11 @@ between; given in a body's own principal frame, they turn with it.
 
 import numpy as np
 
+from buildarena_simulation.engines.joint_places import is_simple_piece
 from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.model import FloatArray, Structure
 from buildarena_simulation.structure.motion import Motion
+from buildarena_simulation.structure.vectors import turned_wrenches
 
 Force = tuple[list[float], list[float]]
 """A force and the point it acts on, or a force and a torque about the centre of mass."""
@@ -37,11 +39,15 @@ def thrust_forces(
 
 
 def drag_forces(
-    clusters: Clusters, motion: Motion, axes: FloatArray, moments: FloatArray
+    structure: Structure, clusters: Clusters, motion: Motion, axes: FloatArray, moments: FloatArray
 ) -> list[tuple[int, Force]]:
-    """Root cluster, force and torque of each piece's drag: Unity's v *= 1 - drag·dt as a force.
+    """Cluster, force and torque of drag: Unity's v *= 1 - drag·dt as a force.
+
+    A piece with no joints but wheels' axles moves as its root does, which takes the drag of all; in
+    any other each cluster has its own.
 
     Args:
+        structure: The machine.
         clusters: The clusters.
         motion: Their motion.
         axes: (C, 3, 3) machine_from_principal.
@@ -49,6 +55,9 @@ def drag_forces(
     """
     found = []
     for piece in clusters.pieces:
+        if not is_simple_piece(structure, clusters, piece):
+            found += [(c, _own_drag(clusters, motion, axes, moments, c=c)) for c in piece]
+            continue
         root, inside = piece[0], list(piece)
         to_body = (motion.rotation[root] @ axes[root]).T
         drag = float(clusters.linear_drag[inside] @ clusters.mass[inside])
@@ -56,3 +65,25 @@ def drag_forces(
         torque = -clusters.angular_drag[root] * moments[root] * (to_body @ motion.spin[root])
         found.append((root, (force.tolist(), torque.tolist())))
     return found
+
+
+def body_wrenches(wrenches: FloatArray, axes: FloatArray) -> list[tuple[int, Force]]:
+    """Cluster, force and torque of each cluster that a wrench acts on.
+
+    Args:
+        wrenches: (C, 6) about the centres of mass, machine frame axes.
+        axes: (C, 3, 3) machine_from_principal.
+    """
+    local = turned_wrenches(axes.transpose(0, 2, 1), wrenches)
+    acted_on = np.flatnonzero(wrenches.any(axis=1))
+    return [(int(c), (local[c, :3].tolist(), local[c, 3:].tolist())) for c in acted_on]
+
+
+def _own_drag(
+    clusters: Clusters, motion: Motion, axes: FloatArray, moments: FloatArray, *, c: int
+) -> Force:
+    to_body = (motion.rotation[c] @ axes[c]).T
+    drag = clusters.linear_drag[c] * clusters.mass[c]
+    force = -drag * (to_body @ motion.velocity[c])
+    torque = -clusters.angular_drag[c] * moments[c] * (to_body @ motion.spin[c])
+    return force.tolist(), torque.tolist()

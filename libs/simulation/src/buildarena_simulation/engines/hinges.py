@@ -1,13 +1,15 @@
 """Motion of clusters on hinges, for engines that report hinge angles only."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from buildarena_simulation.engines.bullet_joints import Articulation
 from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.model import FloatArray, IntArray, Structure
 from buildarena_simulation.structure.motion import Motion
-from buildarena_simulation.structure.vectors import cross
+from buildarena_simulation.structure.vectors import cross, turn_about
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -17,6 +19,9 @@ class HingedPiece:
     Attributes:
         body: The engine's id of it.
         inside: Its clusters, the root first.
+        links: The engine's link of each of them; the root's is -1.
+        articulation: Its joints, if one of them is more than a simple axle; else None, and the rest
+            says all.
         wheel_signs: Per hinge, -1 where the link turned is not the wheel's but its mount's.
         wheel_places: Per hinge, which wheel of the structure it is.
         wheel_torques: Per hinge, torque limit of its motor, mass·unit²/s².
@@ -24,6 +29,8 @@ class HingedPiece:
 
     body: int
     inside: tuple[int, ...]
+    links: Mapping[int, int]
+    articulation: Articulation | None
     wheel_signs: FloatArray
     wheel_places: IntArray
     wheel_torques: FloatArray
@@ -53,11 +60,11 @@ class HingeFrames:
             angle: Of its hinge, rad.
             rate: Of its hinge, rad/s.
         """
-        clusters, wheel = self.clusters, self.clusters.wheel[c]
+        clusters, wheel = self.clusters, self.clusters.seated[c]
         parent = clusters.parent[c]
-        axis, hinge = self.structure.directions[wheel], self.structure.positions[wheel]
+        axis, hinge = self.structure.joints.axes[wheel], self.structure.joints.points[wheel]
         rotation, position = motion.rotation, motion.position
-        rotation[c] = rotation[parent] @ self.parent_from_child[c] @ _turn_about(axis, angle)
+        rotation[c] = rotation[parent] @ self.parent_from_child[c] @ turn_about(axis, angle)
         point = position[parent] + rotation[parent] @ hinge
         position[c] = point - rotation[c] @ hinge
         motion.spin[c] = motion.spin[parent] + rate * (rotation[c] @ axis)
@@ -77,19 +84,4 @@ def hinge_frames(structure: Structure, clusters: Clusters, motion: Motion) -> Hi
         structure=structure,
         clusters=clusters,
         parent_from_child=motion.rotation[up].transpose(0, 2, 1) @ motion.rotation,
-    )
-
-
-def hinge_rate(structure: Structure, clusters: Clusters, motion: Motion, c: int) -> float:
-    """Speed at which a cluster turns on its hinge, rad/s."""
-    axis = motion.rotation[c] @ structure.directions[clusters.wheel[c]]
-    return float((motion.spin[c] - motion.spin[clusters.parent[c]]) @ axis)
-
-
-def _turn_about(axis: FloatArray, angle: float) -> FloatArray:
-    """Rotation by an angle about a unit axis (Rodrigues), (3, 3)."""
-    x, y, z = axis
-    cross_matrix = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.asarray(
-        np.eye(3) + np.sin(angle) * cross_matrix + (1 - np.cos(angle)) * cross_matrix @ cross_matrix
     )

@@ -5,15 +5,17 @@ filled in by the compiler from the collision shapes.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
 from buildarena_simulation.constants import FRICTION_TERRAIN
 from buildarena_simulation.engines.base import World, quaternion_of
+from buildarena_simulation.engines.joint_places import is_simple
+from buildarena_simulation.engines.mjcf_joints import JointText
+from buildarena_simulation.engines.xml_text import opened, tag
 from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.model import FloatArray, ShapeKind, Structure
 from buildarena_simulation.structure.motion import Motion
@@ -81,13 +83,20 @@ class MjcfState:
 def mjcf_of(world: World, state: MjcfState, settings: MjcfSettings) -> str:
     """The MJCF text of a world with its clusters.
 
-    Bodies are named "cluster C", hinges "hinge C", free joints "free C", geoms "solid C K", sites
-    and actuators of cannons "cannon N", tendons "rope R", the cargo "cargo".
+    Bodies are named "cluster C", their joints "hinge C", free joints "free C", geoms "solid C K",
+    sites and actuators of cannons "cannon N", tendons "rope R", the cargo "cargo".
     """
+    joints = JointText(
+        structure=world.structure,
+        clusters=state.clusters,
+        axes=state.axes,
+        gravity=world.gravity,
+        servo_slip=settings.servo_slip,
+    )
     lines = [
         "<mujoco>",
         '<compiler angle="radian" autolimits="true" inertiafromgeom="false"/>',
-        _opened(
+        opened(
             "option",
             timestep=settings.time_step_s,
             gravity=(0.0, 0.0, -world.gravity),
@@ -100,13 +109,13 @@ def mjcf_of(world: World, state: MjcfState, settings: MjcfSettings) -> str:
         '<flag autoreset="disable"/>',  # a rollout that blows up must not restart unnoticed
         "</option>",
         "<default>",
-        _tag("geom", condim=3, solref=settings.solref, solimp=settings.solimp),
-        _tag("tendon", solreflimit=settings.solref),
+        tag("geom", condim=3, solref=settings.solref, solimp=settings.solimp),
+        tag("tendon", solreflimit=settings.solref),
         "</default>",
         "<worldbody>",
         *_static(world),
         *_cargo(world, state.cargo_mass),
-        *_pieces(world.structure, state),
+        *_pieces(world.structure, state, joints),
         "</worldbody>",
         "<contact>",
         *_exclusions(state.clusters),
@@ -115,8 +124,12 @@ def mjcf_of(world: World, state: MjcfState, settings: MjcfSettings) -> str:
         "<tendon>",
         *_ropes(world.structure, state),
         "</tendon>",
+        "<equality>",
+        *joints.equalities(),
+        "</equality>",
         "<actuator>",
-        *_actuators(world, state, settings),
+        *joints.drives(),
+        *_cannons(world.structure, state),
         "</actuator>",
         "</mujoco>",
     ]
@@ -129,9 +142,9 @@ def _static(world: World) -> Iterator[str]:
         "priority": _TERRAIN_PRIORITY,
     }
     if world.ground:
-        yield _tag("geom", name="ground", type="plane", size=(0.0, 0.0, 1.0), **surface)
+        yield tag("geom", name="ground", type="plane", size=(0.0, 0.0, 1.0), **surface)
     for i, box in enumerate(world.terrain):
-        yield _tag(
+        yield tag(
             "geom",
             name=f"terrain {i}",
             type="box",
@@ -148,10 +161,10 @@ def _cargo(world: World, mass: float) -> Iterator[str]:
         return
     a, b, c = cargo.size
     moments = mass / 12 * np.array([b**2 + c**2, a**2 + c**2, a**2 + b**2])
-    yield _opened("body", name="cargo", pos=cargo.position)
-    yield _tag("inertial", pos=(0.0, 0.0, 0.0), mass=mass, diaginertia=moments)
+    yield opened("body", name="cargo", pos=cargo.position)
+    yield tag("inertial", pos=(0.0, 0.0, 0.0), mass=mass, diaginertia=moments)
     yield "<freejoint/>"
-    yield _tag(
+    yield tag(
         "geom",
         name="cargo",
         type="box",
@@ -162,41 +175,36 @@ def _cargo(world: World, mass: float) -> Iterator[str]:
     yield "</body>"
 
 
-def _pieces(structure: Structure, state: MjcfState) -> Iterator[str]:
+def _pieces(structure: Structure, state: MjcfState, joints: JointText) -> Iterator[str]:
     for piece in state.clusters.pieces:
-        yield from _body(structure, state, piece[0])
+        yield from _body(structure, state, joints, piece[0])
 
 
-def _body(structure: Structure, state: MjcfState, c: int) -> Iterator[str]:
-    """A cluster's body and, within it, those that hang on it by axles."""
+def _body(structure: Structure, state: MjcfState, joints: JointText, c: int) -> Iterator[str]:
+    """A cluster's body and, within it, those that hang on it by joints."""
     clusters, motion = state.clusters, state.motion
     centers = motion.centers_of_mass(clusters)
     parent = int(clusters.parent[c])
     turn = motion.rotation[c] @ state.axes[c]
     if parent < 0:
         place = centers[c]
+    elif not is_simple(structure, clusters, c):
+        place = state.in_body(parent, clusters.center_of_mass[c])
+        turn = state.axes[parent].T @ state.axes[c]
     else:
         to_parent = (motion.rotation[parent] @ state.axes[parent]).T
         place, turn = to_parent @ (centers[c] - centers[parent]), to_parent @ turn
-    yield _opened("body", name=f"cluster {c}", pos=place, quat=quaternion_of(turn))
-    yield _tag("inertial", pos=(0.0, 0.0, 0.0), mass=clusters.mass[c], diaginertia=state.moments[c])
+    yield opened("body", name=f"cluster {c}", pos=place, quat=quaternion_of(turn))
+    yield tag("inertial", pos=(0.0, 0.0, 0.0), mass=clusters.mass[c], diaginertia=state.moments[c])
     if parent < 0:
-        yield _tag("freejoint", name=f"free {c}")
+        yield tag("freejoint", name=f"free {c}")
     else:
-        wheel = clusters.wheel[c]
-        yield _tag(
-            "joint",
-            name=f"hinge {c}",
-            type="hinge",
-            pos=state.in_body(c, structure.positions[wheel]),
-            axis=state.axes[c].T @ structure.directions[wheel],
-            armature=0.01,
-        )
+        yield from joints.joints(c)
     yield from _solids(state, c)
     yield from _cannon_sites(structure, state, c)
     yield from _rope_sites(structure, state, c)
     for child in np.flatnonzero(clusters.parent == c):
-        yield from _body(structure, state, int(child))
+        yield from _body(structure, state, joints, int(child))
     yield "</body>"
 
 
@@ -205,7 +213,7 @@ def _solids(state: MjcfState, c: int) -> Iterator[str]:
     quaternions = quaternion_of(np.array([state.axes[c].T @ solid.rotation for solid in solids]))
     for k, solid in enumerate(solids):
         half = solid.half_extents
-        yield _tag(
+        yield tag(
             "geom",
             name=f"solid {c} {k}",
             type=str(solid.kind),
@@ -220,7 +228,7 @@ def _solids(state: MjcfState, c: int) -> Iterator[str]:
 def _cannon_sites(structure: Structure, state: MjcfState, c: int) -> Iterator[str]:
     for cannon in np.flatnonzero(state.clusters.cluster_of[structure.cannons] == c):
         place = state.in_body(c, structure.thrust_points[cannon])
-        yield _tag("site", name=f"cannon {structure.cannons[cannon]}", pos=place)
+        yield tag("site", name=f"cannon {structure.cannons[cannon]}", pos=place)
 
 
 def _rope_sites(structure: Structure, state: MjcfState, c: int) -> Iterator[str]:
@@ -229,7 +237,7 @@ def _rope_sites(structure: Structure, state: MjcfState, c: int) -> Iterator[str]
         ends = ((ropes.first[r], ropes.first_point[r]), (ropes.second[r], ropes.second_point[r]))
         for k, (block, point) in enumerate(ends):
             if of[block] == c:
-                yield _tag("site", name=f"rope {r} {k}", pos=state.in_body(c, point))
+                yield tag("site", name=f"rope {r} {k}", pos=state.in_body(c, point))
 
 
 def _exclusions(clusters: Clusters) -> Iterator[str]:
@@ -237,7 +245,7 @@ def _exclusions(clusters: Clusters) -> Iterator[str]:
     for piece in clusters.pieces:
         for i, first in enumerate(piece):
             for second in piece[i + 1 :]:
-                yield _tag("exclude", body1=f"cluster {first}", body2=f"cluster {second}")
+                yield tag("exclude", body1=f"cluster {first}", body2=f"cluster {second}")
 
 
 def _surface_pairs(world: World, state: MjcfState, settings: MjcfSettings) -> Iterator[str]:
@@ -255,7 +263,7 @@ def _surface_pairs(world: World, state: MjcfState, settings: MjcfSettings) -> It
     for name, coefficient in sliding:
         roll, spin = _friction(coefficient)[1:]
         for surface in surfaces:
-            yield _tag(
+            yield tag(
                 "pair",
                 geom1=surface,
                 geom2=name,
@@ -268,54 +276,25 @@ def _surface_pairs(world: World, state: MjcfState, settings: MjcfSettings) -> It
 
 
 def _ropes(structure: Structure, state: MjcfState) -> Iterator[str]:
+    ropes = structure.ropes
     for r in state.ropes:
-        yield _opened(
-            "spatial",
-            name=f"rope {r}",
-            limited="true",
-            range=(0.0, structure.ropes.length[r]),
-        )
-        yield _tag("site", site=f"rope {r} 0")
-        yield _tag("site", site=f"rope {r} 1")
+        length = ropes.length[r]
+        if ropes.stiffness[r]:
+            spring = {"stiffness": ropes.stiffness[r], "damping": ropes.damping[r]}
+            yield opened("spatial", name=f"rope {r}", springlength=length, **spring)
+        else:
+            yield opened("spatial", name=f"rope {r}", limited="true", range=(0.0, length))
+        yield tag("site", site=f"rope {r} 0")
+        yield tag("site", site=f"rope {r} 1")
         yield "</spatial>"
 
 
-def _actuators(world: World, state: MjcfState, settings: MjcfSettings) -> Iterator[str]:
-    structure = world.structure
-    for c in np.flatnonzero(state.clusters.parent >= 0):
-        torque = structure.torques[state.clusters.wheel[c]] * world.gravity
-        yield _tag(
-            "velocity",
-            name=f"hinge {c}",
-            joint=f"hinge {c}",
-            kv=torque / settings.servo_slip,
-            forcerange=(-torque, torque),
-        )
+def _cannons(structure: Structure, state: MjcfState) -> Iterator[str]:
     for i in structure.cannons:
         recoil = state.axes[state.clusters.cluster_of[i]].T @ -structure.directions[i]
         gear = (*recoil, 0.0, 0.0, 0.0)
-        yield _tag("general", name=f"cannon {i}", site=f"cannon {i}", gear=gear)
+        yield tag("general", name=f"cannon {i}", site=f"cannon {i}", gear=gear)
 
 
 def _friction(coefficient: float) -> tuple[float, float, float]:
     return (coefficient, 0.005, 0.0001)
-
-
-def _tag(tag: str, **attributes: object) -> str:
-    return f"<{tag}{_written(attributes)}/>"
-
-
-def _opened(tag: str, **attributes: object) -> str:
-    return f"<{tag}{_written(attributes)}>"
-
-
-def _written(attributes: Mapping[str, object]) -> str:
-    return "".join(f" {key}={quoteattr(_text(value))}" for key, value in attributes.items())
-
-
-def _text(value: object) -> str:
-    if isinstance(value, str):
-        return value
-    if isinstance(value, int):
-        return str(value)
-    return " ".join(repr(float(number)) for number in np.atleast_1d(np.asarray(value)))

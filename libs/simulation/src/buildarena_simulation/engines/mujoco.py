@@ -6,18 +6,25 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from buildarena_simulation.constants import MAX_SPIN
+from buildarena_simulation.constants import FORCES_EVERY_S, MAX_SPIN
 from buildarena_simulation.engines.base import CargoPose, World, principal_frames
 from buildarena_simulation.engines.closest_points import ShapeTable, shape_table
-from buildarena_simulation.engines.hinges import hinge_rate
 from buildarena_simulation.engines.impacts import ImpactWatch
+from buildarena_simulation.engines.joint_places import is_simple_piece
 from buildarena_simulation.engines.mjcf import MjcfSettings, MjcfState, mjcf_of
+from buildarena_simulation.engines.mujoco_joints import (
+    JointAddresses,
+    drag_apart,
+    enter_joint,
+    joint_addresses,
+)
+from buildarena_simulation.engines.tendons import Tendons
 from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.contacts import CARGO, WORLD, ContactForces
 from buildarena_simulation.structure.model import BoolArray, FloatArray, IntArray
 from buildarena_simulation.structure.motion import Motion
 from buildarena_simulation.structure.solids import Solid, Solids
-from buildarena_simulation.structure.vectors import cross, turned
+from buildarena_simulation.structure.vectors import cross, turned, turned_wrenches
 
 _TIME_STEP_S = 1 / 500
 _STEPS_PER_EVALUATION = 20
@@ -61,6 +68,7 @@ class MujocoEngine:
         self._rope_alive = np.ones(len(world.structure.ropes), dtype=bool)
         self._cargo_mass = world.cargo.mass if world.cargo else 0.0
         self._cargo_state: tuple[FloatArray, FloatArray] | None = None
+        self._targets: FloatArray | None = None
 
     @property
     def time_step_s(self) -> float:
@@ -106,6 +114,12 @@ class MujocoEngine:
         self._addresses = _addresses_in(
             self._model, self._world, clusters, solids, self._rope_alive
         )
+        self._tendons = Tendons(
+            model=self._model,
+            data=self._data,
+            ropes=self._structure.ropes,
+            of=self._addresses.tendons,
+        )
         self._shapes: dict[int, ShapeTable] = {}
         if self._world.cargo is not None:
             self._cargo_body = self._model.body("cargo").id
@@ -131,19 +145,24 @@ class MujocoEngine:
     def drop_rope(self, index: int) -> None:
         """See `Engine`."""
         self._rope_alive[index] = False
-        self._model.tendon_limited[self._addresses.tendons[index]] = 0
+        self._tendons.drop(index)
 
-    def advance(self, wheel_speeds: FloatArray, thrusts: FloatArray) -> None:
+    def advance(self, targets: FloatArray, thrusts: FloatArray) -> None:
         """See `Engine`."""
         model, data, at = self._model, self._data, self._addresses
+        self._targets = targets[-1]
+        if self._apart:
+            drag_apart(model, data, (self._clusters, at.bodies), self.motion(), self._apart)
         data.ctrl[at.thrust_actuators] = thrusts
         impacts = ImpactWatch(
-            len(wheel_speeds), gravity=self._world.gravity, time_step_s=self.time_step_s
+            len(targets), gravity=self._world.gravity, time_step_s=self.time_step_s
         )
         velocity = data.qvel[at.free_dofs]
-        for row in wheel_speeds:
-            if len(at.hinge_wheels):
-                data.ctrl[at.hinge_actuators] = row[at.hinge_wheels] * at.hinge_signs
+        if self._world.field is not None:
+            self._tendons.set_lengths(self._world.field.rest_lengths())
+        for step, row in enumerate(targets):
+            self._apply_own_forces(step)
+            at.joints.follow(model, data, row)
             mujoco.mj_step(model, data)
             before, velocity = velocity, data.qvel[at.free_dofs]
             if impacts.is_impact(velocity - before):
@@ -151,11 +170,8 @@ class MujocoEngine:
         self._limit_spin()
         self._keep_cargo_state()
         self._impacts = impacts
-        self._tensions = self._read_tensions()
-        # A step leaves the kinematics of its beginning behind; bring them up to its end.
-        mujoco.mj_kinematics(model, data)
-        mujoco.mj_comPos(model, data)
-        mujoco.mj_comVel(model, data)
+        self._tensions = self._tendons.tensions()
+        self._bring_up()
 
     def contacts(self) -> ContactForces:
         """See `Engine`."""
@@ -190,7 +206,23 @@ class MujocoEngine:
 
     def close(self) -> None:
         """See `Engine`."""
-        del self._data, self._model
+        del self._tendons, self._data, self._model
+
+    def _apply_own_forces(self, step: int) -> None:
+        field, every = self._world.field, round(FORCES_EVERY_S / self.time_step_s)
+        if field is None or step % every:
+            return
+        if step:
+            self._bring_up()
+        motion, data = self.motion(), self._data
+        wrenches = field.wrenches(self._clusters, motion)
+        data.xfrc_applied[self._addresses.bodies] = turned_wrenches(motion.rotation, wrenches)
+
+    def _bring_up(self) -> None:
+        """Brings the kinematics up to the end of the last step, which leaves its start's behind."""
+        mujoco.mj_kinematics(self._model, self._data)
+        mujoco.mj_comPos(self._model, self._data)
+        mujoco.mj_comVel(self._model, self._data)
 
     def _keep_cargo_state(self) -> None:
         if self._world.cargo is not None:
@@ -203,9 +235,16 @@ class MujocoEngine:
         self._dof_invweight_times_mass = model.dof_invweight0[:6] * mass
 
     def _set_drag(self, moments: FloatArray) -> None:
-        """Damping of each piece's free joint: Unity's v *= 1 - drag·dt, as a force."""
+        """Damping of each piece's free joint: Unity's v *= 1 - drag·dt, as a force.
+
+        The clusters of a piece with other joints than wheels' axles have each its own drag.
+        """
         model, clusters = self._model, self._clusters
+        self._apart: list[tuple[int, ...]] = []
         for piece in clusters.pieces:
+            if not is_simple_piece(self._structure, clusters, piece):
+                self._apart.append(piece)
+                continue
             root, inside = piece[0], list(piece)
             dof = model.joint(f"free {root}").dofadr[0]
             drag = clusters.linear_drag[inside] @ clusters.mass[inside]
@@ -216,6 +255,7 @@ class MujocoEngine:
         model, data, clusters = self._model, self._data, self._clusters
         if self._cargo_state is not None:
             data.qpos[:7], data.qvel[:6] = self._cargo_state
+        bodies = (self._structure, clusters, self._axes)
         for c, parent in enumerate(clusters.parent):
             if parent < 0:
                 dof = model.joint(f"free {c}").dofadr[0]
@@ -223,8 +263,7 @@ class MujocoEngine:
                 world_from_body = motion.rotation[c] @ self._axes[c]
                 data.qvel[dof + 3 : dof + 6] = world_from_body.T @ motion.spin[c]
             else:
-                rate = hinge_rate(self._structure, clusters, motion, c)
-                data.qvel[model.joint(f"hinge {c}").dofadr[0]] = rate
+                enter_joint(model, data, bodies, motion, c=c, targets=self._targets)
 
     def _limit_spin(self) -> None:
         """Slows pieces that spin faster than any part of the game may."""
@@ -286,16 +325,6 @@ class MujocoEngine:
                 weights.append(weight)
         return np.concatenate(rows), np.concatenate(blocks), np.concatenate(weights)
 
-    def _read_tensions(self) -> FloatArray:
-        tendons, tensions = self._addresses.tendons, np.zeros(len(self._rope_alive))
-        if tendons:
-            data = self._data
-            limits = data.efc_type[: data.nefc] == mujoco.mjtConstraint.mjCNSTR_LIMIT_TENDON
-            force_of = {int(data.efc_id[k]): data.efc_force[k] for k in np.flatnonzero(limits)}
-            for rope, tendon in tendons.items():
-                tensions[rope] = force_of.get(tendon, 0.0)
-        return tensions
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Addresses:
@@ -306,9 +335,7 @@ class _Addresses:
         body_of_geom: Cluster of each geom, `CARGO` or `WORLD`.
         block_of_geom: Block of each geom that stands for one only, else -1.
         surface_of_geom: Fixed body of each geom as in `ContactForces.surface`.
-        hinge_wheels: (H,) which wheel of the structure each hinge is.
-        hinge_signs: (H,) -1 where the body turned is not the wheel's but its mount's.
-        hinge_actuators: (H,) motor of each hinge.
+        joints: The driven joints.
         thrust_actuators: (K,) actuator of each cannon.
         free_dofs: (F, 3) linear velocities of the free bodies, the cargo first.
         spin_dofs: (P, 3) angular velocities of the pieces.
@@ -319,9 +346,7 @@ class _Addresses:
     body_of_geom: IntArray
     block_of_geom: IntArray
     surface_of_geom: IntArray
-    hinge_wheels: IntArray
-    hinge_signs: FloatArray
-    hinge_actuators: IntArray
+    joints: JointAddresses
     thrust_actuators: IntArray
     free_dofs: IntArray
     spin_dofs: IntArray
@@ -348,8 +373,6 @@ def _addresses_in(
     for name, surface in [("ground", 0)] * world.ground + fixed:
         geom = model.geom(name).id
         body_of_geom[geom], surface_of_geom[geom] = WORLD, surface
-    hinged = np.flatnonzero(clusters.parent >= 0)
-    place = {int(wheel): w for w, wheel in enumerate(structure.wheels)}
     pieces = [model.joint(f"free {piece[0]}").dofadr[0] for piece in clusters.pieces]
     # Only the cargo can stand before the pieces; its free joint comes first.
     free = pieces if pieces[0] == 0 else [0, *pieces]
@@ -358,9 +381,7 @@ def _addresses_in(
         body_of_geom=body_of_geom,
         block_of_geom=block_of_geom,
         surface_of_geom=surface_of_geom,
-        hinge_wheels=_ids(place[int(clusters.wheel[c])] for c in hinged),
-        hinge_signs=np.where(clusters.wheel_is_outer[hinged], 1.0, -1.0),
-        hinge_actuators=_ids(model.actuator(f"hinge {c}").id for c in hinged),
+        joints=joint_addresses(model, structure, clusters),
         thrust_actuators=_ids(model.actuator(f"cannon {i}").id for i in structure.cannons),
         free_dofs=_ids(free)[:, None] + np.arange(3),
         spin_dofs=_ids(pieces)[:, None] + np.arange(3, 6),

@@ -10,14 +10,14 @@ import itertools
 import math
 import shutil
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError
 from importlib.metadata import version as distribution_version
 from pathlib import Path
 
 import numpy as np
 
-from buildarena_simulation.constants import FRICTION_TERRAIN, MAX_SPIN
+from buildarena_simulation.constants import FORCES_EVERY_S, MAX_SPIN
 from buildarena_simulation.engines.base import (
     CargoPose,
     World,
@@ -25,11 +25,19 @@ from buildarena_simulation.engines.base import (
     quaternion_of,
     rotation_of,
 )
+from buildarena_simulation.engines.bullet_bodies import add_box, free_of_damping, set_friction
 from buildarena_simulation.engines.bullet_contacts import read_contacts
+from buildarena_simulation.engines.bullet_joints import articulated
 from buildarena_simulation.engines.closest_points import shape_table
-from buildarena_simulation.engines.external_forces import Force, drag_forces, thrust_forces
-from buildarena_simulation.engines.hinges import HingedPiece, hinge_frames, hinge_rate
+from buildarena_simulation.engines.external_forces import (
+    Force,
+    body_wrenches,
+    drag_forces,
+    thrust_forces,
+)
+from buildarena_simulation.engines.hinges import HingedPiece, hinge_frames
 from buildarena_simulation.engines.impacts import ImpactWatch
+from buildarena_simulation.engines.joint_places import is_simple_piece, joint_rate
 from buildarena_simulation.engines.quiet_output import quiet_output
 from buildarena_simulation.engines.ropes import rope_forces
 from buildarena_simulation.engines.urdf import urdf_of
@@ -47,7 +55,6 @@ _TIME_STEP_S = 1 / 500
 _STEPS_PER_EVALUATION = 20
 _ITERATIONS = 100
 _RESIDUAL = 1e-9
-_SPEED_CAP = 1e5
 _ORIGIN = (0.0, 0.0, 0.0)
 _GROUND_REACH = 2000.0
 
@@ -69,6 +76,7 @@ class PyBulletEngine:
         self._rope_alive = np.ones(len(world.structure.ropes), dtype=bool)
         self._tensions = np.zeros(len(world.structure.ropes))
         self._place_of_wheel = {int(i): w for w, i in enumerate(world.structure.wheels)}
+        self._targets: FloatArray | None = None
         self._client = {"physicsClientId": pybullet.connect(pybullet.DIRECT)}
         self._folder = Path(tempfile.mkdtemp(prefix="buildarena-"))
         self._serial = itertools.count()
@@ -76,6 +84,7 @@ class PyBulletEngine:
         self._solids = Solids(world.structure)
         self._surfaces: dict[int, int] = {}
         self._cargo: int | None = None
+        self._own: list[tuple[int, Force]] = []
         self._start_world()
 
     @property
@@ -105,12 +114,12 @@ class PyBulletEngine:
         self._axes, self._moments = principal_frames(clusters)
         self._hinges = hinge_frames(self._structure, clusters, motion)
         for piece in self._pieces:
+            if piece.articulation is not None:
+                piece.articulation.release()
             pybullet.removeBody(piece.body, **self._client)
         self._pieces = [self._add_piece(piece, motion) for piece in clusters.pieces]
         self._cluster_of_link = {
-            (piece.body, link - 1): c
-            for piece in self._pieces
-            for link, c in enumerate(piece.inside)
+            (piece.body, link): c for piece in self._pieces for c, link in piece.links.items()
         }
         self._address = {c: key for key, c in self._cluster_of_link.items()}
         self._shapes = [shape_table(self._structure, blocks) for blocks in clusters.blocks]
@@ -127,25 +136,28 @@ class PyBulletEngine:
         self._rope_alive[index] = False
         self._tensions[index] = 0.0
 
-    def advance(self, wheel_speeds: FloatArray, thrusts: FloatArray) -> None:
+    def advance(self, targets: FloatArray, thrusts: FloatArray) -> None:
         """See `Engine`."""
         external_forces = thrust_forces(self._structure, self._clusters, self._axes, thrusts)
-        drags = drag_forces(self._clusters, self._motion, self._axes, self._moments)
+        drags = drag_forces(
+            self._structure, self._clusters, self._motion, self._axes, self._moments
+        )
         impacts = ImpactWatch(
-            len(wheel_speeds), gravity=self._world.gravity, time_step_s=self.time_step_s
+            len(targets), gravity=self._world.gravity, time_step_s=self.time_step_s
         )
         velocity = self._free_velocities()
         driven: FloatArray | None = None
-        for row in wheel_speeds:
+        for step, row in enumerate(targets):
             if len(row) and (driven is None or (row != driven).any()):
                 self._drive(row)
                 driven = row
-            self._apply_forces(external_forces, drags)
+            self._apply_forces(external_forces, [*drags, *self._own_forces(step)])
             pybullet.stepSimulation(**self._client)
             before, velocity = velocity, self._free_velocities()
             if impacts.is_impact(velocity - before):
                 self._motion = self._read_motion()
                 impacts.take(self._read_contacts())
+        self._targets = targets[-1]
         self._motion = self._read_motion()
         self._limit_spin()
         self._impacts = impacts
@@ -196,56 +208,53 @@ class PyBulletEngine:
             **self._client,
         )
         if world.ground:
-            ground = self._add_box((_GROUND_REACH, _GROUND_REACH, 1.0), (0.0, 0.0, -1.0), mass=0.0)
+            ground = add_box(
+                self._client, (_GROUND_REACH, _GROUND_REACH, 1.0), (0.0, 0.0, -1.0), mass=0.0
+            )
             self._surfaces[ground] = 0
         for k, box in enumerate(world.terrain, 1):
             turn = pybullet.getQuaternionFromEuler((math.radians(box.slope_deg), 0.0, 0.0))
             half = [v / 2 for v in box.size]
-            self._surfaces[self._add_box(half, box.center, mass=0.0, turn=turn)] = k
+            self._surfaces[add_box(self._client, half, box.center, mass=0.0, turn=turn)] = k
         if world.cargo is not None:
             cargo = world.cargo
-            self._cargo = self._add_box(cargo.size / 2, cargo.position, mass=cargo.mass)
-
-    def _add_box(
-        self,
-        half: Sequence[float] | FloatArray,
-        center: Sequence[float] | FloatArray,
-        *,
-        mass: float,
-        turn: Sequence[float] = (0.0, 0.0, 0.0, 1.0),
-    ) -> int:
-        shape = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=half, **self._client)
-        body = pybullet.createMultiBody(
-            mass,
-            shape,
-            basePosition=center,
-            baseOrientation=turn,
-            useMaximalCoordinates=0,
-            **self._client,
-        )
-        self._free_of_damping(body)
-        self._set_friction(body, -1, FRICTION_TERRAIN)
-        return int(body)
+            self._cargo = add_box(self._client, cargo.size / 2, cargo.position, mass=cargo.mass)
 
     def _add_piece(self, inside: tuple[int, ...], motion: Motion) -> HingedPiece:
         clusters, structure, root = self._clusters, self._structure, inside[0]
         body = self._load(inside, motion)
-        self._free_of_damping(body)
+        free_of_damping(self._client, body)
         velocity, spin = motion.velocity[root].tolist(), motion.spin[root].tolist()
         pybullet.resetBaseVelocity(body, velocity, spin, **self._client)
-        for link, c in enumerate(inside):
-            self._set_friction(body, link - 1, self._friction_of(c))
-            if link:
-                rate = hinge_rate(structure, clusters, motion, c)
-                pybullet.resetJointState(body, link - 1, 0.0, rate, **self._client)
-        hinged = list(inside[1:])
-        places = [self._place_of_wheel[int(wheel)] for wheel in clusters.wheel[hinged]]
+        articulation = articulated(
+            self._world,
+            clusters,
+            self._axes,
+            body=body,
+            inside=inside,
+            time_step_s=self.time_step_s,
+            client=self._client,
+        )
+        for c, link in articulation.links.items():
+            set_friction(self._client, body, link, self._friction_of(c))
+        simple = is_simple_piece(structure, clusters, inside)
+        if simple:
+            for link, c in enumerate(inside[1:]):
+                rate = joint_rate(structure, clusters, motion, c)
+                pybullet.resetJointState(body, link, 0.0, rate, **self._client)
+        else:
+            articulation.start(motion, self._targets)
+        articulation.add_gears()
+        hinged = list(inside[1:]) if simple else []
+        places = [self._place_of_wheel[int(wheel)] for wheel in clusters.seated[hinged]]
         return HingedPiece(
             body=body,
             inside=inside,
-            wheel_signs=np.where(clusters.wheel_is_outer[hinged], 1.0, -1.0),
+            links=articulation.links,
+            articulation=None if simple else articulation,
+            wheel_signs=np.where(clusters.seated_is_outer[hinged], 1.0, -1.0),
             wheel_places=np.array(places, dtype=np.int64),
-            wheel_torques=structure.torques[clusters.wheel[hinged]] * self._world.gravity,
+            wheel_torques=structure.torques[clusters.seated[hinged]] * self._world.gravity,
         )
 
     def _friction_of(self, c: int) -> float:
@@ -275,30 +284,11 @@ class PyBulletEngine:
         file.unlink()
         return int(body)
 
-    def _free_of_damping(self, body: int) -> None:
-        pybullet.changeDynamics(
-            body,
-            -1,
-            linearDamping=0,
-            angularDamping=0,
-            maxJointVelocity=_SPEED_CAP,
-            **self._client,
-        )
-
-    def _set_friction(self, body: int, link: int, friction: float) -> None:
-        # A call of its own: one that also sets damping drops the friction of a link.
-        pybullet.changeDynamics(
-            body,
-            link,
-            lateralFriction=friction,
-            rollingFriction=0,
-            spinningFriction=0,
-            restitution=0,
-            **self._client,
-        )
-
     def _drive(self, speeds: FloatArray) -> None:
         for piece in self._pieces:
+            if piece.articulation is not None:
+                piece.articulation.follow(speeds)
+                continue
             count = len(piece.wheel_signs)
             if count:
                 pybullet.setJointMotorControlArray(
@@ -322,11 +312,23 @@ class PyBulletEngine:
         if self._rope_alive.any():
             self._pull_ropes()
 
+    def _own_forces(self, step: int) -> list[tuple[int, Force]]:
+        field, every = self._world.field, round(FORCES_EVERY_S / self.time_step_s)
+        if field is not None and step % every == 0:
+            wrenches = field.wrenches(self._clusters, self._read_motion())
+            self._own = body_wrenches(wrenches, self._axes)
+        return self._own
+
     def _pull_ropes(self) -> None:
         structure, clusters = self._structure, self._clusters
-        motion = self._read_motion()
+        motion, field = self._read_motion(), self._world.field
         pulls = rope_forces(
-            structure, clusters, motion, alive=self._rope_alive, time_step_s=self.time_step_s
+            structure,
+            clusters,
+            motion,
+            alive=self._rope_alive,
+            rest=structure.ropes.length if field is None else field.rest_lengths(),
+            time_step_s=self.time_step_s,
         )
         self._tensions = pulls.tension
         ends = pulls.forces
@@ -370,7 +372,9 @@ class PyBulletEngine:
             motion.rotation[root] = rotation
             motion.position[root] = center - rotation @ clusters.center_of_mass[root]
             hinged = piece.inside[1:]
-            if hinged:
+            if piece.articulation is not None:
+                piece.articulation.read(motion)
+            elif hinged:
                 states = pybullet.getJointStates(body, range(len(hinged)), **client)
                 for c, state in zip(hinged, states, strict=True):
                     self._hinges.follow(motion, c, state[0], state[1])

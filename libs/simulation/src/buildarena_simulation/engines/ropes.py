@@ -1,4 +1,4 @@
-"""Ropes for engines that have none of their own: a spring-damper as stiff as the step allows.
+"""Ropes and springs for engines that have none: a rope is as stiff as the step allows.
 
 A fixed stiffness diverges on small blocks; here it follows the effective mass between the rope's
 ends, so that the explicit step stays stable whatever hangs on it.
@@ -38,6 +38,7 @@ def rope_forces(
     motion: Motion,
     *,
     alive: BoolArray,
+    rest: FloatArray,
     time_step_s: float,
 ) -> RopePulls:
     """Tension of the ropes at the start of a step.
@@ -47,6 +48,7 @@ def rope_forces(
         clusters: Its clusters.
         motion: Their motion.
         alive: (R,) which ropes hold.
+        rest: (R,) their lengths at rest, units.
         time_step_s: Length of the step, seconds.
     """
     ropes = structure.ropes
@@ -56,7 +58,7 @@ def rope_forces(
     first, second = clusters.cluster_of[ropes.first], clusters.cluster_of[ropes.second]
     slip_first, give_first = _at_end(clusters, motion, first, start, along)
     slip_second, give_second = _at_end(clusters, motion, second, end, along)
-    stretch, rate = length - ropes.length, slip_second - slip_first
+    stretch, rate = length - rest, slip_second - slip_first
     mass = 1.0 / np.maximum(give_first + give_second, 1e-9)
     # Several ropes on one body act together; each takes its share.
     crowd = np.maximum(
@@ -70,6 +72,12 @@ def rope_forces(
     )
     taut = alive & (stretch > 0.0) & (first != second)
     tension = np.where(taut, np.maximum(pull, 0.0), 0.0)
+    if ropes.stiffness.any():
+        elastic, most = ropes.stiffness > 0.0, mass / time_step_s
+        stiffness = np.minimum(ropes.stiffness, _STIFFNESS_SHARE * most / time_step_s)
+        damping = np.minimum(ropes.damping, _DAMPING_SHARE * most)
+        taut = np.where(elastic, alive, taut)
+        tension = np.where(elastic & alive, stiffness * stretch + damping * rate, tension)
     force = tension[:, None] * along
     return RopePulls(
         tension=tension,

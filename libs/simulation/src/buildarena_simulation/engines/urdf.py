@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from buildarena_simulation.engines.urdf_joints import joint_tags, links_before, numbers
 from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.model import FloatArray, ShapeKind, Structure
 from buildarena_simulation.structure.solids import Solid
@@ -21,7 +22,7 @@ def urdf_of(
     axes: FloatArray,
     moments: FloatArray,
 ) -> str:
-    """The URDF of a piece whose hinges all stand at angle 0 in the machine frame.
+    """The URDF of a piece whose joints all stand at 0 in the machine frame.
 
     Args:
         structure: The machine.
@@ -37,7 +38,8 @@ def urdf_of(
     lines = ['<robot name="piece">']
     for link, c in enumerate(inside):
         if link:
-            origins[c] = structure.positions[clusters.wheel[c]]
+            origins[c] = structure.joints.points[clusters.seated[c]]
+            lines += links_before(structure, clusters, c, f"link {link}")
         offset = axes[c].T @ (clusters.center_of_mass[c] - origins[c])
         lines += [f'<link name="link {link}">', *_inertial(clusters.mass[c], moments[c], offset)]
         for solid in solids[c]:
@@ -47,15 +49,14 @@ def urdf_of(
     for link, c in enumerate(inside[1:], 1):
         parent = int(clusters.parent[c])
         place = axes[parent].T @ (origins[c] - origins[parent])
-        axis = axes[c].T @ structure.directions[clusters.wheel[c]]
-        lines += [
-            f'<joint name="hinge {link}" type="continuous">',
-            f'<parent link="link {inside.index(parent)}"/>',
-            f'<child link="link {link}"/>',
-            _origin(place, axes[parent].T @ axes[c]),
-            f'<axis xyz="{_numbers(axis)}"/>',
-            "</joint>",
-        ]
+        lines += joint_tags(
+            structure,
+            clusters,
+            c,
+            names=(f"link {inside.index(parent)}", f"link {link}"),
+            origin=_origin(place, axes[parent].T @ axes[c]),
+            body_from_machine=axes[c].T,
+        )
     lines.append("</robot>")
     return "\n".join(lines) + "\n"
 
@@ -64,7 +65,7 @@ def _inertial(mass: float, moments: FloatArray, offset: FloatArray) -> list[str]
     a, b, c = moments.tolist()
     return [
         "<inertial>",
-        f'<origin xyz="{_numbers(offset)}" rpy="0 0 0"/>',
+        f'<origin xyz="{numbers(offset)}" rpy="0 0 0"/>',
         f'<mass value="{float(mass)!r}"/>',
         f'<inertia ixx="{a!r}" ixy="0" ixz="0" iyy="{b!r}" iyz="0" izz="{c!r}"/>',
         "</inertial>",
@@ -78,7 +79,7 @@ def _collision(solid: Solid, place: FloatArray, rotation: FloatArray) -> list[st
     elif solid.kind is ShapeKind.SPHERE:
         form = f'<sphere radius="{float(half[0])!r}"/>'
     else:
-        form = f'<box size="{_numbers(2 * half)}"/>'
+        form = f'<box size="{numbers(2 * half)}"/>'
     return [
         "<collision>",
         _origin(place, rotation),
@@ -90,7 +91,7 @@ def _collision(solid: Solid, place: FloatArray, rotation: FloatArray) -> list[st
 
 
 def _origin(place: FloatArray, rotation: FloatArray) -> str:
-    return f'<origin xyz="{_numbers(place)}" rpy="{_numbers(_roll_pitch_yaw(rotation))}"/>'
+    return f'<origin xyz="{numbers(place)}" rpy="{numbers(_roll_pitch_yaw(rotation))}"/>'
 
 
 def _roll_pitch_yaw(r: FloatArray) -> FloatArray:
@@ -99,7 +100,3 @@ def _roll_pitch_yaw(r: FloatArray) -> FloatArray:
     if np.hypot(r[0, 0], r[1, 0]) < 1e-9:  # noqa: PLR2004 - straight up or down: roll is free
         return np.array([np.arctan2(-r[1, 2], r[1, 1]), pitch, 0.0])
     return np.array([np.arctan2(r[2, 1], r[2, 2]), pitch, np.arctan2(r[1, 0], r[0, 0])])
-
-
-def _numbers(values: FloatArray) -> str:
-    return " ".join(repr(float(v)) for v in values)

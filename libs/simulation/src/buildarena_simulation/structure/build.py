@@ -3,12 +3,14 @@
 from collections import Counter
 from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 
+from buildarena_geometry.modules.forces import Spring
 from buildarena_geometry.modules.module import Sphere
-from buildarena_simulation.constants import JOINT_STRENGTH, ROPE_STRENGTH, JointKind
+from buildarena_simulation.constants import GRAVITY, JOINT_STRENGTH, ROPE_STRENGTH, JointKind
+from buildarena_simulation.structure.joints import joints_of
 from buildarena_simulation.structure.model import (
     JOINT_KINDS,
     FloatArray,
@@ -20,6 +22,7 @@ from buildarena_simulation.structure.model import (
     Spheres,
     Structure,
 )
+from buildarena_simulation.structure.vectors import axis_frame
 
 _UNIT_STIFFNESS: Final = 1e4
 """Only ratios of stiffness matter to the loads; this one keeps the matrix well scaled."""
@@ -63,7 +66,13 @@ class Link:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rope:
-    """A winch between two blocks; fields as in `Link`, its share that of a rope's strength."""
+    """A winch, tether or spring between two blocks; fields as in `Link`.
+
+    Attributes:
+        share: Its share of a rope's strength, or of a spring's strength, stiffness and damping.
+        length: Of a tether, units; None for as long as it is built.
+        spring: What it does as a spring; None for a rope.
+    """
 
     name: str
     first: int
@@ -72,6 +81,8 @@ class Rope:
     end: FloatArray
     mass: float
     share: float = 1.0
+    length: float | None = None
+    spring: Spring | None = None
 
 
 def build_structure(
@@ -113,6 +124,7 @@ def build_structure(
         centers_of_mass=np.array([center for _, center, _ in lumped]),
         inertias=np.array([inertia for _, _, inertia in lumped]),
         members=_members(parts, [*links, *_far_joints(parts, links)]),
+        joints=joints_of(parts),
         ropes=_ropes(ropes),
         wheels=_indices(i for i, part in enumerate(parts) if part.is_wheel),
         cannons=cannons,
@@ -132,15 +144,6 @@ def build_structure(
         ),
         angular_drag=np.array([part.physics.angular_drag for part in parts]),
     )
-
-
-def axis_frame(direction: FloatArray) -> FloatArray:
-    """A right-handed frame whose first axis points along a vector, (3, 3), columns are the axes."""
-    first = direction / np.linalg.norm(direction)
-    helper = np.array([0.0, 0.0, 1.0]) if abs(first[2]) < 0.9 else np.array([0.0, 1.0, 0.0])  # noqa: PLR2004 - any vector well off the axis will do
-    second = np.cross(helper, first)
-    second /= np.linalg.norm(second)
-    return np.column_stack([first, second, np.cross(first, second)])
 
 
 def _indices(blocks: Iterable[int]) -> IntArray:
@@ -296,6 +299,13 @@ def _brace_springs(length: float) -> FloatArray:
     )
 
 
+def _of_springs(ropes: Sequence[Rope], figure: Literal["stiffness", "damping"]) -> FloatArray:
+    """A figure of each rope's spring, times g; 0 where there is none."""
+    return GRAVITY * np.array(
+        [getattr(rope.spring, figure) * rope.share if rope.spring else 0.0 for rope in ropes]
+    )
+
+
 def _ropes(ropes: Sequence[Rope]) -> Ropes:
     first_point = np.array([rope.start for rope in ropes]).reshape(-1, 3)
     second_point = np.array([rope.end for rope in ropes]).reshape(-1, 3)
@@ -305,6 +315,18 @@ def _ropes(ropes: Sequence[Rope]) -> Ropes:
         second=np.array([rope.second for rope in ropes], dtype=np.int64),
         first_point=first_point,
         second_point=second_point,
-        length=np.linalg.norm(second_point - first_point, axis=1),
-        limit=np.array([rope.share * ROPE_STRENGTH for rope in ropes]),
+        length=np.array(
+            [
+                built if rope.length is None else rope.length
+                for rope, built in zip(
+                    ropes, np.linalg.norm(second_point - first_point, axis=1), strict=True
+                )
+            ]
+        ),
+        limit=np.array(
+            [rope.share * (rope.spring.limit if rope.spring else ROPE_STRENGTH) for rope in ropes]
+        ),
+        stiffness=_of_springs(ropes, "stiffness"),
+        damping=_of_springs(ropes, "damping"),
+        spring_of=tuple(rope.spring for rope in ropes if rope.spring),
     )

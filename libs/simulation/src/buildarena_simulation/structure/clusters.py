@@ -1,7 +1,7 @@
-"""Rigid clusters, the axles between them, and their mass properties.
+"""Rigid clusters, the moving joints between them, and their mass properties.
 
-Blocks joined rigidly form a *cluster*; clusters joined by axles form an articulated *piece*, a
-tree whose root is its largest cluster.
+Blocks joined rigidly form a *cluster*; clusters joined by moving joints (axles, hinges, sliders, …)
+form an articulated *piece*, a tree whose root is its largest cluster.
 """
 
 from collections.abc import Iterable, Sequence
@@ -10,6 +10,7 @@ from typing import Final
 
 import numpy as np
 
+from buildarena_geometry.modules.joints import MOVING_SEATS
 from buildarena_simulation.constants import JointKind
 from buildarena_simulation.structure.model import (
     JOINT_KINDS,
@@ -19,7 +20,8 @@ from buildarena_simulation.structure.model import (
     Structure,
 )
 
-_AXLE: Final = JOINT_KINDS.index(JointKind.AXLE)
+_MOVING: Final = [JOINT_KINDS.index(JointKind(seat)) for seat in MOVING_SEATS]
+_TURNING: Final = [JOINT_KINDS.index(kind) for kind in (JointKind.AXLE, JointKind.HINGE)]
 _COLLINEAR: Final = 1e-3
 
 
@@ -30,12 +32,12 @@ class Clusters:
     Attributes:
         cluster_of: (N,) cluster of each block.
         blocks: Per cluster, the indices of its blocks in ascending order.
-        parent: (C,) the cluster an axle hangs it on, -1 for a piece's root.
-        axle: (C,) the member that is this axle, -1 for a root.
-        wheel: (C,) the axle's wheel (block index), -1 for a root.
-        wheel_is_outer: (C,) whether the wheel belongs to this cluster rather than to its parent.
+        parent: (C,) the cluster a joint hangs it on, -1 for a piece's root.
+        joint: (C,) the member that is this joint, -1 for a root.
+        seated: (C,) the block that sits by this joint (a wheel, a hinge, …), -1 for a root.
+        seated_is_outer: (C,) whether that block belongs to this cluster rather than to its parent.
         root: (C,) root cluster of its piece.
-        level: (C,) number of axles between it and its root.
+        level: (C,) number of joints between it and its root.
         mass: (C,) mass units.
         center_of_mass: (C, 3) machine frame, units.
         inertia: (C, 3, 3) about the centre of mass, machine frame axes.
@@ -46,9 +48,9 @@ class Clusters:
     cluster_of: IntArray
     blocks: tuple[IntArray, ...]
     parent: IntArray
-    axle: IntArray
-    wheel: IntArray
-    wheel_is_outer: BoolArray
+    joint: IntArray
+    seated: IntArray
+    seated_is_outer: BoolArray
     root: IntArray
     level: IntArray
     mass: FloatArray
@@ -70,9 +72,9 @@ class Clusters:
 def find_clusters(structure: Structure, holds: BoolArray) -> Clusters:
     """The clusters of a structure whose members partly hold.
 
-    An axle whose two sides are held together otherwise (a brace across it) is rigid. An axle that
-    closes a loop of clusters is redundant if it lies on the line of the axle it doubles; else the
-    loop cannot turn and is rigid.
+    A moving joint whose two sides are held together otherwise (a brace across it) is rigid. One
+    that closes a loop of clusters is redundant if both it and the one it doubles turn about the
+    same line; else the loop is rigid.
 
     Args:
         structure: The machine.
@@ -82,13 +84,14 @@ def find_clusters(structure: Structure, holds: BoolArray) -> Clusters:
         The clusters, ordered by piece (first block), parents before children.
     """
     members = structure.members
-    rigid = list(np.flatnonzero(holds & (members.kind != _AXLE)).tolist())
-    axles = np.flatnonzero(holds & (members.kind == _AXLE)).tolist()
+    moving = np.isin(members.kind, _MOVING)
+    rigid = list(np.flatnonzero(holds & ~moving).tolist())
+    joints = np.flatnonzero(holds & moving).tolist()
     while True:
         groups = components(len(structure), ((members.first[k], members.second[k]) for k in rigid))
         label = _labels(len(structure), groups)
-        open_axles = [k for k in axles if label[members.first[k]] != label[members.second[k]]]
-        tree, locked = _grow_trees(structure, groups, label, open_axles)
+        free = [k for k in joints if label[members.first[k]] != label[members.second[k]]]
+        tree, locked = _grow_trees(structure, groups, label, free)
         if not locked:
             return _collect(structure, groups, tree)
         rigid.extend(locked)
@@ -122,18 +125,18 @@ def _labels(count: int, groups: Sequence[Sequence[int]]) -> list[int]:
 
 
 _Tree = list[tuple[int, int, int]]
-"""(group, parent group or -1, axle or -1), parents first."""
+"""(group, parent group or -1, joint or -1), parents first."""
 
 
 def _grow_trees(
     structure: Structure,
     groups: Sequence[Sequence[int]],
     label: Sequence[int],
-    axles: Sequence[int],
+    joints: Sequence[int],
 ) -> tuple[_Tree, list[int]]:
-    """Spanning trees of the groups along axles, and the axles that lock a loop."""
+    """Spanning trees of the groups along joints, and the joints that lock a loop."""
     members = structure.members
-    edges = [(label[members.first[k]], label[members.second[k]]) for k in axles]
+    edges = [(label[members.first[k]], label[members.second[k]]) for k in joints]
     tree: _Tree = []
     via: dict[int, int] = {}
     for piece in components(len(groups), edges):
@@ -143,7 +146,7 @@ def _grow_trees(
         waiting = [root]
         while waiting:
             current = waiting.pop(0)
-            for k, (a, b) in zip(axles, edges, strict=True):
+            for k, (a, b) in zip(joints, edges, strict=True):
                 if current not in (a, b):
                     continue
                 other = b if a == current else a
@@ -154,7 +157,7 @@ def _grow_trees(
                     waiting.append(other)
     parent = {group: up for group, up, _ in tree}
     locked = []
-    for k, (a, b) in zip(axles, edges, strict=True):
+    for k, (a, b) in zip(joints, edges, strict=True):
         if via.get(a) == k or via.get(b) == k:
             continue
         doubled = via[a] if parent[a] == b else via[b] if parent[b] == a else None
@@ -164,7 +167,7 @@ def _grow_trees(
 
 
 def _path(parent: dict[int, int], via: dict[int, int], a: int, b: int) -> list[int]:
-    """Axles on the tree path between two groups."""
+    """Joints on the tree path between two groups."""
     up_a, up_b = [a], [b]
     for line in (up_a, up_b):
         while parent[line[-1]] >= 0:
@@ -174,9 +177,11 @@ def _path(parent: dict[int, int], via: dict[int, int], a: int, b: int) -> list[i
 
 
 def _collinear(structure: Structure, k: int, other: int) -> bool:
-    wheels = structure.members.second[[k, other]]
-    first, second = structure.directions[wheels]
-    apart = structure.positions[wheels[1]] - structure.positions[wheels[0]]
+    if not np.isin(structure.members.kind[[k, other]], _TURNING).all():
+        return False
+    seated = structure.members.second[[k, other]]
+    first, second = structure.joints.axes[seated]
+    apart = structure.joints.points[seated[1]] - structure.joints.points[seated[0]]
     return bool(
         np.linalg.norm(np.cross(first, second)) < _COLLINEAR
         and np.linalg.norm(np.cross(first, apart)) < _COLLINEAR
@@ -187,7 +192,7 @@ def _collect(structure: Structure, groups: Sequence[Sequence[int]], tree: _Tree)
     place = {group: c for c, (group, _, _) in enumerate(tree)}
     blocks = tuple(np.array(groups[group], dtype=np.int64) for group, _, _ in tree)
     parent = np.array([place.get(up, -1) for _, up, _ in tree], dtype=np.int64)
-    axle = np.array([k for _, _, k in tree], dtype=np.int64)
+    joint = np.array([k for _, _, k in tree], dtype=np.int64)
     cluster_of = np.zeros(len(structure), dtype=np.int64)
     for c, ids in enumerate(blocks):
         cluster_of[ids] = c
@@ -195,17 +200,17 @@ def _collect(structure: Structure, groups: Sequence[Sequence[int]], tree: _Tree)
     for c, up in enumerate(parent):
         if up >= 0:
             root[c], level[c] = root[up], level[up] + 1
-    wheel = np.where(
-        axle >= 0, structure.members.second[axle] if len(structure.members) else -1, -1
+    seated = np.where(
+        joint >= 0, structure.members.second[joint] if len(structure.members) else -1, -1
     )
     mass, center, inertia = _mass_properties(structure, blocks)
     return Clusters(
         cluster_of=cluster_of,
         blocks=blocks,
         parent=parent,
-        axle=axle,
-        wheel=wheel,
-        wheel_is_outer=(wheel >= 0) & (cluster_of[wheel] == np.arange(len(tree))),
+        joint=joint,
+        seated=seated,
+        seated_is_outer=(seated >= 0) & (cluster_of[seated] == np.arange(len(tree))),
         root=root,
         level=level,
         mass=mass,

@@ -87,7 +87,7 @@ class LoadModel:
         if self._children:
             relative = motion.rotation.transpose(0, 2, 1) @ self._root_rotation
             wrenches = turned_wrenches(relative[clusters.cluster_of], wrenches)
-            self._add_axle_reactions(wrenches, relative, force, moment)
+            self._add_joint_reactions(wrenches, motion, force, moment)
         members = self._solver.solve(self._relieved(wrenches))
         inside = self._solver.inside
         force[inside] = np.sqrt((members[:, :3] ** 2).sum(axis=1))
@@ -113,7 +113,7 @@ class LoadModel:
         wrenches = turned_wrenches(relative[self._clusters.cluster_of], wrenches)
         if self._children:
             count = len(self.holds)
-            self._add_axle_reactions(wrenches, relative, np.zeros(count), np.zeros(count))
+            self._add_joint_reactions(wrenches, motion, np.zeros(count), np.zeros(count))
         return self._solver.displacements(self._relieved(wrenches))
 
     def flexibility(self, blocks: IntArray) -> FloatArray:
@@ -128,6 +128,9 @@ class LoadModel:
         self._solver = self._stiffness.factorize(clusters, self.holds)
         self._arm = structure.centers_of_mass - clusters.center_of_mass[clusters.cluster_of]
         self._compliance = np.asarray(np.linalg.inv(clusters.inertia), dtype=np.float64)
+        self._sliding = np.array(
+            [s >= 0 and structure.parts[s].physics.seat == "slider" for s in clusters.seated]
+        )
         self._children = [
             np.flatnonzero(clusters.level == level)
             for level in range(int(clusters.level.max()), 0, -1)
@@ -169,30 +172,33 @@ class LoadModel:
         to_root = self._root_rotation.transpose(0, 2, 1)
         return turned_wrenches(to_root[clusters.cluster_of], world)
 
-    def _add_axle_reactions(
-        self, wrenches: FloatArray, relative: FloatArray, force: FloatArray, moment: FloatArray
+    def _add_joint_reactions(
+        self, wrenches: FloatArray, motion: Motion, force: FloatArray, moment: FloatArray
     ) -> None:
-        """Adds what each axle transmits to its two blocks, outermost axles first.
+        """Adds what each moving joint transmits to its two blocks, outermost joints first.
 
-        The axle gives the outer cluster what its inertia needs and its other loads do not provide.
+        The joint gives the outer cluster what its inertia needs and its other loads do not provide:
+        drive, spring and stop are in it. A wheel's axle breaks by what it bears across its axis,
+        any other joint by all it transmits.
 
         Args:
             wrenches: (N, 6) on the blocks, each in its own cluster's axes; changed in place.
-            relative: (C, 3, 3) cluster_from_root.
-            force: (M,) filled in for the axles.
-            moment: (M,) filled in for the axles.
+            motion: The clusters' motion now.
+            force: (M,) filled in for the joints.
+            moment: (M,) filled in for the joints.
         """
         structure, clusters = self._structure, self._clusters
-        members = structure.members
+        members, joints = structure.members, structure.joints
+        relative = motion.rotation.transpose(0, 2, 1) @ self._root_rotation
         inertial = turned_wrenches(relative, self._inertial)
         for level in self._children:
             total = self._cluster_totals(wrenches)[level]
             needed = inertial[level] - total
-            axle = clusters.axle[level]
-            wheel_is_outer = clusters.wheel_is_outer[level]
-            outer = np.where(wheel_is_outer, members.second[axle], members.first[axle])
-            inner = np.where(wheel_is_outer, members.first[axle], members.second[axle])
-            hinge = structure.positions[clusters.wheel[level]]
+            joint, seated = clusters.joint[level], clusters.seated[level]
+            seated_is_outer = clusters.seated_is_outer[level]
+            outer = np.where(seated_is_outer, members.second[joint], members.first[joint])
+            inner = np.where(seated_is_outer, members.first[joint], members.second[joint])
+            hinge = joints.points[seated]
             transmitted = needed[:, :3]
             at_hinge = needed[:, 3:] - cross(hinge - clusters.center_of_mass[level], transmitted)
             wrenches[outer, :3] += transmitted
@@ -201,17 +207,29 @@ class LoadModel:
             )
             parent = clusters.parent[level]
             turn = relative[parent] @ relative[level].transpose(0, 2, 1)
-            # The hinge is the same world point in both frames, on the axis both clusters share.
+            # A pivot is the same world point in both frames, on the axis both clusters share.
             back = np.concatenate([transmitted, at_hinge], axis=1)
             back = -turned_wrenches(turn, back)
-            arm = hinge - structure.centers_of_mass[inner]
+            arm = self._seen_by_parents(level, motion) - structure.centers_of_mass[inner]
             back[:, 3:] += cross(arm, back[:, :3])
             np.add.at(wrenches, inner, back)
-            axis = structure.directions[clusters.wheel[level]]
-            bending = at_hinge + cross(hinge - members.point[axle], transmitted)
+            axis = joints.axes[seated]
+            bending = at_hinge + cross(hinge - members.point[joint], transmitted)
             bending -= (bending * axis).sum(axis=1)[:, None] * axis
-            force[axle] = np.sqrt((transmitted**2).sum(axis=1))
-            moment[axle] = np.sqrt((bending**2).sum(axis=1))
+            bending = np.where(joints.simple[seated][:, None], bending, at_hinge)
+            force[joint] = np.sqrt((transmitted**2).sum(axis=1))
+            moment[joint] = np.sqrt((bending**2).sum(axis=1))
+
+    def _seen_by_parents(self, level: IntArray, motion: Motion) -> FloatArray:
+        """Pivots of the joints on which clusters hang, in their parents' frames, (L, 3)."""
+        structure, clusters = self._structure, self._clusters
+        seated = clusters.seated[level]
+        points = structure.joints.points[seated].copy()
+        for k in self._sliding[level].nonzero()[0]:
+            c, parent = level[k], clusters.parent[level[k]]
+            apart = motion.position[c] + motion.rotation[c] @ points[k] - motion.position[parent]
+            points[k] = apart @ motion.rotation[parent]
+        return points
 
     def _add_shared_faces(self, loads: FloatArray, ratio: FloatArray) -> None:
         """Raises the ratios of connectors to that of all connectors on one of their faces.

@@ -1,13 +1,14 @@
 """The arrays of one machine: what does not change while it is simulated."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from buildarena_geometry.modules.forces import Spring
 from buildarena_geometry.modules.module import Module, Physics
 from buildarena_simulation.constants import JointKind
 
@@ -81,6 +82,9 @@ class Part:
         shapes: Its collision shapes.
         direction: (3,) unit vector, machine frame: a cannon's spray, a torch's flame, a wheel's
             outward axis; None for the others.
+        axis: (3,) unit vector, machine frame: what it turns about or slides along on its seat;
+            zero for blocks that do not move there.
+        pivot: (3,) a point of that axis, machine frame, units.
         forward_is_clockwise: Whether its motor turns it clockwise, seen from outside, when it runs
             forward.
     """
@@ -94,6 +98,8 @@ class Part:
     shapes: tuple[Shape, ...]
     direction: FloatArray | None = None
     forward_is_clockwise: bool = False
+    axis: FloatArray = field(default_factory=lambda: np.zeros(3))
+    pivot: FloatArray = field(default_factory=lambda: np.zeros(3))
 
     @property
     def mass(self) -> float:
@@ -102,7 +108,7 @@ class Part:
 
     @property
     def is_wheel(self) -> bool:
-        """Whether it turns on the face it sits on."""
+        """Whether it turns on an axle on the face it sits on."""
         return self.physics.seat == "axle"
 
 
@@ -169,7 +175,7 @@ class Members:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ropes:
-    """The winches' ropes, tension only; one row each.
+    """The winches' ropes, tension only, and the springs; one row each.
 
     Attributes:
         names: What each joins, fit to be shown.
@@ -179,6 +185,9 @@ class Ropes:
         second_point: (R, 3) where it ends, machine frame, units.
         length: (R,) its length, units.
         limit: (R,) tension at which it gives way, mass·g.
+        stiffness: (R,) of a spring, mass/s²; 0 of a rope.
+        damping: (R,) of a spring, mass/s; 0 of a rope.
+        spring_of: What each spring does, in the order of `springs`.
     """
 
     names: tuple[str, ...]
@@ -188,9 +197,53 @@ class Ropes:
     second_point: FloatArray
     length: FloatArray
     limit: FloatArray
+    stiffness: FloatArray
+    damping: FloatArray
+    spring_of: tuple[Spring, ...] = ()
 
     def __len__(self) -> int:
         return len(self.names)
+
+    @property
+    def springs(self) -> IntArray:
+        """Which rows are springs."""
+        return np.flatnonzero(self.stiffness)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mesh:
+    """Two cogs whose teeth engage.
+
+    Attributes:
+        first: Block index of one.
+        second: Block index of the other.
+        ratio: Speed of the second about its own axis over that of the first, both seen from what
+            they are mounted on.
+    """
+
+    first: int
+    second: int
+    ratio: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Joints:
+    """How blocks move on what they sit on.
+
+    Attributes:
+        axes: (N, 3) as `Part.axis`.
+        points: (N, 3) as `Part.pivot`.
+        simple: (N,) whether a block turns on its axle without limits, spring or a further drive,
+            so that the angle it has turned through does not matter.
+        driven: (D,) blocks that follow a target: the wheels, then other driven joints.
+        meshes: The cogs that engage.
+    """
+
+    axes: FloatArray
+    points: FloatArray
+    simple: BoolArray
+    driven: IntArray
+    meshes: tuple[Mesh, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -209,6 +262,7 @@ class Structure:
         centers_of_mass: (N, 3) of block and brace halves together, machine frame, units.
         inertias: (N, 3, 3) of block and brace halves about that point, machine frame axes.
         members: The joints.
+        joints: How blocks move on what they sit on.
         ropes: The winches' ropes.
         wheels: (W,) indices of the wheels.
         cannons: (C,) indices of the cannons.
@@ -232,6 +286,7 @@ class Structure:
     centers_of_mass: FloatArray
     inertias: FloatArray
     members: Members
+    joints: Joints
     ropes: Ropes
     wheels: IntArray
     cannons: IntArray

@@ -17,6 +17,24 @@ def cross(a: FloatArray, b: FloatArray) -> FloatArray:
     return product
 
 
+def axis_frame(direction: FloatArray) -> FloatArray:
+    """A right-handed frame whose first axis points along a vector, (3, 3), columns are the axes."""
+    first = direction / np.linalg.norm(direction)
+    helper = np.array([0.0, 0.0, 1.0]) if abs(first[2]) < 0.9 else np.array([0.0, 1.0, 0.0])  # noqa: PLR2004 - any vector well off the axis will do
+    second = np.cross(helper, first)
+    second /= np.linalg.norm(second)
+    return np.column_stack([first, second, np.cross(first, second)])
+
+
+def turn_about(axis: FloatArray, angle: float) -> FloatArray:
+    """Rotation by an angle about a unit axis (Rodrigues), (3, 3)."""
+    x, y, z = axis
+    cross_matrix = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.asarray(
+        np.eye(3) + np.sin(angle) * cross_matrix + (1 - np.cos(angle)) * cross_matrix @ cross_matrix
+    )
+
+
 def turned(rotations: FloatArray, vectors: FloatArray) -> FloatArray:
     """Each vector (K, 3) turned by its rotation (K, 3, 3)."""
     return np.asarray((rotations @ vectors[:, :, None])[:, :, 0])

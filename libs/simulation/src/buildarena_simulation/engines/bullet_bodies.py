@@ -1,0 +1,70 @@
+"""Bodies of a PyBullet world: boxes, damping and friction."""
+
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+from buildarena_simulation.constants import FRICTION_TERRAIN
+from buildarena_simulation.engines.quiet_output import quiet_output
+from buildarena_simulation.structure.model import FloatArray
+
+with quiet_output():
+    import pybullet
+
+_SPEED_CAP: Final = 1e5
+
+
+def add_box(
+    client: Mapping[str, int],
+    half: Sequence[float] | FloatArray,
+    center: Sequence[float] | FloatArray,
+    *,
+    mass: float,
+    turn: Sequence[float] = (0.0, 0.0, 0.0, 1.0),
+) -> int:
+    """Adds a box of neutral friction; its id.
+
+    Args:
+        client: The engine's world.
+        half: (3,) half-extents, units.
+        center: (3,) world frame, units.
+        mass: 0 for one that never moves.
+        turn: World_from_box as a quaternion (x, y, z, w).
+    """
+    shape = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=half, **client)
+    body = pybullet.createMultiBody(
+        mass,
+        shape,
+        basePosition=center,
+        baseOrientation=turn,
+        useMaximalCoordinates=0,
+        **client,
+    )
+    free_of_damping(client, body)
+    set_friction(client, body, -1, FRICTION_TERRAIN)
+    return int(body)
+
+
+def free_of_damping(client: Mapping[str, int], body: int) -> None:
+    """Takes a body's damping and cap on speed away: drag is a force of ours."""
+    pybullet.changeDynamics(
+        body,
+        -1,
+        linearDamping=0,
+        angularDamping=0,
+        maxJointVelocity=_SPEED_CAP,
+        **client,
+    )
+
+
+def set_friction(client: Mapping[str, int], body: int, link: int, friction: float) -> None:
+    """Gives one link a coefficient of friction, and no bounce."""
+    # A call of its own: one that also sets damping drops the friction of a link.
+    pybullet.changeDynamics(
+        body,
+        link,
+        lateralFriction=friction,
+        rollingFriction=0,
+        spinningFriction=0,
+        restitution=0,
+        **client,
+    )

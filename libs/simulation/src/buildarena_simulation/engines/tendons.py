@@ -1,0 +1,57 @@
+"""MuJoCo's tendons: the ropes and springs that hold."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from buildarena_simulation.structure.model import FloatArray, Ropes
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tendons:
+    """The ropes and springs of a compiled model.
+
+    Attributes:
+        model: The model.
+        data: Its state.
+        ropes: All ropes and springs of the machine.
+        of: Tendon of each one that holds.
+    """
+
+    model: "mujoco.MjModel"
+    data: "mujoco.MjData"
+    ropes: Ropes
+    of: Mapping[int, int]
+
+    def drop(self, index: int) -> None:
+        """Lets a rope or spring go."""
+        tendon, model = self.of[index], self.model
+        model.tendon_limited[tendon] = 0
+        model.tendon_stiffness[tendon] = model.tendon_damping[tendon] = 0.0
+
+    def set_lengths(self, lengths: FloatArray) -> None:
+        """Gives the springs their lengths at rest, (R,), units."""
+        for rope in self.ropes.springs:
+            if int(rope) in self.of:
+                self.model.tendon_lengthspring[self.of[int(rope)]] = lengths[rope]
+
+    def tensions(self) -> FloatArray:
+        """The pull of each rope and spring in the last step, (R,), mass·unit/s²."""
+        tensions, data = np.zeros(len(self.ropes)), self.data
+        if not self.of:
+            return tensions
+        limits = data.efc_type[: data.nefc] == mujoco.mjtConstraint.mjCNSTR_LIMIT_TENDON
+        force_of = {int(data.efc_id[k]): data.efc_force[k] for k in np.flatnonzero(limits)}
+        for rope, tendon in self.of.items():
+            tensions[rope] = force_of.get(tendon, 0.0)
+            if self.ropes.stiffness[rope]:
+                tensions[rope] = self._pull(tendon)
+        return tensions
+
+    def _pull(self, tendon: int) -> float:
+        model, data = self.model, self.data
+        stretch = data.ten_length[tendon] - model.tendon_lengthspring[tendon, 0]
+        pull = model.tendon_stiffness[tendon] * stretch
+        return float(pull + model.tendon_damping[tendon] * data.ten_velocity[tendon])

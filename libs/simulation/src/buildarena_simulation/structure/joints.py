@@ -1,0 +1,57 @@
+"""How blocks move on what they sit on, as arrays; which cogs engage."""
+
+from collections.abc import Sequence
+from itertools import combinations
+from typing import Final
+
+import numpy as np
+
+from buildarena_simulation.structure.model import Joints, Mesh, Part
+
+_MESH_SLACK: Final = 0.1
+"""Cogs engage if the distance of their axes misses the sum of their pitch radii by no more, units.
+Chosen: a fifth of the shift that a builder is allowed."""
+
+_PARALLEL: Final = 0.996
+"""Cosine of the greatest angle between the axes of cogs that engage. Chosen: five degrees."""
+
+
+def joints_of(parts: Sequence[Part]) -> Joints:
+    """How the blocks of a machine move on what they sit on.
+
+    Args:
+        parts: The blocks.
+    """
+    wheels = [i for i, part in enumerate(parts) if part.is_wheel]
+    others = [i for i, part in enumerate(parts) if not part.is_wheel and _is_driven(part)]
+    return Joints(
+        axes=np.array([part.axis for part in parts]),
+        points=np.array([part.pivot for part in parts]),
+        simple=np.array([part.is_wheel and part.module.joint is None for part in parts]),
+        driven=np.array([*wheels, *others], dtype=np.int64),
+        meshes=_meshes(parts),
+    )
+
+
+def _is_driven(part: Part) -> bool:
+    return part.module.joint is not None and part.module.joint.drive is not None
+
+
+def _meshes(parts: Sequence[Part]) -> tuple[Mesh, ...]:
+    """Cogs with parallel axes, beside each other, whose pitch circles touch."""
+    cogs = [(i, part, part.module.gear) for i, part in enumerate(parts)]
+    found = []
+    for (i, first, one), (j, second, other) in combinations(cogs, 2):
+        if one is None or other is None:
+            continue
+        alike = float(first.axis @ second.axis)
+        apart = second.shapes[0].center - first.shapes[0].center
+        along = float(apart @ first.axis)
+        distance = float(np.linalg.norm(apart - along * first.axis))
+        thickness = first.shapes[0].half_extents[2] + second.shapes[0].half_extents[2]
+        touch = abs(distance - one.pitch_radius - other.pitch_radius) <= _MESH_SLACK
+        if touch and abs(alike) >= _PARALLEL and abs(along) < thickness - _MESH_SLACK:
+            # On parallel axes cogs turn against each other, on opposite ones the same way.
+            ratio = -float(np.sign(alike)) * one.pitch_radius / other.pitch_radius
+            found.append(Mesh(first=i, second=j, ratio=ratio))
+    return tuple(found)

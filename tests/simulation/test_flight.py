@@ -1,0 +1,181 @@
+"""Fans, wings, propellers, bowls and balloons as worked out by hand, on both engines."""
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import pytest
+from tests.simulation.designs import DOWN, EAST, NORTH, SOUTH, UP, WEST, Direction
+from tests.simulation.designs.workshop import WorkshopDraft
+
+from buildarena_geometry import KeyPress, Machine
+from buildarena_geometry.modules.sets import module_set
+from buildarena_simulation import Scenario, Trajectory, simulate
+from buildarena_simulation.constants import GRAVITY
+from buildarena_simulation.machine import structure_of
+from buildarena_simulation.scenario import Control, ReleasedPlacement
+from buildarena_simulation.structure.aerodynamics import wings_of
+
+WORKSHOP = module_set("workshop")
+DRIVEN = Control(mode="agent")
+HELD = (KeyPress(time_s=0.0, key="UpArrow", hold_for_s=100.0),)
+Law = Callable[[np.ndarray], np.ndarray]
+
+
+def _released(
+    machine: Machine,
+    engine: str,
+    *,
+    seconds: float,
+    velocity: Sequence[float] = (0.0, 0.0, 0.0),
+    height: float = 200.0,
+) -> Trajectory:
+    place = ReleasedPlacement(height=height, velocity=tuple(velocity))
+    scenario = Scenario(duration_s=seconds, placement=place, control=DRIVEN)
+    return simulate(machine, scenario, engine, controls=HELD)
+
+
+def _path(machine: Machine, force: Law, velocity: Sequence[float], seconds: float) -> np.ndarray:
+    """How far a machine gets that does not turn, under weight, drag and a force, (3,)."""
+    structure = structure_of(machine)
+    mass = structure.masses.sum()
+    drag = (structure.linear_drag * structure.masses).sum()
+    v, way, step = np.array(velocity, dtype=float), np.zeros(3), 1e-3
+    for _ in range(round(seconds / step)):
+        a = (force(v) - drag * v) / mass - np.array([0.0, 0.0, GRAVITY])
+        way += step * (v + step * a / 2)
+        v = v + step * a
+    return way
+
+
+def _way(trajectory: Trajectory) -> np.ndarray:
+    first, *_, last = trajectory.positions[:, 0].astype(float)
+    return np.asarray(last - first)
+
+
+@pytest.mark.parametrize("load", [1, 9, 14])
+def test_a_fan_lifts_and_drops_its_load_as_thrust_and_weight_say(engine: str, load: int) -> None:
+    draft = WorkshopDraft()
+    start = draft.start()
+    draft.row(start, DOWN, load)
+    fan = draft.attach(start, UP, "Flying Block")
+    draft.bind(fan, "fly", "UpArrow")
+    thrust = WORKSHOP["Flying Block"].forces.push.force * GRAVITY
+    found = _way(_released(draft.machine, engine, seconds=2.0))
+    expected = _path(draft.machine, lambda v: np.array([0.0, 0.0, thrust]), (0, 0, 0), 2.0)
+    assert found[2] == pytest.approx(expected[2], rel=0.02)
+    assert np.abs(found[:2]).max() < 0.01
+
+
+def _pair(module: str, y_axis: Direction) -> Machine:
+    """The same on both sides, so that nothing turns."""
+    draft = WorkshopDraft()
+    start = draft.start()
+    for side in (EAST, WEST):
+        draft.placed(start, side, module, y_axis)
+    return draft.machine
+
+
+def _plate(v: np.ndarray) -> np.ndarray:
+    """The air's force on two wing panels that lie level."""
+    wing = WORKSHOP["Wing Panel"].forces.wing
+    size = -2 * wing.coefficient * v[2] * min(v @ v, wing.cap_speed**2)
+    return np.array([0.0, 0.0, size])
+
+
+@pytest.mark.parametrize("attack_deg", [-8.0, 2.0, 5.0, 12.0, 30.0, 90.0])
+@pytest.mark.parametrize("speed", [12.0, 24.0, 45.0])
+def test_a_wing_lifts_and_drags_as_its_law_says(
+    engine: str, attack_deg: float, speed: float
+) -> None:
+    machine = _pair("Wing Panel", UP)
+    angle = math.radians(attack_deg)
+    velocity = (0.0, speed * math.cos(angle), -speed * math.sin(angle))
+    found = _way(_released(machine, engine, seconds=0.6, velocity=velocity))
+    expected = _path(machine, _plate, velocity, 0.6)
+    assert found == pytest.approx(expected, abs=0.03 * float(np.linalg.norm(expected)))
+
+
+def test_a_glider_of_a_few_panels_flies_at_a_sensible_speed() -> None:
+    wing = WORKSHOP["Wing Panel"]
+    mass = WORKSHOP.start.mass + 4 * wing.mass + 2 * 0.3
+    flown = {}
+    for speed in (15.0, 25.0):
+        normal = GRAVITY * mass / (4 * wing.forces.wing.coefficient * speed**2)
+        flown[speed] = math.degrees(math.asin(normal / speed))
+    assert 2.0 < flown[25.0] < flown[15.0] < 25.0, "angles of attack that carry it"
+
+
+@pytest.mark.parametrize("name", ["Propeller", "Small Propeller"])
+def test_the_published_law_holds_for_any_flow(name: str) -> None:
+    wing = WORKSHOP[name].forces.wing
+    rng = np.random.default_rng(7)
+    velocity = 20.0 * rng.normal(size=(200, 3))
+    pitch = math.radians({"Propeller": 23.069, "Small Propeller": 22.845}[name])
+    # The law's frame is left-handed: its x axis is ours reversed.
+    mirrored = velocity * np.array([-1.0, 1.0, 1.0])
+    along = mirrored @ np.array([-math.sin(pitch), math.cos(pitch), 0.0])
+    expected = -0.015 * along * np.minimum((velocity**2).sum(axis=1), 900.0)
+    found = wings_of([wing] * 200, np.tile(np.eye(3), (200, 1, 1))).forces(velocity)
+    assert found[:, 1] == pytest.approx(expected)
+    assert (found[:, [0, 2]] == 0.0).all()
+
+
+def _lifted(engine: str, module: str, y_axis: Direction, flip: bool) -> float:
+    """By how much two blades that a wheel turns lighten what stands on the ground, mass·g."""
+    draft = WorkshopDraft()
+    start = draft.start()
+    for side in (EAST, WEST, NORTH, SOUTH):
+        draft.row(start, side, 4)
+    top = draft.row(start, UP, 2)[-1]
+    wheel = draft.attach(top, UP, "Powered Wheel")
+    if flip:
+        draft.do("flip_spin", block_id=wheel)
+    hub = draft.row(wheel, UP, 1)[-1]
+    for side in (EAST, WEST):
+        draft.placed(hub, side, module, y_axis)
+    draft.bind(wheel, "spinning_forward", "UpArrow")
+    scenario = Scenario(duration_s=3.0, control=DRIVEN)
+    trajectory = simulate(draft.machine, scenario, engine, controls=HELD)
+    assert not trajectory.breaks
+    weight = structure_of(draft.machine).masses.sum()
+    return float(weight - trajectory.bearing.ground[-25:].mean())
+
+
+@pytest.mark.parametrize("name", ["Propeller", "Small Propeller"])
+@pytest.mark.parametrize("y_axis", [UP, DOWN])
+def test_blades_on_a_wheel_pull_as_the_published_law_says(
+    engine: str, name: str, y_axis: Direction
+) -> None:
+    module = WORKSHOP[name]
+    radius = 0.5 + structure_of(_pair(name, UP)).positions[1, 0] - 0.5
+    speed = WORKSHOP["Powered Wheel"].motor.speed * radius
+    pitch = math.radians(module.forces.wing.pitch_deg)
+    pull = 2 * 0.015 * speed * math.sin(pitch) * min(speed**2, 900.0) / GRAVITY
+    one, other = (_lifted(engine, name, y_axis, flip) for flip in (False, True))
+    assert sorted((one, other)) == pytest.approx([-pull, pull], rel=0.03)
+
+
+@pytest.mark.parametrize("y_axis", [UP, DOWN])
+def test_bowls_fall_as_fast_as_their_drag_says(engine: str, y_axis: Direction) -> None:
+    machine = _pair("Drag Block", y_axis)
+    wing = WORKSHOP["Drag Block"].forces.wing
+    # The bowl opens against its y axis: what falls with it down is braked.
+    coefficient = 2 * wing.coefficient if y_axis == UP else 0.0
+    structure = structure_of(machine)
+    mass = structure.masses.sum()
+    drag = (structure.linear_drag * structure.masses).sum()
+    trajectory = _released(machine, engine, seconds=3.0)
+    speed = -float(np.diff(trajectory.positions[-2:, 0, 2].astype(float))[0]) * 25.0
+
+    def braked(v: np.ndarray) -> np.ndarray:
+        return np.array([0.0, 0.0, coefficient * v[2] ** 2])
+
+    assert -_way(trajectory)[2] == pytest.approx(
+        -_path(machine, braked, (0, 0, 0), 3.0)[2], rel=0.02
+    )
+    if coefficient:
+        terminal = (math.sqrt(drag**2 + 4 * coefficient * mass * GRAVITY) - drag) / (
+            2 * coefficient
+        )
+        assert speed == pytest.approx(terminal, rel=0.02)
