@@ -4,6 +4,7 @@ from buildarena_geometry.actions.lookups import nearest
 from buildarena_geometry.changes import Change
 from buildarena_geometry.feedback import modules as words
 from buildarena_geometry.feedback.words import listing
+from buildarena_geometry.modules.module import Module
 from buildarena_geometry.modules.names import CaselessNames
 from buildarena_geometry.modules.parameters import Name, RefusalError, shown
 from buildarena_geometry.outcomes import Cause
@@ -32,16 +33,24 @@ def list_modules(state: MachineState, category: Name) -> Change:
 
 
 def describe_module(state: MachineState, module: Name) -> Change:
-    """Tells all about one module: size, faces, actions and use.
+    """Tells all about a module: size, faces, actions and use.
 
     Args:
-        module: Name of the module.
+        module: Name of the module, or several names with commas between them.
     """
-    found = state.catalogue.named(module)
+    names = [name for name in module.split(",") if name.strip()] or [module]
+    found = {one.name: one for one in (_described(state, name.strip()) for name in names)}
+    return Change(
+        after=state, render=lambda: "\n\n".join(words.module_text(one) for one in found.values())
+    )
+
+
+def _described(state: MachineState, name: str) -> Module:
+    found = state.catalogue.named(name)
     if found is None or found.kind == "cargo":
         known = [one.name for one in state.catalogue.values() if one.kind != "cargo"]
         raise RefusalError(
             Cause.UNKNOWN_MODULE,
-            f"There is no module {shown(module)}. Modules: {nearest(module, known)}.",
+            f"There is no module {shown(name)}. Modules: {nearest(name, known)}.",
         )
-    return Change(after=state, render=lambda: words.module_text(found))
+    return found

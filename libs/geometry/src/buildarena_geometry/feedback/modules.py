@@ -43,7 +43,7 @@ def lookup_text(catalogue: Catalogue) -> str:
     count = sum(module.kind not in ("start", "cargo") for module in catalogue.values())
     return (
         f"{counted(count, 'module')} may be used. Look up what you need: list_modules names those "
-        "of a category, describe_module tells all about one.\n"
+        "of a category, describe_module tells all about one or several.\n"
         f"{categories_text(catalogue)}"
     )
 

@@ -100,11 +100,13 @@ def draft_phase(session: Session, plan: Plan, part: SubStructure) -> str:
     )
     dialogue = Dialogue(session, phase="draft", opening=opening, sub_structure=part.name)
     drafter = _looking_up(session, Role(name="drafter", system=pack.roles["drafter"]))
-    reviewer = Role(name="reviewer", system=pack.roles["reviewer"], tools=[OBJECTION])
+    reviewer = _looking_up(
+        session, Role(name="reviewer", system=pack.roles["reviewer"], tools=[OBJECTION])
+    )
     for turn in range(DRAFT_TURNS):
         if turn % 2 == 0:
             _speak(dialogue, drafter)
-        elif terminates(dialogue.turn(reviewer)):
+        elif terminates(_speak(dialogue, reviewer)):
             dialogue.remark(drafter, pack.say("blueprint", name=part.name))
             return _speak(dialogue, drafter).text
     raise ConstructionFailedError(
