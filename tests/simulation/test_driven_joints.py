@@ -18,13 +18,15 @@ def test_a_slider_falls_freely_to_its_stop(engine: str) -> None:
     slider = rig.attach(rig.attach(rig.top, EAST), DOWN, "Slider")
     rig.row(slider, DOWN, 2)
     trajectory = rig.tried(engine, 2.0)
-    way = place_of(trajectory, slider) - place_of(trajectory, rig.top)
+    way, base = place_of(trajectory, slider), place_of(trajectory, rig.top)
     fallen = way[0, 2] - way[:, 2]
     falling = (trajectory.time_s <= 0.2) & (trajectory.time_s >= 0.12)
     expected = GRAVITY * trajectory.time_s**2 / 2
     assert fallen[falling] == pytest.approx(expected[falling], rel=0.05)
-    assert fallen[-1] == pytest.approx(1.0, abs=0.02)
-    assert fallen.max() < 1.1
+    # The mast itself settles by the margin of its shape.
+    drawn = fallen - (base[0, 2] - base[:, 2])
+    assert drawn[-1] == pytest.approx(1.0, abs=0.02)
+    assert drawn.max() < 1.1
     assert abs(way[:, :2] - way[0, :2]).max() < 0.02
 
 

@@ -154,3 +154,14 @@ def test_a_cart_rolls_downhill_as_its_inertia_says(engine: str, wheel: str) -> N
     drag = (clusters.linear_drag @ clusters.mass) * speed[rows].mean()
     expected = (clusters.mass.sum() * GRAVITY * math.sin(slope) - drag) / rolling
     assert gained == pytest.approx(expected, rel=0.05)
+
+
+def test_what_swings_freely_never_rises_above_its_start(engine: str) -> None:
+    rig = Rig()
+    first = rig.attach(rig.row(rig.top, NORTH, 2)[-1], NORTH, "Swivel")
+    second = rig.attach(rig.row(first, EAST, 2)[-1], EAST, "Ball Joint")
+    bob = rig.attach(rig.row(second, EAST, 2)[-1], EAST, "Weight")
+    trajectory = rig.tried(engine, 8.0)
+    height = place_of(trajectory, bob)[:, 2]
+    assert height.min() < height[0] - 4.0
+    assert height.max() < height[0] + 0.05
