@@ -3,7 +3,10 @@
 from collections.abc import Mapping, Sequence
 from typing import Final
 
+import numpy as np
+
 from buildarena_simulation.constants import FRICTION_TERRAIN
+from buildarena_simulation.engines.base import CargoPose
 from buildarena_simulation.engines.quiet_output import quiet_output
 from buildarena_simulation.structure.model import FloatArray
 
@@ -67,4 +70,15 @@ def set_friction(client: Mapping[str, int], body: int, link: int, friction: floa
         spinningFriction=0,
         restitution=0,
         **client,
+    )
+
+
+def pose_of(client: Mapping[str, int], body: int | None) -> CargoPose:
+    """Where a body is and how fast its centre moves."""
+    position, turn = pybullet.getBasePositionAndOrientation(body, **client)
+    velocity, _ = pybullet.getBaseVelocity(body, **client)
+    return CargoPose(
+        position=np.array(position),
+        quaternion=np.array(turn)[[3, 0, 1, 2]],
+        velocity=np.array(velocity),
     )

@@ -12,9 +12,10 @@ from buildarena_simulation.engines.closest_points import ShapeTable, shape_table
 from buildarena_simulation.engines.impacts import ImpactWatch
 from buildarena_simulation.engines.mjcf import MjcfSettings, MjcfState, mjcf_of
 from buildarena_simulation.engines.mujoco_joints import JointAddresses, enter_joint, joint_addresses
-from buildarena_simulation.engines.tendons import Tendons
+from buildarena_simulation.engines.tendons import Tendons, weld_wrenches
 from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.contacts import CARGO, WORLD, ContactForces
+from buildarena_simulation.structure.grips import Hold
 from buildarena_simulation.structure.model import BoolArray, FloatArray, IntArray
 from buildarena_simulation.structure.motion import Motion
 from buildarena_simulation.structure.solids import Solid, Solids
@@ -59,6 +60,7 @@ class MujocoEngine:
             servo_slip=_SERVO_SLIP,
         )
         self._solids = Solids(world.structure)
+        self._holds: tuple[Hold, ...] = ()
         self._rope_alive = np.ones(len(world.structure.ropes), dtype=bool)
         self._cargo_mass = world.cargo.mass if world.cargo else 0.0
         self._cargo_state: tuple[FloatArray, FloatArray] | None = None
@@ -102,6 +104,7 @@ class MujocoEngine:
             moments=moments,
             cargo_mass=self._cargo_mass,
             ropes=np.flatnonzero(self._rope_alive).tolist(),
+            holds=self._holds,
         )
         self._model = mujoco.MjModel.from_xml_string(mjcf_of(self._world, state, self._mjcf))
         self._data = mujoco.MjData(self._model)
@@ -173,6 +176,14 @@ class MujocoEngine:
     def struck(self) -> bool:
         """See `Engine`."""
         return self._impacts.struck
+
+    def hold(self, holds: Sequence[Hold]) -> None:
+        """See `Engine`."""
+        self._holds = tuple(holds)
+
+    def grip_wrenches(self) -> FloatArray:
+        """See `Engine`."""
+        return weld_wrenches(self._model, self._data, self._holds)
 
     def rope_tensions(self) -> FloatArray:
         """See `Engine`."""
