@@ -17,20 +17,17 @@ export function found(modules: readonly ModuleView[], text: string): ModuleView[
 }
 
 /** What can be put on the chosen face, and connectors between two faces. */
-export function AttachPanel({ hand, allowed }: { hand: Hand; allowed: readonly string[] | null }) {
-  const query = useQuery(modulesQuery());
+export function AttachPanel({ hand, task }: { hand: Hand; task: { name: string; version: string } }) {
+  const query = useQuery(modulesQuery(task.name, task.version));
   if (hand.bench.parts.length === 0) return <Begin hand={hand} />;
   return (
     <Answered query={query} rows={6}>
-      {(all) => {
-        const modules = all.filter((one) => allowed === null || allowed.includes(one.name));
-        return (
-          <Stack gap="sm">
-            <Blocks hand={hand} modules={modules.filter((one) => !UNPLACED.has(one.kind))} />
-            <Connectors hand={hand} names={modules.filter((one) => one.kind === "connector").map((one) => one.name)} />
-          </Stack>
-        );
-      }}
+      {(modules) => (
+        <Stack gap="sm">
+          <Blocks hand={hand} modules={modules.filter((one) => !UNPLACED.has(one.kind))} />
+          <Connectors hand={hand} names={modules.filter((one) => one.kind === "connector").map((one) => one.name)} />
+        </Stack>
+      )}
     </Answered>
   );
 }

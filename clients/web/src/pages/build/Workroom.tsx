@@ -82,7 +82,7 @@ export function Workroom({ view }: { view: SessionView }) {
               <Tabs.Tab value="keys">Keys</Tabs.Tab>
               <Tabs.Tab value="tools">All tools</Tabs.Tab>
             </Tabs.List>
-            <Tabs.Panel value="attach" pt="sm"><AttachPanel hand={hand} allowed={document.constraints?.modules ?? null} /></Tabs.Panel>
+            <Tabs.Panel value="attach" pt="sm"><AttachPanel hand={hand} task={{ name: view.job.task, version: view.job.task_version }} /></Tabs.Panel>
             <Tabs.Panel value="part" pt="sm"><PartPanel hand={hand} view={view} /></Tabs.Panel>
             <Tabs.Panel value="keys" pt="sm"><KeysPanel hand={hand} view={view} duration={document.scenario?.duration_s ?? DURATION_S} /></Tabs.Panel>
             <Tabs.Panel value="tools" pt="sm"><ToolsPanel hand={hand} view={view} /></Tabs.Panel>

@@ -19,8 +19,13 @@ export const session = (id: string) =>
     queryFn: () => jsonOf<SessionView>(`/v1/sessions/${encodeURIComponent(id)}`),
   });
 
-export const modules = () =>
-  queryOptions({ queryKey: ["modules"], staleTime: Infinity, queryFn: () => jsonOf<ModuleView[]>("/v1/modules") });
+/** The modules that a task offers. */
+export const modules = (task: string, version: string) =>
+  queryOptions({
+    queryKey: ["modules", task, version],
+    staleTime: Infinity,
+    queryFn: () => jsonOf<ModuleView[]>(`/v1/modules?${new URLSearchParams({ task, version }).toString()}`),
+  });
 
 const EMPTY: Bench = { name: MAIN, parts: [], control_sequence: [], sub_structures: [], available: [], mass: 0, detached: [] };
 

@@ -82,3 +82,33 @@ def pose_of(client: Mapping[str, int], body: int | None) -> CargoPose:
         quaternion=np.array(turn)[[3, 0, 1, 2]],
         velocity=np.array(velocity),
     )
+
+
+def set_up(
+    client: Mapping[str, int],
+    *,
+    gravity: float,
+    time_step_s: float,
+    iterations: int,
+    residual: float,
+) -> None:
+    """Sets a new world's gravity and solver.
+
+    Args:
+        client: The engine's world.
+        gravity: Downward acceleration, units/s².
+        time_step_s: Length of a step, seconds.
+        iterations: Most iterations of the solver.
+        residual: At which it stops.
+    """
+    pybullet.setGravity(0, 0, -gravity, **client)
+    pybullet.setPhysicsEngineParameter(
+        fixedTimeStep=time_step_s,
+        numSubSteps=0,
+        numSolverIterations=iterations,
+        solverResidualThreshold=residual,
+        enableConeFriction=1,
+        deterministicOverlappingPairs=1,
+        enableFileCaching=0,
+        **client,
+    )

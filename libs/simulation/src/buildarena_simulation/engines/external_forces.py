@@ -6,6 +6,7 @@ between; given in a body's own principal frame, they turn with it.
 
 import numpy as np
 
+from buildarena_simulation.engines.joint_places import is_simple_piece
 from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.model import FloatArray, Structure
 from buildarena_simulation.structure.motion import Motion
@@ -38,11 +39,15 @@ def thrust_forces(
 
 
 def drag_forces(
-    clusters: Clusters, motion: Motion, axes: FloatArray, moments: FloatArray
+    structure: Structure, clusters: Clusters, motion: Motion, axes: FloatArray, moments: FloatArray
 ) -> list[tuple[int, Force]]:
-    """Root cluster, force and torque of each piece's drag: Unity's v *= 1 - drag·dt as a force.
+    """Cluster, force and torque of drag: Unity's v *= 1 - drag·dt as a force.
+
+    A piece with no joints but wheels' axles moves as its root does, which takes the drag of all; in
+    any other each cluster has its own.
 
     Args:
+        structure: The machine.
         clusters: The clusters.
         motion: Their motion.
         axes: (C, 3, 3) machine_from_principal.
@@ -50,6 +55,9 @@ def drag_forces(
     """
     found = []
     for piece in clusters.pieces:
+        if not is_simple_piece(structure, clusters, piece):
+            found += [(c, _own_drag(clusters, motion, axes, moments, c=c)) for c in piece]
+            continue
         root, inside = piece[0], list(piece)
         to_body = (motion.rotation[root] @ axes[root]).T
         drag = float(clusters.linear_drag[inside] @ clusters.mass[inside])
@@ -69,3 +77,13 @@ def body_wrenches(wrenches: FloatArray, axes: FloatArray) -> list[tuple[int, For
     local = turned_wrenches(axes.transpose(0, 2, 1), wrenches)
     acted_on = np.flatnonzero(wrenches.any(axis=1))
     return [(int(c), (local[c, :3].tolist(), local[c, 3:].tolist())) for c in acted_on]
+
+
+def _own_drag(
+    clusters: Clusters, motion: Motion, axes: FloatArray, moments: FloatArray, *, c: int
+) -> Force:
+    to_body = (motion.rotation[c] @ axes[c]).T
+    drag = clusters.linear_drag[c] * clusters.mass[c]
+    force = -drag * (to_body @ motion.velocity[c])
+    torque = -clusters.angular_drag[c] * moments[c] * (to_body @ motion.spin[c])
+    return force.tolist(), torque.tolist()

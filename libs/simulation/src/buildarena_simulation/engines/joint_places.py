@@ -5,6 +5,7 @@ machine frame every joint stands at 0.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,6 +41,11 @@ def seat_of(structure: Structure, clusters: Clusters, c: int) -> str:
 def is_simple(structure: Structure, clusters: Clusters, c: int) -> bool:
     """Whether a cluster hangs on an axle whose angle does not matter."""
     return bool(structure.joints.simple[clusters.seated[c]])
+
+
+def is_simple_piece(structure: Structure, clusters: Clusters, piece: Sequence[int]) -> bool:
+    """Whether all joints of a piece, given root first, are axles whose angles do not matter."""
+    return all(is_simple(structure, clusters, c) for c in piece[1:])
 
 
 def sign_of(clusters: Clusters, c: int) -> float:

@@ -1,7 +1,6 @@
 """MuJoCo behind the engine seam: one body per cluster, one geom per block, hinges for axles."""
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 
 import mujoco
 import numpy as np
@@ -10,15 +9,20 @@ from buildarena_simulation.constants import FORCES_EVERY_S, MAX_SPIN
 from buildarena_simulation.engines.base import CargoPose, World, principal_frames
 from buildarena_simulation.engines.closest_points import ShapeTable, shape_table
 from buildarena_simulation.engines.impacts import ImpactWatch
+from buildarena_simulation.engines.joint_places import is_simple_piece
 from buildarena_simulation.engines.mjcf import MjcfSettings, MjcfState, mjcf_of
-from buildarena_simulation.engines.mujoco_joints import JointAddresses, enter_joint, joint_addresses
+from buildarena_simulation.engines.mujoco_addresses import addresses_in
+from buildarena_simulation.engines.mujoco_joints import (
+    drag_apart,
+    enter_joint,
+)
 from buildarena_simulation.engines.tendons import Tendons, weld_wrenches
 from buildarena_simulation.structure.clusters import Clusters
-from buildarena_simulation.structure.contacts import CARGO, WORLD, ContactForces
+from buildarena_simulation.structure.contacts import ContactForces
 from buildarena_simulation.structure.grips import Hold
-from buildarena_simulation.structure.model import BoolArray, FloatArray, IntArray
+from buildarena_simulation.structure.model import FloatArray, IntArray
 from buildarena_simulation.structure.motion import Motion
-from buildarena_simulation.structure.solids import Solid, Solids
+from buildarena_simulation.structure.solids import Solids
 from buildarena_simulation.structure.vectors import cross, turned, turned_wrenches
 
 _TIME_STEP_S = 1 / 500
@@ -108,9 +112,7 @@ class MujocoEngine:
         )
         self._model = mujoco.MjModel.from_xml_string(mjcf_of(self._world, state, self._mjcf))
         self._data = mujoco.MjData(self._model)
-        self._addresses = _addresses_in(
-            self._model, self._world, clusters, solids, self._rope_alive
-        )
+        self._addresses = addresses_in(self._model, self._world, clusters, solids, self._rope_alive)
         self._tendons = Tendons(
             model=self._model,
             data=self._data,
@@ -148,6 +150,8 @@ class MujocoEngine:
         """See `Engine`."""
         model, data, at = self._model, self._data, self._addresses
         self._targets = targets[-1]
+        if self._apart:
+            drag_apart(model, data, (self._clusters, at.bodies), self.motion(), self._apart)
         data.ctrl[at.thrust_actuators] = thrusts
         impacts = ImpactWatch(
             len(targets), gravity=self._world.gravity, time_step_s=self.time_step_s
@@ -238,9 +242,16 @@ class MujocoEngine:
         self._dof_invweight_times_mass = model.dof_invweight0[:6] * mass
 
     def _set_drag(self, moments: FloatArray) -> None:
-        """Damping of each piece's free joint: Unity's v *= 1 - drag·dt, as a force."""
+        """Damping of each piece's free joint: Unity's v *= 1 - drag·dt, as a force.
+
+        The clusters of a piece with other joints than wheels' axles have each its own drag.
+        """
         model, clusters = self._model, self._clusters
+        self._apart: list[tuple[int, ...]] = []
         for piece in clusters.pieces:
+            if not is_simple_piece(self._structure, clusters, piece):
+                self._apart.append(piece)
+                continue
             root, inside = piece[0], list(piece)
             dof = model.joint(f"free {root}").dofadr[0]
             drag = clusters.linear_drag[inside] @ clusters.mass[inside]
@@ -320,70 +331,3 @@ class MujocoEngine:
                 blocks.append(found)
                 weights.append(weight)
         return np.concatenate(rows), np.concatenate(blocks), np.concatenate(weights)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Addresses:
-    """Where a compiled model keeps what belongs to clusters, blocks, wheels and ropes.
-
-    Attributes:
-        bodies: (C,) body of each cluster.
-        body_of_geom: Cluster of each geom, `CARGO` or `WORLD`.
-        block_of_geom: Block of each geom that stands for one only, else -1.
-        surface_of_geom: Fixed body of each geom as in `ContactForces.surface`.
-        joints: The driven joints.
-        thrust_actuators: (K,) actuator of each cannon.
-        free_dofs: (F, 3) linear velocities of the free bodies, the cargo first.
-        spin_dofs: (P, 3) angular velocities of the pieces.
-        tendons: Tendon of each rope that holds.
-    """
-
-    bodies: IntArray
-    body_of_geom: IntArray
-    block_of_geom: IntArray
-    surface_of_geom: IntArray
-    joints: JointAddresses
-    thrust_actuators: IntArray
-    free_dofs: IntArray
-    spin_dofs: IntArray
-    tendons: Mapping[int, int]
-
-
-def _addresses_in(
-    model: "mujoco.MjModel",
-    world: World,
-    clusters: Clusters,
-    solids: Sequence[Sequence[Solid]],
-    rope_alive: BoolArray,
-) -> _Addresses:
-    structure = world.structure
-    body_of_geom = np.full(model.ngeom, CARGO, dtype=np.int64)
-    block_of_geom, surface_of_geom = (np.full(model.ngeom, -1, dtype=np.int64) for _ in range(2))
-    for c, of_cluster in enumerate(solids):
-        for k, solid in enumerate(of_cluster):
-            geom = model.geom(f"solid {c} {k}").id
-            body_of_geom[geom] = c
-            if len(solid.blocks) == 1:
-                block_of_geom[geom] = solid.blocks[0]
-    fixed = [(f"terrain {k}", k + 1) for k in range(len(world.terrain))]
-    for name, surface in [("ground", 0)] * world.ground + fixed:
-        geom = model.geom(name).id
-        body_of_geom[geom], surface_of_geom[geom] = WORLD, surface
-    pieces = [model.joint(f"free {piece[0]}").dofadr[0] for piece in clusters.pieces]
-    # Only the cargo can stand before the pieces; its free joint comes first.
-    free = pieces if pieces[0] == 0 else [0, *pieces]
-    return _Addresses(
-        bodies=_ids(model.body(f"cluster {c}").id for c in range(len(clusters))),
-        body_of_geom=body_of_geom,
-        block_of_geom=block_of_geom,
-        surface_of_geom=surface_of_geom,
-        joints=joint_addresses(model, structure, clusters),
-        thrust_actuators=_ids(model.actuator(f"cannon {i}").id for i in structure.cannons),
-        free_dofs=_ids(free)[:, None] + np.arange(3),
-        spin_dofs=_ids(pieces)[:, None] + np.arange(3, 6),
-        tendons={int(r): model.tendon(f"rope {r}").id for r in np.flatnonzero(rope_alive)},
-    )
-
-
-def _ids(numbers: Iterable[int]) -> IntArray:
-    return np.array([int(number) for number in numbers], dtype=np.int64)

@@ -1,5 +1,6 @@
 """Moving joints in a compiled MuJoCo model: where they start, and what their drives are told."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -117,3 +118,31 @@ def enter_joint(
     count = len(found.place)
     data.qpos[place : place + count] = found.place
     data.qvel[dof : dof + count] = found.rate
+
+
+def drag_apart(
+    model: "mujoco.MjModel",
+    data: "mujoco.MjData",
+    bodies: tuple[Clusters, IntArray],
+    motion: Motion,
+    pieces: Sequence[Sequence[int]],
+) -> None:
+    """Applies the drag of every cluster of some pieces until it is called again.
+
+    Args:
+        model: The model.
+        data: Its state; the applied generalised forces are written.
+        bodies: The clusters, and (C,) the body of each.
+        motion: The clusters' motion.
+        pieces: The clusters of each piece.
+    """
+    clusters, body_of = bodies
+    centers = motion.centers_of_mass(clusters)
+    data.qfrc_applied[:] = 0.0
+    for c in (c for piece in pieces for c in piece):
+        turn = motion.rotation[c]
+        force = -clusters.linear_drag[c] * clusters.mass[c] * motion.velocity[c]
+        slowed = clusters.inertia[c] @ (turn.T @ motion.spin[c])
+        torque = -clusters.angular_drag[c] * (turn @ slowed)
+        body = int(body_of[c])
+        mujoco.mj_applyFT(model, data, force, torque, centers[c], body, data.qfrc_applied)

@@ -1,9 +1,8 @@
 """PyBullet behind the engine seam: one multibody per articulated piece, read from URDF text.
 
-Why it is done this way: multibodies (not maximal coordinates) keep heavy cargo quiet;
-`createCollisionShapeArray` drops shapes beyond 16, URDF text does not; compound inertia computed by
-PyBullet is wrong, so ours is given; URDFs are cached by file name, so caching is off. Its own
-damping grows with the square of the speed, so drag is a force of ours.
+Why: multibodies keep heavy cargo quiet; `createCollisionShapeArray` drops shapes beyond 16; inertia
+computed by PyBullet is wrong; URDFs are cached by file name; its damping grows with the speed's
+square, so drag is a force of ours.
 """
 
 import itertools
@@ -30,6 +29,7 @@ from buildarena_simulation.engines.bullet_bodies import (
     free_of_damping,
     pose_of,
     set_friction,
+    set_up,
 )
 from buildarena_simulation.engines.bullet_contacts import read_contacts
 from buildarena_simulation.engines.bullet_grips import BulletGrips
@@ -43,7 +43,7 @@ from buildarena_simulation.engines.external_forces import (
 )
 from buildarena_simulation.engines.hinges import HingedPiece, hinge_frames
 from buildarena_simulation.engines.impacts import ImpactWatch
-from buildarena_simulation.engines.joint_places import is_simple, joint_rate
+from buildarena_simulation.engines.joint_places import is_simple_piece, joint_rate
 from buildarena_simulation.engines.quiet_output import quiet_output
 from buildarena_simulation.engines.ropes import rope_forces
 from buildarena_simulation.engines.urdf import urdf_of
@@ -149,7 +149,9 @@ class PyBulletEngine:
     def advance(self, targets: FloatArray, thrusts: FloatArray) -> None:
         """See `Engine`."""
         external_forces = thrust_forces(self._structure, self._clusters, self._axes, thrusts)
-        drags = drag_forces(self._clusters, self._motion, self._axes, self._moments)
+        drags = drag_forces(
+            self._structure, self._clusters, self._motion, self._axes, self._moments
+        )
         impacts = ImpactWatch(
             len(targets), gravity=self._world.gravity, time_step_s=self.time_step_s
         )
@@ -206,16 +208,12 @@ class PyBulletEngine:
 
     def _start_world(self) -> None:
         world = self._world
-        pybullet.setGravity(0, 0, -world.gravity, **self._client)
-        pybullet.setPhysicsEngineParameter(
-            fixedTimeStep=self.time_step_s,
-            numSubSteps=0,
-            numSolverIterations=_ITERATIONS,
-            solverResidualThreshold=_RESIDUAL,
-            enableConeFriction=1,
-            deterministicOverlappingPairs=1,
-            enableFileCaching=0,
-            **self._client,
+        set_up(
+            self._client,
+            gravity=world.gravity,
+            time_step_s=self.time_step_s,
+            iterations=_ITERATIONS,
+            residual=_RESIDUAL,
         )
         if world.ground:
             ground = add_box(
@@ -247,7 +245,7 @@ class PyBulletEngine:
         )
         for c, link in articulation.links.items():
             set_friction(self._client, body, link, self._friction_of(c))
-        simple = all(is_simple(structure, clusters, c) for c in inside[1:])
+        simple = is_simple_piece(structure, clusters, inside)
         if simple:
             for link, c in enumerate(inside[1:]):
                 rate = joint_rate(structure, clusters, motion, c)

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from buildarena_simulation.engines.urdf_joints import joint_tags, numbers
+from buildarena_simulation.engines.urdf_joints import joint_tags, links_before, numbers
 from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.model import FloatArray, ShapeKind, Structure
 from buildarena_simulation.structure.solids import Solid
@@ -39,6 +39,7 @@ def urdf_of(
     for link, c in enumerate(inside):
         if link:
             origins[c] = structure.joints.points[clusters.seated[c]]
+            lines += links_before(structure, clusters, c, f"link {link}")
         offset = axes[c].T @ (clusters.center_of_mass[c] - origins[c])
         lines += [f'<link name="link {link}">', *_inertial(clusters.mass[c], moments[c], offset)]
         for solid in solids[c]:

@@ -53,6 +53,36 @@ def joint_tags(
     return _joint(f"joint {number}", kind, names, origin, axis, limits=limits)
 
 
+def links_before(structure: Structure, clusters: Clusters, c: int, name: str) -> list[str]:
+    """The small links that a cluster's joint needs before its own: an engine wants parents first.
+
+    Args:
+        structure: The machine.
+        clusters: Its clusters.
+        c: The cluster.
+        name: Of its own link.
+    """
+    if seat_of(structure, clusters, c) != "constant_velocity":
+        return []
+    inertia = f'ixx="{_BETWEEN}" ixy="0" ixz="0" iyy="{_BETWEEN}" iyz="0" izz="{_BETWEEN}"'
+    lines: list[str] = []
+    for between in _between(name):
+        lines += [
+            f'<link name="{between}">',
+            "<inertial>",
+            _STRAIGHT,
+            f'<mass value="{_BETWEEN}"/>',
+            f"<inertia {inertia}/>",
+            "</inertial>",
+            "</link>",
+        ]
+    return lines
+
+
+def _between(name: str) -> list[str]:
+    return [f"{name} between {k}" for k in (0, 1)]
+
+
 def numbers(values: FloatArray) -> str:
     """Numbers of an attribute, written in full."""
     return " ".join(repr(float(v)) for v in values)
@@ -65,20 +95,8 @@ def _halves(
     limits: tuple[float, float] | None,
 ) -> list[str]:
     parent, child = names
-    between = [f"{child} between {k}" for k in (0, 1)]
-    chain = [parent, *between, child]
+    chain = [parent, *_between(child), child]
     lines: list[str] = []
-    inertia = f'ixx="{_BETWEEN}" ixy="0" ixz="0" iyy="{_BETWEEN}" iyz="0" izz="{_BETWEEN}"'
-    for name in between:
-        lines += [
-            f'<link name="{name}">',
-            "<inertial>",
-            _STRAIGHT,
-            f'<mass value="{_BETWEEN}"/>',
-            f"<inertia {inertia}/>",
-            "</inertial>",
-            "</link>",
-        ]
     for k in range(3):
         # The outer hinges turn by half of what the shaft bends.
         share = 1.0 if k == 1 else 0.5

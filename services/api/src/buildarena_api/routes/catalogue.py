@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, Query
 from pydantic import BaseModel, Field
 
-from buildarena_api.dependencies import RegistryDep
-from buildarena_geometry import load_catalogue
+from buildarena_api.dependencies import ContextDep, RegistryDep
+from buildarena_api.http.problems import ProblemError
+from buildarena_geometry import module_set
 
 router = APIRouter(prefix="/v1", tags=["catalogue"])
 
@@ -33,6 +36,8 @@ class ModuleView(BaseModel):
     )
     faces: list[str] = Field(description="Labels of the faces that take a block")
     actions: list[str] = Field(description="What keys can be bound to")
+    categories: list[str] = Field(description="Groups it is looked up in; none for basic modules")
+    simulated: bool = Field(description="Whether both engines have its physics")
 
 
 @router.get("/models")
@@ -45,8 +50,25 @@ def list_models(registry: RegistryDep) -> list[ModelView]:
 
 
 @router.get("/modules")
-def list_modules() -> list[ModuleView]:
-    """Lists the basic modules."""
+def list_modules(
+    context: ContextDep,
+    set_: Annotated[
+        Literal["basic", "workshop", "all"] | None,
+        Query(alias="set", description="The modules of a set; the basic ones by default"),
+    ] = None,
+    task: Annotated[str | None, Query(description="What builders of this task may use")] = None,
+    version: Annotated[str | None, Query(description="Of the task; the newest by default")] = None,
+) -> list[ModuleView]:
+    """Lists modules: the basic ones, those of a set, or those that a task allows."""
+    if task is not None and set_ is not None:
+        raise ProblemError(422, "modules are those of a set or of a task: give one of the two")
+    if task is None and version is not None:
+        raise ProblemError(422, "version is a task's: give the task too")
+    catalogue = (
+        module_set(set_ or "basic")
+        if task is None
+        else context.tasks.find(task, version).task.constraints.catalogue
+    )
     return [
         ModuleView(
             name=m.name,
@@ -57,6 +79,8 @@ def list_modules() -> list[ModuleView]:
             size=m.size,
             faces=[face.label for face in m.faces],
             actions=list(m.actions),
+            categories=list(m.facts.categories),
+            simulated=m.facts.simulated,
         )
-        for m in load_catalogue().values()
+        for m in catalogue.values()
     ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from difflib import get_close_matches
 from functools import cache
 from typing import Annotated, Final
 
@@ -12,7 +13,7 @@ from buildarena_api.dependencies import ContextDep
 from buildarena_api.http.answers import KeptAnswers
 from buildarena_api.http.etags import Answer, conditional
 from buildarena_api.http.problems import ProblemError, problem_responses
-from buildarena_geometry import DocumentError, Machine, load_catalogue
+from buildarena_geometry import DocumentError, Machine, module_set
 from buildarena_geometry.export import machine_glb, module_glb
 from buildarena_pipeline.runtime.context import Context
 from buildarena_simulation import MachineNotSimulable
@@ -85,14 +86,16 @@ def thumbnail(
 
 @cache
 def _module_models() -> dict[str, Answer]:
-    return {name: Answer.of(module_glb(module)) for name, module in load_catalogue().items()}
+    # The cargo of the basic set has a shape too, and the name of a module of the others.
+    modules = {**module_set("basic"), **module_set("all")}
+    return {name: Answer.of(module_glb(module)) for name, module in modules.items()}
 
 
 def _module_answer(name: str) -> Answer:
     found = _module_models().get(name)
     if found is None:
-        choices = ", ".join(_module_models())
-        raise ProblemError(404, f"there is no module {name!r}; choose from {choices}")
+        near = get_close_matches(name, _module_models(), n=3, cutoff=0.0)
+        raise ProblemError(404, f"there is no module {name!r}; the nearest are {', '.join(near)}")
     return found
 
 
