@@ -3,7 +3,10 @@
 from collections.abc import Mapping, Sequence
 from typing import Final
 
+import numpy as np
+
 from buildarena_simulation.constants import FRICTION_TERRAIN
+from buildarena_simulation.engines.base import CargoPose
 from buildarena_simulation.engines.quiet_output import quiet_output
 from buildarena_simulation.structure.model import FloatArray
 
@@ -66,5 +69,46 @@ def set_friction(client: Mapping[str, int], body: int, link: int, friction: floa
         rollingFriction=0,
         spinningFriction=0,
         restitution=0,
+        **client,
+    )
+
+
+def pose_of(client: Mapping[str, int], body: int | None) -> CargoPose:
+    """Where a body is and how fast its centre moves."""
+    position, turn = pybullet.getBasePositionAndOrientation(body, **client)
+    velocity, _ = pybullet.getBaseVelocity(body, **client)
+    return CargoPose(
+        position=np.array(position),
+        quaternion=np.array(turn)[[3, 0, 1, 2]],
+        velocity=np.array(velocity),
+    )
+
+
+def set_up(
+    client: Mapping[str, int],
+    *,
+    gravity: float,
+    time_step_s: float,
+    iterations: int,
+    residual: float,
+) -> None:
+    """Sets a new world's gravity and solver.
+
+    Args:
+        client: The engine's world.
+        gravity: Downward acceleration, units/s².
+        time_step_s: Length of a step, seconds.
+        iterations: Most iterations of the solver.
+        residual: At which it stops.
+    """
+    pybullet.setGravity(0, 0, -gravity, **client)
+    pybullet.setPhysicsEngineParameter(
+        fixedTimeStep=time_step_s,
+        numSubSteps=0,
+        numSolverIterations=iterations,
+        solverResidualThreshold=residual,
+        enableConeFriction=1,
+        deterministicOverlappingPairs=1,
+        enableFileCaching=0,
         **client,
     )
