@@ -203,7 +203,7 @@ BROKEN = [
         edit(landmarks=[{"name": "fire", "along": 1, "heats": True}]),
         "radius: it is missing; a flame",
     ),
-    (other(BRACE, link="spring"), "link: expected one of rigid, rope"),
+    (other(BRACE, link="glue"), "link: expected one of rigid, rope, spring"),
     (other(WHEEL, motor={**WHEEL["motor"], "torque": 0}), "torque: expected a number above 0"),
     (other(CANNON, thrust={**CANNON["thrust"], "spheres": [{"along": 1}]}), "radius is missing"),
 ]

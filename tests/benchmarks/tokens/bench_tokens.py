@@ -10,6 +10,7 @@ import argparse
 import json
 import sys
 from collections import defaultdict
+from dataclasses import replace
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[3]))
@@ -27,6 +28,11 @@ BASELINE = {"support-1": (30, 46279), "transport-1": (36, 56810), "lift-3": (67,
 PUBLISHED = {"support-1": (67, 630_000)}
 """Mean requests and input tokens of the paper's models."""
 BAR = 2 / 3
+LOOKED_UP_TASK = "transport-1"
+LOOKED_UP_IN = ("builder", "guidance-builder", "five-role")
+LOOKED_UP_BAR = {"builder": 0.5}
+"""Of one who builds alone, and carries the list through every turn. Where several roles share the
+work most of them never read it, so that there is less to save."""
 
 
 def parts_of(request: Request) -> dict[str, int]:
@@ -62,22 +68,47 @@ def measured(task: str) -> dict[str, dict[str, int]]:
     }
 
 
+def told_and_looked_up(workflow: str) -> tuple[int, int]:
+    """Input tokens of the expert's session that is told forty modules, and that looks them up."""
+    totals = []
+    for how in ("told", "looked_up"):
+        given = builtin_tasks()[LOOKED_UP_TASK]
+        update = {"modules": "workshop", "module_list": how}
+        task = replace(given, constraints=given.constraints.model_copy(update=update))
+        model = Recording()
+        played = Player()("builtin/expert", task=task, client=model, workflow=workflow)
+        if played.failure is not None:
+            raise SystemExit(f"{workflow}, {how}: the expert failed: {played.failure}")
+        characters = sum(sum(parts_of(request).values()) for request in model.requests)
+        totals.append(characters // CHARACTERS_PER_TOKEN)
+    return totals[0], totals[1]
+
+
 def main() -> int:
     """Runs the benchmark.
 
     Returns:
-        The exit code: 1 if support-1 takes more than two thirds of what it took.
+        The exit code: 1 if support-1 takes more than two thirds of what it took, or looking modules
+        up more than half of what telling them takes.
     """
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--json", type=Path, help="where the figures go")
     parser.add_argument("--tasks", nargs="*", default=sorted(builtin_tasks()))
     options = parser.parse_args()
+    lookups = {workflow: told_and_looked_up(workflow) for workflow in LOOKED_UP_IN}
     figures = {task: measured(task) for task in options.tasks}
     for task, stages in figures.items():
         _print(task, stages)
     if options.json:
         options.json.parent.mkdir(parents=True, exist_ok=True)
         options.json.write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
+    for workflow, (told, looked_up) in lookups.items():
+        _say(
+            f"{LOOKED_UP_TASK} with 40 modules, {workflow}: {told:,} tokens told, "
+            f"{looked_up:,} looked up; ratio {looked_up / told:.2f}"
+        )
+    if any(lookups[name][1] > bar * lookups[name][0] for name, bar in LOOKED_UP_BAR.items()):
+        return 1
     return (
         0
         if all(_ratio(task, figures[task]) <= BAR for task in figures if task == "support-1")

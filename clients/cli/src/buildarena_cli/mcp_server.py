@@ -44,7 +44,7 @@ def make_server(client: Client) -> Server[Any]:
         client: The API.
     """
     tools = _tools()
-    machine_tools = CaselessNames(tool.name for tool in building_tools())
+    machine_tools = CaselessNames(tool.name for tool in building_tools(looked_up=True))
     # Threads would carry out calls that were sent side by side in any order.
     turns: defaultdict[object, asyncio.Lock] = defaultdict(asyncio.Lock)
 
@@ -142,7 +142,8 @@ def _tools() -> list[types.Tool]:
                 ["session", *tool.parameters.get("required", [])],
             ),
         )
-        for tool in building_tools()
+        # Sessions of tasks that tell their modules refuse to have them looked up.
+        for tool in building_tools(looked_up=True)
     ]
     return managing + building
 

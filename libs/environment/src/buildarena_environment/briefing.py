@@ -14,9 +14,10 @@ from string import Template
 from typing import Final
 
 from buildarena_benchmark import Task
+from buildarena_benchmark.tasks.document import Constraints
 from buildarena_environment.workbench import ASSEMBLY, MAIN
-from buildarena_geometry import load_catalogue
-from buildarena_geometry.feedback.modules import modules_text
+from buildarena_geometry import modules_named
+from buildarena_geometry.feedback.modules import lookup_text, modules_text
 from buildarena_geometry.feedback.words import counted
 
 _CONTROL: Final = {
@@ -40,6 +41,8 @@ _CHECKS: Final = {
     "wheels": "At least {count} powered wheels.",
 }
 
+_LOOKED_UP: Final = "Only the modules that can be looked up."
+
 
 def briefing(task: Task, *, trials: str, conduct: str, values: Mapping[str, str]) -> str:
     """All that a builder must know to play a task, but for its tools.
@@ -61,15 +64,30 @@ def briefing(task: Task, *, trials: str, conduct: str, values: Mapping[str, str]
         main=MAIN,
         assembly=ASSEMBLY,
         checks=_checks(task),
-        modules=modules_text(load_catalogue(), task.constraints.modules),
+        modules=modules_told(task.constraints),
         **values,
     )
 
 
+def modules_told(constraints: Constraints) -> str:
+    """What a builder reads about its modules: all of them, or how to look them up."""
+    if constraints.looked_up:
+        return lookup_text(constraints.catalogue)
+    return modules_text(constraints.catalogue, modules_named(constraints.modules))
+
+
 @cache
-def briefing_digest(trials: str, conduct: str) -> str:
-    """Hash of the words around a statement: results of different ones don't compare."""
+def briefing_digest(trials: str, conduct: str, *, looked_up: bool = False) -> str:
+    """Hash of the words around a statement: results of different ones don't compare.
+
+    Args:
+        trials: How often it may submit.
+        conduct: What holds for its calls and for the end.
+        looked_up: Whether modules are looked up: who does that does not compare with who is told.
+    """
     words = [_text(trials, conduct), *_CONTROL.values(), *_CHECKS.values()]
+    if looked_up:
+        words.append(_LOOKED_UP)
     return sha256("\0".join(words).encode()).hexdigest()
 
 
@@ -90,7 +108,7 @@ def _checks(task: Task) -> str:
     limits = task.constraints
     checks = [_CHECKS["always"].format(own=limits.max_blocks, all=limits.most_blocks)]
     if limits.modules is not None:
-        checks.append(_CHECKS["modules"])
+        checks.append(_LOOKED_UP if limits.looked_up else _CHECKS["modules"])
     checks += [
         _CHECKS["least"].format(count=count, name=name)
         for name, count in limits.min_modules.items()

@@ -160,7 +160,8 @@ class Environment:
         self.reference = reference_of(self.task, reference, needed="indicator" in self.weights)
         self._tries = tries
         self._shaped = bool(self.weights.keys() - TERMINAL)
-        self._bench = Workbench()
+        limits_of = self.task.constraints
+        self._bench = Workbench(limits_of.catalogue, looked_up=limits_of.looked_up)
         self._steps = self._changes = self._refused = 0
         self._trials: tuple[Trial, ...] = ()
         self._done = False
@@ -191,7 +192,8 @@ class Environment:
                 "after": LAST if self.rounds == 1 else AGAIN,
             },
         )
-        return Observation(task=self.task.name, briefing=text, tools=tools_of_models())
+        tools = tools_of_models(looked_up=self.task.constraints.looked_up)
+        return Observation(task=self.task.name, briefing=text, tools=tools)
 
     @property
     def machines(self) -> Mapping[str, Machine]:

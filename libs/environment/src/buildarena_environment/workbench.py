@@ -4,14 +4,24 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final, Self
 
 from buildarena_environment.errors import NothingToSubmitError
-from buildarena_geometry import GROUPS, Cause, Machine, Refused, ToolDefinition, tool_definitions
+from buildarena_geometry import (
+    GROUPS,
+    LOOKUP,
+    Cause,
+    Machine,
+    Refused,
+    ToolDefinition,
+    tool_definitions,
+)
+from buildarena_geometry.modules.names import CaselessNames
 
 if TYPE_CHECKING:
-    from buildarena_geometry import Outcome
+    from buildarena_geometry import Catalogue, Outcome
     from buildarena_geometry.documents.log import LoggedState
 
 MAIN: Final = "main"
@@ -38,15 +48,24 @@ MACHINE: Final = {
     "default": MAIN,
 }
 """Schema of the argument that says which machine a call is meant for."""
+_LOOKUPS: Final = CaselessNames(tool.name for tool in tool_definitions([LOOKUP]))
 
 
-def building_tools() -> tuple[ToolDefinition, ...]:
-    """All actions of the geometry library, as they are."""
-    return tool_definitions(GROUPS)
+def building_tools(*, looked_up: bool = False) -> tuple[ToolDefinition, ...]:
+    """All actions of the geometry library, as they are.
+
+    Args:
+        looked_up: Whether the task has its modules looked up, and there are tools for that.
+    """
+    return tool_definitions((*GROUPS, LOOKUP) if looked_up else GROUPS)
 
 
-def tools_of_models() -> tuple[ToolDefinition, ...]:
-    """The actions with one more argument, `machine`, and the tool that submits."""
+def tools_of_models(*, looked_up: bool = False) -> tuple[ToolDefinition, ...]:
+    """The actions with one more argument, `machine`, and the tool that submits.
+
+    Args:
+        looked_up: As for `building_tools`.
+    """
     building = [
         ToolDefinition(
             name=tool.name,
@@ -57,7 +76,7 @@ def tools_of_models() -> tuple[ToolDefinition, ...]:
             },
             group=tool.group,
         )
-        for tool in building_tools()
+        for tool in building_tools(looked_up=looked_up)
     ]
     return (*building, SUBMIT)
 
@@ -67,9 +86,15 @@ class Workbench:
 
     The machine called ``assembly`` is put together from copies of all others, as they are when
     the first call to it is made.
+
+    Args:
+        catalogue: The modules they may be made of; the basic ones if left out.
+        looked_up: Whether modules may be looked up here; the calls are refused where they are told.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, catalogue: Catalogue | None = None, *, looked_up: bool = False) -> None:
+        self._catalogue = catalogue
+        self._looked_up = looked_up
         self._machines: dict[str, Machine] = {}
 
     @property
@@ -84,13 +109,19 @@ class Workbench:
                 cause=Cause.MALFORMED_ARGUMENTS,
                 text="A machine's name has 1 to 40 letters, digits, dashes and underscores.",
             )
+        if not self._looked_up and isinstance(tool, str) and _LOOKUPS.find(tool) is not None:
+            return Refused(
+                cause=Cause.UNKNOWN_ACTION,
+                text=f"There is no action {tool} in this task, which tells its modules.",
+            )
         return self.machine(machine).act(tool, arguments)
 
     def machine(self, name: str) -> Machine:
         """The machine with a name, empty when there was none."""
         found = self._machines.get(name)
         if found is None:
-            found = Machine(available=self._machines if name == ASSEMBLY else None)
+            available = self._machines if name == ASSEMBLY else None
+            found = Machine(catalogue=self._catalogue, available=available)
             self._machines[name] = found
         return found
 
@@ -120,8 +151,15 @@ class Workbench:
     def return_to(self, values: Mapping[str, LoggedState]) -> None:
         """Puts on it what `values` gave; costs what differs where the machines are its own."""
         self._machines = {
-            name: _returned(self._machines.get(name), value) for name, value in values.items()
+            name: _returned(self._machines.get(name), self._offered(value))
+            for name, value in values.items()
         }
+
+    def _offered(self, value: LoggedState) -> LoggedState:
+        """A value from elsewhere goes on with what may be used here."""
+        if self._catalogue is None or value.state.catalogue is self._catalogue:
+            return value
+        return replace(value, state=replace(value.state, catalogue=self._catalogue))
 
     @classmethod
     def holding(cls, machines: Mapping[str, Machine]) -> Self:

@@ -21,7 +21,7 @@ from buildarena_geometry.outcomes import (
 )
 from buildarena_geometry.poses import Pose
 from buildarena_geometry.steps import Difference, Step, step
-from buildarena_geometry.tools import GROUPS, ToolDefinition, tool_definitions
+from buildarena_geometry.tools import GROUPS, LOOKUP, ToolDefinition, tool_definitions
 
 __version__ = "0.1.0"
 
@@ -30,6 +30,7 @@ __all__ = [
     "FEEDBACK_VERSION",
     "GROUPS",
     "KEYS",
+    "LOOKUP",
     "MODULE_SETS",
     "Accepted",
     "ActionLog",

@@ -17,7 +17,7 @@ from buildarena_geometry.modules.catalogue import load_catalogue
 from buildarena_geometry.modules.parameters import LARGEST_NUMBER, RefusalError, shown
 from buildarena_geometry.outcomes import Accepted, Cause, Outcome, Refused
 from buildarena_geometry.state import MachineState
-from buildarena_geometry.tools import ACTIONS, action_named
+from buildarena_geometry.tools import action_named, tool_definitions
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from buildarena_geometry.blocks import Block, Connector, Joint, KeyPress
     from buildarena_geometry.modules.module import Catalogue
     from buildarena_geometry.state import SubStructure
+
+_OFFERED = tuple(tool.name for tool in tool_definitions())  # what every builder has
 
 
 class Machine:
@@ -263,7 +265,7 @@ class Machine:
         if action is None:
             raise RefusalError(
                 Cause.UNKNOWN_ACTION,
-                f"There is no action {shown(name)}. Actions: {listing(ACTIONS)}.",
+                f"There is no action {shown(name)}. Actions: {listing(_OFFERED)}.",
             )
         return action.propose(self._state, **action.read(arguments))
 

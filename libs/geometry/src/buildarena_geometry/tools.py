@@ -11,7 +11,15 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
-from buildarena_geometry.actions import assemble, build, control, query, refine, remove
+from buildarena_geometry.actions import (
+    assemble,
+    build,
+    catalogue,
+    control,
+    query,
+    refine,
+    remove,
+)
 from buildarena_geometry.changes import Change
 from buildarena_geometry.feedback.words import listing
 from buildarena_geometry.modules.names import CaselessNames
@@ -19,6 +27,9 @@ from buildarena_geometry.modules.parameters import JsonSchema, Parameter, Refusa
 from buildarena_geometry.outcomes import Cause
 
 GROUPS = ("build", "refine", "assemble", "control", "query")
+"""What every builder has."""
+LOOKUP = "lookup"
+"""What builders have besides where they look modules up instead of being told them."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,7 +40,7 @@ class ToolDefinition:
         name: the action's name.
         description: what it does.
         parameters: JSON schema of its arguments, an object.
-        group: one of `GROUPS`.
+        group: one of `GROUPS`, or `LOOKUP`.
     """
 
     name: str
@@ -88,7 +99,7 @@ def tool_definitions(groups: Iterable[str] = GROUPS) -> tuple[ToolDefinition, ..
     """The actions of some groups as tools for models.
 
     Args:
-        groups: names from `GROUPS`.
+        groups: names from `GROUPS`, and `LOOKUP`.
 
     Returns:
         The definitions, group by group in the order asked for.
@@ -98,8 +109,9 @@ def tool_definitions(groups: Iterable[str] = GROUPS) -> tuple[ToolDefinition, ..
     """
     wanted = tuple(groups)
     for group in wanted:
-        if group not in GROUPS:
-            raise ValueError(f"there is no group {group!r}; the groups are {', '.join(GROUPS)}")
+        if group not in (*GROUPS, LOOKUP):
+            known = ", ".join((*GROUPS, LOOKUP))
+            raise ValueError(f"there is no group {group!r}; the groups are {known}")
     return tuple(
         action.definition
         for group in wanted
@@ -195,6 +207,14 @@ ACTIONS: Mapping[str, Action] = {
                 query.review_powered_blocks,
                 query.review_control_config,
                 query.review_control_sequence,
+            ),
+        ),
+        (
+            LOOKUP,
+            (
+                catalogue.list_module_categories,
+                catalogue.list_modules,
+                catalogue.describe_module,
             ),
         ),
     )

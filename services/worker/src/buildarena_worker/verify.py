@@ -23,7 +23,7 @@ from buildarena_benchmark import Task, broken_constraint, failed_score, score
 from buildarena_besiege import LogIncompleteError, MachineNotPlayableError, prepare_run
 from buildarena_geometry import KeyPress, Machine
 from buildarena_geometry.machine_files import machine_bytes
-from buildarena_pipeline.agents.workbench import Workbench
+from buildarena_pipeline.agents.workbench import bench_of
 from buildarena_pipeline.catalog.prompt_packs import PromptPacks
 from buildarena_pipeline.catalog.simulators import BESIEGE
 from buildarena_pipeline.catalog.tasks import TaskCatalog
@@ -188,7 +188,7 @@ class Verifier:
             return checks + self._trial_checks(job, machine)
         with self._store.database.transaction() as connection:
             calls = self._store.external_calls.read(job.id, connection=connection)
-        bench = Workbench()
+        bench = bench_of(task_of(job, self._tasks))
         again = [bench.call(call.machine, call.tool, call.arguments) for call in calls]
         checks = [
             _compare("calls", [_answer_of(call) for call in calls], [_answer_of(c) for c in again])

@@ -123,7 +123,8 @@ def _first_words(task: Mapping[str, Any] | None, track: Mapping[str, Any]) -> st
     if task is None:
         return None
     as_read = track.get("workflow") == EXTERNAL_WORKFLOW
-    if as_read and track.get("prompts_digest") == briefing_digest():
+    looked_up = bool(track.get("looked_up"))
+    if as_read and track.get("prompts_digest") == briefing_digest(looked_up=looked_up):
         return _briefing(compact(task["document"])) or str(task["statement"])
     return str(task["statement"])
 

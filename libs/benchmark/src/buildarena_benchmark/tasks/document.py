@@ -13,7 +13,13 @@ from pydantic_core import PydanticCustomError
 
 from buildarena_benchmark.tasks.fields import Coordinate, Count, Document, Threshold
 from buildarena_benchmark.tasks.workshop_scoring import WorkshopScoring, hopeless
-from buildarena_geometry import MODULE_SETS, module_set, modules_named
+from buildarena_geometry import (
+    MODULE_SETS,
+    Catalogue,
+    catalogue_of,
+    module_set,
+    modules_named,
+)
 from buildarena_simulation import Scenario
 
 MAX_BLOCK_SECONDS: Final = 20_000
@@ -70,6 +76,7 @@ class Constraints(Document):
             have as many for each sub-structure that is allowed.
         modules: Which modules may be used: a set's name, or names of modules; None for the basic
             set.
+        module_list: Whether builders are told all modules they may use, or look them up by tools.
         min_modules: Fewest blocks or connectors of a module, by its name.
         min_wheels: Fewest powered wheels; shown to builders, judged by the scorer.
     """
@@ -84,8 +91,19 @@ class Constraints(Document):
         ]
         | None
     ) = None
+    module_list: Literal["told", "looked_up"] = "told"
     min_modules: dict[ModuleName, Annotated[int, Field(ge=1, le=1000)]] = Field(default={})
     min_wheels: Count = 0
+
+    @property
+    def looked_up(self) -> bool:
+        """Whether builders look modules up by tools instead of being told them."""
+        return self.module_list == "looked_up"
+
+    @property
+    def catalogue(self) -> Catalogue:
+        """What machines are built from."""
+        return catalogue_of(self.modules)
 
     @property
     def most_blocks(self) -> int:

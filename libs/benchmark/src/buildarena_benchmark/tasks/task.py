@@ -94,6 +94,9 @@ def _version_of(document: TaskDocument) -> str:
     content = document.model_dump(
         mode="json", include={"statement", "constraints", "scenario", "scoring"}
     )
+    if not document.constraints.looked_up:
+        # Tasks that say nothing of it keep the versions they had before it could be said.
+        del content["constraints"]["module_list"]
     content["scorer_version"] = SCORER_VERSION
     text = json.dumps(content, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()[:12]

@@ -12,7 +12,7 @@ from buildarena_geometry.errors import DocumentError
 from buildarena_geometry.feedback.words import listing
 from buildarena_geometry.keys import KEYS
 from buildarena_geometry.modules.parameters import LARGEST_NUMBER, LONGEST_TEXT
-from buildarena_geometry.modules.sets import module_set, smallest_set
+from buildarena_geometry.modules.sets import module_set, modules_of_action, smallest_set
 from buildarena_geometry.outcomes import RefusalClass
 from buildarena_geometry.poses import Pose
 from buildarena_geometry.reading import Fields, Reader
@@ -74,7 +74,7 @@ def read_machine(
     structures = _read_structures(fields["structures"], blocks)
     records = tuple(_record(entry) for entry in fields["log"].items())
     if catalogue is None:
-        catalogue = smallest_set(_used(known, blocks, connectors, available, records))
+        catalogue = smallest_set(_used(blocks, connectors, available, records))
     state = MachineState(
         catalogue=catalogue,
         available={name: machine.state for name, machine in available.items()},
@@ -93,7 +93,6 @@ def read_machine(
 
 
 def _used(
-    known: Catalogue,
     blocks: Mapping[str, Block],
     connectors: Mapping[str, Connector],
     available: Mapping[str, LoggedState],
@@ -106,11 +105,7 @@ def _used(
         yield from (part.module.name for part in machine.state.parts)
     for record in records:
         if record.reason is None and isinstance(record.arguments, dict):
-            for argument in ("new_block", "connector"):
-                written = record.arguments.get(argument)
-                module = known.named(written) if isinstance(written, str) else None
-                if module is not None:
-                    yield module.name
+            yield from (module.name for module in modules_of_action(record.arguments))
 
 
 def _read_blocks(entries: Reader, catalogue: Catalogue) -> dict[str, Block]:

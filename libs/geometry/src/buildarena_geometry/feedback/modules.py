@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from buildarena_geometry.feedback.words import plain
+from buildarena_geometry.feedback.words import counted, plain, point
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator
 
     from buildarena_geometry.modules.module import Catalogue, Module
+
+OTHER = "other"  # the category of modules that name none
 
 
 def modules_text(catalogue: Catalogue, names: Collection[str] | None = None) -> str:
@@ -34,6 +36,59 @@ def modules_in_short(catalogue: Catalogue, names: Collection[str] | None = None)
         actions = f", does {', '.join(module.actions)}" if module.actions else ""
         lines.append(f"- {module.name}: {_size(module)}, mass {plain(module.mass)}{actions}")
     return "\n".join(lines)
+
+
+def lookup_text(catalogue: Catalogue) -> str:
+    """What builders read who look modules up, in place of the modules."""
+    count = sum(module.kind not in ("start", "cargo") for module in catalogue.values())
+    return (
+        f"{counted(count, 'module')} may be used. Look up what you need: list_modules names those "
+        "of a category, describe_module tells all about one or several.\n"
+        f"{categories_text(catalogue)}"
+    )
+
+
+def categories_text(catalogue: Catalogue) -> str:
+    """The categories, with how many modules each has."""
+    sizes = ", ".join(
+        f"{name} ({len(modules)})" for name, modules in modules_of_category(catalogue).items()
+    )
+    return f"Categories: {sizes}."
+
+
+def category_text(catalogue: Catalogue, category: str) -> str:
+    """The modules of a category, a short line each.
+
+    Raises:
+        KeyError: there is no such category.
+    """
+    return "\n".join(_short_line(module) for module in modules_of_category(catalogue)[category])
+
+
+def module_text(module: Module) -> str:
+    """All that builders read about a module."""
+    line = _module_line(module).removeprefix("- ")
+    if not module.faces:
+        return line
+    # World-sized blocks have faces that their letters do not place.
+    places = [f"{face.label} {point(face.center)}" for face in module.faces]
+    up = "centre" if module.kind == "start" else "the face it sits on, z away from it"
+    return f"{line}\nFaces, from {up}: {', '.join(places)}."
+
+
+def modules_of_category(catalogue: Catalogue) -> dict[str, list[Module]]:
+    """The modules that builders may use by category; one may be in several."""
+    found: dict[str, list[Module]] = {}
+    for module in catalogue.values():
+        if module.kind != "cargo":
+            for category in module.facts.categories or (OTHER,):
+                found.setdefault(category, []).append(module)
+    return found
+
+
+def _short_line(module: Module) -> str:
+    first = module.description.partition(". ")[0].rstrip(".")
+    return f"- {module.name} (mass {plain(module.mass)}): {first}."
 
 
 def _chosen(catalogue: Catalogue, names: Collection[str] | None) -> Iterator[Module]:

@@ -9,7 +9,9 @@ from buildarena_geometry.modules.catalogue import basic_modules, extended_module
 from buildarena_geometry.modules.module import Catalogue
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+    from buildarena_geometry.modules.module import Module
 
 MODULE_SETS = ("basic", "workshop", "all")
 
@@ -68,9 +70,25 @@ def smallest_set(names: Iterable[str]) -> Catalogue:
     return module_set(MODULE_SETS[-1])
 
 
+def modules_of_action(arguments: Mapping[str, object]) -> Iterator[Module]:
+    """The modules that an action's arguments name.
+
+    Args:
+        arguments: as they were given, whether or not they were right.
+    """
+    for argument in ("new_block", "connector"):
+        written = arguments.get(argument)
+        module = module_set("all").named(written) if isinstance(written, str) else None
+        if module is not None:
+            yield module
+
+
 @cache
 def catalogue_of(chosen: str | tuple[str, ...] | None) -> Catalogue:
-    """The modules that a choice allows, as machines are built from them.
+    """The modules that machines are built from where a choice is made.
+
+    A list of basic modules leaves a machine all of them, as it always did: what it is made of is
+    checked when it is handed in.
 
     Args:
         chosen: a set's name, modules' names, or None for the basic set.
@@ -84,4 +102,7 @@ def catalogue_of(chosen: str | tuple[str, ...] | None) -> Catalogue:
     unknown = [name for name in chosen if name not in known]
     if unknown:
         raise ValueError(f"there is no module {unknown[0]!r}; the modules are {', '.join(known)}")
-    return Catalogue((known.start, *(known[name] for name in chosen if name != known.start.name)))
+    if set(chosen) <= {*modules_named("basic"), known.start.name}:
+        return module_set("basic")
+    wanted = {*chosen, known.start.name}
+    return Catalogue(tuple(module for name, module in known.items() if name in wanted))

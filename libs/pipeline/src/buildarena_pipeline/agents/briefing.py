@@ -66,9 +66,13 @@ def briefing(task: Task) -> str:
     )
 
 
-def briefing_digest() -> str:
-    """Hash of the words around a statement: results of different ones don't compare."""
-    return words_around.briefing_digest(TRIALS, _conduct())
+def briefing_digest(*, looked_up: bool = False) -> str:
+    """Hash of the words around a statement: results of different ones don't compare.
+
+    Args:
+        looked_up: Whether the task's modules are looked up instead of told.
+    """
+    return words_around.briefing_digest(TRIALS, _conduct(), looked_up=looked_up)
 
 
 @cache

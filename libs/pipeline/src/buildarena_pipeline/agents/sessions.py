@@ -131,7 +131,10 @@ class ExternalSessions:
             further.append(ValidationIssue(path="agent", message=message))
         chosen = chosen_task(self._context, task, simulator, further=further)
         version = simulation_version(simulator, self._context.settings.besiege_version)
-        track = external_track(simulator, version, briefing_digest())
+        looked_up = chosen.constraints.looked_up
+        track = external_track(
+            simulator, version, briefing_digest(looked_up=looked_up), looked_up=looked_up
+        )
         model = f"{kind}/{agent}"
         config = {"name": model, "provider": EXTERNAL_PROVIDER, "model": agent}
         key = JobKey(
@@ -183,7 +186,7 @@ class ExternalSessions:
                 raise SessionClosedError(
                     f"session {job_id} has made {MAX_CALLS} calls, the most it may make: submit it"
                 )
-            bench = self._bench(job_id, count, connection)
+            bench = self._bench(lease.job, count, connection)
             if bench.size >= MAX_SESSION_BYTES:
                 self._keep_bench(job_id, count, bench)
                 raise SessionClosedError(
@@ -212,7 +215,7 @@ class ExternalSessions:
         with self._lock:
             bench = self._benches.pop((job_id, len(calls)), None)
         if bench is None:
-            bench = rebuild(calls)
+            bench = rebuild(calls, self._task(job))
         # A call in between works on a workbench of its own, so this one stays as it is.
         machines = {name: machine.copy() for name, machine in bench.machines.items()}
         state = SessionState(
@@ -236,7 +239,7 @@ class ExternalSessions:
         with context.store.database.transaction() as connection:
             lease = self._open_lease(job_id, connection)
             calls = context.store.external_calls.read(job_id, connection=connection)
-            bench = rebuild(calls)
+            bench = rebuild(calls, self._task(lease.job))
             machine = bench.submitted()
             transcript = Transcript([turn_of_call(i, call) for i, call in enumerate(calls)])
             queue = hand_in(context, lease, machine, transcript, connection=connection)
@@ -255,13 +258,17 @@ class ExternalSessions:
             raise SessionClosedError(f"session {job_id} is not open: it is {state}")
         return lease
 
-    def _bench(self, job_id: str, count: int, connection: Any) -> Workbench:
+    def _bench(self, job: Job, count: int, connection: Any) -> Workbench:
         """The workbench after so many calls: kept from the last call, or built again."""
         with self._lock:
-            bench = self._benches.pop((job_id, count), None)
+            bench = self._benches.pop((job.id, count), None)
         if bench is not None:
             return bench
-        return rebuild(self._context.store.external_calls.read(job_id, connection=connection))
+        calls = self._context.store.external_calls.read(job.id, connection=connection)
+        return rebuild(calls, self._task(job))
+
+    def _task(self, job: Job) -> Task | None:
+        return self._context.tasks.exact(job.task, job.task_version)
 
     def _keep_bench(self, job_id: str, count: int, bench: Workbench) -> None:
         with self._lock:

@@ -6,9 +6,9 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
-from buildarena_benchmark import ValidationIssue
+from buildarena_benchmark import Task, ValidationIssue
 from buildarena_environment import workbench as building
-from buildarena_geometry import Refused
+from buildarena_geometry import Catalogue, Refused
 from buildarena_geometry.json_values import levels
 from buildarena_pipeline.errors import SubmissionError
 from buildarena_store import ExternalCall, clean
@@ -25,8 +25,8 @@ class Workbench(building.Workbench):
         size: Bytes of all arguments and feedback so far.
     """
 
-    def __init__(self) -> None:
-        super().__init__()
+    def __init__(self, catalogue: Catalogue | None = None, *, looked_up: bool = False) -> None:
+        super().__init__(catalogue, looked_up=looked_up)
         self.size = 0
 
     def call(self, machine: str, tool: str, arguments: Any) -> ExternalCall:
@@ -67,9 +67,16 @@ def _refused(message: str) -> SubmissionError:
     return SubmissionError([ValidationIssue(path="arguments", message=message)])
 
 
-def rebuild(calls: Sequence[ExternalCall]) -> Workbench:
-    """The workbench after these calls."""
-    bench = Workbench()
+def bench_of(task: Task | None) -> Workbench:
+    """An empty workbench with what a task offers; None for one whose task is no longer known."""
+    if task is None:
+        return Workbench()
+    return Workbench(task.constraints.catalogue, looked_up=task.constraints.looked_up)
+
+
+def rebuild(calls: Sequence[ExternalCall], task: Task | None) -> Workbench:
+    """The workbench after these calls in a session of a task."""
+    bench = bench_of(task)
     for call in calls:
         bench.call(call.machine, call.tool, call.arguments)
     return bench

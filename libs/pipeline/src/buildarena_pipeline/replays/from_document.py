@@ -42,19 +42,22 @@ def replay_of_document(document: object, turns: Sequence[Turn]) -> Replay:
         DocumentError: It is no machine document.
     """
     kept = Machine.from_document(document).logged
+    offered = kept.state.catalogue
     recorder = Recorder()
     chapters: dict[str, Chapter] = {}
     for name, one in kept.available.items():
-        chapter = Chapter(name=name, kind="sub_structure", machine=Machine())
+        chapter = Chapter(name=name, kind="sub_structure", machine=Machine(catalogue=offered))
         chapters[name] = _played(recorder, chapter, one, _of_part(turns, name))
     if kept.available:
         made = {name: chapter.machine for name, chapter in chapters.items()}
-        last = Chapter(name=ASSEMBLY, kind="assembly", machine=Machine(available=made))
+        last = Chapter(
+            name=ASSEMBLY, kind="assembly", machine=Machine(catalogue=offered, available=made)
+        )
         _played(recorder, last, kept, _of_assembly(turns))
     else:
         built = [turn for turn in turns if turn["stage"] == BUILD]
         part = built[-1].get("sub_structure") if built else None
-        last = Chapter(name=part or "machine", kind="machine", machine=Machine())
+        last = Chapter(name=part or "machine", kind="machine", machine=Machine(catalogue=offered))
         _played(recorder, last, kept, _of_part(turns, part))
     _name_controller(last, turns)
     return Replay(

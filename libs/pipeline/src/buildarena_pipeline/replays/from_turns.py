@@ -7,7 +7,8 @@ from itertools import groupby
 from typing import Any, Final
 
 from buildarena_environment import ASSEMBLY
-from buildarena_geometry import Machine
+from buildarena_geometry import Catalogue, Machine, RefusalClass
+from buildarena_geometry.modules.sets import modules_of_action, smallest_set
 from buildarena_pipeline.agents.workbench import Workbench
 from buildarena_pipeline.replays.chapters import (
     Chapter,
@@ -38,7 +39,7 @@ def replay_of_turns(turns: Sequence[Turn]) -> Replay:
     """
     if turns and turns[0]["stage"] == EXTERNAL:
         return _replay_of_calls(turns)
-    session = _Session()
+    session = _Session(_offered(turns))
     for (phase, part), dialogue in groupby(turns, key=place):
         session.play(phase, part, list(dialogue))
     return Replay(
@@ -53,9 +54,22 @@ def place(turn: Turn) -> tuple[str, str | None]:
     return (turn["stage"], turn.get("sub_structure"))
 
 
+def _offered(turns: Sequence[Turn]) -> Catalogue:
+    """The smallest set with the modules that a transcript's actions name and were given."""
+    actions = [action for turn in turns for action in turn["actions"]]
+    given = [action for action in actions if action["reason"] != RefusalClass.MODULE_RESTRICTION]
+    return smallest_set(
+        module.name
+        for action in given
+        if isinstance(action["arguments"], Mapping)
+        for module in modules_of_action(action["arguments"])
+    )
+
+
 def _replay_of_calls(turns: Sequence[Turn]) -> Replay:
     """An agent's machines grow side by side, each in a chapter of its own."""
-    bench, recorder, chapters = Workbench(), Recorder(), dict[str, Chapter]()
+    bench = Workbench(_offered(turns), looked_up=True)
+    recorder, chapters = Recorder(), dict[str, Chapter]()
     for turn in turns:
         name = str(turn["sub_structure"])
         if name not in chapters:
@@ -76,7 +90,8 @@ def _replay_of_calls(turns: Sequence[Turn]) -> Replay:
 class _Session:
     """The machines of a model's session, dialogue by dialogue."""
 
-    def __init__(self) -> None:
+    def __init__(self, catalogue: Catalogue) -> None:
+        self._catalogue = catalogue
         self.chapters: dict[str, Chapter] = {}
         self.recorder = Recorder()
         self.machine: Machine | None = None
@@ -117,10 +132,10 @@ class _Session:
         if known is not None:
             return known
         if phase == ASSEMBLE:
-            made = Chapter(name=name, kind="assembly", machine=Machine(available=self._machines))
+            made = Chapter(name=name, kind="assembly", machine=self._empty(self._machines))
         else:
             kind: Kind = "machine" if part is None else "sub_structure"
-            made = Chapter(name=name, kind=kind, machine=Machine())
+            made = Chapter(name=name, kind=kind, machine=self._empty())
         self.chapters[name] = made
         return made
 
@@ -133,8 +148,11 @@ class _Session:
         if action["ok"] and chapter.kind == "machine" and self._is_anew(chapter, action):
             # Where one role builds alone, nothing stands between two rounds.
             chapter.steps.clear()
-            chapter.machine = Machine()
+            chapter.machine = self._empty()
         self.recorder.record(chapter, turn, action["name"], action["arguments"])
+
+    def _empty(self, available: Mapping[str, Machine] | None = None) -> Machine:
+        return Machine(catalogue=self._catalogue, available=available)
 
     def _is_anew(self, chapter: Chapter, action: Mapping[str, Any]) -> bool:
         return chapter.machine.started and str(action["name"]).lower() == "start"

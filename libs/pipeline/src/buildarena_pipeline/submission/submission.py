@@ -11,7 +11,7 @@ from buildarena_pipeline.catalog.models import ModelRegistry
 from buildarena_pipeline.catalog.prompt_packs import PromptPacks
 from buildarena_pipeline.catalog.simulators import simulation_version, simulator_issues
 from buildarena_pipeline.catalog.specs import Budget, Decoding, JobSpec, SweepSpec, Variant
-from buildarena_pipeline.catalog.tracks import make_track
+from buildarena_pipeline.catalog.tracks import Track, make_track
 from buildarena_pipeline.catalog.workflows import workflow_sources
 from buildarena_pipeline.errors import SubmissionError
 from buildarena_pipeline.runtime.context import Context
@@ -171,18 +171,12 @@ class Submissions:
         self._require_known(variant, tasks, models, found)
         task_names, model_names = set(tasks.values()), set(models.values())
         self._require_size(len(task_names) * len(model_names) * len(seeds))
-        track = make_track(
-            self._workflows[variant.workflow],
-            variant.simulator,
-            self._packs.load(variant.prompts),
-            version=simulation_version(variant.simulator, self._context.settings.besiege_version),
-            one_shot=variant.one_shot,
-            closed_loop=variant.closed_loop,
-        )
-        track_config = track.as_config()
+        tracks = {looked_up: self._track(variant, looked_up) for looked_up in (False, True)}
+        configs = {looked_up: track.as_config() for looked_up, track in tracks.items()}
         limits = variant.limits.model_dump(exclude_none=True)
         new = []
         for task_name in dict.fromkeys(tasks.values()):
+            looked_up = found[task_name].constraints.looked_up
             for model_name in dict.fromkeys(models.values()):
                 config = model_config(self._registry, model_name, variant.decoding)
                 config_hash = configuration_hash(config, limits)
@@ -192,17 +186,28 @@ class Submissions:
                             task=task_name,
                             task_version=found[task_name].version,
                             model_hash=config_hash,
-                            track=track.id,
+                            track=tracks[looked_up].id,
                             seed=seed,
                         ),
                         model=model_name,
                         model_config=config,
-                        track_config=track_config,
+                        track_config=configs[looked_up],
                         limits=limits,
                     )
                     for seed in seeds
                 ]
         return new
+
+    def _track(self, variant: Variant, looked_up: bool) -> Track:
+        return make_track(
+            self._workflows[variant.workflow],
+            variant.simulator,
+            self._packs.load(variant.prompts),
+            version=simulation_version(variant.simulator, self._context.settings.besiege_version),
+            one_shot=variant.one_shot,
+            closed_loop=variant.closed_loop,
+            looked_up=looked_up,
+        )
 
     def _require_known(
         self,

@@ -157,7 +157,7 @@ def open_session(
         statement=opened.task.statement,
         limits=LimitsView.model_validate(LIMITS),
         calls=opened.job.actions,
-        tools=_tools(),
+        tools=_tools(looked_up=opened.task.constraints.looked_up),
     )
 
 
@@ -173,7 +173,7 @@ def show_session(session_id: str, sessions: ExternalDep) -> SessionView:
         job=JobView.of(state.job),
         open=state.open,
         machines=[machine_view(name, machine) for name, machine in state.machines.items()],
-        tools=_tools(),
+        tools=_tools(looked_up=bool(state.job.track_config.get("looked_up"))),
         limits=LimitsView.model_validate(LIMITS),
         calls=state.calls,
         bytes=state.size,
@@ -213,10 +213,10 @@ def submit_session(
     return JobView.of(job)
 
 
-def _tools() -> list[ToolView]:
+def _tools(*, looked_up: bool) -> list[ToolView]:
     return [
         ToolView(name=tool.name, description=tool.description, parameters=dict(tool.parameters))
-        for tool in building_tools()
+        for tool in building_tools(looked_up=looked_up)
     ]
 
 

@@ -17,6 +17,9 @@ from buildarena_worker.builtin.reading import Situation, read_situation
 from buildarena_worker.session.messages import Reply, Request, ToolCall
 
 DONE = "TERMINATE"
+DESCRIBE = "describe_module"
+DESIGNERS = ("planner", "drafter", "guidance", "engineer")
+"""The roles that must know modules; guidance only where it has no drawing."""
 
 
 def reply(request: Request) -> Reply:
@@ -25,6 +28,9 @@ def reply(request: Request) -> Reply:
     if situation.task not in DESIGNS:
         return Reply(text=f"I have no design for {situation.task or 'this task'}. {DONE}")
     design = _design(situation.task, request.seed)
+    looking = _look_up(design, situation, request)
+    if looking is not None:
+        return looking
     speakers = {
         "planner": lambda: Reply(text=_plan(design)),
         "drafter": lambda: Reply(text=_drawing(design, situation)),
@@ -41,6 +47,25 @@ def reply(request: Request) -> Reply:
 @lru_cache(maxsize=1024)  # sessions that one process may play at once
 def _design(task: str, seed: int) -> Design:
     return DESIGNS[task](seed)
+
+
+def _look_up(design: Design, situation: Situation, request: Request) -> Reply | None:
+    """What a role that designs looks up before it speaks: the modules it uses, in one call."""
+    if situation.own_lookups or not any(tool.name == DESCRIBE for tool in request.tools):
+        return None
+    if situation.role not in DESIGNERS or (situation.role == "guidance" and situation.has_drawing):
+        return None
+    parts = design.parts.values()
+    everything = [action for part in parts for action in part.actions]
+    script = everything if situation.role == "planner" else _script(design, situation)
+    used = dict.fromkeys(
+        str(value)
+        for _, arguments in script
+        for argument, value in arguments.items()
+        if argument in ("new_block", "connector")
+    )
+    call = ToolCall(id="look_1", name=DESCRIBE, arguments={"module": ", ".join(used)})
+    return Reply(text="", calls=(call,)) if used else None
 
 
 def _plan(design: Design) -> str:

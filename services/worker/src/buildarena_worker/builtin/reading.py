@@ -5,8 +5,11 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
+from buildarena_geometry import LOOKUP, tool_definitions
 from buildarena_worker.session.messages import Request
 
+LOOKUPS = frozenset(tool.name for tool in tool_definitions([LOOKUP]))
+"""The tools that modules are looked up with."""
 _ROLE = re.compile(r"^# Role: (\S+)", re.MULTILINE)
 _TASK = re.compile(r"^# Task: (\S+)", re.MULTILINE)
 _PART = re.compile(r"^## (?:Sub-structure|Refinement of): (.+)$", re.MULTILINE)
@@ -26,7 +29,9 @@ class Situation:
         assembling: Whether the sub-structures are being put together.
         refining: Whether a built machine is being corrected.
         own_turns: Replies that this role gave before.
-        own_actions: Tools that this role called before.
+        own_actions: Tools that this role called before, those that look modules up left out.
+        own_lookups: How often it looked modules up.
+        has_drawing: Whether it works from a drawing.
         builder_turns: Replies of the builder that this role has read.
         last_text: What was said last.
     """
@@ -38,6 +43,8 @@ class Situation:
     refining: bool
     own_turns: int
     own_actions: int
+    own_lookups: int
+    has_drawing: bool
     builder_turns: int
     last_text: str
 
@@ -48,6 +55,8 @@ def read_situation(request: Request) -> Situation:
     received = [m.text for m in request.messages if m.role == "user"]
     opening = received[0] if received else ""
     own = [m for m in request.messages if m.role == "assistant"]
+    calls = [call.name for message in own for call in message.calls]
+    lookups = sum(name in LOOKUPS for name in calls)
     part = _PART.search(opening)
     return Situation(
         role=_first(_ROLE, system),
@@ -56,7 +65,9 @@ def read_situation(request: Request) -> Situation:
         assembling=_ASSEMBLY.search(opening) is not None,
         refining=_REFINEMENT.search(opening) is not None,
         own_turns=len(own),
-        own_actions=sum(len(m.calls) for m in own),
+        own_actions=len(calls) - lookups,
+        own_lookups=lookups,
+        has_drawing="Drawing of " in opening,
         builder_turns=sum(len(_BUILDER.findall(text)) for text in received),
         last_text=request.messages[-1].text if request.messages else "",
     )

@@ -10,6 +10,7 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from buildarena_geometry import LOOKUP, tool_definitions
 from buildarena_pipeline.transcript import ActionResult
 from buildarena_worker.session.messages import Message, Reply, Tool, ToolCall
 from buildarena_worker.session.results import ConstructionFailedError
@@ -29,6 +30,7 @@ OBJECTION = Tool(
 )
 
 Act = Callable[[ToolCall], ActionResult]
+_LOOKUPS = frozenset(tool.name for tool in tool_definitions([LOOKUP]))
 
 
 def terminates(reply: Reply) -> bool:
@@ -37,6 +39,11 @@ def terminates(reply: Reply) -> bool:
     A role that speaks of the word, or says when it will say it, does not end anything.
     """
     return not reply.calls and _LAST_LINE.search(reply.text) is not None
+
+
+def is_aside(reply: Reply) -> bool:
+    """Whether a reply does nothing but look modules up: nobody else reads that."""
+    return bool(reply.calls) and all(call.name in _LOOKUPS for call in reply.calls)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -133,7 +140,7 @@ class Dialogue:
                 self._hear(messages, received)
                 messages += _own(said)
                 received = []
-            else:
+            elif not (is_aside(said.reply) and all(action.ok for action in said.actions)):
                 received.append(_rendered(said))
         self._hear(messages, received)
         return messages

@@ -5,7 +5,7 @@ from __future__ import annotations
 from buildarena_geometry import Machine
 from buildarena_worker.session.session import Session
 from buildarena_worker.workflow.base import require_started
-from buildarena_worker.workflow.machine_tools import modules_text
+from buildarena_worker.workflow.machine_tools import modules_of
 from buildarena_worker.workflow.phases import build_phase, refine_phase
 from buildarena_worker.workflow.plan import SubStructure
 
@@ -19,7 +19,7 @@ class GuidanceBuilder:
         """Builds the machine of the session's task as one structure."""
         brief = session.pack.say("no_drawing", statement=session.statement)
         part = SubStructure(name="machine", text=brief)
-        modules = modules_text(session.task.constraints.modules)
+        modules = modules_of(session.task)
         machine = build_phase(session, part, brief, modules=modules)
         require_started(machine)
         return refine_phase(session, machine, part, brief)

@@ -5,13 +5,25 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
-from buildarena_geometry import Machine, Refused, load_catalogue, tool_definitions
+from buildarena_benchmark import Task
+from buildarena_environment.briefing import modules_told
+from buildarena_geometry import (
+    GROUPS,
+    LOOKUP,
+    Machine,
+    Refused,
+    catalogue_of,
+    modules_named,
+    tool_definitions,
+)
+from buildarena_geometry.feedback.modules import lookup_text
 from buildarena_geometry.feedback.modules import modules_in_short as catalogue_in_short
 from buildarena_geometry.feedback.modules import modules_text as catalogue_text
 from buildarena_pipeline.transcript import ActionResult
 from buildarena_worker.session.dialogue import Act
 from buildarena_worker.session.messages import Tool, ToolCall
 
+LOOKUPS = tuple(tool.name for tool in tool_definitions([LOOKUP]))
 QUERIES = ("get_machine_summary", "get_block_details")
 BUILD = (
     "start",
@@ -42,7 +54,7 @@ ASSEMBLE = (
 
 def tools_named(names: Sequence[str]) -> list[Tool]:
     """The library's tool definitions with these names, in this order."""
-    known = {tool.name: tool for tool in tool_definitions()}
+    known = {tool.name: tool for tool in tool_definitions((*GROUPS, LOOKUP))}
     return [
         Tool(
             name=name,
@@ -86,31 +98,39 @@ def acting_on(machine: Machine) -> Act:
     return act
 
 
-def modules_text(names: Sequence[str] | None = None) -> str:
+def lookups(task: Task) -> list[Tool]:
+    """The tools that modules are looked up with; none where they are told."""
+    return tools_named(LOOKUPS) if task.constraints.looked_up else []
+
+
+def modules_text(chosen: str | Sequence[str] | None = None) -> str:
     """The module list for people and models, generated from the catalogue.
 
     Args:
-        names: Only these modules, and the starting block; all that can be built by default.
+        chosen: Only these modules, or those of a set, and the starting block; the basic set by
+            default.
     """
-    return catalogue_text(load_catalogue(), names)
+    allowed = chosen if chosen is None or isinstance(chosen, str) else tuple(chosen)
+    return catalogue_text(catalogue_of(allowed), modules_named(allowed))
 
 
-def parts_text(names: Sequence[str] | None = None) -> str:
-    """The module list in short: sizes, masses and actions, without descriptions.
-
-    Args:
-        names: Only these modules and the start; all that can be built by default.
-    """
-    return catalogue_in_short(load_catalogue(), names)
+def modules_of(task: Task) -> str:
+    """What models read about the modules of a task: all of them, or how to look them up."""
+    return modules_told(task.constraints)
 
 
-def connectors_of(names: Sequence[str] | None = None) -> list[str]:
-    """Names of the connectors among some modules, or of all."""
-    return [
-        module.name
-        for module in load_catalogue().values()
-        if module.size is None and (names is None or module.name in names)
-    ]
+def parts_of(task: Task) -> str:
+    """The same in short: sizes, masses and actions, without descriptions."""
+    limits = task.constraints
+    if limits.looked_up:
+        return lookup_text(limits.catalogue)
+    return catalogue_in_short(limits.catalogue, modules_named(limits.modules))
+
+
+def connectors_of(task: Task) -> list[str]:
+    """Names of the connectors among a task's modules."""
+    allowed = modules_named(task.constraints.modules)
+    return [name for name in task.constraints.catalogue.connectors if name in allowed]
 
 
 def tools_text(names: Sequence[str]) -> str:

@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from buildarena_geometry import Machine
-from buildarena_worker.session.dialogue import OBJECTION, Dialogue, Role, terminates
+from buildarena_worker.session.dialogue import OBJECTION, Dialogue, Role, is_aside, terminates
+from buildarena_worker.session.messages import Reply
 from buildarena_worker.session.results import ConstructionFailedError
 from buildarena_worker.session.session import Session
 from buildarena_worker.workflow.machine_tools import (
     ASSEMBLE,
     BUILD,
+    LOOKUPS,
     REFINE,
     acting_on,
     connectors_of,
-    modules_text,
-    parts_text,
+    lookups,
+    modules_of,
+    parts_of,
     tools_named,
     tools_text,
 )
@@ -26,6 +30,8 @@ PLAN_TURNS = 5
 DRAFT_TURNS = 50
 BUILD_TURNS = 300
 """Replies a phase may take. Source: the paper's workflow appendix."""
+MOST_LOOKUPS = 20
+"""Modules a role may look up before it speaks."""
 SHOWN = 200
 """Characters of a reply that a failure quotes."""
 
@@ -41,13 +47,13 @@ def plan_phase(session: Session) -> Plan:
         "plan",
         task=task.name,
         statement=session.statement,
-        modules=modules_text(task.constraints.modules),
+        modules=modules_of(task),
     )
     dialogue = Dialogue(session, phase="plan", opening=opening)
-    planner = Role(name="planner", system=pack.roles["planner"])
+    planner = _looking_up(session, Role(name="planner", system=pack.roles["planner"]))
     error = PlanError("nothing was said")
     for _ in range(PLAN_TURNS):
-        text = dialogue.turn(planner).text
+        text = _speak(dialogue, planner).text
         try:
             plan = read_plan(text)
             _check_plan(session, plan)
@@ -87,20 +93,22 @@ def draft_phase(session: Session, plan: Plan, part: SubStructure) -> str:
         "draft",
         task=task.name,
         statement=session.statement,
-        modules=modules_text(task.constraints.modules),
+        modules=modules_of(task),
         plan=plan.text,
         name=part.name,
         sub_structure=part.text,
     )
     dialogue = Dialogue(session, phase="draft", opening=opening, sub_structure=part.name)
-    drafter = Role(name="drafter", system=pack.roles["drafter"])
-    reviewer = Role(name="reviewer", system=pack.roles["reviewer"], tools=[OBJECTION])
+    drafter = _looking_up(session, Role(name="drafter", system=pack.roles["drafter"]))
+    reviewer = _looking_up(
+        session, Role(name="reviewer", system=pack.roles["reviewer"], tools=[OBJECTION])
+    )
     for turn in range(DRAFT_TURNS):
         if turn % 2 == 0:
-            dialogue.turn(drafter)
-        elif terminates(dialogue.turn(reviewer)):
+            _speak(dialogue, drafter)
+        elif terminates(_speak(dialogue, reviewer)):
             dialogue.remark(drafter, pack.say("blueprint", name=part.name))
-            return dialogue.turn(drafter).text
+            return _speak(dialogue, drafter).text
     raise ConstructionFailedError(
         "turn_limit", f"no agreed drawing of {part.name} within {DRAFT_TURNS} turns"
     )
@@ -120,7 +128,7 @@ def build_phase(
     Raises:
         ConstructionFailedError: An objection, or the turn limit.
     """
-    machine = Machine()
+    machine = Machine(catalogue=session.task.constraints.catalogue)
     session.machine = machine
     pack, task = session.pack, session.task
     opening = pack.say("build", task=task.name, name=part.name)
@@ -129,7 +137,7 @@ def build_phase(
         task=task.name,
         name=part.name,
         blueprint=blueprint,
-        modules=modules or parts_text(task.constraints.modules),
+        modules=modules or parts_of(task),
         tools=tools_text(BUILD),
     )
     dialogue = Dialogue(session, phase="build", opening=opening, sub_structure=part.name)
@@ -159,7 +167,7 @@ def refine_phase(session: Session, machine: Machine, part: SubStructure, bluepri
         name=part.name,
         blueprint=blueprint,
         summary=summary,
-        modules=parts_text(task.constraints.modules),
+        modules=parts_of(task),
         tools=tools_text(REFINE),
     )
     dialogue = Dialogue(session, phase="refine", opening=opening, sub_structure=part.name)
@@ -178,14 +186,14 @@ def refine_phase(session: Session, machine: Machine, part: SubStructure, bluepri
 
 def assemble_phase(session: Session, plan: Plan, machines: Mapping[str, Machine]) -> Machine:
     """Lets builder and guidance put the sub-structures together."""
-    assembly = Machine(available=machines)
+    assembly = Machine(catalogue=session.task.constraints.catalogue, available=machines)
     session.machine = assembly
     pack, task = session.pack, session.task
     parts = "\n\n".join(
         f"### {name}\n\n{machine.act('get_machine_summary', {}).text}"
         for name, machine in machines.items()
     )
-    connectors = ", ".join(connectors_of(task.constraints.modules))
+    connectors = ", ".join(connectors_of(task))
     opening = pack.say("assemble", task=task.name, parts=", ".join(machines), connectors=connectors)
     brief = pack.say(
         "guide_assemble",
@@ -205,19 +213,19 @@ def assemble_phase(session: Session, plan: Plan, machines: Mapping[str, Machine]
 def solo_phase(session: Session) -> Machine:
     """Lets one role design and build alone."""
     pack, task = session.pack, session.task
-    machine = Machine()
+    machine = Machine(catalogue=session.task.constraints.catalogue)
     session.machine = machine
     opening = pack.say(
         "build_solo",
         task=task.name,
         statement=session.statement,
-        modules=modules_text(task.constraints.modules),
+        modules=modules_of(task),
     )
     dialogue = Dialogue(session, phase="build", opening=opening)
     role = Role(
         name="builder",
         system=pack.roles["solo"],
-        tools=[*tools_named(BUILD), OBJECTION],
+        tools=[*tools_named(BUILD), *lookups(task), OBJECTION],
         act=acting_on(machine),
     )
     _alternate(dialogue, (role,), ends=role, what="building")
@@ -235,13 +243,34 @@ def _builder(session: Session, machine: Machine, names: Sequence[str]) -> Role:
 
 def _guidance(session: Session, brief: str) -> Role:
     system = session.pack.roles["guidance"]
-    return Role(name="guidance", system=system, tools=[OBJECTION], brief=brief)
+    guidance = Role(name="guidance", system=system, tools=[OBJECTION], brief=brief)
+    return _looking_up(session, guidance)
+
+
+def _looking_up(session: Session, role: Role) -> Role:
+    """A role that speaks, with the tools to look modules up where the task has it so."""
+    tools = lookups(session.task)
+    if not tools:
+        return role
+    offered = Machine(catalogue=session.task.constraints.catalogue)
+    return replace(role, tools=[*role.tools, *tools], act=acting_on(offered))
+
+
+def _speak(dialogue: Dialogue, role: Role) -> Reply:
+    """A role's turn, and further ones while it looks modules up instead of speaking."""
+    reply = dialogue.turn(role)
+    may_look = any(tool.name in LOOKUPS for tool in role.tools)
+    for _ in range(MOST_LOOKUPS if may_look else 0):
+        if not is_aside(reply):
+            break
+        reply = dialogue.turn(role)
+    return reply
 
 
 def _alternate(dialogue: Dialogue, roles: Sequence[Role], *, ends: Role, what: str) -> None:
     for turn in range(BUILD_TURNS):
         role = roles[turn % len(roles)]
-        reply = dialogue.turn(role)
+        reply = _speak(dialogue, role)
         if role is ends and terminates(reply):
             return
     raise ConstructionFailedError("turn_limit", f"{what} took more than {BUILD_TURNS} turns")

@@ -1,0 +1,56 @@
+"""Questions about the modules that a machine may be made of; they change nothing."""
+
+from buildarena_geometry.actions.lookups import nearest
+from buildarena_geometry.changes import Change
+from buildarena_geometry.feedback import modules as words
+from buildarena_geometry.feedback.words import listing
+from buildarena_geometry.modules.module import Module
+from buildarena_geometry.modules.names import CaselessNames
+from buildarena_geometry.modules.parameters import Name, RefusalError, shown
+from buildarena_geometry.outcomes import Cause
+from buildarena_geometry.state import MachineState
+
+
+def list_module_categories(state: MachineState) -> Change:
+    """Lists the categories of modules and how many each has."""
+    return Change(after=state, render=lambda: words.categories_text(state.catalogue))
+
+
+def list_modules(state: MachineState, category: Name) -> Change:
+    """Lists the modules of a category, a short line each.
+
+    Args:
+        category: Name of the category.
+    """
+    found = words.modules_of_category(state.catalogue)
+    name = CaselessNames(found).find(category)
+    if name is None:
+        raise RefusalError(
+            Cause.UNKNOWN_MODULE,
+            f"There is no category {shown(category)}. Categories: {listing(found)}.",
+        )
+    return Change(after=state, render=lambda: words.category_text(state.catalogue, name))
+
+
+def describe_module(state: MachineState, module: Name) -> Change:
+    """Tells all about a module: size, faces, actions and use.
+
+    Args:
+        module: Name of the module, or several names with commas between them.
+    """
+    names = [name for name in module.split(",") if name.strip()] or [module]
+    found = {one.name: one for one in (_described(state, name.strip()) for name in names)}
+    return Change(
+        after=state, render=lambda: "\n\n".join(words.module_text(one) for one in found.values())
+    )
+
+
+def _described(state: MachineState, name: str) -> Module:
+    found = state.catalogue.named(name)
+    if found is None or found.kind == "cargo":
+        known = [one.name for one in state.catalogue.values() if one.kind != "cargo"]
+        raise RefusalError(
+            Cause.UNKNOWN_MODULE,
+            f"There is no module {shown(name)}. Modules: {nearest(name, known)}.",
+        )
+    return found
