@@ -44,7 +44,7 @@ def test_an_unknown_module_names_the_choices(api, name) -> None:
     answer = api.get(f"/v1/modules/{name}.glb")
     assert answer.status_code == 404
     if "%" not in name:
-        assert "Brace" in answer.json()["detail"]
+        assert "the nearest are" in answer.json()["detail"]
 
 
 def test_machines_are_models_and_pictures(api, context, monkeypatch) -> None:

@@ -55,7 +55,7 @@ def test_the_catalogue(client) -> None:
     assert client.health()["status"] == "ok" or client.health()["checks"]
     require_shape(client.caller(), schemas.CallerView)
     tasks = client.tasks()
-    assert len(tasks) == 9
+    assert len(tasks) == 15
     require_shape(tasks[0], schemas.TaskView)
     task = client.task("lift-1")
     require_shape(task, schemas.TaskDetail)

@@ -2,11 +2,13 @@
 
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from buildarena_benchmark import Task, builtin_tasks
 from buildarena_simulation import ENGINES
+from buildarena_simulation.structure import clusters
 
 # The reference designs are a module of this folder, shared with the benchmarks.
 sys.path.insert(0, str(Path(__file__).parents[2]))
@@ -14,6 +16,19 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 @pytest.fixture(params=ENGINES)
 def engine(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+@pytest.fixture(params=("base", "arm"))
+def root(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
+    """Which side of a joint the engines see it from: the heavy base, or what hangs on it."""
+    heaviest = clusters._root
+
+    def lightest(*arguments: Any) -> int:
+        structure, groups, piece, _ = arguments
+        return min(piece, key=lambda g: float(structure.masses[groups[g]].sum()))
+
+    monkeypatch.setattr(clusters, "_root", heaviest if request.param == "base" else lightest)
     return str(request.param)
 
 

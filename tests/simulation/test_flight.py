@@ -62,7 +62,7 @@ def test_a_fan_lifts_and_drops_its_load_as_thrust_and_weight_say(engine: str, lo
     draft.bind(fan, "fly", "UpArrow")
     thrust = WORKSHOP["Flying Block"].forces.push.force * GRAVITY
     found = _way(_released(draft.machine, engine, seconds=2.0))
-    expected = _path(draft.machine, lambda v: np.array([0.0, 0.0, thrust]), (0, 0, 0), 2.0)
+    expected = _path(draft.machine, lambda _: np.array([0.0, 0.0, thrust]), (0, 0, 0), 2.0)
     assert found[2] == pytest.approx(expected[2], rel=0.02)
     assert np.abs(found[:2]).max() < 0.01
 

@@ -807,17 +807,21 @@ class ModuleView(TypedDict):
 
     Attributes:
         actions: What keys can be bound to.
+        categories: Groups it is looked up in; none for basic modules.
         faces: Labels of the faces that take a block.
+        simulated: Whether both engines have its physics.
         size: Extents along its own x, y and z, units; null for connectors.
     """
 
     actions: list[str]
+    categories: list[str]
     cost: float
     description: str
     faces: list[str]
     kind: str
     mass: float
     name: str
+    simulated: bool
     size: list[float] | None
 
 

@@ -7,6 +7,7 @@ from buildarena_benchmark.scores import Score, failed_score, score
 from buildarena_benchmark.tasks.loading import (
     builtin_tasks,
     load_task,
+    paper_tasks,
     parse_custom_task,
     parse_task,
 )
@@ -24,6 +25,7 @@ __all__ = [
     "builtin_tasks",
     "failed_score",
     "load_task",
+    "paper_tasks",
     "parse_custom_task",
     "parse_task",
     "robustness",

@@ -7,6 +7,7 @@ import numpy as np
 from buildarena_simulation.bearing import BearingMeter
 from buildarena_simulation.constants import GRAVITY
 from buildarena_simulation.engines.base import Engine, World
+from buildarena_simulation.holding import Holding
 from buildarena_simulation.resting import FaceFinder
 from buildarena_simulation.structure.clusters import Clusters, find_clusters
 from buildarena_simulation.structure.contacts import EvenSharing, PointForces, together
@@ -33,6 +34,9 @@ class BreakingModel:
         clusters: Its clusters at the start.
         motion: Their motion at the start.
         interval_s: Time between two evaluations, seconds.
+
+    Attributes:
+        holding: What blocks hold; None where none can.
     """
 
     def __init__(
@@ -53,6 +57,7 @@ class BreakingModel:
         self.motion = motion
         self.breaks: list[Break] = []
         self.events: list[Event] = []
+        self.holding: Holding | None = None
 
     def follow(
         self,
@@ -122,6 +127,11 @@ class BreakingModel:
             self._fall_apart(engine)
         return held
 
+    def told_events(self) -> tuple[Event, ...]:
+        """What let go or took hold so far, in order of time."""
+        holds = [] if self.holding is None else self.holding.events
+        return tuple(sorted([*self.events, *holds], key=lambda event: event.time_s))
+
     def _giving_way(self, ratio: FloatArray, worst: int) -> list[int]:
         """The worst joint and, where it is a connector, those that overload its face with it.
 
@@ -179,6 +189,8 @@ class BreakingModel:
         faces = self._faces.find(clusters, motion, cargo)
         contacts = faces.joined_to(engine.contacts(), clusters.cluster_of)
         others = [self._pushes(thrusts), self._pulls(tensions)]
+        if self.holding is not None:
+            others.append(self.holding.forces(clusters, motion))
         if self._field is not None:
             others.append(self._field.taken(clusters, motion))
         contacts, shared = self._supports.settled(

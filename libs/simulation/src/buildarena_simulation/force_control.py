@@ -9,6 +9,7 @@ from buildarena_geometry.modules.forces import Spring
 from buildarena_simulation.control import Bindings, KeyHold
 from buildarena_simulation.scenario import Control
 from buildarena_simulation.structure.force_field import Commands
+from buildarena_simulation.structure.grips import grips_of
 from buildarena_simulation.structure.model import BoolArray, FloatArray, Structure
 from buildarena_simulation.structure.own_forces import OwnForces
 
@@ -22,12 +23,16 @@ class ForceSchedule:
         heights: (S, A) by how much each held height was moved, units.
         let_go: (S, D) whether each decoupler's key was pressed by then.
         rests: (S, K) length of each spring at rest, as a share of its built length.
+        grab: (S, G) whether each grip's key for it is held.
+        release: (S, G) the same to let go.
     """
 
     pushing: BoolArray
     heights: FloatArray
     let_go: BoolArray
     rests: FloatArray
+    grab: BoolArray
+    release: BoolArray
 
     def at(self, step: int, kicks: FloatArray) -> Commands:
         """What is asked for from a step on.
@@ -86,13 +91,43 @@ def plan_forces(
         if decoupling is not None:
             held = held_during(pressed, bindings[block].get(decoupling.action, ()), times)
             let_go[:, k] = np.logical_or.accumulate(held)
+    grab, release = _grip_keys(structure, bindings, pressed, times)
+    return ForceSchedule(
+        pushing=pushing,
+        heights=heights,
+        let_go=let_go,
+        rests=_rests(structure, bindings, pressed, times),
+        grab=grab,
+        release=release,
+    )
+
+
+def _grip_keys(
+    structure: Structure, bindings: Bindings, pressed: Sequence[KeyHold], times: FloatArray
+) -> tuple[BoolArray, BoolArray]:
+    """Whether the keys that grab, and those that release, are held, each (S, G)."""
+    grips = grips_of(structure)
+    grab, release = (np.zeros((len(times), len(grips)), dtype=bool) for _ in range(2))
+    for g, block in enumerate(grips.blocks):
+        grip = structure.parts[block].module.forces.grip
+        if grip is not None:
+            grab[:, g] = held_during(pressed, bindings[block].get(grip.grab, ()), times)
+            release[:, g] = held_during(pressed, bindings[block].get(grip.release, ()), times)
+    return grab, release
+
+
+def _rests(
+    structure: Structure, bindings: Bindings, pressed: Sequence[KeyHold], times: FloatArray
+) -> FloatArray:
+    """Length of each spring at rest, (S, K), as a share of its built length."""
     rests = np.ones((len(times), len(structure.ropes.spring_of)))
-    for k, spring in enumerate(structure.ropes.spring_of):
-        bound = bindings[len(structure) + k] if len(structure) + k < len(bindings) else {}
+    # Tests of structures alone give the keys of blocks only, or none.
+    of_springs = [*bindings[len(structure) :], *({} for _ in structure.ropes.spring_of)]
+    for k, (spring, bound) in enumerate(zip(structure.ropes.spring_of, of_springs, strict=False)):
         held = held_during(pressed, bound.get(spring.contract or "", ()), times)
         if held.any():
-            rests[:, k] = _drawn(held, spring, time_step_s)
-    return ForceSchedule(pushing=pushing, heights=heights, let_go=let_go, rests=rests)
+            rests[:, k] = _drawn(held, spring, float(times[1]))
+    return rests
 
 
 def _drawn(held: BoolArray, spring: Spring, time_step_s: float) -> FloatArray:

@@ -23,6 +23,7 @@ from buildarena_simulation.engines import ENGINES, create_engine, engine_version
 from buildarena_simulation.engines.base import Engine, World
 from buildarena_simulation.errors import BuildarenaSimulationError, SimulationError
 from buildarena_simulation.force_control import ForceSchedule, plan_forces
+from buildarena_simulation.holding import Holding
 from buildarena_simulation.machine import bindings_of, structure_of
 from buildarena_simulation.placement import Start, start_digest, start_of
 from buildarena_simulation.recording import Recorder
@@ -200,6 +201,8 @@ class _Trial:
         engine.enter(clusters, motion)
         self._interval_s = engine.time_step_s * engine.steps_per_evaluation
         self.breaking = BreakingModel(world, clusters, motion, interval_s=self._interval_s)
+        if any(part.module.forces.grip for part in structure.parts):
+            self.breaking.holding = Holding(world)
         self.recorder = Recorder(structure, scenario)
         self._blown_up = False
 
@@ -262,6 +265,22 @@ class _Trial:
             # The push lasts one interval, so that the loads that it makes are seen.
             kicks[asked] = held * table.impulse[asked] / self._interval_s
         field.commands = schedule.at(step, kicks)
+        holding, breaking = self.breaking.holding, self.breaking
+        if holding is not None and not self._blown_up:
+            cargo = self._engine.cargo() if self._scenario.cargo else None
+            if holding.update(
+                breaking.clusters,
+                breaking.motion,
+                cargo,
+                grab=schedule.grab[step],
+                release=schedule.release[step],
+                time_s=step * self._engine.time_step_s,
+            ):
+                self._hold(holding)
+
+    def _hold(self, holding: Holding) -> None:
+        self._engine.hold(holding.holds)
+        self._engine.enter(self.breaking.clusters, self.breaking.motion)
 
     def _advance(self, targets: np.ndarray, firing: np.ndarray, step: int) -> None:
         if self._blown_up:
@@ -279,9 +298,15 @@ class _Trial:
             self._blown_up = True
             self.breaking.motion = motion
             return
+        holding = self.breaking.holding
+        slipped = holding is not None and holding.follow(
+            engine, time_s=time_s + self._interval_s, interval_s=self._interval_s
+        )
         self.breaking.follow(
             engine, motion, thrusts, time_s=time_s + self._interval_s, cargo_mass=mass
         )
+        if slipped and holding is not None:
+            self._hold(holding)
 
     def _sample(self, time_s: float) -> None:
         cargo = self._scenario.cargo

@@ -55,9 +55,18 @@ class AsyncCatalogue(AsyncSender):
         """The models that jobs can name."""
         return cast("list[ModelView]", await self.get("/v1/models"))
 
-    async def modules(self) -> list[ModuleView]:
-        """The kinds of parts that machines are made of."""
-        return cast("list[ModuleView]", await self.get("/v1/modules"))
+    async def modules(
+        self, *, of_set: str | None = None, task: str | None = None, version: str | None = None
+    ) -> list[ModuleView]:
+        """The kinds of parts that machines are made of: the basic ones by default.
+
+        Args:
+            of_set: Those of a set: "basic", "workshop" or "all".
+            task: Those that builders of a task may use.
+            version: The task's; the newest by default.
+        """
+        found = await self.get("/v1/modules", set=of_set, task=task, version=version)
+        return cast("list[ModuleView]", found)
 
     async def workers(self) -> list[WorkerView]:
         """The workers that were heard of lately."""

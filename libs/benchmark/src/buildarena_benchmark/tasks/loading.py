@@ -12,20 +12,27 @@ from buildarena_benchmark.tasks.document import TaskDocument
 from buildarena_benchmark.tasks.sources import read_model, read_source
 from buildarena_benchmark.tasks.task import Task, task_of
 
-_ORDER: Final = tuple(
+_PAPER: Final = tuple(
     f"{category}-{level}" for category in ("transport", "support", "lift") for level in (1, 2, 3)
 )
+_WORKSHOP: Final = (*(f"mechanisms-{level}" for level in (1, 2, 3, 4)), "flight-1", "flight-2")
 
 
 @cache
 def builtin_tasks() -> Mapping[str, Task]:
-    """The nine built-in tasks by name, in the paper's order."""
+    """The built-in tasks by name: the paper's nine in its order, then mechanisms and flight."""
     folder = resources.files("buildarena_benchmark.tasks") / "catalogue"
     tasks = {}
-    for name in _ORDER:
+    for name in (*_PAPER, *_WORKSHOP):
         text = (folder / f"{name}.yaml").read_text(encoding="utf-8")
         tasks[name] = parse_task(text, origin=f"{name}.yaml")
     return MappingProxyType(tasks)
+
+
+@cache
+def paper_tasks() -> Mapping[str, Task]:
+    """The paper's nine tasks by name: those that the overall ranking is over."""
+    return MappingProxyType({name: builtin_tasks()[name] for name in _PAPER})
 
 
 def load_task(source: str | Path) -> Task:

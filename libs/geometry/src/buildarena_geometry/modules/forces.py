@@ -13,6 +13,10 @@ if TYPE_CHECKING:
 
 FORCE_FIELDS = ("push", "wing", "lift", "altitude", "tether", "spring", "decouple", "grip")
 _POWERS = (0, 1, 2)
+_FASTEST_LOSS = 100.0  # 1/s; what air takes from a block faster than this, no step follows
+_MOST_DAMPING = 3.0  # mass·g per unit/s and mass unit; the same for a held height
+_STIFFEST = 1000.0  # mass·g per unit; a stiffer spring between small blocks outruns the step
+_MOST_SPRING_DAMPING = 10.0  # mass·g per unit/s
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -229,14 +233,15 @@ def read_forces(fields: Fields, actions: tuple[str, ...]) -> Forces:
                 f"no {name}: a connector has no force but a spring's, "
                 "and only connectors have a spring"
             )
+    mass = fields["mass"].number(above=0)
     springs = fields.has("link") and fields["link"].value == "spring"
     if fields.has("spring") != springs:
         fields["spring"].fail("a spring with the link spring, and none with another link")
     return Forces(
         push=_push(fields["push"], actions) if fields.has("push") else None,
-        wing=_wing(fields["wing"]) if fields.has("wing") else None,
+        wing=_wing(fields["wing"], mass) if fields.has("wing") else None,
         lift=_lift(fields["lift"]) if fields.has("lift") else None,
-        altitude=_altitude(fields["altitude"], actions) if fields.has("altitude") else None,
+        altitude=_altitude(fields["altitude"], actions, mass) if fields.has("altitude") else None,
         tether=_tether(fields["tether"]) if fields.has("tether") else None,
         spring=_spring(fields["spring"], actions) if fields.has("spring") else None,
         decouple=_decoupling(fields["decouple"], actions) if fields.has("decouple") else None,
@@ -254,7 +259,7 @@ def _push(entry: Reader, actions: tuple[str, ...]) -> Push:
     )
 
 
-def _wing(entry: Reader) -> Wing:
+def _wing(entry: Reader, mass: float) -> Wing:
     fields = entry.fields(
         required=("normal", "coefficient", "power", "cap_speed"),
         optional=("pitch_deg", "one_sided", "origin"),
@@ -262,12 +267,14 @@ def _wing(entry: Reader) -> Wing:
     power = fields["power"].integer()
     if power not in _POWERS:
         fields["power"].fail("0, 1 or 2")
+    cap_speed = fields["cap_speed"].number(above=0)
+    most = _FASTEST_LOSS * mass / cap_speed**power
     return Wing(
         normal=fields["normal"].direction(),
         pitch_deg=fields["pitch_deg"].number() if "pitch_deg" in fields else 0.0,
-        coefficient=fields["coefficient"].number(least=0),
+        coefficient=_up_to(most, fields["coefficient"], least=0.0),
         power=power,
-        cap_speed=fields["cap_speed"].number(above=0),
+        cap_speed=cap_speed,
         one_sided=fields["one_sided"].truth() if "one_sided" in fields else False,
         origin=_origin(fields),
     )
@@ -278,14 +285,14 @@ def _lift(entry: Reader) -> Lift:
     return Lift(force=fields["force"].number(least=0), origin=_origin(fields))
 
 
-def _altitude(entry: Reader, actions: tuple[str, ...]) -> Altitude:
+def _altitude(entry: Reader, actions: tuple[str, ...], mass: float) -> Altitude:
     fields = entry.fields(
         required=("most", "stiffness", "damping", "rise", "sink", "rate"), optional=("origin",)
     )
     return Altitude(
         most=fields["most"].number(least=0),
         stiffness=fields["stiffness"].number(above=0),
-        damping=fields["damping"].number(least=0),
+        damping=_up_to(_MOST_DAMPING * mass, fields["damping"], least=0.0),
         rise=fields["rise"].choice(actions),
         sink=fields["sink"].choice(actions),
         rate=fields["rate"].number(above=0),
@@ -307,8 +314,8 @@ def _spring(entry: Reader, actions: tuple[str, ...]) -> Spring:
     if shortest > 1.0:
         fields["shortest"].fail("a share, above 0 and at most 1")
     return Spring(
-        stiffness=fields["stiffness"].number(above=0),
-        damping=fields["damping"].number(least=0),
+        stiffness=_up_to(_STIFFEST, fields["stiffness"], above=0.0),
+        damping=_up_to(_MOST_SPRING_DAMPING, fields["damping"], least=0.0),
         contract=fields["contract"].choice(actions) if fields.has("contract") else None,
         shortest=shortest,
         rate=fields["rate"].number(above=0),
@@ -338,6 +345,15 @@ def _grip(entry: Reader, actions: tuple[str, ...]) -> Grip:
         moment=fields["moment"].number(above=0),
         origin=_origin(fields),
     )
+
+
+def _up_to(
+    most: float, entry: Reader, *, least: float | None = None, above: float | None = None
+) -> float:
+    number = entry.number(least=least, above=above)
+    if number > most:
+        entry.fail(f"a number of at most {most:g}, which a simulation's steps can follow")
+    return number
 
 
 def _origin(fields: Fields) -> str:

@@ -4,7 +4,7 @@ An engine builds bodies from clusters, steps them, and reports poses and contact
 breaking, control, heating and recording are shared and independent of the engine.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -14,6 +14,7 @@ from buildarena_simulation.scenario import TerrainBox
 from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.contacts import ContactForces
 from buildarena_simulation.structure.force_field import ForceField
+from buildarena_simulation.structure.grips import Hold
 from buildarena_simulation.structure.model import FloatArray, Structure
 from buildarena_simulation.structure.motion import Motion
 
@@ -94,6 +95,15 @@ class Engine(Protocol):
 
     def drop_rope(self, index: int) -> None:
         """Removes a rope that gave way from the world."""
+
+    def hold(self, holds: Sequence[Hold]) -> None:
+        """Says what blocks hold from the next `enter` on, each where it is then."""
+
+    def grip_wrenches(self) -> FloatArray:
+        """Force and moment on each block that holds, about its hold's point, (H, 6).
+
+        World frame, mass·unit/s² and mass·unit²/s², in the last step.
+        """
 
     def advance(self, targets: FloatArray, thrusts: FloatArray) -> None:
         """Steps the world.

@@ -31,7 +31,7 @@ _SERVO_TIME_S: Final = 0.02
 _TEETH: Final = 1e6
 """Greatest force between teeth, and of a spring, mass·unit/s²: more than occurs."""
 
-_TOOTH_ERP: Final = 0.2
+_TOOTH_ERP: Final = 0.8
 """Share of a gear's error that a step takes away."""
 
 _NO_TURN: Final = (0.0, 0.0, 0.0, 1.0)

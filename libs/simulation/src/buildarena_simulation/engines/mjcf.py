@@ -17,6 +17,8 @@ from buildarena_simulation.engines.joint_places import is_simple
 from buildarena_simulation.engines.mjcf_joints import JointText
 from buildarena_simulation.engines.xml_text import opened, tag
 from buildarena_simulation.structure.clusters import Clusters
+from buildarena_simulation.structure.contacts import CARGO, WORLD
+from buildarena_simulation.structure.grips import Hold
 from buildarena_simulation.structure.model import FloatArray, ShapeKind, Structure
 from buildarena_simulation.structure.motion import Motion
 from buildarena_simulation.structure.solids import Solid
@@ -65,6 +67,7 @@ class MjcfState:
         moments: (C, 3) principal moments of inertia.
         cargo_mass: Mass of the cargo now.
         ropes: Indices of the ropes that hold.
+        holds: What blocks hold.
     """
 
     clusters: Clusters
@@ -74,6 +77,7 @@ class MjcfState:
     moments: FloatArray
     cargo_mass: float
     ropes: Sequence[int]
+    holds: Sequence[Hold] = ()
 
     def in_body(self, c: int, point: FloatArray) -> FloatArray:
         """A machine-frame point in the frame of a cluster's body: its principal frame."""
@@ -127,6 +131,7 @@ def mjcf_of(world: World, state: MjcfState, settings: MjcfSettings) -> str:
         "<equality>",
         *joints.equalities(),
         "</equality>",
+        *_welds(state),
         "<actuator>",
         *joints.drives(),
         *_cannons(world.structure, state),
@@ -294,6 +299,23 @@ def _cannons(structure: Structure, state: MjcfState) -> Iterator[str]:
         recoil = state.axes[state.clusters.cluster_of[i]].T @ -structure.directions[i]
         gear = (*recoil, 0.0, 0.0, 0.0)
         yield tag("general", name=f"cannon {i}", site=f"cannon {i}", gear=gear)
+
+
+def _welds(state: MjcfState) -> Iterator[str]:
+    """What blocks hold; named "grip G". A weld keeps its bodies as they are compiled."""
+    if not state.holds:
+        return
+    yield "<equality>"
+    for hold in state.holds:
+        c = int(state.clusters.cluster_of[hold.block])
+        names = {WORLD: "", CARGO: "cargo"}
+        other = names.get(hold.other)
+        if other is None:
+            other = f"cluster {state.clusters.cluster_of[hold.other]}"
+        # The held body comes first: a weld's point is one of its second body.
+        first = {"body1": other or "world", "body2": f"cluster {c}"}
+        yield tag("weld", name=f"grip {hold.grip}", anchor=state.in_body(c, hold.point), **first)
+    yield "</equality>"
 
 
 def _friction(coefficient: float) -> tuple[float, float, float]:

@@ -28,6 +28,9 @@ _STOP_SOLREF = (0.008, 1.0)
 _TIE_SOLREF = (0.004, 1.0)
 """The same of what ties joints together: teeth, and the halves of a constant-velocity joint."""
 
+_TIE_SOLIMP = (0.9999, 0.9999, 0.001)
+"""Impedance of such a tie: hard."""
+
 _SERVO_SLACK = 0.01
 """A drive exerts all its force this far off its place, rad or units."""
 
@@ -165,4 +168,5 @@ class JointText:
             joint2=other,
             polycoef=(0.0, ratio, 0.0, 0.0, 0.0),
             solref=_TIE_SOLREF,
+            solimp=_TIE_SOLIMP,
         )

@@ -1,7 +1,6 @@
 """MuJoCo behind the engine seam: one body per cluster, one geom per block, hinges for axles."""
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 
 import mujoco
 import numpy as np
@@ -12,18 +11,18 @@ from buildarena_simulation.engines.closest_points import ShapeTable, shape_table
 from buildarena_simulation.engines.impacts import ImpactWatch
 from buildarena_simulation.engines.joint_places import is_simple_piece
 from buildarena_simulation.engines.mjcf import MjcfSettings, MjcfState, mjcf_of
+from buildarena_simulation.engines.mujoco_addresses import addresses_in
 from buildarena_simulation.engines.mujoco_joints import (
-    JointAddresses,
     drag_apart,
     enter_joint,
-    joint_addresses,
 )
-from buildarena_simulation.engines.tendons import Tendons
+from buildarena_simulation.engines.tendons import Tendons, weld_wrenches
 from buildarena_simulation.structure.clusters import Clusters
-from buildarena_simulation.structure.contacts import CARGO, WORLD, ContactForces
-from buildarena_simulation.structure.model import BoolArray, FloatArray, IntArray
+from buildarena_simulation.structure.contacts import ContactForces
+from buildarena_simulation.structure.grips import Hold
+from buildarena_simulation.structure.model import FloatArray, IntArray
 from buildarena_simulation.structure.motion import Motion
-from buildarena_simulation.structure.solids import Solid, Solids
+from buildarena_simulation.structure.solids import Solids
 from buildarena_simulation.structure.vectors import cross, turned, turned_wrenches
 
 _TIME_STEP_S = 1 / 500
@@ -65,6 +64,7 @@ class MujocoEngine:
             servo_slip=_SERVO_SLIP,
         )
         self._solids = Solids(world.structure)
+        self._holds: tuple[Hold, ...] = ()
         self._rope_alive = np.ones(len(world.structure.ropes), dtype=bool)
         self._cargo_mass = world.cargo.mass if world.cargo else 0.0
         self._cargo_state: tuple[FloatArray, FloatArray] | None = None
@@ -108,12 +108,11 @@ class MujocoEngine:
             moments=moments,
             cargo_mass=self._cargo_mass,
             ropes=np.flatnonzero(self._rope_alive).tolist(),
+            holds=self._holds,
         )
         self._model = mujoco.MjModel.from_xml_string(mjcf_of(self._world, state, self._mjcf))
         self._data = mujoco.MjData(self._model)
-        self._addresses = _addresses_in(
-            self._model, self._world, clusters, solids, self._rope_alive
-        )
+        self._addresses = addresses_in(self._model, self._world, clusters, solids, self._rope_alive)
         self._tendons = Tendons(
             model=self._model,
             data=self._data,
@@ -181,6 +180,14 @@ class MujocoEngine:
     def struck(self) -> bool:
         """See `Engine`."""
         return self._impacts.struck
+
+    def hold(self, holds: Sequence[Hold]) -> None:
+        """See `Engine`."""
+        self._holds = tuple(holds)
+
+    def grip_wrenches(self) -> FloatArray:
+        """See `Engine`."""
+        return weld_wrenches(self._model, self._data, self._holds)
 
     def rope_tensions(self) -> FloatArray:
         """See `Engine`."""
@@ -324,70 +331,3 @@ class MujocoEngine:
                 blocks.append(found)
                 weights.append(weight)
         return np.concatenate(rows), np.concatenate(blocks), np.concatenate(weights)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Addresses:
-    """Where a compiled model keeps what belongs to clusters, blocks, wheels and ropes.
-
-    Attributes:
-        bodies: (C,) body of each cluster.
-        body_of_geom: Cluster of each geom, `CARGO` or `WORLD`.
-        block_of_geom: Block of each geom that stands for one only, else -1.
-        surface_of_geom: Fixed body of each geom as in `ContactForces.surface`.
-        joints: The driven joints.
-        thrust_actuators: (K,) actuator of each cannon.
-        free_dofs: (F, 3) linear velocities of the free bodies, the cargo first.
-        spin_dofs: (P, 3) angular velocities of the pieces.
-        tendons: Tendon of each rope that holds.
-    """
-
-    bodies: IntArray
-    body_of_geom: IntArray
-    block_of_geom: IntArray
-    surface_of_geom: IntArray
-    joints: JointAddresses
-    thrust_actuators: IntArray
-    free_dofs: IntArray
-    spin_dofs: IntArray
-    tendons: Mapping[int, int]
-
-
-def _addresses_in(
-    model: "mujoco.MjModel",
-    world: World,
-    clusters: Clusters,
-    solids: Sequence[Sequence[Solid]],
-    rope_alive: BoolArray,
-) -> _Addresses:
-    structure = world.structure
-    body_of_geom = np.full(model.ngeom, CARGO, dtype=np.int64)
-    block_of_geom, surface_of_geom = (np.full(model.ngeom, -1, dtype=np.int64) for _ in range(2))
-    for c, of_cluster in enumerate(solids):
-        for k, solid in enumerate(of_cluster):
-            geom = model.geom(f"solid {c} {k}").id
-            body_of_geom[geom] = c
-            if len(solid.blocks) == 1:
-                block_of_geom[geom] = solid.blocks[0]
-    fixed = [(f"terrain {k}", k + 1) for k in range(len(world.terrain))]
-    for name, surface in [("ground", 0)] * world.ground + fixed:
-        geom = model.geom(name).id
-        body_of_geom[geom], surface_of_geom[geom] = WORLD, surface
-    pieces = [model.joint(f"free {piece[0]}").dofadr[0] for piece in clusters.pieces]
-    # Only the cargo can stand before the pieces; its free joint comes first.
-    free = pieces if pieces[0] == 0 else [0, *pieces]
-    return _Addresses(
-        bodies=_ids(model.body(f"cluster {c}").id for c in range(len(clusters))),
-        body_of_geom=body_of_geom,
-        block_of_geom=block_of_geom,
-        surface_of_geom=surface_of_geom,
-        joints=joint_addresses(model, structure, clusters),
-        thrust_actuators=_ids(model.actuator(f"cannon {i}").id for i in structure.cannons),
-        free_dofs=_ids(free)[:, None] + np.arange(3),
-        spin_dofs=_ids(pieces)[:, None] + np.arange(3, 6),
-        tendons={int(r): model.tendon(f"rope {r}").id for r in np.flatnonzero(rope_alive)},
-    )
-
-
-def _ids(numbers: Iterable[int]) -> IntArray:
-    return np.array([int(number) for number in numbers], dtype=np.int64)

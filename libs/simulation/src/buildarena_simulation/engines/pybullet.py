@@ -1,23 +1,22 @@
 """PyBullet behind the engine seam: one multibody per articulated piece, read from URDF text.
 
-Why it is done this way: multibodies (not maximal coordinates) keep heavy cargo quiet;
-`createCollisionShapeArray` drops shapes beyond 16, URDF text does not; compound inertia computed by
-PyBullet is wrong, so ours is given; URDFs are cached by file name, so caching is off. Its own
-damping grows with the square of the speed, so drag is a force of ours.
+Why: multibodies keep heavy cargo quiet; `createCollisionShapeArray` drops shapes beyond 16; inertia
+computed by PyBullet is wrong; URDFs are cached by file name; its damping grows with the speed's
+square, so drag is a force of ours.
 """
 
 import itertools
 import math
 import shutil
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib.metadata import PackageNotFoundError
 from importlib.metadata import version as distribution_version
 from pathlib import Path
 
 import numpy as np
 
-from buildarena_simulation.constants import FORCES_EVERY_S, MAX_SPIN
+from buildarena_simulation.constants import FORCES_EVERY_S
 from buildarena_simulation.engines.base import (
     CargoPose,
     World,
@@ -25,8 +24,17 @@ from buildarena_simulation.engines.base import (
     quaternion_of,
     rotation_of,
 )
-from buildarena_simulation.engines.bullet_bodies import add_box, free_of_damping, set_friction
+from buildarena_simulation.engines.bullet_bodies import (
+    add_box,
+    free_of_damping,
+    friction_of,
+    limit_spin,
+    pose_of,
+    set_friction,
+    set_up,
+)
 from buildarena_simulation.engines.bullet_contacts import read_contacts
+from buildarena_simulation.engines.bullet_grips import BulletGrips
 from buildarena_simulation.engines.bullet_joints import articulated
 from buildarena_simulation.engines.closest_points import shape_table
 from buildarena_simulation.engines.external_forces import (
@@ -43,6 +51,7 @@ from buildarena_simulation.engines.ropes import rope_forces
 from buildarena_simulation.engines.urdf import urdf_of
 from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.contacts import CARGO, ContactForces
+from buildarena_simulation.structure.grips import Hold
 from buildarena_simulation.structure.model import FloatArray
 from buildarena_simulation.structure.motion import Motion
 from buildarena_simulation.structure.solids import Solids
@@ -84,6 +93,8 @@ class PyBulletEngine:
         self._solids = Solids(world.structure)
         self._surfaces: dict[int, int] = {}
         self._cargo: int | None = None
+        self._grips = BulletGrips(self._client)
+        self._fresh: Motion | None = None
         self._own: list[tuple[int, Force]] = []
         self._start_world()
 
@@ -112,7 +123,9 @@ class PyBulletEngine:
         """See `Engine`."""
         self._clusters, self._motion = clusters, motion
         self._axes, self._moments = principal_frames(clusters)
+        self._compliance = np.asarray(np.linalg.inv(clusters.inertia))
         self._hinges = hinge_frames(self._structure, clusters, motion)
+        self._grips.leave()
         for piece in self._pieces:
             if piece.articulation is not None:
                 piece.articulation.release()
@@ -126,6 +139,7 @@ class PyBulletEngine:
         self._free_bodies = [piece.body for piece in self._pieces]
         if self._cargo is not None:
             self._free_bodies.append(self._cargo)
+        self._grips.enter(clusters, motion, self._axes, self._address, self._cargo)
 
     def set_cargo_mass(self, mass: float) -> None:
         """See `Engine`."""
@@ -159,7 +173,7 @@ class PyBulletEngine:
                 impacts.take(self._read_contacts())
         self._targets = targets[-1]
         self._motion = self._read_motion()
-        self._limit_spin()
+        limit_spin(self._client, self._pieces, self._motion)
         self._impacts = impacts
 
     def contacts(self) -> ContactForces:
@@ -171,6 +185,14 @@ class PyBulletEngine:
         """See `Engine`."""
         return self._impacts.struck
 
+    def hold(self, holds: Sequence[Hold]) -> None:
+        """See `Engine`."""
+        self._grips.holds = tuple(holds)
+
+    def grip_wrenches(self) -> FloatArray:
+        """See `Engine`."""
+        return self._grips.wrenches()
+
     def rope_tensions(self) -> FloatArray:
         """See `Engine`."""
         return self._tensions
@@ -181,13 +203,7 @@ class PyBulletEngine:
 
     def cargo(self) -> CargoPose:
         """See `Engine`."""
-        position, turn = pybullet.getBasePositionAndOrientation(self._cargo, **self._client)
-        velocity, _ = pybullet.getBaseVelocity(self._cargo, **self._client)
-        return CargoPose(
-            position=np.array(position),
-            quaternion=np.array(turn)[[3, 0, 1, 2]],
-            velocity=np.array(velocity),
-        )
+        return pose_of(self._client, self._cargo)
 
     def close(self) -> None:
         """See `Engine`."""
@@ -196,16 +212,12 @@ class PyBulletEngine:
 
     def _start_world(self) -> None:
         world = self._world
-        pybullet.setGravity(0, 0, -world.gravity, **self._client)
-        pybullet.setPhysicsEngineParameter(
-            fixedTimeStep=self.time_step_s,
-            numSubSteps=0,
-            numSolverIterations=_ITERATIONS,
-            solverResidualThreshold=_RESIDUAL,
-            enableConeFriction=1,
-            deterministicOverlappingPairs=1,
-            enableFileCaching=0,
-            **self._client,
+        set_up(
+            self._client,
+            gravity=world.gravity,
+            time_step_s=self.time_step_s,
+            iterations=_ITERATIONS,
+            residual=_RESIDUAL,
         )
         if world.ground:
             ground = add_box(
@@ -236,7 +248,7 @@ class PyBulletEngine:
             client=self._client,
         )
         for c, link in articulation.links.items():
-            set_friction(self._client, body, link, self._friction_of(c))
+            set_friction(self._client, body, link, friction_of(structure, clusters.blocks[c]))
         simple = is_simple_piece(structure, clusters, inside)
         if simple:
             for link, c in enumerate(inside[1:]):
@@ -256,12 +268,6 @@ class PyBulletEngine:
             wheel_places=np.array(places, dtype=np.int64),
             wheel_torques=structure.torques[clusters.seated[hinged]] * self._world.gravity,
         )
-
-    def _friction_of(self, c: int) -> float:
-        """Friction of a cluster: a link has one coefficient, that of its wheels if it has any."""
-        parts = [self._structure.parts[i] for i in self._clusters.blocks[c]]
-        deciding = next((part for part in parts if part.is_wheel), parts[0])
-        return float(deciding.physics.friction)
 
     def _load(self, inside: tuple[int, ...], motion: Motion) -> int:
         """The body of a piece, put where its root is."""
@@ -313,19 +319,22 @@ class PyBulletEngine:
             self._pull_ropes()
 
     def _own_forces(self, step: int) -> list[tuple[int, Force]]:
-        field, every = self._world.field, round(FORCES_EVERY_S / self.time_step_s)
-        if field is not None and step % every == 0:
-            wrenches = field.wrenches(self._clusters, self._read_motion())
-            self._own = body_wrenches(wrenches, self._axes)
+        field = self._world.field
+        if field is not None and step % round(FORCES_EVERY_S / self.time_step_s) == 0:
+            # Ropes ask for the same motion in this step.
+            self._fresh = motion = self._read_motion()
+            self._own = body_wrenches(field.wrenches(self._clusters, motion), self._axes)
         return self._own
 
     def _pull_ropes(self) -> None:
         structure, clusters = self._structure, self._clusters
-        motion, field = self._read_motion(), self._world.field
+        motion, field = self._fresh or self._read_motion(), self._world.field
+        self._fresh = None
         pulls = rope_forces(
             structure,
             clusters,
             motion,
+            compliance=self._compliance,
             alive=self._rope_alive,
             rest=structure.ropes.length if field is None else field.rest_lengths(),
             time_step_s=self.time_step_s,
@@ -342,17 +351,6 @@ class PyBulletEngine:
         """Velocity of every piece and of the cargo, (K, 3), units/s."""
         client = self._client
         return np.array([pybullet.getBaseVelocity(body, **client)[0] for body in self._free_bodies])
-
-    def _limit_spin(self) -> None:
-        """Slows pieces that spin faster than any part of the game may."""
-        for piece in self._pieces:
-            root = piece.inside[0]
-            spin = self._motion.spin[root]
-            speed = float(np.linalg.norm(spin))
-            if speed > MAX_SPIN:
-                slower = (spin * (MAX_SPIN / speed)).tolist()
-                velocity = self._motion.velocity[root].tolist()
-                pybullet.resetBaseVelocity(piece.body, velocity, slower, **self._client)
 
     def _read_motion(self) -> Motion:
         """Poses and velocities of all clusters, children by way of their hinges' angles."""

@@ -1,11 +1,12 @@
-"""MuJoCo's tendons: the ropes and springs that hold."""
+"""MuJoCo's tendons, the ropes and springs that hold, and its welds, what blocks hold."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 
+from buildarena_simulation.structure.grips import Hold
 from buildarena_simulation.structure.model import FloatArray, Ropes
 
 
@@ -55,3 +56,25 @@ class Tendons:
         stretch = data.ten_length[tendon] - model.tendon_lengthspring[tendon, 0]
         pull = model.tendon_stiffness[tendon] * stretch
         return float(pull + model.tendon_damping[tendon] * data.ten_velocity[tendon])
+
+
+def weld_wrenches(
+    model: "mujoco.MjModel", data: "mujoco.MjData", holds: Sequence[Hold]
+) -> FloatArray:
+    """Force and moment on each block that holds, about its hold's point, (H, 6), world frame.
+
+    A weld's six constraint forces act on its first body: a force, and twice a moment in the axes of
+    the second body.
+    """
+    found = np.zeros((len(holds), 6))
+    if not holds:
+        return found
+    equalities = data.efc_type[: data.nefc] == mujoco.mjtConstraint.mjCNSTR_EQUALITY
+    for row, hold in enumerate(holds):
+        weld = model.equality(f"grip {hold.grip}").id
+        rows = np.flatnonzero(equalities & (data.efc_id[: data.nefc] == weld))
+        if len(rows) == len(found[row]):
+            force = data.efc_force[rows]
+            turn = data.xmat[model.eq_obj2id[weld]].reshape(3, 3)
+            found[row] = -np.concatenate([force[:3], turn @ force[3:] / 2])
+    return found

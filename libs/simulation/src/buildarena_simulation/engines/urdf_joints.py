@@ -12,9 +12,9 @@ from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.model import FloatArray, Structure
 
 _STRAIGHT = '<origin xyz="0 0 0" rpy="0 0 0"/>'
-_BETWEEN = 1e-3
-"""Mass and moment of inertia of a link between two hinges, mass and mass·unit²: too little to tell,
-enough for the solver."""
+_BETWEEN_MASS, _BETWEEN_INERTIA = 1e-3, 0.02
+"""Of a link between two hinges, mass and mass·unit²: a tenth of what a block has, as a solver by
+iteration ties heavy links by light ones badly."""
 
 _STRONG = 1e9
 """Effort and velocity that the format asks for, and that nothing reads."""
@@ -64,14 +64,15 @@ def links_before(structure: Structure, clusters: Clusters, c: int, name: str) ->
     """
     if seat_of(structure, clusters, c) != "constant_velocity":
         return []
-    inertia = f'ixx="{_BETWEEN}" ixy="0" ixz="0" iyy="{_BETWEEN}" iyz="0" izz="{_BETWEEN}"'
+    i = _BETWEEN_INERTIA
+    inertia = f'ixx="{i}" ixy="0" ixz="0" iyy="{i}" iyz="0" izz="{i}"'
     lines: list[str] = []
     for between in _between(name):
         lines += [
             f'<link name="{between}">',
             "<inertial>",
             _STRAIGHT,
-            f'<mass value="{_BETWEEN}"/>',
+            f'<mass value="{_BETWEEN_MASS}"/>',
             f"<inertia {inertia}/>",
             "</inertial>",
             "</link>",

@@ -1,7 +1,8 @@
 """Rigid clusters, the moving joints between them, and their mass properties.
 
 Blocks joined rigidly form a *cluster*; clusters joined by moving joints (axles, hinges, sliders, …)
-form an articulated *piece*, a tree whose root is its largest cluster.
+form an articulated *piece*, a tree whose root is its largest cluster, or its heaviest where more
+than wheels moves.
 """
 
 from collections.abc import Iterable, Sequence
@@ -92,9 +93,23 @@ def find_clusters(structure: Structure, holds: BoolArray) -> Clusters:
         label = _labels(len(structure), groups)
         free = [k for k in joints if label[members.first[k]] != label[members.second[k]]]
         tree, locked = _grow_trees(structure, groups, label, free)
+        locked += _held_by_teeth(structure, label, free)
         if not locked:
             return _collect(structure, groups, tree)
         rigid.extend(locked)
+
+
+def _held_by_teeth(structure: Structure, label: Sequence[int], free: Sequence[int]) -> list[int]:
+    """Joints of cogs that engage with one which is fast to what both are mounted on."""
+    members = structure.members
+    seat_of = {int(members.second[k]): k for k in free}
+    held = []
+    for mesh in structure.joints.meshes:
+        for cog, other in ((mesh.first, mesh.second), (mesh.second, mesh.first)):
+            k = seat_of.get(cog)
+            if k is not None and other not in seat_of and label[members.first[k]] == label[other]:
+                held.append(k)
+    return held
 
 
 def components(count: int, edges: Iterable[tuple[int, int]]) -> list[list[int]]:
@@ -140,7 +155,8 @@ def _grow_trees(
     tree: _Tree = []
     via: dict[int, int] = {}
     for piece in components(len(groups), edges):
-        root = max(piece, key=lambda g: (len(groups[g]), -g))
+        inside = [k for k, (a, _) in zip(joints, edges, strict=True) if a in piece]
+        root = _root(structure, groups, piece, inside)
         reached = {root}
         tree.append((root, -1, -1))
         waiting = [root]
@@ -164,6 +180,24 @@ def _grow_trees(
         if doubled is None or not _collinear(structure, k, doubled):
             locked.extend([k, *_path(parent, via, a, b)])
     return tree, locked
+
+
+def _root(
+    structure: Structure,
+    groups: Sequence[Sequence[int]],
+    piece: Sequence[int],
+    joints: Sequence[int],
+) -> int:
+    """The group that a piece's tree grows from.
+
+    Where wheels are all that moves, it is the one of most blocks. Elsewhere it is the heaviest:
+    what a joint bears follows from the motion of the outer side, and an error of the heavier side's
+    would outweigh the lighter one's loads.
+    """
+    simple = structure.joints.simple[structure.members.second[list(joints)]].all()
+    if simple:
+        return max(piece, key=lambda g: (len(groups[g]), -g))
+    return max(piece, key=lambda g: (round(float(structure.masses[groups[g]].sum()), 9), -g))
 
 
 def _path(parent: dict[int, int], via: dict[int, int], a: int, b: int) -> list[int]:

@@ -73,6 +73,8 @@ class ForceField:
             clusters: The clusters.
             motion: Their motion now.
         """
+        if not len(self.table):
+            return np.zeros((len(clusters), 6))
         forces = self._forces(clusters, motion)
         self._sum += forces
         self._count += 1
@@ -146,5 +148,6 @@ class ForceField:
 def field_of(structure: Structure) -> ForceField | None:
     """What a structure's blocks exert by themselves; None where none does."""
     table = own_forces_of(structure)
-    exerted = len(table) or len(structure.ropes.springs)
+    grips = any(part.module.forces.grip for part in structure.parts)
+    exerted = len(table) or len(structure.ropes.springs) or grips
     return ForceField(table, structure.ropes) if exerted else None

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Query
 from pydantic import BaseModel, Field
 
 from buildarena_api.dependencies import ContextDep, RegistryDep
-from buildarena_api.http.problems import ProblemError
+from buildarena_api.http.problems import ProblemError, problem_responses
 from buildarena_geometry import module_set
 
 router = APIRouter(prefix="/v1", tags=["catalogue"])
@@ -49,7 +49,7 @@ def list_models(registry: RegistryDep) -> list[ModelView]:
     ]
 
 
-@router.get("/modules")
+@router.get("/modules", responses=problem_responses(404, 422, 503))
 def list_modules(
     context: ContextDep,
     set_: Annotated[

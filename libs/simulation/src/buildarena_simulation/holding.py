@@ -1,0 +1,209 @@
+"""Follows what a machine's grips hold through a trial."""
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+import numpy as np
+
+from buildarena_simulation.constants import GRAVITY, LOAD_FILTER_S
+from buildarena_simulation.engines.base import CargoPose, Engine, World, rotation_of
+from buildarena_simulation.scenario import TerrainBox
+from buildarena_simulation.structure.clusters import Clusters
+from buildarena_simulation.structure.contacts import CARGO, WORLD, PointForces
+from buildarena_simulation.structure.grips import Hold, distances, grips_of
+from buildarena_simulation.structure.model import BoolArray, FloatArray, Shape, ShapeKind
+from buildarena_simulation.structure.motion import Motion
+from buildarena_simulation.trajectory import Event
+
+_NONE: Final = PointForces(
+    block=np.zeros(0, dtype=np.int64), point=np.zeros((0, 3)), force=np.zeros((0, 3))
+)
+
+
+class Holding:
+    """What the grips hold: they take the first thing that comes near until they are told to let go.
+
+    Args:
+        world: The machine and what is around it.
+    """
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self._grips = grips_of(world.structure)
+        count = len(self._grips)
+        self._ready = np.ones(count, dtype=bool)
+        self._loads = np.zeros((count, 6))
+        self._held: dict[int, tuple[Hold, str]] = {}
+        self._borne: list[tuple[Hold, FloatArray]] = []
+        self.events: list[Event] = []
+
+    @property
+    def holds(self) -> tuple[Hold, ...]:
+        """What is held now."""
+        return tuple(hold for hold, _ in self._held.values())
+
+    def update(
+        self,
+        clusters: Clusters,
+        motion: Motion,
+        cargo: CargoPose | None,
+        *,
+        grab: BoolArray,
+        release: BoolArray,
+        time_s: float,
+    ) -> bool:
+        """Takes hold and lets go.
+
+        Args:
+            clusters: The clusters.
+            motion: Where they are.
+            cargo: Where the cargo is, if there is one.
+            grab: (G,) whether each grip is told to hold again.
+            release: (G,) whether each is told to let go; it wins over `grab`.
+            time_s: Time now, seconds.
+
+        Returns:
+            Whether anything changed.
+        """
+        before = len(self.events)
+        self._ready = (self._ready | grab) & ~release
+        for k in np.flatnonzero(release):
+            self._drop(int(k), "released", time_s)
+        for k in np.flatnonzero(self._ready):
+            if int(k) not in self._held:
+                self._seek(int(k), clusters, motion, cargo, time_s)
+        return len(self.events) > before
+
+    def follow(self, engine: Engine, *, time_s: float, interval_s: float) -> bool:
+        """Follows the loads of what is held, and lets go what is too heavy.
+
+        Args:
+            engine: Tells the loads.
+            time_s: Time now, seconds.
+            interval_s: Since the last call, seconds.
+
+        Returns:
+            Whether anything slipped.
+        """
+        blend = 1.0 - math.exp(-interval_s / LOAD_FILTER_S)
+        slipped = False
+        self._borne = list(zip(self.holds, engine.grip_wrenches(), strict=True))
+        for hold, wrench in self._borne:
+            load = self._loads[hold.grip]
+            load += blend * (wrench / GRAVITY - load)
+            norms = np.linalg.norm(load.reshape(2, 3), axis=1)
+            if (norms > self._grips.limits[hold.grip]).any():
+                self._drop(hold.grip, "slipped", time_s)
+                self._ready[hold.grip] = False
+                slipped = True
+        return slipped
+
+    def forces(self, clusters: Clusters, motion: Motion) -> PointForces:
+        """What the holds did to the blocks that hold, and to those that are held, when followed.
+
+        Args:
+            clusters: The clusters.
+            motion: Their motion now.
+        """
+        if not self._borne:
+            return _NONE
+        rows = []
+        for hold, wrench in self._borne:
+            c = clusters.cluster_of[hold.block]
+            point = motion.position[c] + motion.rotation[c] @ hold.point
+            for at, force in _as_forces(point, wrench):
+                rows.append((hold.block, at, force))
+                if hold.other >= 0:
+                    rows.append((hold.other, at, -force))
+        return PointForces(
+            block=np.array([block for block, _, _ in rows], dtype=np.int64),
+            point=np.array([point for _, point, _ in rows]),
+            force=np.array([force for _, _, force in rows]),
+        )
+
+    def _drop(self, k: int, what: str, time_s: float) -> None:
+        if k in self._held:
+            _, name = self._held.pop(k)
+            self._loads[k] = 0.0
+            self._tell(k, what, name, time_s)
+
+    def _tell(self, k: int, what: str, name: str, time_s: float) -> None:
+        block = self._world.structure.parts[self._grips.blocks[k]].id
+        self.events.append(Event(time_s=round(time_s, 6), what=what, joint=block, held=name))
+
+    def _seek(
+        self, k: int, clusters: Clusters, motion: Motion, cargo: CargoPose | None, time_s: float
+    ) -> None:
+        """Takes hold of the nearest thing within reach, if there is one."""
+        grips, block = self._grips, self._grips.blocks[k]
+        c = int(clusters.cluster_of[block])
+        points = motion.position[c] + grips.places[k] @ motion.rotation[c].T
+        reach, found = float(grips.reach[k]), []
+        if self._world.ground:
+            found.append((max(0.0, float(points[:, 2].min())), WORLD, "ground"))
+        for name, other, shape in self._things(cargo):
+            near = np.linalg.norm(points[4] - shape.center)
+            if near < reach + np.linalg.norm(shape.half_extents) + np.ptp(points, axis=0).max():
+                found.append((float(distances(points, [shape])[0]), other, name))
+        found += self._pieces(points, c, clusters, motion, reach)
+        nearest = min(found, default=None)
+        if nearest is not None and nearest[0] <= reach:
+            hold = Hold(grip=k, block=block, other=nearest[1], point=grips.tips[k])
+            self._held[k] = (hold, nearest[2])
+            self._tell(k, "grabbed", nearest[2], time_s)
+
+    def _things(self, cargo: CargoPose | None) -> Iterator[tuple[str, int, Shape]]:
+        for number, box in enumerate(self._world.terrain, start=1):
+            yield f"terrain {number}", WORLD, _terrain(box)
+        if cargo is not None and self._world.cargo is not None:
+            yield (
+                "cargo",
+                CARGO,
+                Shape(
+                    kind=ShapeKind.BOX,
+                    center=cargo.position,
+                    rotation=rotation_of(cargo.quaternion),
+                    half_extents=self._world.cargo.size / 2,
+                ),
+            )
+
+    def _pieces(
+        self, points: FloatArray, c: int, clusters: Clusters, motion: Motion, reach: float
+    ) -> list[tuple[float, int, str]]:
+        """Blocks of other pieces within reach: distance, block, id."""
+        found = []
+        structure = self._world.structure
+        far = clusters.root[clusters.cluster_of] != clusters.root[c]
+        for block in np.flatnonzero(far).tolist():
+            other = clusters.cluster_of[block]
+            local = (points - motion.position[other]) @ motion.rotation[other]
+            shapes: Sequence[Shape] = structure.parts[block].shapes
+            near = float(distances(local, shapes).min())
+            if near <= reach:
+                found.append((near, block, structure.parts[block].id))
+        return found
+
+
+def _terrain(box: TerrainBox) -> Shape:
+    tilt = math.radians(box.slope_deg)
+    cosine, sine = math.cos(tilt), math.sin(tilt)
+    return Shape(
+        kind=ShapeKind.BOX,
+        center=np.array(box.center),
+        rotation=np.array([[1.0, 0.0, 0.0], [0.0, cosine, -sine], [0.0, sine, cosine]]),
+        half_extents=np.array(box.size) / 2,
+    )
+
+
+def _as_forces(point: FloatArray, wrench: FloatArray) -> Iterator[tuple[FloatArray, FloatArray]]:
+    """A force at a point, and a pair of forces half a unit off it that has the moment."""
+    force, moment = wrench[:3], wrench[3:]
+    yield point, force
+    size = float(np.linalg.norm(moment))
+    if size > 0.0:
+        across = np.cross(moment, np.eye(3)[int(np.abs(moment).argmin())])
+        across /= np.linalg.norm(across)
+        pull = np.cross(moment, across)
+        yield point + across / 2, pull
+        yield point - across / 2, -pull

@@ -1,0 +1,146 @@
+"""What grabbers hold, and how much, on both engines."""
+
+import numpy as np
+import pytest
+from tests.simulation.designs import DOWN, EAST, NORTH, SOUTH, UP, WEST
+from tests.simulation.designs.workshop import WorkshopDraft
+
+from buildarena_geometry import KeyPress, Machine
+from buildarena_geometry.modules.sets import module_set
+from buildarena_simulation import Scenario, Trajectory, simulate
+from buildarena_simulation.constants import COLLISION_MARGIN, GRAVITY, JOINT_STRENGTH
+from buildarena_simulation.machine import structure_of
+from buildarena_simulation.scenario import Cargo, Control, TerrainBox
+
+WORKSHOP = module_set("workshop")
+GRIP = WORKSHOP["Grabber"].forces.grip
+DRIVEN = Control(mode="agent")
+
+
+def _press(key: str, time: float, hold_for: float = 0.1) -> KeyPress:
+    return KeyPress(time_s=time, key=key, hold_for_s=hold_for)
+
+
+END = 3.0 - COLLISION_MARGIN
+"""Height of the grabber's end, units."""
+
+
+def _stool(*, bound: bool = True) -> tuple[Machine, str]:
+    """Four legs, between which a grabber looks down from the starting block."""
+    draft = WorkshopDraft()
+    start = draft.start()
+    for side in (EAST, WEST, NORTH, SOUTH):
+        draft.row(draft.row(start, side, 2)[-1], DOWN, 4)
+    grabber = draft.attach(start, DOWN, "Grabber")
+    if bound:
+        draft.bind(grabber, "grab", "UpArrow")
+        draft.bind(grabber, "release", "DownArrow")
+    return draft.machine, grabber
+
+
+def _cargo(mass: float, *, gap: float = 0.1, final: float | None = None) -> Cargo:
+    """Cargo in the air, so far below the grabber's end."""
+    return Cargo(
+        size=(1.0, 1.0, 1.0),
+        initial_mass=mass,
+        final_mass=mass if final is None else final,
+        ramp_s=8.0,
+        at=(0.0, 0.0, END - 1.0 - gap),
+    )
+
+
+def _tried(
+    machine: Machine, engine: str, cargo: Cargo, *keys: KeyPress, seconds: float = 3.0
+) -> Trajectory:
+    scenario = Scenario(duration_s=seconds, cargo=cargo, control=DRIVEN)
+    return simulate(machine, scenario, engine, controls=keys)
+
+
+def _told(trajectory: Trajectory) -> list[tuple[str, str]]:
+    return [(event.what, event.held) for event in trajectory.events]
+
+
+@pytest.mark.parametrize("mass", [2.0, 50.0, 150.0])
+def test_a_grabber_holds_a_load_against_its_weight(engine: str, mass: float) -> None:
+    machine, grabber = _stool(bound=False)
+    trajectory = _tried(machine, engine, _cargo(mass))
+    assert _told(trajectory) == [("grabbed", "cargo")]
+    assert trajectory.events[0].joint == grabber
+    assert np.ptp(trajectory.cargo_position[:, 2]) < 0.06
+    joint = [peak.joint for peak in trajectory.joint_peaks].index(f"1-{grabber}")
+    borne = trajectory.joint_loads[-25:, joint].mean() * JOINT_STRENGTH["attachment"].force
+    assert borne == pytest.approx(mass + WORKSHOP["Grabber"].mass, rel=0.03, abs=1.2)
+    weight = structure_of(machine).masses.sum() + mass
+    assert trajectory.bearing.ground[-25:].mean() == pytest.approx(weight, rel=0.03)
+
+
+def test_a_load_that_grows_too_heavy_slips(engine: str) -> None:
+    machine, _ = _stool()
+    trajectory = _tried(machine, engine, _cargo(5.0, final=405.0), seconds=6.0)
+    assert _told(trajectory) == [("grabbed", "cargo"), ("slipped", "cargo")]
+    mass = 5.0 + 400.0 * (trajectory.events[1].time_s - 0.5) / 8.0
+    assert mass == pytest.approx(GRIP.force, rel=0.07)
+    assert trajectory.cargo_position[-1, 2] == pytest.approx(0.5, abs=0.1)
+
+
+def test_what_is_out_of_reach_is_not_held(engine: str) -> None:
+    machine, _ = _stool()
+    trajectory = _tried(machine, engine, _cargo(2.0, gap=GRIP.reach + 0.1))
+    assert trajectory.events == ()
+    assert trajectory.cargo_position[-1, 2] == pytest.approx(0.5, abs=0.05)
+
+
+def test_a_released_grabber_stays_open_until_it_is_told_to_grab(engine: str) -> None:
+    machine, _ = _stool()
+    top = END - 1.0 - 0.15
+    table = TerrainBox(center=(0.0, 0.0, top / 2), size=(1.0, 1.0, top))
+    scenario = Scenario(
+        duration_s=4.0, terrain=(table,), cargo=_cargo(2.0, gap=0.1), control=DRIVEN
+    )
+    keys = (_press("DownArrow", 1.0), _press("UpArrow", 3.0))
+    trajectory = simulate(machine, scenario, engine, controls=keys)
+    assert _told(trajectory) == [("grabbed", "cargo"), ("released", "cargo"), ("grabbed", "cargo")]
+    times = [event.time_s for event in trajectory.events]
+    assert times == pytest.approx([0.0, 1.0, 3.0], abs=0.05)
+    assert trajectory.cargo_position[70, 2] == pytest.approx(top + 0.5, abs=0.03)
+
+
+def _anchored() -> Machine:
+    """Fans that would lift it, and a grabber on the ground."""
+    draft = WorkshopDraft()
+    start = draft.start()
+    for side in (EAST, WEST):
+        block = draft.attach(start, side)
+        draft.bind(draft.attach(block, UP, "Flying Block"), "fly", "UpArrow")
+    draft.bind(draft.attach(start, DOWN, "Grabber"), "release", "DownArrow")
+    return draft.machine
+
+
+def test_a_grabber_holds_the_ground(engine: str) -> None:
+    machine = _anchored()
+    scenario = Scenario(duration_s=2.0, control=DRIVEN)
+    keys = (_press("UpArrow", 0.2, 2.0), _press("DownArrow", 1.2))
+    trajectory = simulate(machine, scenario, engine, controls=keys)
+    assert _told(trajectory) == [("grabbed", "ground"), ("released", "ground")]
+    height = trajectory.positions[:, 0, 2].astype(float)
+    assert np.ptp(height[:30]) < 0.05
+    lift = 2 * WORKSHOP["Flying Block"].forces.push.force
+    mass = structure_of(machine).masses.sum()
+    rise = 0.5 * (lift / mass - 1.0) * GRAVITY * 0.6**2
+    assert height[45] - height[30] == pytest.approx(rise, rel=0.15)
+
+
+def test_a_grabber_holds_a_block_of_another_piece(engine: str) -> None:
+    machine, grabber = _stool()
+    below = {"base_block": grabber, "face": "A", "new_block": "Small Wooden Block"}
+    assert machine.act("attach_block_to", below).ok
+    loose = list(machine.blocks)[-1]
+    for _ in range(2):
+        away = {"block_id": loose, "shift_real": [0.3, 0.0, 0.0]}
+        assert machine.act("shift_block", away).ok
+    scenario = Scenario(duration_s=2.0, control=DRIVEN)
+    trajectory = simulate(machine, scenario, engine, controls=(_press("DownArrow", 1.0),))
+    assert _told(trajectory) == [("grabbed", loose), ("released", loose)]
+    height = trajectory.positions[:, trajectory.block_ids.index(loose), 2].astype(float)
+    assert np.ptp(height[2:25]) < 0.06
+    assert height[-1] == pytest.approx(0.5, abs=0.1)
