@@ -27,7 +27,7 @@ _STAND_INS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
         "Suspension": ("Small Wooden Block", "Slider"),
         "Sqr Balloon": ("Balloon",),
         "Hinge": ("Swivel", "Ball Joint"),
-        "Small Wooden Block": ("Grip Pad", "Ballast"),
+        "Small Wooden Block": ("Ballast",),
         "Double Wooden Block": ("Wooden Pole",),
         "Log": ("Double Wooden Block",),
     }
