@@ -98,7 +98,7 @@ class Gallery:
         good = [found for found in confirmed if found.success]
         lines = ["# What the hunt found", "", "## Suspects", ""]
         lines += _table(ranked([f for f in good if f.suspicions])) or ["None.", ""]
-        for category in ("support", "transport", "lift"):
+        for category in ("support", "transport", "lift", "mechanisms", "flight"):
             best = best_of(good, category)
             lines += [f"## Best of {category}", "", *(_table(best) or ["None.", ""])]
             lines += [f"![{f.task} {f.key}](machines/{f.task}-{f.key}.png)\n" for f in best]

@@ -86,7 +86,7 @@ def replayed(
     Returns:
         The machine and the accepted actions, with the ids they have now.
     """
-    machine = Machine(available=dict(available)) if available else Machine()
+    machine = Machine(available=available, catalogue=module_set("workshop"))
     kept: Actions = []
     names: dict[str, str] = {}
     for action in actions:

@@ -20,6 +20,15 @@ _MODULES: Final[Mapping[str, tuple[tuple[str, ...], tuple[float, ...]]]] = Mappi
         "support": ((WOOD, WHEEL), (0.95, 0.05)),
         "transport": ((WOOD, WHEEL, CANNON), (0.6, 0.35, 0.05)),
         "lift": ((WOOD, CANNON, TORCH), (0.4, 0.3, 0.3)),
+        "mechanisms": (
+            (WOOD, "Log", "Large Wheel", "Suspension", "Steering Hinge", "Steering Block")
+            + ("Swivel", "Grabber", "Cog Medium Powered", "Cog Large Unpowered"),
+            (0.3, 0.1, 0.1, 0.1, 0.08, 0.08, 0.06, 0.06, 0.06, 0.06),
+        ),
+        "flight": (
+            (WOOD, "Log", "Wing Panel", "Sqr Balloon", "Balloon", "Flying Block", "Drag Block"),
+            (0.3, 0.1, 0.2, 0.15, 0.1, 0.1, 0.05),
+        ),
     }
 )
 _KEYS: Final = ("UpArrow", "DownArrow", "LeftArrow")
@@ -238,7 +247,8 @@ def _bind(machine: Machine, category: str, draw: Draw) -> Actions:
         params = {"block_id": block.id, "action": action, "new_key": key}
         done = act(machine, "add_control_key", params)
         made += [] if done is None else [done]
-    return made + (_press(machine, category, draw, key) if category == "transport" else [])
+    driven = category in ("transport", "mechanisms", "flight")
+    return made + (_press(machine, category, draw, key) if driven else [])
 
 
 def _press(machine: Machine, category: str, draw: Draw, key: str | None = None) -> Actions:
@@ -264,5 +274,7 @@ _GROWTHS: Final[Mapping[str, tuple[tuple[Mutation, float], ...]]] = MappingProxy
         "support": _SHAPES,
         "transport": (*_SHAPES, (_bind, 2.0), (_press, 1.0)),
         "lift": (*_SHAPES, (_bind, 1.5)),
+        "mechanisms": (*_SHAPES, (_bind, 2.0), (_press, 1.0)),
+        "flight": (*_SHAPES, (_bind, 2.0), (_press, 1.0)),
     }
 )

@@ -12,6 +12,12 @@ ALIKE = {
     "support": "support-1",
     "thrust": "lift-1",
     "height": "lift-2",
+    "road": "mechanisms-1",
+    "slalom": "mechanisms-1",
+    "winch": "mechanisms-3",
+    "place": "mechanisms-4",
+    "hover": "flight-1",
+    "glide": "flight-2",
 }
 """By scorer: the built-in task with an example of the kind."""
 

@@ -1,4 +1,4 @@
-"""Arms that take hold of a cargo: one that swings it over a wall."""
+"""Arms that take hold of a cargo: one swings it over a wall, one lifts it by gears."""
 
 from __future__ import annotations
 
@@ -12,6 +12,9 @@ from buildarena_worker.builtin.designs.drafting import (
     WEST,
     Draft,
 )
+
+_LIFTS_S = (18.5, 18.2, 17.9, 17.6)
+"""When the lift begins, by seed, seconds."""
 
 
 def swinging_arm(seed: int) -> Design:
@@ -51,3 +54,74 @@ def swinging_arm(seed: int) -> Design:
             ],
         },
     )
+
+
+def geared_lift(seed: int) -> Design:
+    """An arm on a large gear wheel that four powered ones drive, with a counterweight."""
+    begin = _LIFTS_S[seed % len(_LIFTS_S)]
+    draft = Draft(modules="workshop")
+    beams, hub, post = _trestle(draft)
+    wheel = draft.attach(hub, EAST, "Cog Large Unpowered")
+    motors = [draft.attach(base, EAST, "Cog Medium Powered") for base in post]
+    root = draft.attach(wheel, EAST)
+    hand = draft.attach(draft.row(root, NORTH, 6)[-1], EAST, "Swivel")
+    draft.attach(draft.row(hand, DOWN, 3)[-1], DOWN, "Grabber")
+    near = draft.row(root, SOUTH, 4)[-1]
+    for way in (EAST, UP, DOWN):
+        draft.attach(near, way, "Log", note="counterweight")
+    draft.attach(draft.attach(near, SOUTH), EAST, "Log", note="counterweight")
+    _brace(draft, beams, post)
+    return Design(
+        overall="A trestle with a geared arm: four motors on one large wheel, a counterweight.",
+        parts={
+            "lift": PartDesign(
+                description="Two beams on the ground, a post of 8, an arm of 6 on a large wheel",
+                actions=tuple(draft.actions),
+            )
+        },
+        control={
+            "control_design": "All four motors lift together, and brake when the key is let go.",
+            "control_config": [
+                {"block": motor, "action": "spinning_forward", "keys": ["UpArrow"]}
+                for motor in motors
+            ],
+            "control_sequence": [{"time": begin, "key": "UpArrow", "hold_for": 1.2}],
+        },
+    )
+
+
+_Beams = dict[str, list[str]]
+
+
+def _trestle(draft: Draft) -> tuple[_Beams, str, list[str]]:
+    """Beams on both sides of the cargo, and a post with seats for a wheel and its motors.
+
+    Returns:
+        The beams by name, the block of the large wheel, and those of the motors.
+    """
+    middle = draft.start("between the beams")
+    beams = {"west": draft.row(middle, WEST, 3)}
+    foot, east = beams["west"][-1], draft.row(middle, EAST, 2)[-1]
+    beams["near"] = draft.row(foot, NORTH, 8)
+    beams["far"] = draft.row(east, NORTH, 8)
+    beams["back"] = draft.row(foot, SOUTH, 4)
+    beams["post"] = draft.row(foot, UP, 8)
+    hub = beams["post"][4]
+    ahead, behind = draft.row(hub, NORTH, 3)[-1], draft.row(hub, SOUTH, 3)[-1]
+    return beams, hub, [beams["post"][1], beams["post"][7], ahead, behind]
+
+
+def _brace(draft: Draft, beams: _Beams, post: list[str]) -> None:
+    """Braces from the motors' seats to beams and top, across the beams, and about the foot."""
+    _, top, ahead, behind = post
+    west, near = beams["west"], beams["near"]
+    draft.connect(ahead, near[5], NORTH, UP)
+    draft.connect(behind, beams["back"][3], SOUTH, UP)
+    draft.connect(top, ahead, NORTH, UP)
+    draft.connect(top, behind, SOUTH, UP)
+    for k in (7, 5, 3):
+        draft.connect(near[k], beams["far"][k], EAST, WEST)
+    draft.connect(west[0], beams["post"][0], UP, EAST)
+    draft.connect(west[0], west[2], SOUTH, DOWN)
+    draft.connect(west[1], west[2], NORTH, DOWN)
+    draft.connect(west[0], near[1], NORTH, EAST)
