@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final, Self
 
-from buildarena_geometry import Accepted, Machine
+from buildarena_geometry import Accepted, Machine, module_set
 
 Action = dict[str, Any]
 Actions = list[Action]

@@ -21,8 +21,10 @@ _MODULES: Final[Mapping[str, tuple[tuple[str, ...], tuple[float, ...]]]] = Mappi
         "transport": ((WOOD, WHEEL, CANNON), (0.6, 0.35, 0.05)),
         "lift": ((WOOD, CANNON, TORCH), (0.4, 0.3, 0.3)),
         "mechanisms": (
-            (WOOD, "Log", "Large Wheel", "Suspension", "Steering Hinge", "Steering Block")
-            + ("Swivel", "Grabber", "Cog Medium Powered", "Cog Large Unpowered"),
+            (
+                *(WOOD, "Log", "Large Wheel", "Suspension", "Steering Hinge", "Steering Block"),
+                *("Swivel", "Grabber", "Cog Medium Powered", "Cog Large Unpowered"),
+            ),
             (0.3, 0.1, 0.1, 0.1, 0.08, 0.08, 0.06, 0.06, 0.06, 0.06),
         ),
         "flight": (

@@ -24,24 +24,32 @@ CELLS: Final = (14, 8, 4)
 
 FULL_MARKS: Final[Mapping[str, float]] = MappingProxyType(
     {
-        **{"support": 1500.0, "transport": 150.0, "thrust": 8.0, "height": 5000.0},
-        **{"road": 36.0, "slalom": 6.0, "winch": 200.0, "place": 10.0, "hover": 28.0, "glide": 5.0},
+        "support": 1500.0,
+        "transport": 150.0,
+        "thrust": 8.0,
+        "height": 5000.0,
+        "road": 36.0,
+        "slalom": 6.0,
+        "winch": 200.0,
+        "place": 10.0,
+        "hover": 28.0,
+        "glide": 5.0,
     }
 )
 """Indicators that are worth an objective of 1, by scorer."""
 
 _SEARCH_S: Final[Mapping[str, float]] = MappingProxyType(
     {
-        **{"support": 17.0, "transport": 12.0, "thrust": 4.0, "height": 13.0},
-        # Those of the workshop that are judged at the end are never shortened.
-        **{
-            "road": 15.0,
-            "slalom": 15.0,
-            "winch": 30.0,
-            "place": 30.0,
-            "hover": 15.0,
-            "glide": 30.0,
-        },
+        "support": 17.0,
+        "transport": 12.0,
+        "thrust": 4.0,
+        "height": 13.0,
+        "road": 15.0,
+        "slalom": 15.0,
+        "winch": 30.0,
+        "place": 30.0,
+        "hover": 15.0,
+        "glide": 30.0,
     }
 )
 """Seconds of a trial while searching; the full length is for what is confirmed."""

@@ -18,7 +18,7 @@ _LIFTS_S = (18.5, 18.2, 17.9, 17.6)
 
 
 def swinging_arm(seed: int) -> Design:
-    """An arm that turns over the top of a post; its gripper hangs from a swivel and stays upright."""
+    """An arm that turns over the top of a post; its gripper hangs from a swivel, upright."""
     begin = 1.0 + 0.1 * (seed % 5)
     draft = Draft(modules="workshop")
     middle = draft.start("under the post")
