@@ -19,6 +19,7 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).parents[3]))
 
 from tests.simulation.designs import beam, deck, lattice, replayed
+from tests.simulation.designs.mechanisms import mechanism
 from tests.simulation.designs.workshop import airship
 from tests.simulation.references import REFERENCES, load_machine, outcome
 
@@ -37,11 +38,14 @@ BARS = {
     ("car with cargo", "mujoco"): 0.05,
     ("airship of 60 parts", "mujoco"): 0.05,
     ("airship of 60 parts", "pybullet"): 0.15,
+    ("60 parts, 20 joints", "mujoco"): 0.05,
+    ("60 parts, 20 joints", "pybullet"): 0.15,
 }
 TASK_OF_CASE = {
     "deck that collapses": "support-1",
     "car": "transport-1",
     "car with cargo": "transport-2",
+    "60 parts, 20 joints": "transport-1",
 }
 """Cases tried in a task's own scenario; the others under a load that breaks nothing."""
 AIRSHIP = "airship of 60 parts"
@@ -85,6 +89,7 @@ def _speed() -> dict[str, dict[str, float]]:
         "car": load_machine("car"),
         "car with cargo": load_machine("carrier"),
         AIRSHIP: airship(),
+        "60 parts, 20 joints": mechanism(),
     }
     _say(f"{'seconds per simulated second':34s}" + "".join(f"{e:>20s}" for e in ENGINES))
     figures: dict[str, dict[str, float]] = {}

@@ -9,7 +9,7 @@ from importlib import resources
 from typing import Any
 
 import numpy as np
-from tests.simulation.designs.draft import DOWN, Draft
+from tests.simulation.designs.draft import DOWN, EAST, NORTH, SOUTH, UP, WEST, Draft
 
 from buildarena_geometry import Catalogue, Machine, module_set
 from buildarena_geometry.modules.catalogue import read_modules
@@ -149,3 +149,34 @@ def period_of(time_s: np.ndarray, swing: np.ndarray) -> float:
     share = -level[rows] / (level[rows + 1] - level[rows])
     passages = time_s[rows] + share * (time_s[1] - time_s[0])
     return float(np.diff(passages).mean())
+
+
+def mechanism() -> Machine:
+    """Sixty parts with twenty joints: a chassis on six wheels and suspensions, with arms on it."""
+    draft = Draft()
+    draft.machine = Machine(catalogue=catalogue())
+    middle = draft.start()
+    spine = [*reversed(draft.row(middle, SOUTH, 6)), middle, *draft.row(middle, NORTH, 6)]
+    for k in (1, 6, 11):
+        for side in (EAST, WEST):
+            leg = draft.attach(draft.attach(spine[k], side), side, "Suspension")
+            draft.bind(draft.attach(leg, side, "Powered Wheel"), "spinning_forward", "UpArrow")
+    joints = ("Hinge", "Steering Hinge", "Swivel", "Ball Joint", "Slider", "Piston")
+    for name, k in zip(
+        (*joints, "Steering Block", "Spinning Block"), range(0, 13, 1), strict=False
+    ):
+        if name in ("Steering Hinge", "Steering Block"):
+            draft.bind(_armed(draft, spine[k + 2], name), "turn_left", "LeftArrow")
+        else:
+            _armed(draft, spine[k + 2], name)
+    draft.row(spine[0], UP, 60 - len(draft.machine.blocks))
+    draft.press("UpArrow", 0.5, 10.0)
+    draft.press("LeftArrow", 1.0, 2.0)
+    return draft.machine
+
+
+def _armed(draft: Draft, base: str, joint: str) -> str:
+    """A joint on top of a block, with a block on it."""
+    made = draft.attach(base, UP, joint)
+    draft.attach(made, UP)
+    return made

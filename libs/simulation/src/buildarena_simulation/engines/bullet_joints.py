@@ -4,14 +4,16 @@ A constant-velocity joint is three hinges in a row with small links between them
 geared together.
 """
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 import numpy as np
 
 from buildarena_simulation.engines.base import World, quaternion_of, rotation_of
 from buildarena_simulation.engines.joint_places import (
+    driven_clusters,
     engaged,
     entered_place,
     seat_of,
@@ -38,6 +40,25 @@ _NO_TURN: Final = (0.0, 0.0, 0.0, 1.0)
 _NONE: Final = (0.0, 0.0, 0.0)
 
 
+@dataclass(slots=True, kw_only=True)
+class _Drive:
+    """A driven link.
+
+    Attributes:
+        link: The engine's link.
+        sign: -1 where the link moved is not the seated block's but its mount's.
+        force: The most it exerts, mass·unit/s², times units where it turns.
+        holds_place: Whether its target is a place; else it is a speed.
+        told: Its last target; infinite before the first.
+    """
+
+    link: int
+    sign: float
+    force: float
+    holds_place: bool
+    told: float = math.inf
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Articulation:
     """A multibody with joints of any kind.
@@ -62,6 +83,7 @@ class Articulation:
     chains: Mapping[int, tuple[int, ...]]
     client: Mapping[str, int]
     time_step_s: float
+    _drives: dict[int, _Drive] = field(default_factory=dict)
 
     @property
     def structure(self) -> Structure:
@@ -75,6 +97,7 @@ class Articulation:
             motion: The clusters' motion.
             targets: (D,) what the driven joints aimed at last; None at the start.
         """
+        self._find_drives()
         for c, link in self._joints():
             seat = seat_of(self.structure, self.clusters, c)
             found = entered_place(self.structure, self.clusters, motion, c, targets)
@@ -90,32 +113,33 @@ class Articulation:
                 self._rest(c, link)
 
     def follow(self, targets: FloatArray) -> None:
-        """Gives the drives their targets.
+        """Gives the drives their targets; one that stays is not told again.
 
         Args:
             targets: (D,) as in `Schedule.targets`.
         """
-        for d, block in enumerate(self.structure.joints.driven):
-            c = self._cluster_by(int(block))
-            if c is None:
+        wanted = targets.tolist()
+        for d, drive in self._drives.items():
+            target = wanted[d]
+            if target == drive.told:
                 continue
-            part = self.structure.parts[block]
-            drive = None if part.module.joint is None else part.module.joint.drive
-            target, link = float(targets[d]) * sign_of(self.clusters, c), self.links[c]
-            if drive is None:
-                if part.module.motor is not None:
-                    most = part.module.motor.torque * self.world.gravity
-                    self._aim_speed(link, target, most)
-            elif drive.kind == "speed":
-                self._aim_speed(link, target, drive.force * self.world.gravity)
-            else:
+            drive.told = target
+            if drive.holds_place:
                 self._motor(
-                    link,
+                    drive.link,
                     pybullet.POSITION_CONTROL,
-                    targetPosition=target,
+                    targetPosition=drive.sign * target,
                     positionGain=self.time_step_s / _SERVO_TIME_S,
                     velocityGain=1.0,
-                    force=drive.force * self.world.gravity,
+                    force=drive.force,
+                )
+            else:
+                free = math.isnan(target)
+                self._motor(
+                    drive.link,
+                    pybullet.VELOCITY_CONTROL,
+                    targetVelocity=0.0 if free else drive.sign * target,
+                    force=0.0 if free else drive.force,
                 )
 
     def read(self, motion: Motion) -> None:
@@ -142,15 +166,23 @@ class Articulation:
             if joint is not None and (joint.stiffness or joint.damping):
                 self._spring(link, 0.0, 0.0)
 
+    def _find_drives(self) -> None:
+        place = {int(block): d for d, block in enumerate(self.structure.joints.driven)}
+        inside = [c for c in driven_clusters(self.structure, self.clusters) if c in self.links]
+        for c in inside:
+            block = int(self.clusters.seated[c])
+            module = self.structure.parts[block].module
+            drive = None if module.joint is None else module.joint.drive
+            most = self.structure.torques[block] if drive is None else drive.force
+            self._drives[place[block]] = _Drive(
+                link=self.links[c],
+                sign=sign_of(self.clusters, c),
+                force=float(most) * self.world.gravity,
+                holds_place=drive is not None and drive.kind == "position",
+            )
+
     def _joints(self) -> Iterator[tuple[int, int]]:
         return ((c, link) for c, link in self.links.items() if link >= 0)
-
-    def _cluster_by(self, block: int) -> int | None:
-        """The cluster that hangs by a seated block; None if it is none of this body's."""
-        for c in self.links:
-            if self.clusters.seated[c] == block:
-                return c
-        return None
 
     def _rest(self, c: int, link: int) -> None:
         """Friction, or spring and damper, of a joint with one number for its place."""
@@ -171,15 +203,6 @@ class Articulation:
             positionGain=stiffness,
             velocityGain=damping,
             force=_TEETH,
-        )
-
-    def _aim_speed(self, link: int, target: float, most: float) -> None:
-        free = bool(np.isnan(target))
-        self._motor(
-            link,
-            pybullet.VELOCITY_CONTROL,
-            targetVelocity=0.0 if free else target,
-            force=0.0 if free else most,
         )
 
     def _start_ball(self, c: int, link: int, place: FloatArray, rate: FloatArray) -> None:

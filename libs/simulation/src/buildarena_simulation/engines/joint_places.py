@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from buildarena_geometry.modules.joints import MOVING_SEATS
 from buildarena_simulation.engines.base import quaternion_of
 from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.model import FloatArray, Structure
@@ -41,6 +42,12 @@ def seat_of(structure: Structure, clusters: Clusters, c: int) -> str:
 def is_simple(structure: Structure, clusters: Clusters, c: int) -> bool:
     """Whether a cluster hangs on an axle whose angle does not matter."""
     return bool(structure.joints.simple[clusters.seated[c]])
+
+
+def has_joints(structure: Structure) -> bool:
+    """Whether a machine has joints other than simple axles."""
+    moving = np.array([part.physics.seat in MOVING_SEATS for part in structure.parts])
+    return bool((moving & ~structure.joints.simple).any())
 
 
 def is_simple_piece(structure: Structure, clusters: Clusters, piece: Sequence[int]) -> bool:

@@ -45,7 +45,7 @@ from buildarena_simulation.engines.external_forces import (
 )
 from buildarena_simulation.engines.hinges import HingedPiece, hinge_frames
 from buildarena_simulation.engines.impacts import ImpactWatch
-from buildarena_simulation.engines.joint_places import is_simple_piece, joint_rate
+from buildarena_simulation.engines.joint_places import has_joints, is_simple_piece, joint_rate
 from buildarena_simulation.engines.quiet_output import quiet_output
 from buildarena_simulation.engines.ropes import rope_forces
 from buildarena_simulation.engines.urdf import urdf_of
@@ -62,10 +62,9 @@ with quiet_output():
 
 _TIME_STEP_S = 1 / 500
 _STEPS_PER_EVALUATION = 20
-_ITERATIONS = 100
+_ITERATIONS, _ITERATIONS_OF_JOINTS = 100, 60
 _RESIDUAL = 1e-9
-_ORIGIN = (0.0, 0.0, 0.0)
-_GROUND_REACH = 2000.0
+_ORIGIN, _GROUND_REACH = (0.0, 0.0, 0.0), 2000.0
 
 
 def version() -> str:
@@ -86,6 +85,7 @@ class PyBulletEngine:
         self._tensions = np.zeros(len(world.structure.ropes))
         self._place_of_wheel = {int(i): w for w, i in enumerate(world.structure.wheels)}
         self._targets: FloatArray | None = None
+        self._iterations = _ITERATIONS_OF_JOINTS if has_joints(world.structure) else _ITERATIONS
         self._client = {"physicsClientId": pybullet.connect(pybullet.DIRECT)}
         self._folder = Path(tempfile.mkdtemp(prefix="buildarena-"))
         self._serial = itertools.count()
@@ -114,7 +114,7 @@ class PyBulletEngine:
         return {
             "time_step_s": self.time_step_s,
             "steps_per_evaluation": self.steps_per_evaluation,
-            "iterations": _ITERATIONS,
+            "iterations": self._iterations,
             "residual": _RESIDUAL,
             "cone_friction": 1,
         }
@@ -216,7 +216,7 @@ class PyBulletEngine:
             self._client,
             gravity=world.gravity,
             time_step_s=self.time_step_s,
-            iterations=_ITERATIONS,
+            iterations=self._iterations,
             residual=_RESIDUAL,
         )
         if world.ground:
