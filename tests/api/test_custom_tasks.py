@@ -132,7 +132,7 @@ def test_exports_hold_own_tasks(api, end_all) -> None:
         ("measured", "worth", "points")
     }
     latex = api.get("/v1/leaderboard/export", params={"format": "latex"}).text
-    assert "% Measured: custom tasks" in latex
+    assert "% Measured: tasks that the paper does not have" in latex
     assert r"\multirow{2}{*}{narrow-gap}" in latex
     assert r"& builtin/expert & \textbf{7.0} & \textbf{100.0} & \textbf{150.0}" in latex
     assert api.get("/v1/leaderboard/export", params={"format": "parquet"}).status_code == 200

@@ -1,11 +1,11 @@
-"""The task catalogue: nine tasks, their versions, and errors in a user's own."""
+"""The task catalogue: fifteen tasks, their versions, and errors in a user's own."""
 
 from pathlib import Path
 
 import pytest
 import yaml
 
-from buildarena_benchmark import Task, TaskError, load_task
+from buildarena_benchmark import Task, TaskError, load_task, paper_tasks
 
 OWN = """\
 name: tower-bridge
@@ -30,8 +30,13 @@ indicator: {name: load, unit: mass units}
 """
 
 
-def test_there_are_nine_tasks_in_three_categories(tasks: dict[str, Task]) -> None:
-    assert list(tasks) == [f"{c}-{n}" for c in ("transport", "support", "lift") for n in (1, 2, 3)]
+WORKSHOP = [*(f"mechanisms-{level}" for level in (1, 2, 3, 4)), "flight-1", "flight-2"]
+
+
+def test_there_are_the_papers_nine_tasks_and_six_of_the_workshop(tasks: dict[str, Task]) -> None:
+    paper = [f"{c}-{n}" for c in ("transport", "support", "lift") for n in (1, 2, 3)]
+    assert list(tasks) == [*paper, *WORKSHOP]
+    assert list(paper_tasks()) == paper
     for name, task in tasks.items():
         assert (task.category, task.level) == (name[:-2], int(name[-1]))
         assert set(task.difficulty) == {
@@ -45,7 +50,8 @@ def test_there_are_nine_tasks_in_three_categories(tasks: dict[str, Task]) -> Non
         assert all(1 <= weight <= 3 for weight in task.difficulty.values())
 
 
-def test_each_task_has_the_papers_scenario(tasks: dict[str, Task]) -> None:
+def test_each_task_has_the_papers_scenario() -> None:
+    tasks = paper_tasks()
     durations = [task.scenario.duration_s for task in tasks.values()]
     assert durations == [30, 30, 30, 17, 17, 17, 10, 30, 30]
     assert [task.control for task in tasks.values()] == ["agent"] * 3 + ["none"] * 3 + ["held"] * 3
@@ -77,6 +83,42 @@ def test_a_statement_tells_what_the_scorer_measures(tasks: dict[str, Task]) -> N
             assert f"z = {task.scoring.fall_height:g}" in text
         if task.constraints.min_wheels:
             assert "four powered wheels" in text
+
+
+@pytest.mark.parametrize("name", WORKSHOP)
+def test_a_statement_tells_every_threshold(tasks: dict[str, Task], name: str) -> None:
+    task = tasks[name]
+    text = " ".join(task.statement.split())
+    for field, value in task.scoring.model_dump().items():
+        if isinstance(value, int | float):
+            assert TOLD.get((name, field), f"{value:g}") in text, (name, field)
+    for place in (*task.scenario.gates, *task.scenario.marks):
+        assert f"({', '.join(f'{c:g}' for c in place.center)})" in text
+    if task.scenario.control.until_s is not None:
+        assert f"At {task.scenario.control.until_s:g} s all keys are let go" in text
+    assert task.version not in {paper.version for paper in paper_tasks().values()}
+
+
+TOLD = {
+    ("mechanisms-2", "min_gates"): "at least four gates",
+    ("flight-1", "height"): "between z = 8.5 and z = 11.5",
+    ("flight-1", "band"): "between z = 8.5 and z = 11.5",
+}
+
+
+def test_the_papers_tasks_are_what_they_were() -> None:
+    """Their results stay comparable: whatever is added, their versions stay."""
+    assert {name: task.version for name, task in paper_tasks().items()} == {
+        "transport-1": "edc1b4191493",
+        "transport-2": "d04ad1150a61",
+        "transport-3": "9019856d9601",
+        "support-1": "fb0d651f3ae7",
+        "support-2": "dac652cff6eb",
+        "support-3": "150a16d09351",
+        "lift-1": "f5e80eac0fc0",
+        "lift-2": "37f1dd1dd488",
+        "lift-3": "bb74f320a7c6",
+    }
 
 
 def test_a_users_own_task_loads_from_text_and_file(tmp_path: Path) -> None:

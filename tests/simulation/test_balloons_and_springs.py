@@ -1,18 +1,21 @@
 """Balloons on their ropes, balloons that hold a height, and springs, on both engines."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from tests.simulation.designs import DOWN, EAST, NORTH, SOUTH, UP, WEST
 from tests.simulation.designs.workshop import WorkshopDraft
 
+from buildarena_benchmark.scorers.pieces import joined_to_start
 from buildarena_geometry import KeyPress, Machine
 from buildarena_geometry.modules.sets import module_set
 from buildarena_simulation import Scenario, Trajectory, simulate
 from buildarena_simulation.constants import GRAVITY
 from buildarena_simulation.machine import structure_of
 from buildarena_simulation.scenario import Control
+from buildarena_simulation.trajectory import Break
 
 WORKSHOP = module_set("workshop")
 DRIVEN = Control(mode="agent")
@@ -205,3 +208,16 @@ def test_a_springs_keys_are_kept_in_documents() -> None:
     again = Machine.from_document(machine.to_document(), catalogue=WORKSHOP)
     assert [one.bindings for one in again.connectors.values()] == [{"contract": ("UpArrow",)}]
     assert again.to_document() == machine.to_document()
+
+
+def test_a_balloon_belongs_to_its_machine_until_its_rope_gives_way(engine: str) -> None:
+    draft = WorkshopDraft()
+    balloon = draft.attach(_foot(draft), UP, "Balloon")
+    trajectory = _stood(draft.machine, engine, 1.0)
+    assert joined_to_start(draft.machine, trajectory).all()
+    torn = Break(time_s=0.5, joint=f"1-{balloon}", kind="rope", ratio=1.1, cargo_mass=None)
+    later = joined_to_start(draft.machine, replace(trajectory, breaks=(torn,)))
+    index = trajectory.block_ids.index(balloon)
+    assert later[:12].all()
+    assert not later[13:, index].any()
+    assert np.delete(later, index, axis=1).all()

@@ -144,3 +144,29 @@ def test_a_grabber_holds_a_block_of_another_piece(engine: str) -> None:
     height = trajectory.positions[:, trajectory.block_ids.index(loose), 2].astype(float)
     assert np.ptp(height[2:25]) < 0.06
     assert height[-1] == pytest.approx(0.5, abs=0.1)
+
+
+def test_an_arm_carries_what_it_holds(engine: str) -> None:
+    draft = WorkshopDraft()
+    start = draft.start()
+    for side in (EAST, WEST, NORTH, SOUTH):
+        draft.row(start, side, 3)
+    hinge = draft.attach(draft.row(start, UP, 5)[-1], EAST, "Steering Hinge")
+    grabber = draft.attach(draft.attach(hinge, EAST), DOWN, "Grabber")
+    draft.bind(hinge, "turn_left", "LeftArrow")
+    draft.bind(grabber, "release", "DownArrow")
+    x, y, z = (float(v) for v in draft.machine.blocks[grabber].center)
+    cargo = Cargo(
+        size=(1.0, 1.0, 1.0), initial_mass=3.0, final_mass=3.0, ramp_s=1.0, at=(x, y, z - 1.05)
+    )
+    scenario = Scenario(duration_s=4.0, cargo=cargo, control=DRIVEN)
+    keys = (_press("LeftArrow", 0.5, 1.0), _press("DownArrow", 3.0))
+    trajectory = simulate(draft.machine, scenario, engine, controls=keys)
+    assert _told(trajectory) == [("grabbed", "cargo"), ("released", "cargo")]
+    assert not trajectory.breaks
+    held = slice(1, 75)
+    way = trajectory.cargo_position[held].astype(float)
+    gap = way - trajectory.positions[held, trajectory.block_ids.index(grabber)].astype(float)
+    assert np.linalg.norm(way[-1] - way[0]) > 0.5, "the arm turns"
+    assert np.ptp(np.linalg.norm(gap, axis=1)) < 0.05
+    assert trajectory.cargo_position[-1, 2] < way[-1, 2] - 1.0

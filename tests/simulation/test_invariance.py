@@ -90,7 +90,7 @@ def test_a_mirrored_car_drives_as_far(engine: str, tasks: dict[str, Task]) -> No
     "task", [long(task) if task in {"transport-2", "transport-3"} else task for task in TASKS]
 )
 def test_engines_agree_on_machines_that_nobody_chose(task: str) -> None:
-    result = compared(task, seed=5)
+    result = compared("basic", task, seed=5)
     assert result.same
     assert result.close
 

@@ -12,7 +12,7 @@ from buildarena_benchmark import builtin_tasks
 from buildarena_geometry import LOOKUP, module_set, tool_definitions
 from buildarena_pipeline.replays.from_turns import replay_of_turns
 from buildarena_worker.session.messages import Reply
-from buildarena_worker.workflow.phases import MOST_LOOKUPS
+from buildarena_worker.workflow.phases import MAX_LOOKUPS
 
 LOOKUPS = {tool.name for tool in tool_definitions([LOOKUP])}
 HINGE = module_set("workshop")["Hinge"]
@@ -69,7 +69,7 @@ def test_a_role_that_only_looks_up_comes_to_its_end(play):
     model = Scripted(last=call("list_modules", category="basic"))
     played = play(task=task("looked_up"), client=model)
     assert played.failure.reason == "plan_unreadable"
-    assert len(model.requests) == 5 * (1 + MOST_LOOKUPS)
+    assert len(model.requests) == 5 * (1 + MAX_LOOKUPS)
 
 
 def test_a_lookup_that_is_refused_says_what_there_is(play):

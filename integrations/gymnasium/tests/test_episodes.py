@@ -11,6 +11,7 @@ from gymnasium.error import InvalidAction, ResetNeeded
 from gymnasium.utils.env_checker import check_env
 
 import buildarena_gymnasium
+from buildarena_benchmark import builtin_tasks
 from buildarena_environment import SnapshotError, UnknownChoiceError
 from buildarena_gymnasium.spaces import MAX_OBSERVATION, UNKNOWN, observed
 
@@ -25,7 +26,7 @@ def task_of(name: str) -> str:
 
 def test_all_tasks_are_registered_and_registering_twice_is_quiet() -> None:
     buildarena_gymnasium.register_all()
-    assert len(IDS) == 9
+    assert len(IDS) == len(builtin_tasks())
     assert IDS[3] == "BuildArena/Support-1-v0"
     found = gymnasium.make("buildarena_gymnasium:BuildArena/Lift-3-v0")
     assert found.unwrapped.environment.task.name == "lift-3"

@@ -10,6 +10,7 @@ from typing import Any
 from inspect_ai.log import EvalLog, EvalSample, read_eval_log
 from inspect_ai.model import ChatMessage, Model, ModelOutput, ModelUsage, get_model
 
+from buildarena_benchmark import builtin_tasks
 from buildarena_environment import Trial, try_machine
 from buildarena_environment.workbench import Workbench
 
@@ -66,9 +67,7 @@ def listed(*outputs: ModelOutput) -> Answer:
 
 def tried(task: str) -> Trial:
     """What the library itself says of the expert's machine."""
-    from buildarena_benchmark import builtin_tasks
-
-    bench = Workbench()
+    bench = Workbench(builtin_tasks()[task].constraints.catalogue)
     for made in EXPERTS[task]["calls"]:
         assert bench.act(made["machine"], made["tool"], made["arguments"]).ok
     return try_machine(builtin_tasks()[task], bench.submitted())

@@ -15,13 +15,16 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[3]))
 
-from tests.simulation.designs.random_machines import TASKS, random_machine
+from tests.simulation.designs import random_machines, random_workshop
 
 from buildarena_benchmark import builtin_tasks, score
 from buildarena_simulation import ENGINES, simulate
 
-MACHINES = 300
-SAME_VERDICT = 0.95
+DRAWS = {
+    "basic": (random_machines.TASKS, random_machines.random_machine, 300, 0.95),
+    "workshop": (random_workshop.TASKS, random_workshop.random_workshop_machine, 120, 0.90),
+}
+"""By module set: its tasks, how a machine is drawn, how many, and the bar of equal verdicts."""
 CLOSE = 0.90
 TOLERANCE = 0.25
 FINER = 4
@@ -64,9 +67,9 @@ class Comparison:
         return not self.both or high - low <= TOLERANCE * high
 
 
-def compared(task: str, seed: int) -> Comparison:
+def compared(modules: str, task: str, seed: int) -> Comparison:
     """One machine on both engines, and at finer steps if they disagree."""
-    machine, chosen = random_machine(task, seed), builtin_tasks()[task]
+    machine, chosen = DRAWS[modules][1](task, seed), builtin_tasks()[task]
     found = {e: score(chosen, machine, simulate(machine, chosen.scenario, e)) for e in ENGINES}
     result = Comparison(
         task=task,
@@ -84,7 +87,7 @@ def compared(task: str, seed: int) -> Comparison:
     return result
 
 
-def _compared(given: tuple[str, int]) -> Comparison:
+def _compared(given: tuple[str, str, int]) -> Comparison:
     return compared(*given)
 
 
@@ -96,25 +99,27 @@ def main() -> int:
     """
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--json", type=Path, help="where the figures go")
-    parser.add_argument("--machines", type=int, default=MACHINES)
+    parser.add_argument("--set", choices=list(DRAWS), default="basic", dest="modules")
+    parser.add_argument("--machines", type=int, help="300 basic ones or 120 of the workshop")
     parser.add_argument("--first-seed", type=int, default=0)
     parser.add_argument("--processes", type=int, default=2)
     options = parser.parse_args()
+    tasks, _, usual, bar = DRAWS[options.modules]
     wanted = [
-        (TASKS[k % len(TASKS)], options.first_seed + k // len(TASKS))
-        for k in range(options.machines)
+        (options.modules, tasks[k % len(tasks)], options.first_seed + k // len(tasks))
+        for k in range(options.machines or usual)
     ]
     started = time.monotonic()
     with ProcessPoolExecutor(options.processes) as pool:
         results = list(pool.map(_compared, wanted, chunksize=1))
     figures = _figures(results)
-    _print(results, figures, time.monotonic() - started)
+    _print(results, figures, time.monotonic() - started, bar)
     if options.json:
         options.json.parent.mkdir(parents=True, exist_ok=True)
         rows = [asdict(result) for result in results]
         text = json.dumps({**figures, "machines": rows}, indent=1)
         options.json.write_text(text + "\n", encoding="utf-8")
-    return 0 if figures["same_verdict"] >= SAME_VERDICT and figures["close"] >= CLOSE else 1
+    return 0 if figures["same_verdict"] >= bar and figures["close"] >= CLOSE else 1
 
 
 def _figures(results: list[Comparison]) -> dict[str, float]:
@@ -127,9 +132,11 @@ def _figures(results: list[Comparison]) -> dict[str, float]:
     }
 
 
-def _print(results: list[Comparison], figures: dict[str, float], seconds: float) -> None:
+def _print(
+    results: list[Comparison], figures: dict[str, float], seconds: float, bar: float
+) -> None:
     _say(f"{'task':14s}{'machines':>9s}{'same verdict':>14s}{'both succeed':>14s}{'close':>8s}")
-    for task in TASKS:
+    for task in dict.fromkeys(result.task for result in results):
         of_task = [result for result in results if result.task == task]
         both = [result for result in of_task if result.both]
         same, close = sum(r.same for r in of_task), sum(r.close for r in both)
@@ -139,7 +146,7 @@ def _print(results: list[Comparison], figures: dict[str, float], seconds: float)
         if result.finer:
             _say(f"  {result.task} seed {result.seed}: {_side(result)}")
     _say(
-        f"same verdict {figures['same_verdict']:.1%} (bar {SAME_VERDICT:.0%}); indicators within "
+        f"same verdict {figures['same_verdict']:.1%} (bar {bar:.0%}); indicators within "
         f"{TOLERANCE:.0%} where both succeed {figures['close']:.1%} (bar {CLOSE:.0%}); "
         f"{figures['count']} machines in {seconds:.0f} s"
     )

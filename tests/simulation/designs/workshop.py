@@ -1,7 +1,7 @@
 """Drafting machines of the workshop's modules."""
 
 import numpy as np
-from tests.simulation.designs.draft import Direction, Draft
+from tests.simulation.designs.draft import DOWN, EAST, NORTH, SOUTH, UP, WEST, Direction, Draft
 
 from buildarena_geometry import Machine
 from buildarena_geometry.modules.sets import module_set
@@ -27,3 +27,25 @@ class WorkshopDraft(Draft):
                     self.do("twist_block", block_id=made, angle=angle)
                 return made
         raise ValueError(f"the y axis of block {made} cannot look towards {y_axis}")
+
+
+def airship() -> Machine:
+    """A long frame of sixty parts with wings, blades, fans, balloons and springs."""
+    draft = WorkshopDraft()
+    start = draft.start()
+    south = draft.row(start, SOUTH, 12)
+    spine = [*reversed(south), start, *draft.row(start, NORTH, 12)]
+    for k in range(1, 24, 4):
+        for side in (EAST, WEST):
+            draft.placed(spine[k], side, "Wing Panel", UP)
+    for k in range(0, 25, 3):
+        draft.attach(spine[k], UP, "Balloon")
+    for k in range(3, 23, 4):
+        draft.attach(spine[k], DOWN, "Flying Block")
+    for k in (1, 5, 13, 17):
+        draft.placed(spine[k], DOWN, "Propeller", NORTH)
+    for k in (0, 24):
+        draft.placed(spine[k], DOWN, "Drag Block", NORTH)
+    for k in (2, 10, 16):
+        draft.link(spine[k], DOWN, spine[k + 6], DOWN, connector="Spring")
+    return draft.machine

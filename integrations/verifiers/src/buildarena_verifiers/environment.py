@@ -59,7 +59,7 @@ def load_environment(
     """The environment, for programs that don't write a configuration.
 
     Args:
-        tasks: Names of tasks, or one; all nine by default.
+        tasks: Names of tasks, or one; all by default.
         simulator: Name of the engine that tries machines.
         rounds: How often a builder may submit.
         steps: Calls that it may make.

@@ -53,7 +53,7 @@ class BuildTasksetConfig(vf.TasksetConfig):
     """Which episodes there are.
 
     Attributes:
-        tasks: Names of tasks, all nine by default.
+        tasks: Names of tasks, all by default.
         simulator: Name of the engine that tries machines.
         rounds: How often a builder may submit.
         steps: Calls that it may make.

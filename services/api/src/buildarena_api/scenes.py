@@ -159,7 +159,7 @@ def _connector(link: Connector, machine: Machine) -> ConnectorPlace:
         id=link.id,
         module=link.module.name,
         joint=f"{link.module.name} {link.id}",
-        rope=link.module.link == "rope",
+        rope=link.module.link != "rigid",
         start=_end(machine.blocks[link.start[0]], link.start[1]),
         end=_end(machine.blocks[link.end[0]], link.end[1]),
     )

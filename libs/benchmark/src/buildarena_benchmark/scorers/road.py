@@ -34,7 +34,7 @@ def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict
     The distance is the starting block's, as far as wheels drove it (see `driven_distances`), on the
     road, and while the cargo stays near its place on the machine, which bears it. The acceleration
     is vertical, and counts while the machine moves, from when the cargo has settled until the
-    machine has got farthest.
+    machine has got farthest, or to the road's end.
 
     Args:
         task: Thresholds.
@@ -53,7 +53,7 @@ def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict
     joined = joined_to_start(machine, trajectory)
     path = trajectory.positions[:, starting_block(machine, trajectory)].astype(np.float64)
     on_road = np.logical_and.accumulate(np.abs(path[:, 0]) <= scoring.half_width)
-    ahead = np.where(on_road, path[:, 1] - path[0, 1], 0.0)
+    ahead = np.where(on_road, np.minimum(path[:, 1] - path[0, 1], scoring.length), 0.0)
     driven = driven_distances(machine, trajectory, joined, path)
     reach = np.zeros_like(ahead) if driven is None else driven
     counted = np.minimum(ahead, np.minimum(reach, moved_upright(trajectory, joined, path)))

@@ -58,7 +58,7 @@ def driven_distances(
     columns = [
         column
         for column, wheel in enumerate(bearing.wheel_ids)
-        if machine.blocks[wheel].module.spins
+        if machine.blocks[wheel].module.motor
     ]
     if not columns:
         return np.full(len(path), SLACK)

@@ -103,7 +103,7 @@ def _has_wheels(machine: "Machine", trajectory: "Trajectory", joined: Mask) -> M
     """Until when every wheel is joined to the starting block, (T,)."""
     assert trajectory.bearing is not None  # noqa: S101 - the caller looked
     wheels = set(trajectory.bearing.wheel_ids)
-    wheels |= {block.id for block in machine.blocks.values() if block.module.spins}
+    wheels |= {block.id for block in machine.blocks.values() if block.module.motor}
     columns = [k for k, block in enumerate(trajectory.block_ids) if block in wheels]
     whole = joined[:, columns].all(axis=1) if columns else np.zeros(len(joined), dtype=bool)
     return np.asarray(np.logical_and.accumulate(whole))

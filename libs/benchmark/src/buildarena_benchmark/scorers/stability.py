@@ -7,6 +7,7 @@ import numpy as np
 from buildarena_benchmark.scorers.series import Series
 from buildarena_benchmark.scorers.verdict import Deciding
 from buildarena_simulation.constants import GRAVITY
+from buildarena_simulation.scenario import ReleasedPlacement
 
 if TYPE_CHECKING:
     from buildarena_geometry import Machine
@@ -90,7 +91,7 @@ def _bound(
     height = max([0.0, float(start[:, 2].max()), *tops])
     if trajectory.cargo_position is not None:
         height = max(height, float(trajectory.cargo_position[0, 2]))
-    fall = np.sqrt(2.0 * GRAVITY * height)
+    fall = np.sqrt(2.0 * GRAVITY * height) + _release_speed(scenario)
     modules = [machine.blocks[block].module for block in trajectory.block_ids]
     thrusts = np.array(
         [
@@ -104,6 +105,14 @@ def _bound(
     extent = start.max(axis=0) - start.min(axis=0)
     rim = spin * (float(np.linalg.norm(extent)) + 2.0)
     return np.asarray(0.5 * (_MARGIN * (fall + gained[1:] + rim) + _SLACK) ** 2)
+
+
+def _release_speed(scenario: "Scenario") -> float:
+    """Speed that the scenario gives the machine, units/s."""
+    placement = scenario.placement
+    if not isinstance(placement, ReleasedPlacement):
+        return 0.0
+    return float(np.linalg.norm(placement.velocity))
 
 
 def _top(box: "TerrainBox") -> float:

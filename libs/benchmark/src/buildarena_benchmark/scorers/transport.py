@@ -51,7 +51,7 @@ def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict
     scoring = task.scoring
     assert isinstance(scoring, TransportScoring)  # noqa: S101 - the scorer is chosen by it
     path = _subject_path(scoring, machine, trajectory)
-    wheels = [b.id for b in machine.blocks.values() if b.module.spins]
+    wheels = [b.id for b in machine.blocks.values() if b.module.motor]
     if path is None or not _is_driven(machine, trajectory):
         return Verdict(
             success=False, indicator=0.0, metrics={"wheels": len(wheels), "driven": False}

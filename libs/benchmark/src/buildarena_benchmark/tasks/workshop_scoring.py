@@ -21,6 +21,7 @@ class RoadScoring(Document):
         max_shift: Farthest that the cargo may get from its place on the machine, units.
         settle_s: When the cargo's place is taken, and accelerations begin to count, seconds.
         half_width: Of the road about x = 0, units; beyond it nothing counts any more.
+        length: Of the road: farther distances count as this, units.
     """
 
     name: Literal["road"]
@@ -29,6 +30,7 @@ class RoadScoring(Document):
     max_shift: Threshold = 1.5
     settle_s: Threshold = 2.0
     half_width: Threshold = 15.0
+    length: Threshold = 36.0
 
 
 class SlalomScoring(Document):
@@ -151,6 +153,8 @@ def _hopeless_road(scoring: RoadScoring, scenario: Scenario) -> str | None:
         return "the cargo is judged, but scenario has no cargo"
     if scoring.settle_s >= scenario.duration_s:
         return f"settle_s {scoring.settle_s:g} is not within the trial"
+    if scoring.length <= scoring.min_distance:
+        return f"the road's length {scoring.length:g} does not exceed min_distance"
     return None
 
 

@@ -9,16 +9,20 @@ from xml.sax.saxutils import escape
 
 import numpy as np
 
+from buildarena_geometry.blocks import Block
 from buildarena_geometry.export.meshes import COLOURS, CYLINDER_SIDES, normal, polygons
 from buildarena_geometry.modules.solids import Box
+from buildarena_geometry.poses import Pose
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from buildarena_geometry.blocks import Block
     from buildarena_geometry.machine import Machine
+    from buildarena_geometry.modules.module import Module
 
 _LIGHT = np.array([0.35, -0.5, 0.79])  # where the light comes from, world frame, unit length
+PICTURE = 200.0  # pixels that the longest side of a module takes where no view is given
+_DIGITS = 6  # decimals that count: the last bits of a product differ from processor to processor
 _DARKEST = 0.55  # brightness of a face turned away from the light
 _AXES = (
     ("east", (1, 0, 0), "#c0392b"),
@@ -72,6 +76,27 @@ def machine_svg(machine: Machine, view: View | None = None) -> str:
         drawing.add_block(block, machine.state.free_faces(block))
     for link in machine.connectors.values():
         drawing.add_rod(link.start_point, link.end_point)
+    return drawing.text()
+
+
+def module_svg(module: Module, view: View | None = None) -> str:
+    """A module as an SVG document: its root point at the origin, its axes, its faces' letters.
+
+    Args:
+        module: what to draw; a connector is drawn as a rod.
+        view: from where; by default as large as a small picture takes, without the compass.
+    """
+    pose = Pose()
+    if module.kind == "connector":
+        drawing = _Drawing(view or View(compass=False))
+        drawing.add_rod(pose.position, np.array([2.0, 0.0, 0.0]))
+        return drawing.text()
+    size = max(module.size or (1.0,))
+    scale = min(80.0, PICTURE / max(1.0, size))
+    usual = View(scale=scale, compass=False, face_labels=("1",), frames=("1",))
+    drawing = _Drawing(view or usual)
+    block = Block(id="1", module=module, world_from_block=pose)
+    drawing.add_block(block, list(module.face_of_label))
     return drawing.text()
 
 
@@ -134,13 +159,14 @@ class _Drawing:
 
     def _add_polygon(self, corners: NDArray[np.float64], kind: str, *, edged: bool) -> None:
         outward = normal(corners)
-        if outward @ self._towards_eye <= 0:
+        if round(float(outward @ self._towards_eye), _DIGITS) <= 0:
             return
-        brightness = _DARKEST + (1 - _DARKEST) * max(0.0, float(outward @ _LIGHT))
+        lit = round(float(outward @ _LIGHT), _DIGITS)
+        brightness = _DARKEST + (1 - _DARKEST) * max(0.0, lit)
         red, green, blue = (round(255 * part * brightness) for part in COLOURS[kind])
         flat = [self._project(corner) for corner in corners]
         points = " ".join(f"{x:.1f},{y:.1f}" for x, y in flat)
-        depth = float(corners.mean(axis=0) @ self._towards_eye)
+        depth = round(float(corners.mean(axis=0) @ self._towards_eye), _DIGITS)
         colour = f"#{red:02x}{green:02x}{blue:02x}"
         edge = "#2b2b2b" if edged else colour
         shape = f'<polygon points="{points}" fill="{colour}" stroke="{edge}"/>'
@@ -178,7 +204,13 @@ class _Drawing:
         )
 
     def _project(self, point: NDArray[np.float64]) -> NDArray[np.float64]:
-        across, up = self._axes @ point * self._view.scale
+        across, up = _even(self._axes @ point * self._view.scale)
         flat = np.array([across, -up])
         self._points.append(flat)
         return flat
+
+
+def _even(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The values as they are on every processor; never -0."""
+    even: NDArray[np.float64] = np.round(values, _DIGITS) + 0.0
+    return even

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from buildarena_geometry.blocks import JOINT_REACH
+from buildarena_geometry.feedback.motion import motions
 from buildarena_geometry.feedback.words import (
     caption,
     counted,
@@ -256,12 +257,12 @@ def _gap(joint: Joint) -> str:
 
 
 def _use(block: Block) -> list[str]:
-    if block.module.spins:
+    if block.module.motor is not None:
         forward = rolling(block.axis_xyz, clockwise=block.forward_is_clockwise)
         return [f"centre {point(block.body_center_xyz)}", forward + _flipped(block)]
     towards = block.pointing_xyz
     if towards is None:
-        return []
+        return motions(block)
     marks = [
         _landmark(mark.name, block.landmark(mark.along), mark.radius)
         for mark in block.module.landmarks

@@ -5,10 +5,12 @@ from typing import Final
 
 import numpy as np
 
-from buildarena_simulation.constants import FRICTION_TERRAIN
+from buildarena_simulation.constants import FRICTION_TERRAIN, MAX_SPIN
 from buildarena_simulation.engines.base import CargoPose
+from buildarena_simulation.engines.hinges import HingedPiece
 from buildarena_simulation.engines.quiet_output import quiet_output
-from buildarena_simulation.structure.model import FloatArray
+from buildarena_simulation.structure.model import FloatArray, IntArray, Structure
+from buildarena_simulation.structure.motion import Motion
 
 with quiet_output():
     import pybullet
@@ -112,3 +114,28 @@ def set_up(
         enableFileCaching=0,
         **client,
     )
+
+
+def friction_of(structure: Structure, blocks: IntArray) -> float:
+    """Friction of a cluster: a link has one coefficient, that of its wheels if it has any."""
+    parts = [structure.parts[i] for i in blocks]
+    deciding = next((part for part in parts if part.is_wheel), parts[0])
+    return float(deciding.physics.friction)
+
+
+def limit_spin(client: Mapping[str, int], pieces: Sequence[HingedPiece], motion: Motion) -> None:
+    """Slows pieces that spin faster than any part of the game may.
+
+    Args:
+        client: The engine's world.
+        pieces: Its pieces.
+        motion: The clusters' motion.
+    """
+    for piece in pieces:
+        root = piece.inside[0]
+        spin = motion.spin[root]
+        speed = float(np.linalg.norm(spin))
+        if speed > MAX_SPIN:
+            slower = (spin * (MAX_SPIN / speed)).tolist()
+            velocity = motion.velocity[root].tolist()
+            pybullet.resetBaseVelocity(piece.body, velocity, slower, **client)

@@ -312,7 +312,7 @@ def _welds(state: MjcfState) -> Iterator[str]:
         other = names.get(hold.other)
         if other is None:
             other = f"cluster {state.clusters.cluster_of[hold.other]}"
-        # The held body comes first: the point is told in the frame of the second one.
+        # The held body comes first: a weld's point is one of its second body.
         first = {"body1": other or "world", "body2": f"cluster {c}"}
         yield tag("weld", name=f"grip {hold.grip}", anchor=state.in_body(c, hold.point), **first)
     yield "</equality>"

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from buildarena_simulation.constants import FORCES_EVERY_S, MAX_SPIN
+from buildarena_simulation.constants import FORCES_EVERY_S
 from buildarena_simulation.engines.base import (
     CargoPose,
     World,
@@ -27,6 +27,8 @@ from buildarena_simulation.engines.base import (
 from buildarena_simulation.engines.bullet_bodies import (
     add_box,
     free_of_damping,
+    friction_of,
+    limit_spin,
     pose_of,
     set_friction,
     set_up,
@@ -92,6 +94,7 @@ class PyBulletEngine:
         self._surfaces: dict[int, int] = {}
         self._cargo: int | None = None
         self._grips = BulletGrips(self._client)
+        self._fresh: Motion | None = None
         self._own: list[tuple[int, Force]] = []
         self._start_world()
 
@@ -120,6 +123,7 @@ class PyBulletEngine:
         """See `Engine`."""
         self._clusters, self._motion = clusters, motion
         self._axes, self._moments = principal_frames(clusters)
+        self._compliance = np.asarray(np.linalg.inv(clusters.inertia))
         self._hinges = hinge_frames(self._structure, clusters, motion)
         self._grips.leave()
         for piece in self._pieces:
@@ -169,7 +173,7 @@ class PyBulletEngine:
                 impacts.take(self._read_contacts())
         self._targets = targets[-1]
         self._motion = self._read_motion()
-        self._limit_spin()
+        limit_spin(self._client, self._pieces, self._motion)
         self._impacts = impacts
 
     def contacts(self) -> ContactForces:
@@ -244,7 +248,7 @@ class PyBulletEngine:
             client=self._client,
         )
         for c, link in articulation.links.items():
-            set_friction(self._client, body, link, self._friction_of(c))
+            set_friction(self._client, body, link, friction_of(structure, clusters.blocks[c]))
         simple = is_simple_piece(structure, clusters, inside)
         if simple:
             for link, c in enumerate(inside[1:]):
@@ -264,12 +268,6 @@ class PyBulletEngine:
             wheel_places=np.array(places, dtype=np.int64),
             wheel_torques=structure.torques[clusters.seated[hinged]] * self._world.gravity,
         )
-
-    def _friction_of(self, c: int) -> float:
-        """Friction of a cluster: a link has one coefficient, that of its wheels if it has any."""
-        parts = [self._structure.parts[i] for i in self._clusters.blocks[c]]
-        deciding = next((part for part in parts if part.is_wheel), parts[0])
-        return float(deciding.physics.friction)
 
     def _load(self, inside: tuple[int, ...], motion: Motion) -> int:
         """The body of a piece, put where its root is."""
@@ -323,17 +321,20 @@ class PyBulletEngine:
     def _own_forces(self, step: int) -> list[tuple[int, Force]]:
         field = self._world.field
         if field is not None and step % round(FORCES_EVERY_S / self.time_step_s) == 0:
-            motion = self._read_motion()
+            # Ropes ask for the same motion in this step.
+            self._fresh = motion = self._read_motion()
             self._own = body_wrenches(field.wrenches(self._clusters, motion), self._axes)
         return self._own
 
     def _pull_ropes(self) -> None:
         structure, clusters = self._structure, self._clusters
-        motion, field = self._read_motion(), self._world.field
+        motion, field = self._fresh or self._read_motion(), self._world.field
+        self._fresh = None
         pulls = rope_forces(
             structure,
             clusters,
             motion,
+            compliance=self._compliance,
             alive=self._rope_alive,
             rest=structure.ropes.length if field is None else field.rest_lengths(),
             time_step_s=self.time_step_s,
@@ -350,17 +351,6 @@ class PyBulletEngine:
         """Velocity of every piece and of the cargo, (K, 3), units/s."""
         client = self._client
         return np.array([pybullet.getBaseVelocity(body, **client)[0] for body in self._free_bodies])
-
-    def _limit_spin(self) -> None:
-        """Slows pieces that spin faster than any part of the game may."""
-        for piece in self._pieces:
-            root = piece.inside[0]
-            spin = self._motion.spin[root]
-            speed = float(np.linalg.norm(spin))
-            if speed > MAX_SPIN:
-                slower = (spin * (MAX_SPIN / speed)).tolist()
-                velocity = self._motion.velocity[root].tolist()
-                pybullet.resetBaseVelocity(piece.body, velocity, slower, **self._client)
 
     def _read_motion(self) -> Motion:
         """Poses and velocities of all clusters, children by way of their hinges' angles."""

@@ -37,6 +37,7 @@ def rope_forces(
     clusters: Clusters,
     motion: Motion,
     *,
+    compliance: FloatArray,
     alive: BoolArray,
     rest: FloatArray,
     time_step_s: float,
@@ -47,6 +48,7 @@ def rope_forces(
         structure: The machine.
         clusters: Its clusters.
         motion: Their motion.
+        compliance: (C, 3, 3) inverse of the clusters' inertias.
         alive: (R,) which ropes hold.
         rest: (R,) their lengths at rest, units.
         time_step_s: Length of the step, seconds.
@@ -56,8 +58,14 @@ def rope_forces(
     length = np.linalg.norm(end - start, axis=1)
     along = (end - start) / np.maximum(length, 1e-9)[:, None]
     first, second = clusters.cluster_of[ropes.first], clusters.cluster_of[ropes.second]
-    slip_first, give_first = _at_end(clusters, motion, first, start, along)
-    slip_second, give_second = _at_end(clusters, motion, second, end, along)
+    slip, give = _at_ends(
+        clusters,
+        motion,
+        np.concatenate([first, second]),
+        (np.concatenate([start, end]), np.concatenate([along, along])),
+        compliance,
+    )
+    (slip_first, slip_second), (give_first, give_second) = np.split(slip, 2), np.split(give, 2)
     stretch, rate = length - rest, slip_second - slip_first
     mass = 1.0 / np.maximum(give_first + give_second, 1e-9)
     # Several ropes on one body act together; each takes its share.
@@ -89,12 +97,17 @@ def rope_forces(
     )
 
 
-def _at_end(
-    clusters: Clusters, motion: Motion, c: np.ndarray, point: FloatArray, along: FloatArray
+def _at_ends(
+    clusters: Clusters,
+    motion: Motion,
+    c: np.ndarray,
+    ends: tuple[FloatArray, FloatArray],
+    compliance: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Speed along the rope of its end, and the velocity it gains per unit impulse, each (R,)."""
+    """Speed along a rope of its ends, and the velocity they gain per unit impulse, each (2R,)."""
+    point, along = ends
     arm = point - motion.centers_of_mass(clusters)[c]
     velocity = motion.velocity[c] + cross(motion.spin[c], arm)
     lever = turned(motion.rotation[c].transpose(0, 2, 1), cross(arm, along))
-    gained = turned(np.linalg.inv(clusters.inertia[c]), lever)
+    gained = turned(compliance[c], lever)
     return (velocity * along).sum(axis=1), 1.0 / clusters.mass[c] + (lever * gained).sum(axis=1)

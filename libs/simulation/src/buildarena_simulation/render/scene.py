@@ -105,7 +105,7 @@ class Scene:
                 if k is not None
             ]
             if len(local) == 2:  # noqa: PLR2004 - both ends are tracked
-                color = _WINCH if connector.module.link == "rope" else _BRACE
+                color = _BRACE if connector.module.link == "rigid" else _WINCH
                 self._braces.append((local, broken[0] if broken else np.inf, color))
 
     @property

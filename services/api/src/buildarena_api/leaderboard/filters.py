@@ -11,7 +11,7 @@ from fastapi import Depends, Query, Request
 from buildarena_api.dependencies import ContextDep
 from buildarena_api.http.problems import ProblemError
 from buildarena_api.leaderboard.cache import BoardCache, Question
-from buildarena_benchmark import ValidationIssue, builtin_tasks
+from buildarena_benchmark import ValidationIssue, builtin_tasks, paper_tasks
 from buildarena_benchmark.flags import Reading
 from buildarena_benchmark.leaderboard import BoardQuery
 
@@ -51,6 +51,13 @@ def select_board(
     track: Annotated[str | None, Query(description="Default: the first with ended jobs")] = None,
     task: Annotated[list[str] | None, Query(description="Only these tasks")] = None,
     level: Annotated[list[int] | None, Query(description="Only tasks of these levels")] = None,
+    category: Annotated[
+        list[str] | None,
+        Query(
+            description="Only tasks of these categories, over whose built-in ones models are "
+            "ranked then; by default the overall ranking is over the paper's nine tasks"
+        ),
+    ] = None,
     model: Annotated[list[str] | None, Query(description="Only these models")] = None,
     sweep: Annotated[
         list[str] | None,
@@ -69,7 +76,7 @@ def select_board(
     """What the parameters ask for.
 
     Raises:
-        ProblemError: A track, task or level is unknown, or a time has no zone.
+        ProblemError: A track, task, level or category is unknown, or a time has no zone.
         NotFoundError: A sweep is unknown.
     """
     sweeps = frozenset(sweep) if sweep else None
@@ -85,13 +92,19 @@ def select_board(
     for number in level or ():
         if number not in levels:
             raise unknown("level", str(number), [str(known) for known in levels])
+    categories = sorted({entry.category for entry in tasks.values()})
+    for name in category or ():
+        if name not in categories:
+            raise unknown("category", name, categories)
     require_zones(since=since, until=until)
     chosen = None
-    if task or level:
+    if task or level or category:
         chosen = frozenset(
             name
             for name, entry in tasks.items()
-            if (not task or name in task) and (not level or entry.level in level)
+            if (not task or name in task)
+            and (not level or entry.level in level)
+            and (not category or entry.category in category)
         )
     query = BoardQuery(
         tasks=chosen,
@@ -99,13 +112,24 @@ def select_board(
         since=since,
         until=until,
         reading=reading,
-        # A task of somebody's own does not take from the others that are ranked over all
-        # tasks, unless it is asked for.
-        overall=None if task else frozenset(builtin_tasks()),
+        overall=_ranked_over(task, category),
     )
     track = track or (tracks[0] if tracks else None)
     question = Question(track=track or "", query=query, sweeps=sweeps, members=members)
     return Selection(track=track, tracks=tracks, query=query, question=question)
+
+
+def _ranked_over(task: list[str] | None, category: list[str] | None) -> frozenset[str] | None:
+    """Tasks that the overall ranking is over; None for all that are shown.
+
+    A task that not everybody has played takes no model out of the ranking over all tasks, unless
+    it is asked for.
+    """
+    if task:
+        return None
+    if category:
+        return frozenset(name for name, one in builtin_tasks().items() if one.category in category)
+    return frozenset(paper_tasks())
 
 
 def require_zones(**times: datetime | None) -> None:

@@ -17,7 +17,7 @@ from buildarena_api.http.concurrency import limited
 from buildarena_api.http.problems import problem_responses
 from buildarena_api.leaderboard.filters import BoardsDep, SelectionDep
 from buildarena_api.leaderboard.views import Board, PublishedView, Row, board_view
-from buildarena_benchmark import builtin_tasks
+from buildarena_benchmark import paper_tasks
 from buildarena_benchmark.leaderboard import Board as RankedBoard
 from buildarena_benchmark.leaderboard import (
     cost_table,
@@ -220,12 +220,12 @@ def _kind(name: str) -> type:
 
 
 def _latex(ranked: RankedBoard) -> str:
-    """Our two tables and the paper's two; custom tasks in tables of their own."""
+    """Our two tables and the paper's two; other tasks in tables of their own."""
     cells = {board.task: [row.cell for row in board.rows] for board in ranked.tasks}
-    ours = {task: row for task, row in cells.items() if task in builtin_tasks()}
+    ours = {task: row for task, row in cells.items() if task in paper_tasks()}
     own = {task: row for task, row in cells.items() if task not in ours}
     paper = {task: rows for task, rows in published_rows().items() if task in ours}
-    others = ["% Measured: custom tasks", plain_table(own)] if own else []
+    others = ["% Measured: tasks that the paper does not have", plain_table(own)] if own else []
     return "\n".join(
         [
             "% Needs the packages booktabs and multirow.",

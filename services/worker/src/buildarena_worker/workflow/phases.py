@@ -30,7 +30,7 @@ PLAN_TURNS = 5
 DRAFT_TURNS = 50
 BUILD_TURNS = 300
 """Replies a phase may take. Source: the paper's workflow appendix."""
-MOST_LOOKUPS = 20
+MAX_LOOKUPS = 20
 """Modules a role may look up before it speaks."""
 SHOWN = 200
 """Characters of a reply that a failure quotes."""
@@ -260,7 +260,7 @@ def _speak(dialogue: Dialogue, role: Role) -> Reply:
     """A role's turn, and further ones while it looks modules up instead of speaking."""
     reply = dialogue.turn(role)
     may_look = any(tool.name in LOOKUPS for tool in role.tools)
-    for _ in range(MOST_LOOKUPS if may_look else 0):
+    for _ in range(MAX_LOOKUPS if may_look else 0):
         if not is_aside(reply):
             break
         reply = dialogue.turn(role)

@@ -1,10 +1,10 @@
-"""Parametric designs of our own for the nine tasks; docs/expert.md explains them."""
+"""Parametric designs of our own for the built-in tasks; docs/expert.md explains them."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
-from buildarena_worker.builtin.designs import bridges, rockets, vehicles
+from buildarena_worker.builtin.designs import bridges, flyers, rockets, rovers, vehicles
 from buildarena_worker.builtin.designs.design import Design
 
 DESIGNS: dict[str, Callable[[int], Design]] = {
@@ -17,6 +17,9 @@ DESIGNS: dict[str, Callable[[int], Design]] = {
     "lift-1": rockets.engine,
     "lift-2": rockets.rocket,
     "lift-3": rockets.framed_rocket,
+    "mechanisms-1": rovers.rough_rider,
+    "flight-1": flyers.hoverer,
+    "flight-2": flyers.glider,
 }
 """By task name: the design for a seed, which varies it within its tolerances."""
 

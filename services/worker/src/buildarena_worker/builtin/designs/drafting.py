@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from buildarena_geometry import Machine
+from buildarena_geometry import Machine, catalogue_of
 
 Action = tuple[str, Mapping[str, Any]]
 Direction = tuple[int, int, int]
@@ -28,14 +28,17 @@ class Draft:
 
     Args:
         available: Sub-structures by name, for an assembly.
+        modules: A module set's name; the basic one by default.
 
     Attributes:
         machine: The machine so far.
         actions: The actions that made it.
     """
 
-    def __init__(self, available: Mapping[str, Machine] | None = None) -> None:
-        self.machine = Machine(available=dict(available)) if available else Machine()
+    def __init__(
+        self, available: Mapping[str, Machine] | None = None, *, modules: str | None = None
+    ) -> None:
+        self.machine = Machine(available=available, catalogue=catalogue_of(modules))
         self.actions: list[Action] = []
 
     def do(self, name: str, **arguments: Any) -> None:
@@ -96,12 +99,32 @@ class Draft:
         """Attaches a torch whose flame is in a direction."""
         return self._aimed(self.attach(base, side, TORCH), flame)
 
-    def wheel(self, base: str, side: Direction) -> str:
+    def wheel(self, base: str, side: Direction, module: str = WHEEL) -> str:
         """Attaches a wheel to an east or west side; forward spin rolls it north."""
-        made = self.attach(base, side, WHEEL)
+        made = self.attach(base, side, module)
         if side == WEST:
             self.do("flip_spin", block_id=made)
         return made
+
+    def turn_axis(self, block: str, axis: int, way: Direction, *, further_deg: float = 0.0) -> None:
+        """Twists a block by quarter turns until an axis of its own has a direction, and further.
+
+        Args:
+            block: The block.
+            axis: 0, 1 or 2 for its own x, y or z axis.
+            way: The direction.
+            further_deg: How much it is twisted beyond that, degrees.
+        """
+        for angle in (0, 90, 180, 270):
+            turned = self.machine.copy()
+            if angle and not turned.act("twist_block", {"block_id": block, "angle": angle}).ok:
+                continue
+            rotation = np.array(turned.blocks[block].world_from_block.rotation)
+            if rotation[:, axis] @ np.array(way) > ALIGNED:
+                if angle + further_deg:
+                    self.do("twist_block", block_id=block, angle=angle + further_deg)
+                return
+        raise ValueError(f"block {block} cannot have its axis {axis} towards {way}")
 
     def _aimed(self, block: str, way: Direction) -> str:
         """Twists a block by quarter turns until it points in a direction."""
