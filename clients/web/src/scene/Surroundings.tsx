@@ -1,13 +1,22 @@
 import { useFrame } from "@react-three/fiber";
 import { useMemo, useRef } from "react";
-import type { Group } from "three";
+import { DoubleSide, type Group } from "three";
 import type { Vector } from "./modules";
 
 export interface Scenario {
   duration_s: number;
   terrain: { center: Vector; size: Vector; slope_deg?: number }[];
-  cargo: { size: Vector; drop_height: number; final_mass: number } | null;
-  placement: { kind: string; gap?: number; lowest_center?: number };
+  cargo: { size: Vector; drop_height: number; final_mass: number; at?: Vector | null } | null;
+  placement: { kind: string; gap?: number; lowest_center?: number; height?: number; velocity?: Vector };
+  gates?: Gate[];
+  marks?: { name: string; center: Vector; radius: number }[];
+}
+
+export interface Gate {
+  name: string;
+  center: readonly [number, number];
+  half_width: number;
+  heading_deg?: number;
 }
 
 const GROUND = 160;
@@ -31,7 +40,39 @@ function Ground({ height }: { height: number }) {
   );
 }
 
-/** The ground and the fixed boxes of a scenario. */
+const POST = 2;
+const FLAT = 0.03;
+
+/** Where a gate's two posts stand: the line between them lies across the way it is crossed. */
+export function posts({ center, half_width, heading_deg = 0 }: Gate): [Vector, Vector] {
+  const heading = (heading_deg * Math.PI) / 180;
+  const at = (sign: number): Vector => [center[0] + sign * half_width * Math.cos(heading), center[1] - sign * half_width * Math.sin(heading), 0];
+  return [at(-1), at(1)];
+}
+
+/** What is shown and nothing can touch: gates to be crossed, and places. */
+function Signs({ scenario }: { scenario: Scenario }) {
+  return (
+    <>
+      {(scenario.gates ?? []).flatMap((gate) =>
+        posts(gate).map(([x, y], side) => (
+          <mesh key={`${gate.name} ${side}`} position={[x, y, POST / 2]} rotation={[Math.PI / 2, 0, 0]}>
+            <cylinderGeometry args={[0.08, 0.08, POST, 12]} />
+            <meshLambertMaterial color={side === 0 ? "#c2410c" : "#1d4ed8"} />
+          </mesh>
+        )),
+      )}
+      {(scenario.marks ?? []).map(({ name, center, radius }) => (
+        <mesh key={name} position={[center[0], center[1], center[2] + FLAT]}>
+          <ringGeometry args={[Math.max(0, radius - 0.1), radius, 48]} />
+          <meshBasicMaterial color="#c2410c" side={DoubleSide} />
+        </mesh>
+      ))}
+    </>
+  );
+}
+
+/** The ground, the fixed boxes, the gates and the marks of a scenario. */
 export function Surroundings({ scenario, floor = 0 }: { scenario: Scenario | null; floor?: number }) {
   const terrain = useMemo(() => scenario?.terrain ?? [], [scenario]);
   return (
@@ -43,6 +84,7 @@ export function Surroundings({ scenario, floor = 0 }: { scenario: Scenario | nul
           <meshLambertMaterial color="#9aa38b" />
         </mesh>
       ))}
+      {scenario !== null && <Signs scenario={scenario} />}
     </>
   );
 }
