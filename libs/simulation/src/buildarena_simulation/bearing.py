@@ -38,6 +38,11 @@ class BearingMeter:
         cargo = -up[other == CARGO].sum()
         self.now = np.concatenate([on_surface, [cargo], on_block[self._wheels]])
 
+    def add_held(self, ground: float, cargo: float) -> None:
+        """Takes what grips hold: the ground on them, and they on the cargo, mass·g upwards."""
+        self.now[0] += ground
+        self.now[self._surfaces] += cargo
+
     def series(self, rows: NDArray[np.float64], wheel_ids: tuple[str, ...]) -> Bearing:
         """The bearing of readings (T, K + 2 + W), each a `now`."""
         grained = np.round(rows * 256.0).astype(np.float32) / np.float32(256.0)

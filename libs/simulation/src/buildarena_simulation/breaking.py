@@ -202,6 +202,8 @@ class BreakingModel:
             others=others,
         )
         self.bearing.read(contacts.other, contacts.surface, shared)
+        if self.holding is not None:
+            self.bearing.add_held(*self.holding.lifts())
         return together([shared, *others])
 
     def _pushes(self, thrusts: FloatArray) -> PointForces:

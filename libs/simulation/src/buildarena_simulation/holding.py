@@ -122,6 +122,18 @@ class Holding:
             force=np.array([force for _, _, force in rows]),
         )
 
+    def lifts(self) -> tuple[float, float]:
+        """Vertical forces of what is held, upwards: of the ground on grips, of grips on the cargo.
+
+        Returns:
+            Both in mass·g, as `Bearing` tells them; terrain that is held counts as ground.
+        """
+        on = dict.fromkeys((WORLD, CARGO), 0.0)
+        for hold, wrench in self._borne:
+            if hold.other in on:
+                on[hold.other] += float(wrench[2]) / GRAVITY
+        return on[WORLD], -on[CARGO]
+
     def _drop(self, k: int, what: str, time_s: float) -> None:
         if k in self._held:
             _, name = self._held.pop(k)

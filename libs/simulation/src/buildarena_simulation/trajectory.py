@@ -76,7 +76,7 @@ class Event:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Bearing:
-    """Vertical contact forces at T instants, each the mean over a moment before it, mass·g.
+    """Vertical forces of contacts and grips at T instants, each the mean over a moment, mass·g.
 
     Upwards is positive. K terrain boxes, W wheels. Arrays are read-only.
 

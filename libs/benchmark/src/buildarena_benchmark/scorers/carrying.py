@@ -56,7 +56,8 @@ def is_airborne(machine: "Machine", trajectory: "Trajectory", joined: Mask) -> M
     """
     whole = masses_of(machine, trajectory, np.ones_like(joined))
     allowed = whole - masses_of(machine, trajectory, joined) + _TOUCH * whole
-    borne = _summed(from_below(trajectory), _HALF_A_SECOND)
+    # A grip that holds on to the ground pulls at it.
+    borne = _summed(np.abs(from_below(trajectory)), _HALF_A_SECOND)
     return np.asarray(borne <= _summed(allowed, _HALF_A_SECOND))
 
 

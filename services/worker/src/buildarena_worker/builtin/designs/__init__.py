@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from buildarena_worker.builtin.designs import bridges, flyers, rockets, rovers, vehicles
+from buildarena_worker.builtin.designs import arms, bridges, flyers, rockets, rovers, vehicles
 from buildarena_worker.builtin.designs.design import Design
 
 DESIGNS: dict[str, Callable[[int], Design]] = {
@@ -18,6 +18,7 @@ DESIGNS: dict[str, Callable[[int], Design]] = {
     "lift-2": rockets.rocket,
     "lift-3": rockets.framed_rocket,
     "mechanisms-1": rovers.rough_rider,
+    "mechanisms-4": arms.swinging_arm,
     "flight-1": flyers.hoverer,
     "flight-2": flyers.glider,
 }
