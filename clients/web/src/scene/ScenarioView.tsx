@@ -2,7 +2,8 @@ import { Stack, Text } from "@mantine/core";
 import { useMemo } from "react";
 import { Box3, Vector3 } from "three";
 import { Stage } from "./Stage";
-import { Surroundings, posts, type Scenario } from "./Surroundings";
+import { posts } from "./signs";
+import { Surroundings, type Scenario } from "./Surroundings";
 
 const ROOM = 5;
 const SEEN = 30;

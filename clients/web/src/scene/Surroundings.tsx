@@ -2,6 +2,7 @@ import { useFrame } from "@react-three/fiber";
 import { useMemo, useRef } from "react";
 import { DoubleSide, type Group } from "three";
 import type { Vector } from "./modules";
+import { posts, type Gate } from "./signs";
 
 export interface Scenario {
   duration_s: number;
@@ -10,13 +11,6 @@ export interface Scenario {
   placement: { kind: string; gap?: number; lowest_center?: number; height?: number; velocity?: Vector };
   gates?: Gate[];
   marks?: { name: string; center: Vector; radius: number }[];
-}
-
-export interface Gate {
-  name: string;
-  center: readonly [number, number];
-  half_width: number;
-  heading_deg?: number;
 }
 
 const GROUND = 160;
@@ -42,13 +36,6 @@ function Ground({ height }: { height: number }) {
 
 const POST = 2;
 const FLAT = 0.03;
-
-/** Where a gate's two posts stand: the line between them lies across the way it is crossed. */
-export function posts({ center, half_width, heading_deg = 0 }: Gate): [Vector, Vector] {
-  const heading = (heading_deg * Math.PI) / 180;
-  const at = (sign: number): Vector => [center[0] + sign * half_width * Math.cos(heading), center[1] - sign * half_width * Math.sin(heading), 0];
-  return [at(-1), at(1)];
-}
 
 /** What is shown and nothing can touch: gates to be crossed, and places. */
 function Signs({ scenario }: { scenario: Scenario }) {
