@@ -17,7 +17,18 @@ FILES = ("modules.yaml", "extended.yaml")
 PICTURES = Path("images", "modules")
 GUIDE = "modules.md"
 NOT_PHYSICS = {
-    *("name", "kind", "categories", "simulated", "mass", "cost", "size", "center", "faces"),
+    *(
+        "name",
+        "brief",
+        "kind",
+        "categories",
+        "simulated",
+        "mass",
+        "cost",
+        "size",
+        "center",
+        "faces",
+    ),
     *("colliders", "body", "pointing", "landmarks", "actions", "default_keys", "spin", "sources"),
     *("root_offset", "overlaps_base", "description", "besiege"),
 }

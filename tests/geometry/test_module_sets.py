@@ -133,6 +133,13 @@ def test_every_type_can_be_attached_and_comes_back_from_its_document(name):
     assert again.mass == pytest.approx(0.25 + module_set("all")[name].mass)
 
 
+@pytest.mark.parametrize("category", ["basic", "locomotion", "mechanical", "flight"])
+def test_lists_of_a_category_are_short(category):
+    lines = built(module_set("workshop")).act("list_modules", {"category": category}).text
+    assert all(len(line) < 130 for line in lines.splitlines())
+    assert all(line.endswith(".") and not line.endswith("..") for line in lines.splitlines())
+
+
 def test_documents_know_all_types_and_a_machine_only_its_own():
     machine = built(module_set("workshop"), ("1", "A", "Hinge"), ("2", "E", "Wing Panel"))
     assert Machine.from_document(machine.to_document()) == machine
@@ -292,6 +299,7 @@ def test_balls_meet_as_balls(tmp_path):
         ({"root_offset": -1}, r"root_offset: expected a number of at least 0"),
         ({"overlaps_base": "yes"}, r"overlaps_base: expected true or false"),
         ({"simulated": 1}, r"simulated: expected true or false"),
+        ({"brief": "x" * 101}, r"brief: expected a text of at most 100 characters"),
         ({"categories": "basic"}, r"categories: expected a list"),
         ({"default_keys": {"fly": "H"}}, r"default_keys.fly: expected keys of the actions none"),
         ({"sources": {"mass": "a book"}}, r"sources.mass: .* known, community, chosen, unknown"),

@@ -2,6 +2,7 @@ import { Stack, Text } from "@mantine/core";
 import { useMemo } from "react";
 import { Box3, Vector3 } from "three";
 import { Stage } from "./Stage";
+import { posts } from "./signs";
 import { Surroundings, type Scenario } from "./Surroundings";
 
 const ROOM = 5;
@@ -15,6 +16,8 @@ export default function ScenarioView({ scenario }: { scenario: Scenario }) {
       const center = new Vector3(...box.center).clampLength(0, SEEN);
       whole.union(new Box3().setFromCenterAndSize(center, new Vector3(...box.size).multiplyScalar(0.5)));
     }
+    for (const gate of scenario.gates ?? []) for (const post of posts(gate)) whole.expandByPoint(new Vector3(...post).clampLength(0, SEEN));
+    for (const mark of scenario.marks ?? []) whole.expandByPoint(new Vector3(...mark.center).clampLength(0, SEEN));
     return whole;
   }, [scenario]);
   const height = cargoHeight(scenario);
@@ -23,12 +26,12 @@ export default function ScenarioView({ scenario }: { scenario: Scenario }) {
       <Stage bounds={bounds} height={320} label={described(scenario)}>
         <Surroundings scenario={scenario} />
         {scenario.cargo !== null && (
-          <mesh position={[0, 0, height]}>
+          <mesh position={cargoPlace(scenario.cargo, height)}>
             <boxGeometry args={[...scenario.cargo.size]} />
             <meshLambertMaterial color="#859966" transparent opacity={0.85} />
           </mesh>
         )}
-        <mesh position={[0, 0, scenario.placement.lowest_center ?? 0.5]}>
+        <mesh position={[0, 0, scenario.placement.lowest_center ?? 0.5 + (scenario.placement.height ?? 0)]}>
           <boxGeometry args={[1, 1, 1]} />
           <meshLambertMaterial color="#cc5c45" transparent opacity={0.6} />
         </mesh>
@@ -43,15 +46,34 @@ function cargoHeight(scenario: Scenario): number {
   return lowest + 1 + (scenario.cargo?.drop_height ?? 0) + (scenario.cargo?.size[2] ?? 0) / 2;
 }
 
-/** A scenario in a sentence or two. */
+function cargoPlace({ at, size }: NonNullable<Scenario["cargo"]>, height: number): [number, number, number] {
+  return at == null ? [0, 0, height] : [at[0], at[1], at[2] + size[2] / 2];
+}
+
+const counted = (count: number, thing: string): string => `${count} ${thing}${count === 1 ? "" : "s"}`;
+
+function released({ height = 0, velocity = [0, 0, 0] }: Scenario["placement"]): string {
+  return `The machine is let go ${height} units up, at ${Math.hypot(...velocity)} units a second.`;
+}
+
+function signs({ gates = [], marks = [] }: Scenario): string {
+  const shown = [...(gates.length > 0 ? [counted(gates.length, "gate")] : []), ...(marks.length > 0 ? [counted(marks.length, "mark")] : [])];
+  return shown.length === 0 ? "" : `There are ${shown.join(" and ")}, which nothing can touch. `;
+}
+
+/** A scenario in a few sentences. */
 export function described(scenario: Scenario): string {
   const place =
     scenario.placement.kind === "span"
       ? `The machine is released above a gap ${scenario.placement.gap ?? "?"} units wide.`
-      : "The machine stands on the ground at the origin.";
+      : scenario.placement.kind === "released"
+        ? released(scenario.placement)
+        : "The machine stands on the ground at the origin.";
   const cargo =
     scenario.cargo === null
       ? "There is no cargo."
-      : `A cargo of ${scenario.cargo.size.join(" x ")} units is dropped onto it and grows to ${scenario.cargo.final_mass} mass units.`;
-  return `${place} ${cargo} The trial lasts ${scenario.duration_s} seconds; the red cube marks the machine's place.`;
+      : scenario.cargo.at == null
+        ? `A cargo of ${scenario.cargo.size.join(" x ")} units is dropped onto it and grows to ${scenario.cargo.final_mass} mass units.`
+        : `A cargo of ${scenario.cargo.size.join(" x ")} units and ${scenario.cargo.final_mass} mass units stands at (${scenario.cargo.at.join(", ")}).`;
+  return `${place} ${cargo} ${signs(scenario)}The trial lasts ${scenario.duration_s} seconds; the red cube marks the machine's place.`;
 }

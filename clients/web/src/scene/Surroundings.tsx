@@ -1,13 +1,16 @@
 import { useFrame } from "@react-three/fiber";
 import { useMemo, useRef } from "react";
-import type { Group } from "three";
+import { DoubleSide, type Group } from "three";
 import type { Vector } from "./modules";
+import { posts, type Gate } from "./signs";
 
 export interface Scenario {
   duration_s: number;
   terrain: { center: Vector; size: Vector; slope_deg?: number }[];
-  cargo: { size: Vector; drop_height: number; final_mass: number } | null;
-  placement: { kind: string; gap?: number; lowest_center?: number };
+  cargo: { size: Vector; drop_height: number; final_mass: number; at?: Vector | null } | null;
+  placement: { kind: string; gap?: number; lowest_center?: number; height?: number; velocity?: Vector };
+  gates?: Gate[];
+  marks?: { name: string; center: Vector; radius: number }[];
 }
 
 const GROUND = 160;
@@ -31,7 +34,32 @@ function Ground({ height }: { height: number }) {
   );
 }
 
-/** The ground and the fixed boxes of a scenario. */
+const POST = 2;
+const FLAT = 0.03;
+
+/** What is shown and nothing can touch: gates to be crossed, and places. */
+function Signs({ scenario }: { scenario: Scenario }) {
+  return (
+    <>
+      {(scenario.gates ?? []).flatMap((gate) =>
+        posts(gate).map(([x, y], side) => (
+          <mesh key={`${gate.name} ${side}`} position={[x, y, POST / 2]} rotation={[Math.PI / 2, 0, 0]}>
+            <cylinderGeometry args={[0.08, 0.08, POST, 12]} />
+            <meshLambertMaterial color={side === 0 ? "#c2410c" : "#1d4ed8"} />
+          </mesh>
+        )),
+      )}
+      {(scenario.marks ?? []).map(({ name, center, radius }) => (
+        <mesh key={name} position={[center[0], center[1], center[2] + FLAT]}>
+          <ringGeometry args={[Math.max(0, radius - 0.1), radius, 48]} />
+          <meshBasicMaterial color="#c2410c" side={DoubleSide} />
+        </mesh>
+      ))}
+    </>
+  );
+}
+
+/** The ground, the fixed boxes, the gates and the marks of a scenario. */
 export function Surroundings({ scenario, floor = 0 }: { scenario: Scenario | null; floor?: number }) {
   const terrain = useMemo(() => scenario?.terrain ?? [], [scenario]);
   return (
@@ -43,6 +71,7 @@ export function Surroundings({ scenario, floor = 0 }: { scenario: Scenario | nul
           <meshLambertMaterial color="#9aa38b" />
         </mesh>
       ))}
+      {scenario !== null && <Signs scenario={scenario} />}
     </>
   );
 }

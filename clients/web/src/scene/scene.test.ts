@@ -4,6 +4,7 @@ import { boundsOf, machineOf, readScene, type MachineScene } from "./machine";
 import { jointsOf, loadsAt, loadsOfBlocks, mostLoaded } from "./loads";
 import { moduleShape } from "./modules";
 import { poseAt } from "./playing";
+import { posts } from "./signs";
 import { instantAt, type Trial } from "./trial";
 
 const CYCLE: [number, number, number, number] = [0.5, 0.5, 0.5, 0.5];
@@ -106,5 +107,14 @@ describe("loads", () => {
     expect([...loadsOfBlocks(TRIAL, loadsAt(TRIAL, 1))]).toEqual([["1", 1.25], ["2", 1.25]]);
     expect(mostLoaded(TRIAL, loadsAt(TRIAL, 2))).toMatchObject({ joint: "Brace 7", ratio: 0.5 });
     expect(mostLoaded(TRIAL, loadsAt(TRIAL, 0))).toBeNull();
+  });
+});
+
+describe("posts", () => {
+  it("stand across the way a gate is crossed, from north towards east", () => {
+    const rounded = (heading_deg: number) =>
+      posts({ name: "g", center: [4, 10], half_width: 1.5, heading_deg }).map((post) => post.map((value) => Math.round(value * 1e6) / 1e6));
+    expect(rounded(0)).toEqual([[2.5, 10, 0], [5.5, 10, 0]]);
+    expect(rounded(90)).toEqual([[4, 11.5, 0], [4, 8.5, 0]]);
   });
 });

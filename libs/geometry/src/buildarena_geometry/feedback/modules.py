@@ -87,7 +87,8 @@ def modules_of_category(catalogue: Catalogue) -> dict[str, list[Module]]:
 
 
 def _short_line(module: Module) -> str:
-    first = module.description.partition(". ")[0].rstrip(".")
+    first = module.facts.brief or module.description.partition(". ")[0]
+    first = first.rstrip(".")
     return f"- {module.name} (mass {plain(module.mass)}): {first}."
 
 

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from buildarena_geometry.reading import Fields
 
 CONFIDENCES = ("known", "community", "chosen", "unknown")
-FACT_FIELDS = ("categories", "simulated", "default_keys", "sources")
+FACT_FIELDS = ("brief", "categories", "simulated", "default_keys", "sources")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -19,6 +19,7 @@ class Facts:
     """What is known about a module besides its shape and its use.
 
     Attributes:
+        brief: what models read about it in a list; "" for the first sentence of its description.
         categories: the groups it is looked up in; the first one is its own.
         simulated: whether both engines have its physics; without, it can be built and not tried.
         default_keys: the keys the game binds to its actions unless told otherwise, by action.
@@ -26,6 +27,7 @@ class Facts:
             "chosen" or "unknown"), or that and the source or reason after a colon.
     """
 
+    brief: str = ""
     categories: tuple[str, ...] = ()
     simulated: bool = True
     default_keys: tuple[tuple[str, str], ...] = ()
@@ -46,6 +48,7 @@ def read_facts(fields: Fields, actions: tuple[str, ...]) -> Facts:
         CatalogueError: a field breaks the format.
     """
     return Facts(
+        brief=fields["brief"].text(longest=100) if "brief" in fields else "",
         categories=tuple(name.text(longest=60) for name in fields.items("categories")),
         simulated=fields["simulated"].truth() if "simulated" in fields else True,
         default_keys=tuple(_keys(fields, actions)),

@@ -34,6 +34,7 @@ from buildarena_simulation.engines.bullet_bodies import (
     set_up,
 )
 from buildarena_simulation.engines.bullet_contacts import read_contacts
+from buildarena_simulation.engines.bullet_friction import follow_friction, mixed_clusters
 from buildarena_simulation.engines.bullet_grips import BulletGrips
 from buildarena_simulation.engines.bullet_joints import articulated
 from buildarena_simulation.engines.closest_points import shape_table
@@ -139,6 +140,8 @@ class PyBulletEngine:
         self._free_bodies = [piece.body for piece in self._pieces]
         if self._cargo is not None:
             self._free_bodies.append(self._cargo)
+        mixed = mixed_clusters(self._structure, clusters)
+        self._mixed = {c: self._address[c] for c in mixed}
         self._grips.enter(clusters, motion, self._axes, self._address, self._cargo)
 
     def set_cargo_mass(self, mass: float) -> None:
@@ -174,6 +177,8 @@ class PyBulletEngine:
         self._targets = targets[-1]
         self._motion = self._read_motion()
         limit_spin(self._client, self._pieces, self._motion)
+        if self._mixed:
+            follow_friction(self._client, self._structure, self._mixed, self._shapes, self._motion)
         self._impacts = impacts
 
     def contacts(self) -> ContactForces:

@@ -34,6 +34,9 @@ _TERRAIN: Final[Color] = (132, 160, 116)
 _BRACE: Final[Color] = (60, 64, 72)
 _WINCH: Final[Color] = (168, 140, 60)
 _FLAME: Final[Color] = (250, 190, 60)
+_SIGN: Final[Color] = (194, 65, 12)
+_POST: Final = 2.0
+"""Height of a gate's posts, units."""
 _ROUND_SIDES: Final = 16
 _LIGHT: Final = np.array([0.35, -0.5, 0.79])
 
@@ -88,6 +91,7 @@ class Scene:
                 _TERRAIN,
             )
         ]
+        self._signs = [*_gates(scenario), *_marks(scenario)]
         self._braces = []
         for connector in machine.connectors.values():
             ends = [
@@ -130,6 +134,7 @@ class Scene:
         """The picture of one sample."""
         trajectory, picture = self._trajectory, Picture()
         picture.faces.extend(self._terrain)
+        picture.lines.extend(self._signs)
         positions = trajectory.positions[sample].astype(np.float64)
         turns = rotation_of(trajectory.quaternions[sample].astype(np.float64))
         for part, k in self._parts:
@@ -157,6 +162,27 @@ class Scene:
             center = trajectory.cargo_position[sample].astype(np.float64)
             picture.faces.extend(_box(center, turn, half, _CARGO))
         return picture
+
+
+def _gates(scenario: "Scenario") -> Iterator[tuple[FloatArray, Color]]:
+    """Two posts of each gate and the line between them."""
+    for gate in scenario.gates:
+        heading = np.radians(gate.heading_deg)
+        across = gate.half_width * np.array([np.cos(heading), -np.sin(heading), 0.0])
+        middle = np.array([*gate.center, 0.0])
+        west, east = middle - across, middle + across
+        up = np.array([0.0, 0.0, _POST])
+        yield from ((np.array(ends), _SIGN) for ends in ((west, west + up), (east, east + up)))
+        yield np.array([west, east]), _SIGN
+
+
+def _marks(scenario: "Scenario") -> Iterator[tuple[FloatArray, Color]]:
+    """The level circle round each mark."""
+    angles = np.linspace(0.0, 2 * np.pi, 2 * _ROUND_SIDES + 1)
+    circle = np.stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)], axis=1)
+    for mark in scenario.marks:
+        rim = np.array(mark.center) + mark.radius * circle
+        yield from ((np.array(ends), _SIGN) for ends in pairwise(rim))
 
 
 def _faces(
