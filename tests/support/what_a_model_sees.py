@@ -18,7 +18,13 @@ from buildarena_worker.session.messages import Message
 from buildarena_worker.workflow.rounds import Loop
 
 PAGE = Path(__file__).parents[2] / "docs" / "what-a-model-sees.md"
-SESSIONS = (("support-1", 0), ("transport-1", 2), ("lift-3", 0))
+SESSIONS = (
+    ("support-1", 0),
+    ("transport-1", 2),
+    ("lift-3", 0),
+    ("mechanisms-4", 0),
+    ("flight-2", 0),
+)
 """Tasks, and how many simulated trials each session is told about."""
 
 HEAD = """# What a model sees
