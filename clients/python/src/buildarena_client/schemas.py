@@ -1624,6 +1624,8 @@ class BoardFilters(TypedDict, total=False):
         track: Default: the first with ended jobs.
         task: Only these tasks.
         level: Only tasks of these levels.
+        category: Only tasks of these categories, over whose built-in ones models are ranked then;
+            by default the overall ranking is over the paper's nine tasks.
         model: Only these models.
         sweep: Only jobs of these sweeps, and their tracks.
         since: Only jobs ended then or later.
@@ -1635,6 +1637,7 @@ class BoardFilters(TypedDict, total=False):
     track: str | None
     task: list[str] | None
     level: list[int] | None
+    category: list[str] | None
     model: list[str] | None
     sweep: list[str] | None
     since: Timestamp | None
