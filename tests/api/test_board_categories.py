@@ -1,0 +1,28 @@
+"""Boards of chosen categories, and what the ranking over all tasks is over."""
+
+from __future__ import annotations
+
+import pytest
+
+from buildarena_api.leaderboard.filters import _ranked_over
+from buildarena_benchmark import builtin_tasks, paper_tasks
+
+
+def test_an_unknown_category_is_refused_with_those_that_there_are(api) -> None:
+    answer = api.get("/v1/leaderboard", params={"category": "garage"})
+    assert answer.status_code == 422
+    assert {"flight", "mechanisms", "lift"} <= set(answer.json()["errors"][0]["choices"])
+    assert api.get("/v1/leaderboard", params={"category": "flight"}).status_code == 200
+
+
+@pytest.mark.parametrize(
+    ("task", "category", "names"),
+    [
+        (None, None, set(paper_tasks())),
+        (None, ["flight"], {"flight-1", "flight-2"}),
+        (None, ["mechanisms", "flight"], set(builtin_tasks()) - set(paper_tasks())),
+        (["support-1"], ["flight"], None),
+    ],
+)
+def test_what_the_overall_ranking_is_over(task, category, names) -> None:
+    assert _ranked_over(task, category) == names
