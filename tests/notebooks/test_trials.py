@@ -99,7 +99,7 @@ def test_a_task_file_is_a_task():
 def test_tasks_are_listed():
     known = ba.tasks()
     assert list(known) == list(builtin_tasks())
-    assert repr(known).splitlines()[3] == "support-1    A bridge over a gap of 5"
+    assert repr(known).splitlines()[3] == "support-1     A bridge over a gap of 5"
     assert "<td>support-1</td>" in known._repr_mimebundle_()["text/html"]
     with pytest.raises(KeyError):
         _ = known["support-4"]

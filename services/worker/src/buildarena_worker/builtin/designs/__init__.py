@@ -18,6 +18,7 @@ DESIGNS: dict[str, Callable[[int], Design]] = {
     "lift-2": rockets.rocket,
     "lift-3": rockets.framed_rocket,
     "mechanisms-1": rovers.rough_rider,
+    "mechanisms-2": rovers.slalom_car,
     "mechanisms-3": arms.geared_lift,
     "mechanisms-4": arms.swinging_arm,
     "flight-1": flyers.hoverer,

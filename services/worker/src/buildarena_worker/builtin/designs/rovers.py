@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from buildarena_worker.builtin.designs.design import Design, PartDesign
 from buildarena_worker.builtin.designs.drafting import (
     DOWN,
@@ -14,6 +16,20 @@ from buildarena_worker.builtin.designs.drafting import (
 )
 
 _HALF_WIDTH, _HALF_LENGTH, _TRAY = 2, 3, 2
+_LEFT, _RIGHT, _AHEAD, _BACK = "LeftArrow", "RightArrow", "UpArrow", "DownArrow"
+_SLALOM = (
+    (2.73, _RIGHT, 0.16),
+    (3.48, _LEFT, 0.38),
+    (5.3, _RIGHT, 0.12),
+    (5.64, _RIGHT, 0.31),
+    (7.46, _LEFT, 0.19),
+    (8.84, _RIGHT, 0.04),
+    (9.65, _LEFT, 0.01),
+    (10.8, _RIGHT, 0.26),
+)
+"""When which way the slalom's car steers and for how long, seconds. It lets the third gate be: from
+the second to the fourth it goes straight. Found by search on both engines; it passes the other four
+within 1.2 of their middles."""
 
 
 def rough_rider(seed: int) -> Design:
@@ -52,5 +68,43 @@ def rough_rider(seed: int) -> Design:
                 for wheel in wheels
             ],
             "control_sequence": [{"time": begin, "key": "UpArrow", "hold_for": 8.0}],
+        },
+    )
+
+
+def slalom_car(seed: int) -> Design:
+    """A long car that steers with all wheels and backs off first, for a run-up."""
+    begin = 0.04 * (seed % 4)
+    draft = Draft(modules="workshop")
+    middle = draft.start("between the axles")
+    front, back = (draft.row(middle, way, _HALF_LENGTH)[-1] for way in (NORTH, SOUTH))
+    config: list[dict[str, Any]] = []
+    for base, keys in ((front, (_LEFT, _RIGHT)), (back, (_RIGHT, _LEFT))):
+        for side in (EAST, WEST):
+            hinge = draft.attach(base, side, "Steering Hinge")
+            draft.turn_axis(hinge, 0, UP)
+            wheel = draft.wheel(hinge, side)
+            config += [
+                {"block": wheel, "action": "spinning_forward", "keys": [_AHEAD]},
+                {"block": wheel, "action": "spinning_backward", "keys": [_BACK]},
+                {"block": hinge, "action": "turn_left", "keys": [keys[0]]},
+                {"block": hinge, "action": "turn_right", "keys": [keys[1]]},
+            ]
+    presses = [(0.2, _BACK, 1.2), (1.75, _AHEAD, 12.0), *_SLALOM]
+    return Design(
+        overall="A long car whose four wheels all steer, the rear ones against the front ones.",
+        parts={
+            "car": PartDesign(
+                description="A beam of 7 blocks, a steering hinge and a wheel at each corner",
+                actions=tuple(draft.actions),
+            )
+        },
+        control={
+            "control_design": "Back off, then drive through and steer from gate to gate.",
+            "control_config": config,
+            "control_sequence": [
+                {"time": round(begin + time, 2), "key": key, "hold_for": hold}
+                for time, key, hold in presses
+            ],
         },
     )
