@@ -14,6 +14,10 @@ import numpy as np
 
 from buildarena_benchmark import builtin_tasks
 from buildarena_geometry import Machine
+from buildarena_simulation.clearance import require_clear_start
+from buildarena_simulation.errors import MachineNotSimulable
+from buildarena_simulation.machine import structure_of
+from buildarena_simulation.placement import start_of
 from buildarena_worker.builtin.designs import DESIGNS
 
 Draw = np.random.Generator
@@ -59,6 +63,23 @@ def random_workshop_machine(task: str, seed: int) -> Machine:
         seed: Of the draw; equal seeds give equal machines.
     """
     draw = np.random.default_rng([seed, TASKS.index(task)])
+    while True:
+        machine = _drawn(task, draw)
+        if _starts_clear(task, machine):
+            return machine
+
+
+def _starts_clear(task: str, machine: Machine) -> bool:
+    """Whether nothing of it is where the trial puts the cargo or has its terrain."""
+    scenario, structure = builtin_tasks()[task].scenario, structure_of(machine)
+    try:
+        require_clear_start(structure, scenario, start_of(structure, scenario, None))
+    except MachineNotSimulable:
+        return False
+    return True
+
+
+def _drawn(task: str, draw: Draw) -> Machine:
     design = DESIGNS[task](int(draw.integers(0, 1000)))
     machine = Machine(catalogue=builtin_tasks()[task].constraints.catalogue)
     (part,) = design.parts.values()
