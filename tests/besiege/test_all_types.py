@@ -8,7 +8,12 @@ import pytest
 from tests.besiege.test_reading_files import assert_alike, contents
 
 from buildarena_benchmark import builtin_tasks
-from buildarena_besiege import plain_machine_file, prepare_run, read_machine_file
+from buildarena_besiege import (
+    MachineNotPlayableError,
+    plain_machine_file,
+    prepare_run,
+    read_machine_file,
+)
 from buildarena_geometry import Machine, module_set
 from buildarena_geometry.modules.module import Module
 
@@ -87,3 +92,16 @@ def test_in_files_of_others_the_ballast_that_sits_on_nothing_is_cargo() -> None:
     loose = read_machine_file(ET.tostring(file))
     assert [block.module.name for block in loose.machine.blocks.values()] == ["Starting Block"]
     assert any("a cargo is the task's" in one for one in loose.not_understood)
+
+
+@pytest.mark.parametrize("task", ["flight-2", "mechanisms-3", "mechanisms-4"])
+def test_trials_that_a_machine_file_cannot_say_are_refused(task: str) -> None:
+    scenario = builtin_tasks()[task].scenario
+    with pytest.raises(MachineNotPlayableError, match="use another engine"):
+        prepare_run(built_with(ALL["Log"]), scenario, name="m", run_id="r")
+
+
+@pytest.mark.parametrize("task", ["mechanisms-1", "mechanisms-2", "flight-1"])
+def test_the_other_trials_of_the_workshop_are_written(task: str) -> None:
+    run = prepare_run(built_with(ALL["Log"]), builtin_tasks()[task].scenario, name="m", run_id="r")
+    assert b"<Machine" in run.machine_file

@@ -15,7 +15,7 @@ from long_tests import LONG
 from working import work
 
 from buildarena_api.leaderboard.agreement import agreement_rows
-from buildarena_benchmark import builtin_tasks, score
+from buildarena_benchmark import builtin_tasks, paper_tasks, score
 from buildarena_besiege import game_start, read_machine_file
 from buildarena_geometry import KeyPress, Machine
 from buildarena_pipeline.catalog.models import load_registry
@@ -30,7 +30,7 @@ from buildarena_worker.wiring import verifier
 ALL = os.environ.get("BESIEGE_TASKS") == "all"
 pytestmark = pytest.mark.timeout(1200 if ALL else 400)
 CATEGORIES = ("transport-2", "support-1", "lift-2")
-TASKS = tuple(builtin_tasks()) if ALL else CATEGORIES if LONG else CATEGORIES[:1]
+TASKS = tuple(paper_tasks()) if ALL else CATEGORIES if LONG else CATEGORIES[:1]
 NEAR = 0.01
 """What a log's four decimals and 25 samples a second leave open, as a share of an indicator."""
 

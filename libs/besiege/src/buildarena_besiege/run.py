@@ -25,7 +25,7 @@ from buildarena_besiege.names import CARGO_ID
 from buildarena_besiege.placement import AS_BUILT, GlobalPose, cargo_root, global_pose, put_down
 from buildarena_besiege.tracking import begin_fields, tracked_blocks
 from buildarena_simulation.constants import MAX_PARTS
-from buildarena_simulation.scenario import SpanPlacement
+from buildarena_simulation.scenario import ReleasedPlacement, SpanPlacement
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -111,11 +111,12 @@ def prepare_run(
         new_guid: Draws the blocks' guids.
 
     Raises:
-        MachineNotPlayableError: The game cannot take the machine.
+        MachineNotPlayableError: The game cannot take the machine, or play the scenario.
         ValueError: The name or the run's id cannot be used.
     """
     _require_name(name)
     _require_run_id(run_id)
+    _require_sayable(scenario)
     prepared = prepared_machine(
         machine, scenario, run_id=run_id, controls=controls, new_guid=new_guid
     )
@@ -263,3 +264,15 @@ def _require_name(name: str) -> None:
 def _require_run_id(run_id: str) -> None:
     if not run_id or len(quote(run_id, safe="", errors="replace")) > _LONGEST_RUN_ID:
         raise ValueError(f"a run's id is a text of 1 to {_LONGEST_RUN_ID} characters")
+
+
+def _require_sayable(scenario: Scenario) -> None:
+    """Refuses what a machine file cannot say: its machines stand, with the cargo above them.
+
+    Raises:
+        MachineNotPlayableError: The scenario is another; the message says what it asks for.
+    """
+    if isinstance(scenario.placement, ReleasedPlacement):
+        raise MachineNotPlayableError("the game lets no machine go in the air: use another engine")
+    if scenario.cargo is not None and scenario.cargo.at is not None:
+        raise MachineNotPlayableError("the game's cargo falls onto the machine: use another engine")
