@@ -143,6 +143,10 @@ class Fields:
         """The entries of a list that may be left out."""
         return list(self[name].items()) if name in self else []
 
+    def text(self, name: str) -> str:
+        """The text of a field that may be left out."""
+        return self[name].text() if name in self else ""
+
     def has(self, name: str) -> bool:
         """Whether the field is there and not null."""
         return self.values.get(name) is not None

@@ -6,8 +6,9 @@ import numpy as np
 
 from buildarena_simulation.errors import MachineNotSimulable
 from buildarena_simulation.placement import Start
-from buildarena_simulation.scenario import Scenario, TerrainBox
+from buildarena_simulation.scenario import Scenario
 from buildarena_simulation.structure.model import FloatArray, Shape, ShapeKind, Structure
+from buildarena_simulation.terrain import shape_of
 
 _ALLOWED = 0.05
 """Overlap that the engines take as a touch, units."""
@@ -46,7 +47,7 @@ def require_clear_start(structure: Structure, scenario: Scenario, start: Start) 
 
 def _obstacles(scenario: Scenario, start: Start) -> Iterator[tuple[str, Shape]]:
     for number, terrain in enumerate(scenario.terrain, start=1):
-        yield f"terrain {number}", _shape_of(terrain)
+        yield f"terrain {number}", shape_of(terrain)
     if start.cargo is not None:
         yield (
             "the cargo",
@@ -57,17 +58,6 @@ def _obstacles(scenario: Scenario, start: Start) -> Iterator[tuple[str, Shape]]:
                 half_extents=start.cargo.size / 2,
             ),
         )
-
-
-def _shape_of(terrain: TerrainBox) -> Shape:
-    tilt = np.radians(terrain.slope_deg)
-    cosine, sine = np.cos(tilt), np.sin(tilt)
-    return Shape(
-        kind=ShapeKind.BOX,
-        center=np.array(terrain.center),
-        rotation=np.array([[1.0, 0.0, 0.0], [0.0, cosine, -sine], [0.0, sine, cosine]]),
-        half_extents=np.array(terrain.size) / 2,
-    )
 
 
 def _overlap(shape: Shape, box: Shape) -> bool:

@@ -93,6 +93,22 @@ class Schedule:
     firing: BoolArray
 
 
+def held_during(keys: Sequence[KeyHold], names: Sequence[str], times: FloatArray) -> BoolArray:
+    """Whether one of some keys is held at each time, (S,).
+
+    Args:
+        keys: The control sequence.
+        names: Which keys.
+        times: (S,) seconds.
+    """
+    result = np.zeros(len(times), dtype=bool)
+    for key in keys:
+        if key.key in names:
+            start, end = key.time_s - 1e-9, key.time_s + key.hold_for_s - 1e-9
+            result |= (times >= start) & (times < end)
+    return result
+
+
 def plan_schedule(
     structure: Structure,
     bindings: Bindings,
@@ -115,17 +131,11 @@ def plan_schedule(
         step_count: Number of engine steps in the trial.
         time_step_s: Length of one, seconds.
     """
-    times = np.arange(step_count) * time_step_s
+    times = np.asarray(np.arange(step_count) * time_step_s, dtype=np.float64)
     pressed = keys if control.mode == "agent" else ()
 
     def held(block: int, action: str) -> BoolArray:
-        wanted = set(bindings[block].get(action, ()))
-        result = np.zeros(step_count, dtype=bool)
-        for key in pressed:
-            if key.key in wanted:
-                start, end = key.time_s - 1e-9, key.time_s + key.hold_for_s - 1e-9
-                result |= (times >= start) & (times < end)
-        return result
+        return held_during(pressed, bindings[block].get(action, ()), times)
 
     targets = _targets(structure, held, step_count=step_count, time_step_s=time_step_s)
     if control.mode == "held":

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from buildarena_geometry.modules.forces import Spring
-from buildarena_simulation.control import Bindings, KeyHold
+from buildarena_simulation.control import Bindings, KeyHold, held_during
 from buildarena_simulation.scenario import Control
 from buildarena_simulation.structure.force_field import Commands
 from buildarena_simulation.structure.grips import grips_of
@@ -139,19 +139,3 @@ def _drawn(held: BoolArray, spring: Spring, time_step_s: float) -> FloatArray:
             max(spring.shortest, share - step) if contracts else min(1.0, share + step)
         )
     return shares
-
-
-def held_during(keys: Sequence[KeyHold], names: Sequence[str], times: FloatArray) -> BoolArray:
-    """Whether one of some keys is held at each time, (S,).
-
-    Args:
-        keys: The control sequence.
-        names: Which keys.
-        times: (S,) seconds.
-    """
-    result = np.zeros(len(times), dtype=bool)
-    for key in keys:
-        if key.key in names:
-            start, end = key.time_s - 1e-9, key.time_s + key.hold_for_s - 1e-9
-            result |= (times >= start) & (times < end)
-    return result

@@ -8,12 +8,12 @@ import numpy as np
 
 from buildarena_simulation.constants import GRAVITY, LOAD_FILTER_S
 from buildarena_simulation.engines.base import CargoPose, Engine, World, rotation_of
-from buildarena_simulation.scenario import TerrainBox
 from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.contacts import CARGO, WORLD, PointForces
 from buildarena_simulation.structure.grips import Hold, distances, grips_of
 from buildarena_simulation.structure.model import BoolArray, FloatArray, Shape, ShapeKind
 from buildarena_simulation.structure.motion import Motion
+from buildarena_simulation.terrain import shape_of
 from buildarena_simulation.trajectory import Event
 
 _NONE: Final = PointForces(
@@ -167,7 +167,7 @@ class Holding:
 
     def _things(self, cargo: CargoPose | None) -> Iterator[tuple[str, int, Shape]]:
         for number, box in enumerate(self._world.terrain, start=1):
-            yield f"terrain {number}", WORLD, _terrain(box)
+            yield f"terrain {number}", WORLD, shape_of(box)
         if cargo is not None and self._world.cargo is not None:
             yield (
                 "cargo",
@@ -195,17 +195,6 @@ class Holding:
             if near <= reach:
                 found.append((near, block, structure.parts[block].id))
         return found
-
-
-def _terrain(box: TerrainBox) -> Shape:
-    tilt = math.radians(box.slope_deg)
-    cosine, sine = math.cos(tilt), math.sin(tilt)
-    return Shape(
-        kind=ShapeKind.BOX,
-        center=np.array(box.center),
-        rotation=np.array([[1.0, 0.0, 0.0], [0.0, cosine, -sine], [0.0, sine, cosine]]),
-        half_extents=np.array(box.size) / 2,
-    )
 
 
 def _as_forces(point: FloatArray, wrench: FloatArray) -> Iterator[tuple[FloatArray, FloatArray]]:

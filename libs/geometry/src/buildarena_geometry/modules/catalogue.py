@@ -312,7 +312,7 @@ def _motor(entry: Reader, actions: tuple[str, ...]) -> Motor:
         forward=fields["forward"].choice(actions),
         backward=fields["backward"].choice(actions),
         forward_sense=cast("Sense", fields["forward_sense"].choice(SENSES)),
-        origin=_origin(fields),
+        origin=fields.text("origin"),
     )
 
 
@@ -324,7 +324,7 @@ def _thrust(entry: Reader, actions: tuple[str, ...]) -> Thrust:
         cold=fields["cold"].number(least=0),
         heated=fields["heated"].number(least=0),
         spheres=tuple(map(_sphere, fields["spheres"].items())),
-        origin=_origin(fields),
+        origin=fields.text("origin"),
     )
 
 
@@ -337,12 +337,8 @@ def _physics(entry: Reader) -> Physics:
         friction=fields["friction"].number(least=0),
         linear_drag=fields["linear_drag"].number(least=0),
         angular_drag=fields["angular_drag"].number(least=0),
-        origin=_origin(fields),
+        origin=fields.text("origin"),
     )
-
-
-def _origin(fields: Fields) -> str:
-    return fields["origin"].text() if "origin" in fields else ""
 
 
 def _besiege_entry(entry: Reader) -> tuple[str, str, str | int | float | bool]:

@@ -255,7 +255,7 @@ def _push(entry: Reader, actions: tuple[str, ...]) -> Push:
         action=fields["action"].choice(actions),
         direction=fields["direction"].direction(),
         force=fields["force"].number(least=0),
-        origin=_origin(fields),
+        origin=fields.text("origin"),
     )
 
 
@@ -276,13 +276,13 @@ def _wing(entry: Reader, mass: float) -> Wing:
         power=power,
         cap_speed=cap_speed,
         one_sided=fields["one_sided"].truth() if "one_sided" in fields else False,
-        origin=_origin(fields),
+        origin=fields.text("origin"),
     )
 
 
 def _lift(entry: Reader) -> Lift:
     fields = entry.fields(required=("force",), optional=("origin",))
-    return Lift(force=fields["force"].number(least=0), origin=_origin(fields))
+    return Lift(force=fields["force"].number(least=0), origin=fields.text("origin"))
 
 
 def _altitude(entry: Reader, actions: tuple[str, ...], mass: float) -> Altitude:
@@ -296,13 +296,13 @@ def _altitude(entry: Reader, actions: tuple[str, ...], mass: float) -> Altitude:
         rise=fields["rise"].choice(actions),
         sink=fields["sink"].choice(actions),
         rate=fields["rate"].number(above=0),
-        origin=_origin(fields),
+        origin=fields.text("origin"),
     )
 
 
 def _tether(entry: Reader) -> Tether:
     fields = entry.fields(required=("length",), optional=("origin",))
-    return Tether(length=fields["length"].number(above=0), origin=_origin(fields))
+    return Tether(length=fields["length"].number(above=0), origin=fields.text("origin"))
 
 
 def _spring(entry: Reader, actions: tuple[str, ...]) -> Spring:
@@ -320,7 +320,7 @@ def _spring(entry: Reader, actions: tuple[str, ...]) -> Spring:
         shortest=shortest,
         rate=fields["rate"].number(above=0),
         limit=fields["limit"].number(above=0),
-        origin=_origin(fields),
+        origin=fields.text("origin"),
     )
 
 
@@ -329,7 +329,7 @@ def _decoupling(entry: Reader, actions: tuple[str, ...]) -> Decoupling:
     return Decoupling(
         action=fields["action"].choice(actions),
         impulse=fields["impulse"].number(least=0),
-        origin=_origin(fields),
+        origin=fields.text("origin"),
     )
 
 
@@ -343,7 +343,7 @@ def _grip(entry: Reader, actions: tuple[str, ...]) -> Grip:
         reach=fields["reach"].number(above=0),
         force=fields["force"].number(above=0),
         moment=fields["moment"].number(above=0),
-        origin=_origin(fields),
+        origin=fields.text("origin"),
     )
 
 
@@ -354,7 +354,3 @@ def _up_to(
     if number > most:
         entry.fail(f"a number of at most {most:g}, which a simulation's steps can follow")
     return number
-
-
-def _origin(fields: Fields) -> str:
-    return fields["origin"].text() if "origin" in fields else ""

@@ -128,7 +128,7 @@ def read_joint(entry: Reader, *, seat: str | None, actions: Sequence[str]) -> Se
         stiffness=_amount(fields, "stiffness"),
         damping=_amount(fields, "damping"),
         drive=_drive(fields["drive"], actions, turns=turns) if fields.has("drive") else None,
-        origin=_origin(fields),
+        origin=fields.text("origin"),
     )
     springs = (joint.stiffness, joint.damping)
     if joint.drive is not None and (seat not in _DRIVEN or any(springs) or joint.friction):
@@ -150,7 +150,7 @@ def read_gear(entry: Reader, *, seat: str | None) -> Gear:
     if seat != "axle":
         entry.fail(f"no gear: a cog's seat is axle, not {seat}")
     fields = entry.fields(required=("pitch_radius",), optional=("origin",))
-    return Gear(pitch_radius=fields["pitch_radius"].number(above=0), origin=_origin(fields))
+    return Gear(pitch_radius=fields["pitch_radius"].number(above=0), origin=fields.text("origin"))
 
 
 def _limits(entry: Reader, *, seat: str) -> tuple[float, float]:
@@ -193,13 +193,9 @@ def _drive(entry: Reader, actions: Sequence[str], *, turns: bool) -> Drive:
         idle=idle,
         lag_per_s=lag,
         forward_sense=cast("Sense | None", sense),
-        origin=_origin(fields),
+        origin=fields.text("origin"),
     )
 
 
 def _amount(fields: Fields, name: str) -> float:
     return fields[name].number(least=0) if fields.has(name) else 0.0
-
-
-def _origin(fields: Fields) -> str:
-    return fields["origin"].text() if "origin" in fields else ""

@@ -10,6 +10,7 @@ import numpy as np
 from buildarena_simulation.engines.base import rotation_of
 from buildarena_simulation.machine import structure_of
 from buildarena_simulation.structure.model import FloatArray, Shape, ShapeKind
+from buildarena_simulation.terrain import shape_of
 
 if TYPE_CHECKING:
     from buildarena_geometry import Machine
@@ -82,14 +83,9 @@ class Scene:
         self._parts = [(part, row[part.id]) for part in structure.parts if part.id in row]
         self._heated = {block: k for k, block in enumerate(trajectory.cannon_ids)}
         self._terrain = [
-            shape
-            for box in scenario.terrain
-            for shape in _box(
-                np.array(box.center),
-                _about_x(np.radians(box.slope_deg)),
-                np.array(box.size) / 2,
-                _TERRAIN,
-            )
+            face
+            for shape in map(shape_of, scenario.terrain)
+            for face in _faces(shape, shape.center, np.eye(3), _TERRAIN)
         ]
         self._signs = [*_gates(scenario), *_marks(scenario)]
         self._braces = []
@@ -261,8 +257,3 @@ def _shaded(corners: FloatArray, center: FloatArray, color: Color) -> tuple[Floa
 def _scaled(color: Sequence[int], brightness: float) -> Color:
     red, green, blue = (round(channel * brightness) for channel in color)
     return red, green, blue
-
-
-def _about_x(angle: float) -> FloatArray:
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])

@@ -1,0 +1,18 @@
+"""The fixed boxes of a scenario as shapes."""
+
+import numpy as np
+
+from buildarena_simulation.scenario import TerrainBox
+from buildarena_simulation.structure.model import Shape, ShapeKind
+
+
+def shape_of(box: TerrainBox) -> Shape:
+    """A box as the world has it: tilted about the east-west axis through its centre."""
+    tilt = np.radians(box.slope_deg)
+    cosine, sine = np.cos(tilt), np.sin(tilt)
+    return Shape(
+        kind=ShapeKind.BOX,
+        center=np.array(box.center),
+        rotation=np.array([[1.0, 0.0, 0.0], [0.0, cosine, -sine], [0.0, sine, cosine]]),
+        half_extents=np.array(box.size) / 2,
+    )
