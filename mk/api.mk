@@ -1,4 +1,4 @@
 .PHONY: bench-api
 
 bench-api: $(STAMP) ## Measures the API's throughput; JSON in .buildarena/
-	@$(BIN)/python tests/benchmarks/api/bench_api.py --json .buildarena/bench-api.json
+	@$(TEST_PYTHON) -m benchmarks.api.bench_api --json .buildarena/bench-api.json

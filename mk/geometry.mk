@@ -1,7 +1,7 @@
 .PHONY: bench-geometry geometry-pictures module-guide
 
 bench-geometry: $(STAMP) ## Measures the geometry library; JSON in .buildarena/
-	@$(BIN)/python tests/benchmarks/geometry/bench_geometry.py --json .buildarena/bench-geometry.json
+	@$(TEST_PYTHON) -m benchmarks.geometry.bench_geometry --json .buildarena/bench-geometry.json
 
 geometry-pictures: $(STAMP) ## Draws the pictures of the geometry guide again
 	@$(BIN)/python examples/geometry/draw_guide.py docs/geometry

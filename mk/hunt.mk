@@ -5,7 +5,7 @@ HUNT_SEED ?= 0
 HUNTING := $(VENV)/.hunting
 
 hunt: $(HUNTING) ## Searches for machines that score without building what is asked; MINUTES=60
-	@OMP_NUM_THREADS=1 $(BIN)/python tests/hunt/hunt.py --minutes $(MINUTES) --seed $(HUNT_SEED)
+	@OMP_NUM_THREADS=1 $(TEST_PYTHON) -m scenarios.hunt.run --minutes $(MINUTES) --seed $(HUNT_SEED)
 
 test test-long: $(HUNTING)
 

@@ -41,12 +41,12 @@ install_requirements() {
     without_pybullet >"$venv/without-pybullet.lock"
     sync "$venv/without-pybullet.lock"
     if ! command -v "${CXX:-c++}" >/dev/null; then
-        echo "PyBullet has no wheel for $system and there is no C++ compiler: without it, machines are simulated with MuJoCo alone."
+        echo "PyBullet has no wheel for $system and there is no C++ compiler: without it, name MuJoCo where machines are simulated (simulator: mujoco)."
         return
     fi
     echo "PyBullet has no wheel for $system: compiling it, which takes some minutes. README.md names the systems that need not."
     sync requirements.lock 2>"$venv/pybullet.log" ||
-        echo "PyBullet could not be compiled (see $venv/pybullet.log): without it, machines are simulated with MuJoCo alone."
+        echo "PyBullet could not be compiled (see $venv/pybullet.log): without it, name MuJoCo where machines are simulated (simulator: mujoco)."
 }
 
 python=$(choose_python)

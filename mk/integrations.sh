@@ -34,7 +34,7 @@ run_tests() {
     local name failed=0
     for name in "$@"; do
         echo "-- $name"
-        "$environments/$name/bin/pytest" "integrations/$name/tests" -n "${WORKERS:-2}" --dist loadgroup -rs \
+        "$environments/$name/bin/pytest" --confcutdir "integrations/$name" "integrations/$name/tests" -n "${WORKERS:-2}" --dist loadgroup -rs \
             -m "${BUILDARENA_TEST_LONG:+long or }not long" || failed=1
     done
     return "$failed"

@@ -3,4 +3,4 @@
 peer: $(STAMP) ## Plays a session against litellm's proxy
 	@[ -x .venv-peer/bin/litellm ] || { bash mk/uv.sh venv --quiet --python $(BIN)/python .venv-peer && \
 		bash mk/uv.sh pip install --quiet --python .venv-peer/bin/python "litellm[proxy]==1.106.2"; }
-	@$(BIN)/python tests/peer/check_litellm.py .venv-peer/bin/litellm
+	@$(TEST_PYTHON) -m scenarios.peer.check_litellm .venv-peer/bin/litellm

@@ -1,10 +1,10 @@
 .PHONY: bench-sessions bench-sessions-1000 bench-job
 
 bench-sessions: $(STAMP) ## Measures 200 sessions at once in one construct process
-	@$(BIN)/python tests/benchmarks/sessions/bench_sessions.py
+	@$(TEST_PYTHON) -m benchmarks.sessions.bench_sessions
 
 bench-sessions-1000: $(STAMP) ## Measures 1,000 sessions of a model that takes 5 s in one construct process; 4 min
-	@$(BIN)/python tests/benchmarks/sessions/bench_sessions.py --sessions 1000 --latency 5 --json .buildarena/bench-sessions-1000.json
+	@$(TEST_PYTHON) -m benchmarks.sessions.bench_sessions --sessions 1000 --latency 5 --json .buildarena/bench-sessions-1000.json
 
 bench-job: $(STAMP) ## Measures what a job costs beside its session and its simulation
-	@$(BIN)/python tests/benchmarks/sessions/bench_job.py --json .buildarena/bench-job.json
+	@$(TEST_PYTHON) -m benchmarks.sessions.bench_job --json .buildarena/bench-job.json

@@ -1,11 +1,11 @@
 .PHONY: bench-simulation bench-agreement bench-agreement-workshop
 
 bench-simulation: $(STAMP) ## Measures the simulation and the engines' agreement; JSON in .buildarena/
-	@$(BIN)/python tests/benchmarks/simulation/bench_simulation.py --json .buildarena/bench-simulation.json
+	@$(TEST_PYTHON) -m benchmarks.simulation.bench_simulation --json .buildarena/bench-simulation.json
 
 bench-agreement: $(STAMP) ## Compares the engines on 300 machines that nobody chose; 10 minutes
-	@$(BIN)/python tests/benchmarks/simulation/bench_agreement.py --json .buildarena/bench-agreement.json
+	@$(TEST_PYTHON) -m benchmarks.simulation.bench_agreement --json .buildarena/bench-agreement.json
 
 bench-agreement-workshop: $(STAMP) ## The same for 120 machines of the workshop's modules
-	@$(BIN)/python tests/benchmarks/simulation/bench_agreement.py --set workshop \
+	@$(TEST_PYTHON) -m benchmarks.simulation.bench_agreement --set workshop \
 		--json .buildarena/bench-agreement-workshop.json

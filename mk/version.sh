@@ -10,7 +10,7 @@ fi
 for package in "$@"; do
     sed -E -i.before \
         -e "s/^version = \".*\"/version = \"$version\"/" \
-        -e "s/\"(buildarena-[a-z]+(\[[a-z]+\])?)==[^\"]+\"/\"\1==$version\"/" "$package/pyproject.toml"
+        -e "s/\"(buildarena-[a-z-]+(\[[a-z]+\])?)==[^\"]+\"/\"\1==$version\"/" "$package/pyproject.toml"
     sed -E -i.before "s/^__version__ = \".*\"/__version__ = \"$version\"/" "$package"/src/*/__init__.py
     rm -f "$package"/pyproject.toml.before "$package"/src/*/__init__.py.before
 done

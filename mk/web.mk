@@ -18,15 +18,15 @@ $(WEB_STAMP): $(WEB_PARTS) $(WEB_SOURCES)
 	@touch $@
 
 test-web: check-web ## Types, lint, logic and pages of the dashboard, in a real browser
-	@$(BIN)/pytest -n $(WORKERS) --dist loadgroup tests/web -rs
+	@$(RUN_TESTS) tests/web
 
 check-web: $(WEB_STAMP) ## Types, lint and logic of the dashboard, without a browser
 	@bash mk/node.sh npm --prefix $(WEB) run --silent check
 	@bash mk/node.sh npm --prefix $(WEB) test
 
 bench-web: $(WEB_STAMP) ## Measures the pages in a browser that draws in software, and a sweep of 10,000 jobs
-	@$(BIN)/python tests/benchmarks/web/bench_web.py
-	@$(BIN)/python tests/benchmarks/web/bench_sweep_page.py --json .buildarena/bench-web.json
+	@$(TEST_PYTHON) -m benchmarks.web.bench_web
+	@$(TEST_PYTHON) -m benchmarks.web.bench_sweep_page --json .buildarena/bench-web.json
 
 # People who look at a service want its pages; without them it runs all the same.
 up: | web-if-it-can-be
@@ -43,4 +43,4 @@ check-web-if-it-can-be: $(STAMP)
 
 # ALL=folder photographs every page there, light and dark, 1280 and 390 wide, in place of docs/images.
 screenshots: $(WEB_STAMP) ## Photographs the dashboard on a demo of its own into docs/images; ALL=FOLDER: every page
-	@$(BIN)/python tests/web/screenshots.py $(if $(ALL),--all $(ALL))
+	@$(TEST_PYTHON) tests/web/screenshots.py $(if $(ALL),--all $(ALL))

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from buildarena_cli.commands import COMMANDS
+from buildarena_cli.command_table import COMMANDS
 
 ROOT = Path(__file__).parents[1]
 SOURCES = [
@@ -57,7 +57,7 @@ def test_links_lead_somewhere(document) -> None:
 
 def test_files_exist(document) -> None:
     named = re.findall(
-        r"`((?:libs|services|clients|integrations|tests|examples|docs|deploy|mk)/[\w./*-]+)`",
+        r"`((?:libs|services|clients|integrations|tests|scenarios|benchmarks|examples|docs|deploy|mk)/[\w./*-]+)`",
         document.read_text(),
     )
     assert not [name for name in named if not list(ROOT.glob(name))]

@@ -6,7 +6,9 @@ import { defineConfig } from "vitest/config";
 
 export const here = (path: string): string => fileURLToPath(new URL(path, import.meta.url));
 
-const MODULES = ["modules.yaml", "extended.yaml"].map((file) => here(`../../libs/geometry/src/buildarena_geometry/modules/${file}`));
+const MODULES = ["modules.yaml", "extended.yaml"].map((file) =>
+  here(`../../libs/geometry/src/buildarena_geometry/modules/${file}`),
+);
 
 interface ModulesFile {
   modules: { name: string; kind: string; center?: number[]; body?: unknown[] }[];

@@ -14,7 +14,7 @@ def needs(name: str) -> list[str]:
     with zipfile.ZipFile(wheel) as archive:
         metadata = next(n for n in archive.namelist() if n.endswith(".dist-info/METADATA"))
         text = archive.read(metadata).decode()
-    return re.findall(r"^Requires-Dist: (buildarena-[a-z]+)==[^;\s]+$", text, re.MULTILINE)
+    return re.findall(r"^Requires-Dist: (buildarena-[a-z-]+)==[^;\s]+$", text, re.MULTILINE)
 
 
 found = [sys.argv[1]]

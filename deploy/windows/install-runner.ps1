@@ -50,7 +50,7 @@ function Install-Packages {
     if ($Wheels) {
         $from = @('--find-links', (Resolve-Path -LiteralPath $Wheels).Path)
     }
-    & (Join-Path $Venv 'Scripts\python.exe') -m pip install --quiet --disable-pip-version-check --upgrade @from buildarena-cli 'buildarena-simworker[besiege]'
+    & (Join-Path $Venv 'Scripts\python.exe') -m pip install --quiet --disable-pip-version-check --upgrade @from buildarena-cli 'buildarena-simworker-besiege[window]'
     if ($LASTEXITCODE -ne 0) { throw 'the packages could not be installed; pip says why above' }
 }
 

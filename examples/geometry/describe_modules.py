@@ -87,8 +87,8 @@ def _contents(modules: list[Module]) -> str:
     found: dict[str, list[str]] = {}
     for module in modules:
         link = f"[{module.name}](#{_slug(module)})"
-        shown = link if module.facts.simulated else f"*{link}*"
-        found.setdefault(module.facts.categories[0], []).append(shown)
+        shown = link if module.simulated else f"*{link}*"
+        found.setdefault(module.categories[0], []).append(shown)
     rows += [f"| {category} | {', '.join(links)} |" for category, links in found.items()]
     return "\n".join(rows)
 
@@ -101,7 +101,7 @@ def _section(module: Module, entry: Mapping[str, Any]) -> Iterator[str]:
     yield "|---|---|"
     for name, text in _facts(module, entry):
         yield f"| {name} | {text} |"
-    sources = [*module.facts.sources, *_origins(entry)]
+    sources = [*module.sources.items(), *_origins(entry)]
     if sources:
         yield "\n| figure | how sure | from, or why |"
         yield "|---|---|---|"
@@ -111,8 +111,8 @@ def _section(module: Module, entry: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _facts(module: Module, entry: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    state = "simulated on both engines" if module.facts.simulated else "can be built, not simulated"
-    yield "use", f"{module.kind}; {', '.join(module.facts.categories)}; {state}"
+    state = "simulated on both engines" if module.simulated else "can be built, not simulated"
+    yield "use", f"{module.kind}; {', '.join(module.categories)}; {state}"
     size = "" if module.size is None else f", size {' x '.join(map(plain, module.size))}"
     figures = f"mass {plain(module.mass)}, cost {module.cost}{size}"
     yield "figures", f"{figures}, number {module.besiege_id} in Besiege"
@@ -127,7 +127,7 @@ def _facts(module: Module, entry: Mapping[str, Any]) -> Iterator[tuple[str, str]
     if module.pointing is not None:
         yield "points", point(module.pointing)
     if module.actions:
-        keys = dict(module.facts.default_keys)
+        keys = module.default_keys
         yield (
             "controls",
             ", ".join(

@@ -3,9 +3,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
-from live_api import LOOPBACK
 from starlette.testclient import TestClient
-from tenants import WITH_KEYS
+from support.clients.tenants import WITH_KEYS
+from support.servers.live_api import LOOPBACK
 
 from buildarena_api.app import create_app
 from buildarena_pipeline.catalog.models import load_registry

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import pytest
-from live_api import LOOPBACK
 from pydantic import SecretStr
-from running import wait_until
 from starlette.testclient import TestClient
-from tenants import ADMIN, WITH_KEYS
+from support.clients.tenants import ADMIN, WITH_KEYS
+from support.servers.live_api import LOOPBACK
+from support.servers.stacks import wait_until
 
 from buildarena_api.app import create_app
 from buildarena_api.http.access import check_binding
@@ -110,8 +110,8 @@ def test_nobody_changes_what_another_submitted(guarded, make_key, sweep) -> None
 
 def test_nobody_plays_anothers_session(guarded, make_key) -> None:
     mine, other = make_key("submit"), make_key("submit")
-    wish = {"task": "support-1", "agent": "me"}
-    opened = guarded.post("/v1/sessions", json=wish, headers=bearer(mine)).json()["id"]
+    payload = {"task": "support-1", "agent": "me"}
+    opened = guarded.post("/v1/sessions", json=payload, headers=bearer(mine)).json()["id"]
     call = {"tool": "start", "arguments": {}}
     for path, body in (("calls", call), ("submit", None)):
         url = f"/v1/sessions/{opened}/{path}"

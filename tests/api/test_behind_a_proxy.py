@@ -9,9 +9,9 @@ from contextlib import ExitStack, contextmanager
 
 import httpx
 import pytest
-from live_api import live_api
-from reverse_proxy import ProxyRules, reverse_proxy
-from tenants import ADMIN, WITH_KEYS
+from support.clients.tenants import ADMIN, WITH_KEYS
+from support.servers.live_api import live_api
+from support.servers.reverse_proxy import ProxyRules, reverse_proxy
 from typer.testing import CliRunner
 
 from buildarena_api.dashboard.files import BASE_NAME, INDEX, read_pages

@@ -8,19 +8,19 @@ from contextlib import ExitStack
 from datetime import UTC, datetime, timedelta
 
 import pytest
-from live_api import LOOPBACK
-from plain_boards import plain_board
 from sqlalchemy import delete, func, insert, select, text, update
 from starlette.testclient import TestClient
+from support.boards.plain_boards import plain_board
+from support.servers.live_api import LOOPBACK
 
 from buildarena_api.app import create_app
 from buildarena_api.leaderboard.views import board_view
 from buildarena_benchmark import builtin_tasks
-from buildarena_benchmark.flags import Reading
+from buildarena_benchmark.flags import ScoringPolicy
 from buildarena_benchmark.leaderboard import BoardQuery, cost_bins, failure_rows
 from buildarena_pipeline.catalog.models import load_registry
 from buildarena_store import TrialFilter
-from buildarena_store.made_tables import board_cells, board_state
+from buildarena_store.derived_tables import board_cells, board_state
 from buildarena_store.tables import board_changes, jobs, sweep_jobs, sweeps
 
 TRACKS = ("first/track-1", "second/track-1")
@@ -102,7 +102,10 @@ def disturb(context, rng: random.Random, number: int) -> None:
 
 def random_query(rng: random.Random) -> dict[str, object]:
     """Parameters of a board, as readers choose them."""
-    found: dict[str, object] = {"track": rng.choice(TRACKS), "reading": rng.choice([*Reading])}
+    found: dict[str, object] = {
+        "track": rng.choice(TRACKS),
+        "policy": rng.choice([*ScoringPolicy]),
+    }
     if rng.random() < 0.3:
         found["task"] = rng.sample(sorted(builtin_tasks()), 8)
     if rng.random() < 0.3:
@@ -132,7 +135,7 @@ def expected(context, params: dict[str, object]) -> tuple[bytes, dict[str, objec
         models=frozenset(params["model"]) if "model" in params else None,
         since=params.get("since"),
         until=params.get("until"),
-        reading=params["reading"],
+        policy=params["policy"],
         overall=None if "task" in params else frozenset(builtin_tasks()),
     )
     own = [trial for trial in every if trial.track == params["track"]]
@@ -147,7 +150,7 @@ def expected(context, params: dict[str, object]) -> tuple[bytes, dict[str, objec
         board,
         track=params["track"],
         tracks=tracks,
-        reading=query.reading,
+        policy=query.policy,
         registry=registry,
         catalogue=context.tasks,
     )
@@ -161,7 +164,7 @@ def expected(context, params: dict[str, object]) -> tuple[bytes, dict[str, objec
         and (query.models is None or trial.model in query.models)
     ]
     bins = cost_bins(
-        trials, reading=query.reading, categories={task.name: task.category for task in tasks}
+        trials, policy=query.policy, categories={task.name: task.category for task in tasks}
     )
     figures = {
         "failures": sorted(
@@ -253,13 +256,13 @@ def test_a_change_that_nobody_took_in_is_found_by_the_next_process(context, proc
     process().get("/v1/leaderboard")
     with context.store.database.transaction() as connection:
         connection.execute(update(jobs).values(indicator=77.0))
-    params = {"track": TRACKS[0], "reading": Reading.OURS}
+    params = {"track": TRACKS[0], "policy": ScoringPolicy.OURS}
     assert asked(process(), params) == expected(context, params)
 
 
 def test_a_change_in_an_open_transaction_is_found_once_it_ends(context, process) -> None:
     fill(context)
-    api, params = process(), {"track": TRACKS[0], "reading": Reading.OURS}
+    api, params = process(), {"track": TRACKS[0], "policy": ScoringPolicy.OURS}
     with context.store.database.transaction() as slow:
         slow.execute(update(jobs).where(jobs.c.id == f"job_{0:020d}").values(indicator=999.0))
         # A later change is taken in, and kept, while the earlier one can't be seen.
@@ -279,7 +282,7 @@ def test_cells_of_another_server_are_not_believed(context, process) -> None:
         connection.execute(update(board_state).values(server="another", snapshot_end=2**60))
         connection.execute(update(board_cells).values(tallies=[], figures=b"", snapshot_end=2**60))
         connection.execute(update(board_changes).values(transaction=2**60))
-    params = {"track": TRACKS[0], "reading": Reading.OURS}
+    params = {"track": TRACKS[0], "policy": ScoringPolicy.OURS}
     api = process()
     assert asked(api, params) == expected(context, params)
     with context.store.database.transaction() as connection:
@@ -290,7 +293,7 @@ def test_cells_of_another_server_are_not_believed(context, process) -> None:
 
 def test_a_database_that_went_back_in_time_is_read_anew(context, process) -> None:
     fill(context)
-    api, params = process(), {"track": TRACKS[0], "reading": Reading.OURS}
+    api, params = process(), {"track": TRACKS[0], "policy": ScoringPolicy.OURS}
     asked(api, params)
     cells = api.app.state.boards._cells
     cells._mark = cells._mark._replace(end=10**9, snapshot=f"{10**9}:{10**9}:")

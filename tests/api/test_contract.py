@@ -9,7 +9,6 @@ from pathlib import Path
 import pytest
 import schemathesis
 from hypothesis import HealthCheck, given, settings, strategies
-from live_api import live_api
 from schemathesis import GenerationMode
 from schemathesis.checks import not_a_server_error
 from schemathesis.specs.openapi.checks import (
@@ -18,7 +17,9 @@ from schemathesis.specs.openapi.checks import (
     response_schema_conformance,
     status_code_conformance,
 )
-from tenants import ADMIN, WITH_KEYS
+from support.clients.tenants import ADMIN, WITH_KEYS
+from support.long_tests import LONG
+from support.servers.live_api import live_api
 
 from buildarena_pipeline.catalog.specs import SweepSpec
 
@@ -57,10 +58,11 @@ WAYS = [
 ]
 
 
+@pytest.mark.sized
 @pytest.mark.parametrize(("label", "mode"), WAYS)
 def test_every_answer_is_a_documented_one(service, label, mode) -> None:
     @settings(
-        max_examples=12,
+        max_examples=12 if LONG else 5,
         deadline=None,
         derandomize=True,
         database=None,

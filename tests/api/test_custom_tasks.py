@@ -6,9 +6,9 @@ import csv
 import io
 
 import pytest
-from live_api import LOOPBACK
 from starlette.testclient import TestClient
-from tenants import new_tenant
+from support.clients.tenants import new_tenant
+from support.servers.live_api import LOOPBACK
 
 from buildarena_api.app import create_app
 from buildarena_api.routes.tasks import EXAMPLE

@@ -1,11 +1,11 @@
-"""Figures of a board as data: the page and the report never differ."""
+"""Metrics of a board as data: the page and the report never differ."""
 
 from __future__ import annotations
 
 import pytest
 from sqlalchemy import text
 
-from buildarena_benchmark.flags import Reading
+from buildarena_benchmark.flags import ScoringPolicy
 from buildarena_benchmark.leaderboard import EndedJob, cost_bins, failure_rows
 from buildarena_store import JobScore, JournalEntry, TrialFilter, Usage
 
@@ -40,9 +40,9 @@ def test_figures_without_jobs_are_empty(api) -> None:
 
 
 @pytest.mark.usefixtures("played")
-@pytest.mark.parametrize("reading", [*Reading])
-def test_figures_are_those_of_the_report(api, context, reading) -> None:
-    answer = api.get("/v1/leaderboard/figures", params={"reading": reading})
+@pytest.mark.parametrize("policy", [*ScoringPolicy])
+def test_figures_are_those_of_the_report(api, context, policy) -> None:
+    answer = api.get("/v1/leaderboard/figures", params={"policy": policy})
     found = answer.json()
     trials: list[EndedJob] = context.store.results.boards.trials(TrialFilter())
     wanted = {
@@ -57,10 +57,10 @@ def test_figures_are_those_of_the_report(api, context, reading) -> None:
     assert any("construction_failed: objection" in row["outcomes"] for row in found["failures"])
     (cost,) = found["cost"]
     categories = {"support-1": cost["category"]}
-    bins = cost_bins(trials, reading=reading, categories=categories)[cost["category"]]
+    bins = cost_bins(trials, policy=policy, categories=categories)[cost["category"]]
     assert [one["trials"] for one in cost["bins"]] == [one.trials for one in bins]
     assert [one["mean"] for one in cost["bins"]] == [one.mean for one in bins]
-    board = api.get("/v1/leaderboard", params={"reading": reading}).json()
+    board = api.get("/v1/leaderboard", params={"policy": policy}).json()
     for name in ("mean_rank", "cost_usd_mean", "success_rate_mean", "pareto"):
         assert [row[name] for row in found["front"]] == [row[name] for row in board["overall"]]
     ranked = [row for row in board["overall"] if row["dimensions"]]
@@ -69,7 +69,7 @@ def test_figures_are_those_of_the_report(api, context, reading) -> None:
     ]
     assert any(row["pareto"] for row in found["front"])
     known = {"If-None-Match": answer.headers["etag"]}
-    again = api.get("/v1/leaderboard/figures", params={"reading": reading}, headers=known)
+    again = api.get("/v1/leaderboard/figures", params={"policy": policy}, headers=known)
     assert again.status_code == 304
 
 
@@ -90,6 +90,6 @@ def test_figures_follow_what_changed_and_what_is_chosen(api, context) -> None:
     assert next(iter(idle["outcomes"])).startswith("cancelled")
 
 
-@pytest.mark.parametrize("bad", [{"track": "x"}, {"task": "x"}, {"reading": "mine"}])
+@pytest.mark.parametrize("bad", [{"track": "x"}, {"task": "x"}, {"policy": "mine"}])
 def test_unknown_choices_are_refused(api, bad) -> None:
     assert api.get("/v1/leaderboard/figures", params=bad).status_code == 422

@@ -10,10 +10,10 @@ from contextlib import ExitStack
 
 import httpx
 import pytest
-from live_api import live_api
-from running import wait_until
 from sqlalchemy import text
-from tenants import WITH_KEYS
+from support.clients.tenants import WITH_KEYS
+from support.servers.live_api import live_api
+from support.servers.stacks import wait_until
 
 from buildarena_pipeline.agents import sessions as agent_sessions
 from buildarena_pipeline.catalog.specs import SweepSpec
@@ -162,7 +162,7 @@ def test_equal_verifications_are_one_and_open_ones_are_bounded(
     with ThreadPoolExecutor(4) as threads:
         rest = list(threads.map(lambda id_: greedy.post(f"/v1/jobs/{id_}/verify"), ids[1:8]))
     assert sorted(answer.status_code for answer in rest) == [202, 202, 429, 429, 429, 429, 429]
-    # Another's equal wish is the same verification; its own has room.
+    # Another's equal request is the same verification; its own has room.
     assert other.post(f"/v1/jobs/{ids[0]}/verify").json()["id"] == same[0].json()["id"]
     assert other.post(f"/v1/jobs/{ids[9]}/verify").status_code == 202
     # One that ended leaves room, and the same job can be verified again.

@@ -8,7 +8,7 @@ import sys
 from collections import Counter
 from pathlib import Path
 
-from live_api import live_api
+from support.servers.live_api import live_api
 
 CONTRACT = Path(__file__).parents[1] / "data" / "openapi.json"
 GENERATOR = str(Path(sys.executable).parent / "openapi-python-client")
@@ -24,8 +24,8 @@ with AuthenticatedClient(base_url=sys.argv[2], token=sys.argv[3]) as client:
     job = submit_job.sync(client=client, body=JobSpec(task="lift-1", model="builtin/idle", seed=5))
     assert show_job.sync(job.id, client=client).seed == 5
     assert [found.id for found in list_jobs.sync(client=client).jobs] == [job.id]
-    wish = SweepSpec(tasks=["lift-1"], models=["builtin/idle"], seeds=[5, 6])
-    sweep = submit_sweep.sync(client=client, body=wish)
+    payload = SweepSpec(tasks=["lift-1"], models=["builtin/idle"], seeds=[5, 6])
+    sweep = submit_sweep.sync(client=client, body=payload)
     assert (sweep.jobs, sweep.added) == (2, 1)
     assert show_sweep.sync(sweep.id, client=client).progress.total == 2
     wrong = submit_job.sync(client=client, body=JobSpec(task="lift-9", model="builtin/idle"))

@@ -4,9 +4,9 @@ import json
 from datetime import UTC, datetime, timedelta
 
 import pytest
-from live_api import LOOPBACK
 from sqlalchemy import delete, text, update
 from starlette.testclient import TestClient
+from support.servers.live_api import LOOPBACK
 
 from buildarena_api.app import create_app
 from buildarena_pipeline.catalog.models import load_registry
@@ -122,21 +122,21 @@ def test_each_reading_of_flags_can_be_asked_for(api, finish) -> None:
     finish(10, flags=["no_wheels"])
     ours = board(api, task="support-1")
     row = expert_of(ours)
-    assert (ours["reading"], row["flagged"], row["flags"]) == ("ours", 5, {"no_wheels": 5})
+    assert (ours["policy"], row["flagged"], row["flags"]) == ("ours", 5, {"no_wheels": 5})
     assert (row["trials"], row["successes"], row["indicator_mean"]) == (5, 0, 0.0)
-    assert board(api, task="support-1", reading="ours") == ours
-    published = board(api, task="support-1", reading="published")
+    assert board(api, task="support-1", policy="ours") == ours
+    published = board(api, task="support-1", policy="published")
     row = expert_of(published)
-    assert (published["reading"], row["flagged"]) == ("published", 5)
+    assert (published["policy"], row["flagged"]) == ("published", 5)
     assert (row["trials"], row["success_rate"]) == (0, None)
 
 
 @pytest.mark.parametrize("path", ["", "/compare", "/export", "/changes", "/manifest"])
 def test_an_unknown_reading_is_refused_with_the_choices(api, path) -> None:
-    given = {"reading": "theirs", "first": "a", "second": "b"}
+    given = {"policy": "theirs", "first": "a", "second": "b"}
     answer = api.get(f"/v1/leaderboard{path}", params=given)
     (error,) = answer.json()["errors"]
-    assert (answer.status_code, error["field"]) == (422, "reading")
+    assert (answer.status_code, error["field"]) == (422, "policy")
     assert error["choices"] == ["ours", "published"]
 
 
@@ -163,9 +163,9 @@ def test_a_comparison_reads_flags_as_asked(api, finish) -> None:
     finish(flags=["start_too_high"])
     pair = {"first": "builtin/expert", "second": "builtin/random"}
     answer = api.get("/v1/leaderboard/compare", params=pair).json()
-    assert (answer["reading"], answer["tasks"][0]["successes"]) == ("ours", [0, 0])
-    answer = api.get("/v1/leaderboard/compare", params={**pair, "reading": "published"}).json()
-    assert (answer["reading"], answer["tasks"]) == ("published", [])
+    assert (answer["policy"], answer["tasks"][0]["successes"]) == ("ours", [0, 0])
+    answer = api.get("/v1/leaderboard/compare", params={**pair, "policy": "published"}).json()
+    assert (answer["policy"], answer["tasks"]) == ("published", [])
 
 
 def test_a_reader_who_has_the_answer_gets_none_until_something_changes(api, context, finish):
@@ -315,3 +315,16 @@ def test_a_board_of_an_unknown_sweep_is_refused(api, finish, route) -> None:
     answer = api.get(f"/v1/leaderboard{route}{joint}sweep=sweep_{'0' * 20}")
     assert answer.status_code == 404
     assert "sweep_" in answer.json()["detail"]
+
+
+def test_the_former_name_of_the_scoring_policy_is_read_for_one_release(api) -> None:
+    former = api.get("/v1/leaderboard?reading=published&track=")
+    assert former.headers["warning"] == '299 - "reading is now policy"'
+    assert former.headers["deprecation"].startswith("@")
+    former = api.get("/v1/leaderboard", params={"reading": "published"})
+    present = api.get("/v1/leaderboard", params={"policy": "published"})
+    assert former.json() == present.json()
+    assert present.json()["reading"] == present.json()["policy"] == "published"
+    assert "deprecation" not in present.headers
+    refused = api.get("/v1/leaderboard", params={"reading": "theirs"})
+    assert refused.status_code == 422

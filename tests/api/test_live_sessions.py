@@ -11,9 +11,9 @@ from dataclasses import replace
 
 import httpx
 import pytest
-from live_api import live_api
 from sqlalchemy import text
-from working import work
+from support.servers.live_api import live_api
+from support.stages import work
 
 from buildarena_pipeline.turns import Transcripts
 from buildarena_store import JournalEntry, StaleLeaseError, TurnResult, Usage

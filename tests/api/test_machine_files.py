@@ -8,7 +8,7 @@ import zlib
 from pathlib import Path
 
 import pytest
-from tenants import new_tenant
+from support.clients.tenants import new_tenant
 
 from buildarena_api.machine_uploads import MAX_BYTES
 from buildarena_geometry import Machine

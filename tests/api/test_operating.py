@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import httpx
 import pytest
-from live_api import live_api
+from support.servers.live_api import live_api
 
 
 @pytest.fixture
@@ -79,8 +79,8 @@ def test_submissions_with_one_key_at_the_same_time_are_one(api, sweep) -> None:
 
 
 def test_an_estimate_stores_nothing(api, sweep) -> None:
-    wish = {**sweep, "models": ["builtin/idle", "openai/gpt-4o"], "seeds": [0, 1, 2, 3]}
-    estimate = api.post("/v1/sweeps/estimate", json=wish).json()
+    payload = {**sweep, "models": ["builtin/idle", "openai/gpt-4o"], "seeds": [0, 1, 2, 3]}
+    estimate = api.post("/v1/sweeps/estimate", json=payload).json()
     assert estimate["jobs"] == 8
     free, paid = estimate["models"]
     assert (free["cost_usd"], free["requests"]) == (0.0, 0.0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
-from tenants import new_tenant, operator
+from support.clients.tenants import new_tenant, operator
 
 from buildarena_geometry import Machine
 

@@ -8,7 +8,7 @@ import sys
 
 import httpx
 import pytest
-from running import wait_until
+from support.servers.stacks import wait_until
 
 from buildarena_cli.local import free_port
 

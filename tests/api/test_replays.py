@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 
 import pytest
-from working import work
+from support.stages import work
 
 from buildarena_api.replays.making import Replays
 from buildarena_pipeline.replays import chapters

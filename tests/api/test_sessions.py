@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import pytest
-from tenants import new_tenant, operator
+from support.clients.tenants import new_tenant, operator
 
 from buildarena_benchmark import builtin_tasks
 from buildarena_pipeline.agents.briefing import briefing

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from tenants import new_tenant, operator
+from support.clients.tenants import new_tenant, operator
 
 from buildarena_store import JobScore
 from buildarena_store.states import AttemptResult, JobState

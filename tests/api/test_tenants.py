@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 from starlette.testclient import TestClient
-from tenants import Tenant, everything, new_tenant, operator
-from working import work
+from support.clients.tenants import Tenant, everything, new_tenant, operator
+from support.stages import work
 
 from buildarena_api.routes.tasks import EXAMPLE
 from buildarena_pipeline.runtime.context import Context
@@ -265,13 +265,13 @@ def test_a_job_that_another_key_asked_for_singly_goes_on(a, b, context) -> None:
 def test_cancelling_a_shared_job_only_ends_ones_own_wish(a, b) -> None:
     mine, theirs = sweep_of(a), sweep_of(b)
     job = the_job(a)["id"]
-    # B takes back its wish, A's stays; so what A cancels later ends.
+    # B takes back its payload, A's stays; so what A cancels later ends.
     assert b.post(f"/v1/jobs/{job}/cancel")["owner"] == a.id
     assert the_job(a)["state"] == "queued"
     b.post("/v1/sweeps", SWEEP)
     assert a.post(f"/v1/jobs/{job}/cancel")["owner"] == b.id
     assert the_job(b)["state"] == "queued"
-    # A took its wish back: B's cancel does not bring it back to A.
+    # A took its payload back: B's cancel does not bring it back to A.
     assert b.post(f"/v1/jobs/{job}/cancel")["outcome"] == "cancelled"
     assert {mine, theirs} <= {sweep["id"] for sweep in a.get("/v1/sweeps")["sweeps"]}
 

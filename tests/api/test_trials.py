@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pyarrow as pa
 import pytest
-from working import work
+from support.stages import work
 
 from buildarena_api.http.negotiation import prefers
 from buildarena_api.routes import trials

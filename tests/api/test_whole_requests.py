@@ -11,10 +11,10 @@ from urllib.parse import urlsplit
 
 import httpx
 import pytest
-from live_api import LOOPBACK, live_api
 from pydantic import ValidationError
 from starlette.testclient import TestClient
-from tenants import operator
+from support.clients.tenants import operator
+from support.servers.live_api import LOOPBACK, live_api
 
 from buildarena_api.app import create_app
 from buildarena_pipeline.catalog.models import load_registry

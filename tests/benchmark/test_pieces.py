@@ -7,7 +7,7 @@ import pytest
 from tests.benchmark.conftest import with_pieces
 
 from buildarena_benchmark import score
-from buildarena_benchmark.scorers.pieces import joined_to_start
+from buildarena_benchmark.scorers.measures.components import joined_to_start
 from buildarena_geometry import Machine
 from buildarena_simulation.trajectory import Break
 

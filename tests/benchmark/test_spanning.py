@@ -152,7 +152,7 @@ def test_without_contact_forces_the_rule_is_not_measured(tasks, trajectory_of, c
 def test_islands_in_the_gap_and_boxes_behind_belong_to_the_scenario(
     tasks: dict[str, Task],
 ) -> None:
-    from buildarena_benchmark.scorers.spanning import terrain_sides
+    from buildarena_benchmark.scorers.measures.spanning import terrain_sides
     from buildarena_simulation import Scenario
 
     content = tasks["support-2"].scenario.model_dump()

@@ -158,7 +158,7 @@ def test_what_cannot_change_a_score_keeps_the_version() -> None:
             "  min_tim_s: 3",
             ["task:18: scoring.min_tim_s: there is no such field", "min_time_s"],
         ),
-        ("name: support\n", "name: suport\n", ["scoring", "'transport', 'support'"]),
+        ("name: support\n", "name: suport\n", ["scoring", "'support', 'thrust', 'transport'"]),
         ("gap: 10}", "gap: -1}", ["task:15: scenario.placement.gap: ", "greater than 0"]),
         ("kind: span", "kind: hover", ["placement", "'ground', 'span'"]),
         ("duration_s: 10", "duration_s: 10.01", ["duration_s", "0.04"]),

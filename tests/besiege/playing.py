@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tests.besiege.lua_game import LuaGame
+from support.lua_game import LuaGame
 
 from buildarena_besiege import GameLog
 from buildarena_besiege.run import prepared_machine

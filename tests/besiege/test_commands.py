@@ -6,8 +6,8 @@ import json
 from pathlib import Path
 
 import pytest
+from support.lua_game import LuaGame
 from tests.besiege.golden import golden_file
-from tests.besiege.lua_game import LuaGame
 from tests.besiege.playing import vehicle
 from tests.besiege.published_logs import copies
 from tests.besiege.test_published_logs import DRIVE_ROWS

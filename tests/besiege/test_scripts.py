@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support.lua_game import VERSIONS
 from tests.besiege.golden import goldens, scenario_of
-from tests.besiege.lua_game import VERSIONS
 from tests.besiege.playing import log_of, played, press, vehicle
 
 from buildarena_benchmark import builtin_tasks

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from emptying import MADE_OF_OTHERS
 from sqlalchemy import create_engine, text
-from working import work
+from support.clients.commands import Done, run
+from support.servers.databases import MADE_OF_OTHERS
+from support.stages import work
 
 from buildarena_pipeline.catalog.specs import SweepSpec
 from buildarena_pipeline.runtime.context import Context, open_context
@@ -23,20 +23,12 @@ BUILDARENA = str(Path(sys.executable).with_name("buildarena"))
 SWEEP = {"tasks": ["support-1"], "models": ["builtin/expert", "builtin/idle"], "seeds": [0]}
 
 
-def command(context: Context, *words: str, **environment: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [BUILDARENA, *words],
-        env={
-            **os.environ,
-            "BUILDARENA_DATABASE_URL": context.settings.required_database_url(),
-            "BUILDARENA_DATA": str(context.settings.data),
-            **environment,
-        },
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=120,
-    )
+def command(context: Context, *words: str, **environment: str) -> Done:
+    service = {
+        "BUILDARENA_DATABASE_URL": context.settings.required_database_url(),
+        "BUILDARENA_DATA": str(context.settings.data),
+    }
+    return run(*words, **(service | environment))
 
 
 @pytest.fixture

@@ -10,9 +10,9 @@ import threading
 import time
 
 import pytest
-from commands import printed, run_cli
-from live_api import live_api
 from sqlalchemy import insert, select, update
+from support.clients.commands import printed, run_cli
+from support.servers.live_api import live_api
 
 from buildarena_benchmark.leaderboard import published_rows
 from buildarena_cli.commands.report import variant

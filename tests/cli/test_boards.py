@@ -46,7 +46,7 @@ def board(models: list[str], tasks: list[str]) -> dict[str, Any]:
             {"model": model, "configuration": "c", "rank": n} for n, model in enumerate(models, 1)
         ],
         "published": [],
-        "reading": "ours",
+        "policy": "ours",
         "flags": [],
     }
 

@@ -2,48 +2,22 @@
 
 from __future__ import annotations
 
-import socket
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from support.servers.wrong_server import answer, wrong_server
 
 from buildarena_cli.client import Client, RefusedError, UnreachableError
 from buildarena_cli.errors import CommandError
 
-HTML = b"HTTP/1.1 200 OK\r\nContent-Type: text/html\r\nContent-Length: 6\r\n\r\n<html>"
+HTML = answer(200, b"<html>")
 SHORT = b"HTTP/1.1 200 OK\r\nContent-Length: 100\r\n\r\nPK"
-MOVED = b"HTTP/1.1 302 Found\r\nLocation: http://127.0.0.1:1/\r\nContent-Length: 0\r\n\r\n"
-WHOLE = b"HTTP/1.1 200 OK\r\nContent-Length: 4\r\n\r\nPK01"
-
-
-@contextmanager
-def answering(answer: bytes) -> Iterator[tuple[str, list[bytes]]]:
-    """The URL of a server with one answer, and what it was sent."""
-    received: list[bytes] = []
-    with socket.create_server(("127.0.0.1", 0)) as server:
-
-        def serve() -> None:
-            while True:
-                try:
-                    connection, _ = server.accept()
-                except OSError:
-                    return
-                with connection:
-                    received.append(connection.recv(65536))
-                    connection.sendall(answer)
-
-        thread = threading.Thread(target=serve)
-        thread.start()
-        yield f"http://127.0.0.1:{server.getsockname()[1]}", received
-        server.shutdown(socket.SHUT_RDWR)
-    thread.join()
+MOVED = answer(302, Location="http://127.0.0.1:1/")
+WHOLE = answer(200, b"PK01")
 
 
 @pytest.mark.parametrize(
-    ("answer", "error", "says"),
+    ("said", "error", "says"),
     [
         (HTML, CommandError, "does not answer in JSON"),
         (SHORT, UnreachableError, "no BuildArena answers"),
@@ -52,27 +26,29 @@ def answering(answer: bytes) -> Iterator[tuple[str, list[bytes]]]:
         (b"", UnreachableError, "no BuildArena answers"),
     ],
 )
-def test_what_is_no_answer_of_an_api_is_one_sentence(answer, error, says) -> None:
-    with answering(answer) as (url, _), pytest.raises(error, match=says):
-        Client(url).get("/v1/jobs")
+def test_what_is_no_answer_of_an_api_is_one_sentence(said, error, says) -> None:
+    with wrong_server(said) as server, pytest.raises(error, match=says):
+        Client(server.url).get("/v1/jobs")
 
 
 def test_a_download_is_there_whole_or_not_at_all(tmp_path: Path) -> None:
     target = tmp_path / "sweep.zip"
-    with answering(SHORT) as (url, _), pytest.raises(UnreachableError):
-        Client(url).download("/v1/x", target)
+    with wrong_server(SHORT) as server, pytest.raises(UnreachableError):
+        Client(server.url).download("/v1/x", target)
     assert not target.exists()
-    with answering(WHOLE) as (url, _):
-        Client(url).download("/v1/x", target)
+    with wrong_server(WHOLE) as server:
+        Client(server.url).download("/v1/x", target)
         with pytest.raises(FileNotFoundError):
-            Client(url).download("/v1/x", tmp_path / "no" / "folder")
+            Client(server.url).download("/v1/x", tmp_path / "no" / "folder")
     assert target.read_bytes() == b"PK01"
 
 
 def test_parameters_and_keys_are_sent_as_the_api_reads_them() -> None:
-    with answering(HTML) as (url, received), pytest.raises(CommandError):
-        Client(url, key="secret").get("/v1/jobs", task=["a b", "c&d"], flagged=True, model=None)
-    head = received[0].decode()
+    with wrong_server(HTML) as server, pytest.raises(CommandError):
+        Client(server.url, key="secret").get(
+            "/v1/jobs", task=["a b", "c&d"], flagged=True, model=None
+        )
+    head = server.received[0].decode()
     assert head.startswith("GET /v1/jobs?task=a+b&task=c%26d&flagged=true HTTP/1.1\r\n")
     assert "Authorization: Bearer secret\r\n" in head
 

@@ -12,10 +12,10 @@ import httpx
 import pyarrow.parquet as pq
 import pytest
 import yaml
-from commands import printed, run_cli
-from live_api import live_api
-from tenants import ADMIN, WITH_KEYS, new_tenant
-from working import work
+from support.clients.commands import printed, run_cli
+from support.clients.tenants import ADMIN, WITH_KEYS, new_tenant
+from support.servers.live_api import live_api
+from support.stages import work
 
 from buildarena_cli.dataset import writing
 from buildarena_cli.dataset.card import card
@@ -256,7 +256,7 @@ def test_disqualified_jobs_can_be_left_out(url, context, tmp_path):
         (["--track", "none/such"], (1, "none/such")),
         (["--license", "appache-2.0"], (2, "did you mean apache-2.0")),
         (["--level", "1"], (2, "--level is for leaderboards")),
-        (["--reading", "published"], (2, "--reading is for leaderboards")),
+        (["--policy", "published"], (2, "--policy is for leaderboards")),
     ],
 )
 def test_nonsense_is_refused_and_leaves_nothing(url, context, tmp_path, words, refusal):
@@ -322,7 +322,7 @@ def test_a_damaged_machine_is_no_row(url, context, tmp_path, monkeypatch):
 
 def test_readers_export_others_jobs_and_no_key_stands_in_them(settings, tmp_path, monkeypatch):
     context = open_context(settings.model_copy(update=WITH_KEYS))
-    from emptying import empty
+    from support.servers.databases import empty
 
     empty(context.store.database)
     try:

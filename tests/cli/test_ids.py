@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
-from commands import printed, run_cli
-from live_api import live_api
-from terminals import piped
+from support.clients.commands import printed, run_cli
+from support.clients.terminals import piped
+from support.servers.live_api import live_api
 
 from buildarena_cli.commands.job_files import file_name
-from buildarena_cli.near import near_words
+from buildarena_cli.suggestions import suggested_words
 from buildarena_pipeline.catalog.specs import SweepSpec
 from buildarena_store import JobScore
 
@@ -96,13 +99,31 @@ def test_names_that_are_no_ids_reach_no_other_route(url) -> None:
         assert f"{word!r} is not a name" in run_cli(url, "task", "show", word).stderr
 
 
+PATIENT = """
+import sys
+from buildarena_cli.terminal import completion
+from buildarena_cli.main import run
+completion.WITHIN_S = 60
+sys.argv = ["buildarena"]
+run()
+"""
+"""The command, which waits for a busy machine's API; a shell's user would not."""
+
+
 def test_shells_are_offered_ids_tasks_and_models(url, ids, sweep) -> None:
     def offered(line: str) -> list[str]:
-        done = piped(
-            _BUILDARENA_COMPLETE="complete_bash",
-            COMP_WORDS=line,
-            COMP_CWORD=str(line.count(" ")),
-            BUILDARENA_URL=url,
+        completing = {
+            "_BUILDARENA_COMPLETE": "complete_bash",
+            "COMP_WORDS": line,
+            "COMP_CWORD": str(line.count(" ")),
+            "BUILDARENA_URL": url,
+        }
+        done = subprocess.run(
+            [sys.executable, "-c", PATIENT],
+            capture_output=True,
+            text=True,
+            check=False,
+            env=os.environ | completing,
         )
         assert done.stderr == ""
         return done.stdout.split()
@@ -245,4 +266,4 @@ def test_a_files_name_stays_in_its_folder(name, safe) -> None:
     ],
 )
 def test_near_words(word, near) -> None:
-    assert near_words(word, ["seeds", "samples", "builtin/expert", "lift-1"]) == near
+    assert suggested_words(word, ["seeds", "samples", "builtin/expert", "lift-1"]) == near

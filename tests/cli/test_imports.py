@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import pytest
-from commands import printed
-from emptying import empty
-from live_api import live_api
-from working import work
+from support.clients.commands import printed
+from support.servers.databases import empty
+from support.servers.live_api import live_api
+from support.stages import work
 
 from buildarena_pipeline.catalog.specs import Limits, SweepSpec
 from buildarena_store.archives import write_archive

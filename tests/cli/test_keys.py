@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterator
 
 import pytest
 import yaml
-from live_api import live_api
-from tenants import ADMIN, WITH_KEYS
+from support.clients.tenants import ADMIN, WITH_KEYS
+from support.servers.live_api import live_api
 from typer.testing import CliRunner, Result
 
 from buildarena_cli.errors import CommandError
@@ -67,8 +67,8 @@ def test_a_wrong_scope_is_named_with_the_choices(call) -> None:
 def test_running_a_file_again_takes_the_sweep_up_with_another_budget(call, tmp_path) -> None:
     key = made(call)["secret"]
     file = tmp_path / "sweep.yaml"
-    wish = {"tasks": ["lift-1"], "models": ["builtin/idle"], "seeds": [0]}
-    file.write_text(yaml.safe_dump({**wish, "budget": {"max_requests": 5}}))
+    payload = {"tasks": ["lift-1"], "models": ["builtin/idle"], "seeds": [0]}
+    file.write_text(yaml.safe_dump({**payload, "budget": {"max_requests": 5}}))
     first = json.loads(call("sweep", "run", str(file), "--detach", "--json", key=key).stdout)
     more = ("--max-requests", "9")
     again = json.loads(call("sweep", "run", str(file), "--detach", "--json", *more, key=key).stdout)

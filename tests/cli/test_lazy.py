@@ -12,10 +12,10 @@ from pathlib import Path
 
 import pytest
 import typer
-from terminals import on_terminal, piped
+from support.clients.terminals import on_terminal, piped
 
 from buildarena_cli import defaults
-from buildarena_cli.commands import COMMANDS
+from buildarena_cli.command_table import COMMANDS
 from buildarena_pipeline.runtime import settings
 
 HEAVY = {

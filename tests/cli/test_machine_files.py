@@ -5,9 +5,9 @@ import sys
 from pathlib import Path
 
 import pytest
-from live_api import live_api
+from support.servers.live_api import live_api
+from support.stages import work
 from typer.testing import CliRunner
-from working import work
 
 from buildarena_cli.errors import CommandError
 from buildarena_cli.main import app
@@ -83,3 +83,49 @@ def test_a_worker_takes_the_commands_place(monkeypatch) -> None:
     assert "choose from construct, simulate.pybullet, simulate.mujoco, simulate.besiege" in str(
         refused.exception
     )
+
+
+@pytest.fixture
+def in_folder(tmp_path, monkeypatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+THEIRS = [
+    {"op": "start", "params": {"init_shift": [0, 0, 0], "init_rotation": [0, 0, 0]}},
+    {"op": "attach_block_to", "params": {"base_block": "1", "face": "f0", "new_block": "Wheel"}},
+    {
+        "op": "attach_block_to",
+        "params": {"base_block": "1", "face": "f1", "new_block": "Single Wooden Block"},
+    },
+]
+
+
+def test_a_log_of_another_dialect_is_read_as_what_it_is(tmp_path) -> None:
+    log, out = tmp_path / "history.json", tmp_path / "machine.json"
+    log.write_text(json.dumps(THEIRS))
+    for chosen in ((), ("--dialect", "2.0")):
+        assert run("machine", "export", str(log), "--out", str(out), *chosen).exit_code == 0
+        blocks = json.loads(out.read_text())["blocks"]
+        modules = [block["module"] for block in blocks]
+        assert modules == ["Starting Block", "Powered Wheel", "Small Wooden Block"]
+
+
+@pytest.mark.parametrize("command", [("check",), ("export", "--out", "out.glb")])
+@pytest.mark.parametrize(
+    ("change", "chosen", "says"),
+    [
+        ({"face": "f9"}, (), "action 3, attach_block_to, is refused"),
+        ({"new_block": "Nonsense"}, (), "Nonsense"),
+        ({}, ("--dialect", "1.0"), "action 2, attach_block_to, is refused"),
+        ({}, ("--dialect", "3.0"), "there is no dialect '3.0'; they are 1.0, 2.0"),
+    ],
+)
+def test_a_refused_action_of_a_log_is_named(in_folder, command, change, chosen, says) -> None:
+    actions = [*THEIRS[:2], {**THEIRS[2], "params": {**THEIRS[2]["params"], **change}}]
+    (in_folder / "history.json").write_text(json.dumps({"actions": actions}))
+    name, *options = command
+    done = run("machine", name, "history.json", *options, *chosen)
+    assert done.exit_code == 1
+    assert says in done.stderr
+    assert not (in_folder / "out.glb").exists()

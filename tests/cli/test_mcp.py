@@ -10,11 +10,11 @@ import subprocess
 import sys
 from pathlib import Path
 
-from live_api import live_api
 from mcp import ClientSession, StdioServerParameters, stdio_client
 from mcp.client.streamable_http import streamable_http_client
-from running import wait_until
-from working import work
+from support.servers.live_api import live_api
+from support.servers.stacks import wait_until
+from support.stages import work
 
 from buildarena_cli.local import free_port
 from buildarena_worker.builtin.designs import DESIGNS
@@ -124,16 +124,16 @@ def _answers(port: int) -> bool:
 async def side_by_side(connected) -> list[str]:
     async with connected as (read, write), ClientSession(read, write) as session:
         await session.initialize()
-        wish = {"task": "support-1", "agent": "mcp"}
-        opened = await said(session, "open_session", wish)
-        assert await said(session, "open_session", wish) == opened
+        payload = {"task": "support-1", "agent": "mcp"}
+        opened = await said(session, "open_session", payload)
+        assert await said(session, "open_session", payload) == opened
         ids = {"session": opened.split()[1]}
         await said(session, "start", ids)
         block = {**ids, "face": "E", "new_block": "small wooden block"}
         # Each needs the one before it.
         rows = [{**block, "base_block": str(number)} for number in range(1, 13)]
         results = await asyncio.gather(*(said(session, "attach_block_to", row) for row in rows))
-        again = await said(session, "open_session", wish)
+        again = await said(session, "open_session", payload)
         assert "It was open already, and 13 calls were made" in again
         return results
 

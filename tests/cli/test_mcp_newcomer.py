@@ -10,10 +10,10 @@ from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
 
-from live_api import live_api
 from mcp import ClientSession, StdioServerParameters, stdio_client
-from newcomer import Newcomer
-from working import work
+from support.clients.newcomer import Newcomer
+from support.servers.live_api import live_api
+from support.stages import work
 
 from buildarena_worker.wiring import verifier
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from commands import printed
-from live_api import live_api
-from terminals import on_terminal, piped
+from support.clients.commands import printed
+from support.clients.terminals import on_terminal, piped
+from support.servers.live_api import live_api
 
 from buildarena_cli.commands.job_lists import COLUMNS
 from buildarena_cli.terminal.output import columns, print_table

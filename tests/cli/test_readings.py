@@ -6,9 +6,9 @@ import csv
 import json
 
 import pytest
-from commands import printed, run_cli
-from live_api import live_api
 from sqlalchemy import insert, select, update
+from support.clients.commands import printed, run_cli
+from support.servers.live_api import live_api
 
 from buildarena_pipeline.catalog.specs import SweepSpec
 from buildarena_store.tables import jobs, rollouts
@@ -63,7 +63,7 @@ def test_a_board_is_read_as_asked(url) -> None:
     ours = rows_of(url)
     assert list(ours) == ["openai/gpt-5", "xai/grok-4", "builtin/random"]
     assert ours["builtin/random"]["successes"] == 0
-    published = rows_of(url, "--reading", "published")
+    published = rows_of(url, "--policy", "published")
     assert published["openai/gpt-5"]["trials"] == 0
     assert published["builtin/random"]["successes"] == 6
     text = printed(url, "leaderboard", "--task", "support-1")
@@ -76,7 +76,7 @@ def test_a_board_is_read_as_asked(url) -> None:
     assert "  never_fell: The bridge carried everything" in overview
     assert "not_driven" not in overview
     assert "left out" not in overview
-    assert "left out" in printed(url, "leaderboard", "--reading", "published")
+    assert "left out" in printed(url, "leaderboard", "--policy", "published")
 
 
 @pytest.mark.parametrize(
@@ -84,7 +84,7 @@ def test_a_board_is_read_as_asked(url) -> None:
     ["leaderboard", "compare a b", "export --out x.csv", "report sweep_x --out x.md"],
 )
 def test_an_unknown_reading_is_a_usage_error_that_names_the_choices(url, words) -> None:
-    done = run_cli(url, *words.split(), "--reading", "theirs")
+    done = run_cli(url, *words.split(), "--policy", "theirs")
     assert done.returncode == 2
     assert "'theirs'" in done.stderr
     assert "'ours'" in done.stderr
@@ -96,10 +96,10 @@ def test_comparisons_and_exports_are_read_as_asked(url, tmp_path) -> None:
     words = ["compare", "openai/gpt-5", "builtin/random", "--json"]
     (task,) = json.loads(printed(url, *words))["tasks"]
     assert task["successes"] == [6, 0]
-    assert json.loads(printed(url, *words, "--reading", "published"))["tasks"] == []
-    for reading, trials in (("ours", "6"), ("published", "0")):
-        out = tmp_path / f"{reading}.csv"
-        printed(url, "export", "--out", str(out), "--reading", reading)
+    assert json.loads(printed(url, *words, "--policy", "published"))["tasks"] == []
+    for policy, trials in (("ours", "6"), ("published", "0")):
+        out = tmp_path / f"{policy}.csv"
+        printed(url, "export", "--out", str(out), "--policy", policy)
         with out.open() as file:
             rows = {row["model"]: row for row in csv.DictReader(file)}
         assert (rows["openai/gpt-5"]["trials"], rows["openai/gpt-5"]["flags"]) == (
@@ -124,7 +124,7 @@ def test_reports_are_read_as_asked_and_tell_what_flags_say(url, sweep, tmp_path)
     assert "≥ 1,500.0" in (tmp_path / "ours.html").read_text()
     assert (tmp_path / "ours.pdf").read_bytes()[:5] == b"%PDF-"
     out = tmp_path / "published.md"
-    printed(url, "report", sweep, "--out", str(out), "--reading", "published")
+    printed(url, "report", sweep, "--out", str(out), "--policy", "published")
     text = out.read_text()
     assert "are left out" in text
     assert "≥ 1,500.0" not in text

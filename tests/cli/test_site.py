@@ -11,10 +11,10 @@ from urllib.parse import urlencode
 
 import httpx
 import pytest
-from commands import printed, run_cli
-from live_api import live_api
-from tenants import ADMIN, WITH_KEYS
-from working import work
+from support.clients.commands import printed, run_cli
+from support.clients.tenants import ADMIN, WITH_KEYS
+from support.servers.live_api import live_api
+from support.stages import work
 
 from buildarena_cli.defaults import KEY_VARIABLE
 from buildarena_cli.site import jobs as site_jobs

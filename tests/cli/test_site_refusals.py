@@ -6,7 +6,7 @@ import fcntl
 from pathlib import Path
 
 import pytest
-from commands import run
+from support.clients.commands import run
 from tests.cli.test_site import files_of, idle, pages, url  # noqa: F401 - fixtures
 
 from buildarena_cli.commands import site as command

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 import yaml
-from commands import printed, run, run_cli
 from jsonschema import Draft202012Validator
-from live_api import live_api
+from support.clients.commands import printed, run, run_cli
+from support.servers.live_api import live_api
 
 ROOT = Path(__file__).parents[2]
 SCHEMA = ROOT / "docs" / "sweep.schema.json"

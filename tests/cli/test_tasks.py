@@ -6,8 +6,8 @@ import json
 from pathlib import Path
 
 import pytest
-from commands import printed, run, run_cli
-from live_api import live_api
+from support.clients.commands import printed, run, run_cli
+from support.servers.live_api import live_api
 
 from buildarena_api.routes.tasks import EXAMPLE
 from buildarena_store import JobScore

@@ -9,9 +9,9 @@ from urllib.request import urlopen
 
 import pyarrow.parquet as pq
 import pytest
-from commands import printed
-from live_api import live_api
-from working import work
+from support.clients.commands import printed
+from support.servers.live_api import live_api
+from support.stages import work
 
 from buildarena_pipeline.agents.sessions import ExternalSessions
 

@@ -1,19 +1,23 @@
-"""One service for each module, and both clients."""
+"""One service for each module, both clients, and pauses that take no time."""
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import pytest
-from either_client import EitherClient
-from emptying import empty
-from live_api import live_api
 from pydantic import SecretStr
 from redis import Redis
-from tenants import ADMIN
-from working import work
+from support.clients.either_client import EitherClient
+from support.clients.tenants import ADMIN
+from support.servers.databases import empty
+from support.servers.live_api import live_api
+from support.stages import work
 
+from buildarena_client.transports.asynchronous import AsyncTransport
+from buildarena_client.transports.blocking import BlockingTransport
 from buildarena_pipeline.catalog.models import load_registry
 from buildarena_pipeline.catalog.specs import SweepSpec
 from buildarena_pipeline.runtime.context import Context, open_context
@@ -49,6 +53,36 @@ class Service:
     sweep: str
     jobs: list[str]
     built: str
+
+    @contextmanager
+    def working(self) -> Iterator[None]:
+        """Workers do what waits, beside the test."""
+        ended = threading.Event()
+
+        def run() -> None:
+            while not ended.wait(0.05):
+                work(self.context)
+
+        thread = threading.Thread(target=run)
+        thread.start()
+        try:
+            yield
+        finally:
+            ended.set()
+            thread.join()
+
+
+@pytest.fixture
+def pauses(monkeypatch) -> list[float]:
+    """How long clients would have waited: they do not wait."""
+    asked: list[float] = []
+
+    async def pause(_transport, seconds: float) -> None:
+        asked.append(seconds)
+
+    for transport in (BlockingTransport, AsyncTransport):
+        monkeypatch.setattr(transport, "pause", pause)
+    return asked
 
 
 @pytest.fixture(autouse=True)

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import threading
 import zipfile
-from contextlib import contextmanager
 from itertools import islice
 from pathlib import Path
 
 import pytest
-from tenants import ADMIN
-from working import work
+from support.clients.tenants import ADMIN
 
 from buildarena_client import (
     BadArgumentError,
@@ -31,24 +28,6 @@ NOBODY = "job_00000000000000000000"
 def require_shape(document, of) -> None:
     """Every key is one of the type's, and all that must be there are."""
     assert of.__required_keys__ <= document.keys() <= of.__annotations__.keys()
-
-
-@contextmanager
-def working(context):
-    """Does what waits, again and again, beside the test."""
-    ended = threading.Event()
-
-    def run() -> None:
-        while not ended.wait(0.05):
-            work(context)
-
-    thread = threading.Thread(target=run)
-    thread.start()
-    try:
-        yield
-    finally:
-        ended.set()
-        thread.join()
 
 
 def test_the_catalogue(client) -> None:
@@ -114,7 +93,7 @@ def test_the_leaderboard_and_what_stands_beside_it(client, service) -> None:
     board = client.leaderboard()
     require_shape(board, schemas.Board)
     require_shape(board["tasks"][0]["rows"][0], schemas.Row)
-    assert client.leaderboard(sweep=[service.sweep], model=["builtin/idle"], reading="published")
+    assert client.leaderboard(sweep=[service.sweep], model=["builtin/idle"], policy="published")
     found = client.compare("builtin/expert", "builtin/idle", task=["lift-1"])
     require_shape(found, schemas.Comparison)
     assert found["tasks"][0]["trials"] == [3, 3]
@@ -197,7 +176,7 @@ def test_a_sweep_is_waited_for(client, service, make) -> None:
     spec = {"tasks": ["lift-1"], "models": ["builtin/idle"], "seeds": seeds, "simulator": "mujoco"}
     sweep = client.submit_sweep(spec)["id"]
     seen = []
-    with working(service.context):
+    with service.working():
         ended = client.wait_for_sweep(
             sweep, progress=lambda one: seen.append(one["progress"]["done"]), poll_s=0.05
         )
@@ -235,7 +214,7 @@ def test_an_agent_builds_and_submits(client, service, make) -> None:
     assert shown["calls"] == 2
     assert shown["open"]
     client.submit_session(opened["id"])
-    with working(service.context):
+    with service.working():
         assert client.wait_for_job(opened["id"], timeout_s=60)["outcome"] == "construction_failed"
 
 

@@ -113,7 +113,7 @@ def test_a_frame_without_rows_has_its_columns(kind) -> None:
     assert [str(one) for one in empty.dtypes] == [str(one) for one in full.dtypes]
     for make in (sweeps_frame, results_frame):
         assert len(make([], kind=kind)) == 0
-    board = {"track": None, "tracks": [], "tasks": [], "reading": "ours"}
+    board = {"track": None, "tracks": [], "tasks": [], "policy": "ours"}
     assert "success_rate" in leaderboard_frame(board, kind=kind).columns
     assert "mean_rank" in leaderboard_frame(board, overall=True, kind=kind).columns
 

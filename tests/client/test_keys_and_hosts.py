@@ -17,7 +17,7 @@ from cryptography import x509
 from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import NameOID
-from wrong_server import answer, wrong_server
+from support.servers.wrong_server import answer, wrong_server
 
 from buildarena_client import (
     BadArgumentError,

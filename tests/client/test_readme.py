@@ -6,11 +6,9 @@ import os
 import re
 import subprocess
 import sys
-import threading
 from pathlib import Path
 
 import pytest
-from working import work
 
 README = Path(__file__).parents[2] / "clients" / "python" / "README.md"
 PROGRAMS = re.findall(r"^```python\n(.*?)^```$", README.read_text(), re.MULTILINE | re.DOTALL)
@@ -20,17 +18,8 @@ SAYS = ("lift-1 builtin/expert 1.0", "transcripts", "success_low", "construction
 @pytest.fixture(scope="module")
 def busy(service):
     """The service while it works."""
-    ended = threading.Event()
-
-    def run() -> None:
-        while not ended.wait(0.05):
-            work(service.context)
-
-    thread = threading.Thread(target=run)
-    thread.start()
-    yield service
-    ended.set()
-    thread.join()
+    with service.working():
+        yield service
 
 
 def ran(program: str, url: str) -> subprocess.CompletedProcess[str]:

@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 import yaml
 
-from buildarena_cli.commands import COMMANDS
-from buildarena_pipeline.catalog.simulators import SIMULATORS
+from buildarena_cli.command_table import COMMANDS
 from buildarena_pipeline.runtime.settings import Settings
+from buildarena_pipeline.runtime.simulators.installed import installed_engines
 
 ROOT = Path(__file__).parents[2]
 COMPOSE_TEXT = (ROOT / "docker-compose.yml").read_text()
@@ -46,7 +46,9 @@ def test_the_compose_file_follows_the_specification() -> None:
     assert done.returncode == 0, done.stdout
 
 
-@pytest.mark.parametrize("path", ["deploy/docker/Dockerfile", "tests/containers/bases/Dockerfile"])
+@pytest.mark.parametrize(
+    "path", ["deploy/docker/Dockerfile", "scenarios/containers/bases/Dockerfile"]
+)
 def test_recipes_are_clean(path) -> None:
     done = run(str(PROGRAMS / "hadolint"), "--config", "deploy/docker/hadolint.yaml", path)
     assert (done.returncode, done.stdout) == (0, "")
@@ -90,7 +92,7 @@ def test_images_of_ours_run_as_an_ordinary_user() -> None:
 def test_every_queue_has_a_service_and_every_target_a_recipe() -> None:
     targets = set(re.findall(r"^FROM \S+ AS (\S+)$", DOCKERFILE, re.MULTILINE))
     assert {_target(service) for service in OURS.values()} <= targets
-    engines = {f"simulate-{name}" for name in SIMULATORS if name != "besiege"}
+    engines = {f"simulate-{name}" for name in installed_engines()}
     assert {"api", "construct", "migrate", "proxy", *engines} <= set(SERVICES)
     assert SERVICES["migrate"]["command"][0] in COMMANDS
 

@@ -10,12 +10,20 @@ import jsonschema
 import kubernetes_validate
 import pytest
 import yaml
-from manifests import KUBERNETES, OVERLAYS, needs_kubectl, of_kind, pods, read, rendered
-from promtool import needs_promtool, promtool
+from support.documents.manifests import (
+    KUBERNETES,
+    OVERLAYS,
+    needs_kubectl,
+    of_kind,
+    pods,
+    read,
+    rendered,
+)
+from support.documents.promtool import needs_promtool, promtool
 
 from buildarena_pipeline.catalog.models import load_registry
-from buildarena_pipeline.catalog.simulators import ENGINE_SIMULATORS
 from buildarena_pipeline.runtime.settings import ARTIFACT_CREDENTIALS, SECRETS, Settings
+from buildarena_pipeline.runtime.simulators.installed import installed_engines
 from buildarena_store.states import CONSTRUCT_QUEUE, simulate_queue
 
 SCHEMA = json.loads(
@@ -163,7 +171,7 @@ def test_each_workload_has_its_image_and_program(overlay: str) -> None:
         **{name: f"buildarena/{name}:latest" for name in OURS},
         "migrate": "buildarena/tools:latest",
     }
-    assert {f"simulate-{engine}" for engine in ENGINE_SIMULATORS} <= set(OURS)
+    assert {f"simulate-{engine}" for engine in installed_engines()} <= set(OURS)
     targets = re.findall(r"^FROM \S+ AS (\S+)$", DOCKERFILE.read_text(), re.MULTILINE)
     assert {image.split("/")[1].split(":")[0] for image in images.values()} <= set(targets)
     assert not [name for name in OURS if "command" in found[name]["spec"]["containers"][0]]
@@ -248,7 +256,7 @@ def test_what_is_scaled_has_no_number_of_its_own() -> None:
 def test_scaling_goes_by_figures_of_the_workers_own_queue(tmp_path: Path) -> None:
     queues = {
         "construct": CONSTRUCT_QUEUE,
-        **{f"simulate-{engine}": simulate_queue(engine) for engine in ENGINE_SIMULATORS},
+        **{f"simulate-{engine}": simulate_queue(engine) for engine in installed_engines()},
     }
     rules = []
     for name, each in of_kind(rendered("external"), "ScaledObject").items():

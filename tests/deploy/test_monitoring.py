@@ -10,8 +10,8 @@ from pathlib import Path
 import httpx
 import pytest
 import yaml
-from live_api import live_api
-from promtool import needs_promtool, promtool
+from support.documents.promtool import needs_promtool, promtool
+from support.servers.live_api import live_api
 
 ROOT = Path(__file__).resolve().parents[2]
 MONITORING = ROOT / "deploy" / "monitoring"

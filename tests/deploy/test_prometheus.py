@@ -13,10 +13,10 @@ from urllib.parse import urlsplit
 import httpx
 import pytest
 import yaml
-from live_api import live_api
 from pydantic import SecretStr
-from running import wait_until
-from tenants import WITH_KEYS
+from support.clients.tenants import WITH_KEYS
+from support.servers.live_api import live_api
+from support.servers.stacks import wait_until
 
 from buildarena_cli.local import free_port
 from buildarena_pipeline.runtime.context import Context, open_context

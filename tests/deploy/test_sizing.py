@@ -6,7 +6,7 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
-from sizing_model import COSTS, LOADS, Load, need, table
+from benchmarks.sizing.sizing_model import COSTS, LOADS, Load, need, table
 
 ROOT = Path(__file__).parents[2]
 

@@ -132,6 +132,17 @@ def test_wheels_and_sdists_say_what_they_are(dist: Path) -> None:
         assert {"LICENSE", "README.md", "pyproject.toml", "PKG-INFO"} <= set(inside)
 
 
+def test_the_clients_types_are_written_when_it_is_built(dist: Path) -> None:
+    schemas = "buildarena_client/schemas.py"
+    (wheel,) = dist.glob("buildarena_client-*.whl")
+    (sdist,) = dist.glob("buildarena_client-*.tar.gz")
+    with zipfile.ZipFile(wheel) as archive:
+        text = archive.read(schemas)
+    with tarfile.open(sdist) as archive:
+        assert [name for name in archive.getnames() if name.endswith(schemas)]
+    assert b"class JobDetail(TypedDict):" in text
+
+
 def test_each_licence_is_the_repositorys() -> None:
     licence = (ROOT / "LICENSE").read_text()
     assert [p for p in PROJECTS if (p.parent / "LICENSE").read_text() != licence] == []

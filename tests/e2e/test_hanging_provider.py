@@ -7,9 +7,9 @@ from pathlib import Path
 
 import httpx
 import pytest
-from crew import models_file
-from provider_standin import ProviderStandIn
-from running import running_stack, wait_until
+from support.providers.stand_in import ProviderStandIn
+from support.servers.construct_threads import models_file
+from support.servers.stacks import running_stack, wait_until
 
 SESSIONS = 8
 
@@ -33,19 +33,19 @@ def test_hanging_sessions_of_one_key_leave_room_for_another_s(tmp_path: Path) ->
         admin = {"Authorization": f"Bearer {stack.admin_key}"}
 
         def key(name: str) -> dict[str, str]:
-            wish = {"name": name, "scopes": ["read", "submit"]}
-            made = client.post("/v1/keys", json=wish, headers=admin)
+            payload = {"name": name, "scopes": ["read", "submit"]}
+            made = client.post("/v1/keys", json=payload, headers=admin)
             assert made.status_code == 201, made.text
             return {"Authorization": f"Bearer {made.json()['secret']}"}
 
         def submit(provider: str, jobs: int, owner: dict[str, str]) -> str:
-            wish = {
+            payload = {
                 "tasks": ["lift-1"],
                 "models": [f"{provider}/expert"],
                 "samples": jobs,
                 "simulator": "mujoco",
             }
-            answer = client.post("/v1/sweeps", json=wish, headers=owner)
+            answer = client.post("/v1/sweeps", json=payload, headers=owner)
             assert answer.status_code == 202, answer.text
             return str(answer.json()["id"])
 

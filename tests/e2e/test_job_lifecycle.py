@@ -11,7 +11,7 @@ from pathlib import Path
 
 import httpx
 import pytest
-from running import finished, results, running_stack, wait_until
+from support.servers.stacks import finished, results, running_stack, wait_until
 
 SWEEP = {
     "tasks": ["support-1"],

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import pytest
 from starlette.testclient import TestClient
-from working import work
+from support.stages import work
 
 from buildarena_api.app import create_app
 from buildarena_api.routes import health
 from buildarena_pipeline.catalog.models import load_registry
 from buildarena_pipeline.catalog.specs import JobSpec
-from buildarena_pipeline.runtime import trial_books
+from buildarena_pipeline.runtime import trial_repository
 from buildarena_pipeline.runtime.context import Context
 from buildarena_simulation import Trajectory, schema_of, write_trajectory
 from buildarena_worker.wiring import verifier
@@ -136,7 +136,7 @@ def test_a_trajectory_of_an_older_schema_is_verified_as_it_is(
     def older(trajectory: Trajectory) -> bytes:
         return write_trajectory(trajectory, schema=2)
 
-    monkeypatch.setattr(trial_books, "write_trajectory", older)
+    monkeypatch.setattr(trial_repository, "write_trajectory", older)
     job, _ = submissions.submit_job(SPEC)
     work(context)
     kept = context.artifacts.get(context.store.jobs.artifacts(job.id)["trajectory-0"])

@@ -6,10 +6,10 @@ import threading
 from contextlib import ExitStack
 
 import httpx
-from live_api import live_api
 from pydantic import SecretStr
-from tenants import ADMIN, WITH_KEYS
-from working import work
+from support.clients.tenants import ADMIN, WITH_KEYS
+from support.servers.live_api import live_api
+from support.stages import work
 
 from buildarena_pipeline.runtime.context import Context, open_context
 

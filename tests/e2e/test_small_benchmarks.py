@@ -3,20 +3,26 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
 
-BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
+ROOT = Path(__file__).parents[2]
 TURNS = 38
 """Turns that the expert takes for its average session of support-1, about."""
 
 
 def test_sessions_are_counted_turn_by_turn(tmp_path) -> None:
     file = tmp_path / "figures.json"
-    script = BENCHMARKS / "sessions" / "bench_sessions.py"
     given = ["--sessions", "3", "--latency", "0.05", "--warm-up", "1", "--json", str(file)]
-    subprocess.run([sys.executable, str(script), *given], check=True, timeout=120)
+    subprocess.run(
+        [sys.executable, "-m", "benchmarks.sessions.bench_sessions", *given],
+        check=True,
+        timeout=120,
+        cwd=ROOT,
+        env={**os.environ, "PYTHONPATH": f"{ROOT}:{ROOT / 'tests'}"},
+    )
     figures = json.loads(file.read_text())
     assert figures["sessions"] == 3
     assert 3 * TURNS / 2 < figures["turns"] < 3 * TURNS * 2
@@ -27,8 +33,7 @@ def test_sessions_are_counted_turn_by_turn(tmp_path) -> None:
 
 
 def test_what_a_job_costs_is_shared_among_all_processes(monkeypatch) -> None:
-    monkeypatch.syspath_prepend(str(BENCHMARKS / "api"))
-    import overhead
+    from benchmarks.api import overhead
 
     for name, value in {"ALONE": 2, "IDLE_S": 0.2, "POLL_S": 0.1}.items():
         monkeypatch.setattr(overhead, name, value)

@@ -6,7 +6,7 @@ import json
 from typing import Any
 
 import pytest
-from expert_calls import DATA, Call, played
+from support.machines.expert_calls import DATA, Call, played
 
 from buildarena_environment import Environment
 from buildarena_geometry import Machine

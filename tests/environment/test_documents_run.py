@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 import pytest
-from documented import run_document, shown_in
+from support.documents.code_blocks import run_document, shown_in
 
 ROOT = Path(__file__).parents[2]
 README = ROOT / "libs/environment/README.md"

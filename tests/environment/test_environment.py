@@ -6,7 +6,7 @@ import json
 from dataclasses import replace
 
 import pytest
-from expert_calls import DATA, REFERENCES, material, played
+from support.machines.expert_calls import DATA, REFERENCES, material, played
 
 from buildarena_benchmark import builtin_tasks
 from buildarena_environment import (
@@ -41,7 +41,9 @@ def test_what_the_expert_builds_is_scored_as_kept(experts) -> None:
 
 
 def test_an_episode_from_reset_to_reward(bridge_calls) -> None:
-    environment = Environment("support-1", rewards={"success": 2.0, "indicator": 1.0})
+    environment = Environment(
+        "support-1", simulator="mujoco", rewards={"success": 2.0, "indicator": 1.0}
+    )
     seen = environment.reset()
     assert "# Task: support-1" in seen.briefing
     assert "You may make 2,000 calls" in seen.briefing

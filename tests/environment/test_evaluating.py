@@ -66,7 +66,10 @@ def test_a_process_that_dies_costs_one_trial_and_is_replaced(bridge) -> None:
     task = builtin_tasks()["support-1"]
     with Evaluator(task, processes=1) as evaluator:
         evaluator.evaluate(Machine())
-        (child,) = [p for p in psutil.Process().children() if "spawn_main" in " ".join(p.cmdline())]
+        child = max(
+            (p for p in psutil.Process().children() if "spawn_main" in " ".join(p.cmdline())),
+            key=psutil.Process.create_time,
+        )
         threading.Timer(0.1, os.kill, (child.pid, signal.SIGKILL)).start()
         lost, kept = evaluator.map([bridge, Machine()])
         assert (lost.trial, kept.error) == (None, "")

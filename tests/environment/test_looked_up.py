@@ -12,7 +12,7 @@ from buildarena_environment.briefing import briefing_digest
 from buildarena_geometry import LOOKUP, module_set, tool_definitions
 from buildarena_pipeline.catalog.prompt_packs import PromptPacks
 from buildarena_pipeline.catalog.tracks import external_track, make_track
-from buildarena_pipeline.catalog.workflows import WorkflowSource
+from buildarena_pipeline.catalog.workflows import workflow_sources
 
 LOOKUPS = {tool.name for tool in tool_definitions([LOOKUP])}
 
@@ -31,7 +31,7 @@ def test_a_builder_is_told_the_set_of_its_task():
 
 
 def test_a_builder_that_looks_up_reads_how_and_has_the_tools():
-    environment = Environment(task(modules="workshop", module_list="looked_up"))
+    environment = Environment(task(modules="workshop", module_list="on_demand"))
     observation = environment.observation
     assert {tool.name for tool in observation.tools} >= LOOKUPS
     assert "list_modules" in observation.briefing
@@ -64,13 +64,13 @@ def test_a_state_goes_on_with_what_its_task_offers():
 
 
 def test_told_and_looked_up_are_tracks_of_their_own():
-    digests = [briefing_digest("once", "conduct", looked_up=how) for how in (False, True)]
+    digests = [briefing_digest("once", "guidelines", on_demand=how) for how in (False, True)]
     assert digests[0] != digests[1]
-    tracks = [external_track("mujoco", "3", digests[how], looked_up=how) for how in (False, True)]
+    tracks = [external_track("mujoco", "3", digests[how], on_demand=how) for how in (False, True)]
     pack = PromptPacks().load("default")
-    source = WorkflowSource(name="builder", digest="")
+    source = workflow_sources({})["builder"]
     tracks += [
-        make_track(source, "mujoco", pack, version="3", looked_up=how) for how in (False, True)
+        make_track(source, "mujoco", pack, version="3", on_demand=how) for how in (False, True)
     ]
     assert len({track.id for track in tracks}) == 4
     assert ["looked_up" in track.as_config() for track in tracks] == [False, True, False, True]

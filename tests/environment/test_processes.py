@@ -10,7 +10,7 @@ import time
 
 import psutil
 import pytest
-from running import wait_until
+from support.servers.stacks import wait_until
 
 PARENT = """
 import subprocess, sys, os, signal

@@ -11,7 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import psutil
 import pytest
-from expert_calls import played
+from support.machines.expert_calls import played
 
 from buildarena_environment import Environment, TrialPool
 from buildarena_simulation import SimulationError

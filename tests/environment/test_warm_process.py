@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import psutil
 import pytest
-from warm_work import make
+from support.warm_work import make
 
 from buildarena_environment.warm_process import ProcessEndedError, WarmProcess
 

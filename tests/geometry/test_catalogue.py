@@ -73,7 +73,7 @@ def test_what_a_module_does_stands_in_its_entry():
         (0.5, 0.5),
     ]
     assert [(flame.along, flame.radius) for flame in torch.flames] == [(1, 0.3)]
-    seats = {name: module.physics.seat for name, module in basic.items() if module.physics}
+    seats = {name: module.physics.joint_type for name, module in basic.items() if module.physics}
     assert seats == {
         "Starting Block": "attachment",
         "Small Wooden Block": "attachment",
@@ -165,6 +165,21 @@ def test_a_users_file_may_be_yaml(tmp_path):
     assert load_catalogue(file)["Crate"].mass == 4
 
 
+def test_a_users_file_may_use_the_old_names_of_fields(tmp_path):
+    physics = {**WOOD["physics"], "seat": "hinge"}
+    del physics["joint_type"]
+    servo = {"kind": "speed", "rate": 9, "force": 2, "forward": "turn", "idle": "free"}
+    old = edit(physics=physics, joint={"drive": servo}, actions=["turn"], tether={"length": 2})
+    module = load_catalogue(write(tmp_path, old))["Crate"]
+    assert module.physics.joint_type == "hinge"
+    assert module.joint.drive.default_mode == "free"
+    assert module.rope_mount.length == 2
+
+
+def test_a_whole_number_may_be_written_with_a_point(tmp_path):
+    assert load_catalogue(write(tmp_path, edit(cost=3.0)))["Crate"].cost == 3
+
+
 def edit(**fields):
     return {**copy.deepcopy(CRATE), **fields}
 
@@ -179,13 +194,13 @@ def other(module, **fields):
 
 BROKEN = [
     (edit(name=3), "name: expected a text"),
-    (edit(kind="engine"), r"modules\[0\] \(Crate\).kind: expected one of start, block"),
+    (edit(kind="engine"), r"modules\[0\] \(Crate\).kind: expected one of block, cannon"),
     (edit(mass=0), "mass: expected a number above 0"),
     (edit(mass="heavy"), "mass: expected a number"),
     (edit(cost=1.5), "cost: expected a whole number"),
-    (edit(size=[1, 2]), "size: expected 3 numbers"),
-    (edit(colour="red"), "there is no field 'colour'; the fields are name, kind"),
-    (edit(faces=[{**FACE, "normal": "up"}]), r"faces\[0\].normal: expected 3 numbers"),
+    (edit(size=[1, 2]), "size: expected a list of length 3"),
+    (edit(colour="red"), "there is no field 'colour'; the fields are push, wing"),
+    (edit(faces=[{**FACE, "normal": "up"}]), r"faces\[0\].normal: expected a list"),
     (edit(colliders=[{"shape": "ball", "from": [0, 0, 0], "to": [1, 1, 1]}]), "box, cylinder"),
     (edit(colliders=[{"shape": "cylinder", "from": [0, 0, 0], "to": [1, 1, 1]}]), "radius"),
     (edit(landmarks=[{"name": "tip"}]), "along is missing"),
@@ -193,15 +208,18 @@ BROKEN = [
     (edit(besiege={"id": 1, "data": [{"type": "x", "key": "y", "value": []}]}), "value: expected"),
     ({key: value for key, value in CRATE.items() if key != "mass"}, "mass is missing"),
     (edit(grabs="yes"), "grabs: expected true or false"),
-    (edit(physics={"seat": "glue"}), "physics: mass_at is missing"),
-    (edit(physics={**WOOD["physics"], "seat": "glue"}), "seat: expected one of attachment, axle"),
+    (edit(physics={"joint_type": "axle"}), "physics: mass_at is missing"),
+    (
+        edit(physics={**WOOD["physics"], "joint_type": "glue"}),
+        "joint_type: expected one of attachment, axle",
+    ),
     (
         edit(physics={**WOOD["physics"], "friction": -1}),
         "friction: expected a number of at least 0",
     ),
     (
         edit(landmarks=[{"name": "fire", "along": 1, "heats": True}]),
-        "radius: it is missing; a flame",
+        "radius: expected the radius of a flame",
     ),
     (other(BRACE, link="glue"), "link: expected one of rigid, rope, spring"),
     (other(WHEEL, motor={**WHEEL["motor"], "torque": 0}), "torque: expected a number above 0"),
@@ -226,7 +244,7 @@ SENSELESS = [
     ),
     (other(CARGO, thrust=CANNON["thrust"]), "action: expected one of "),
     (edit(link="rope"), "link: expected no link: a block is not a connector"),
-    (edit(physics=WHEEL["physics"]), "the seat axle needs either a motor or a joint"),
+    (edit(physics=WHEEL["physics"]), "the joint type axle needs either a motor or a joint"),
 ]
 
 

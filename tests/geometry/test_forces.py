@@ -32,11 +32,11 @@ def read(tmp_path, entry):
 
 
 def test_a_wings_flow_is_its_normal_turned_by_the_pitch(tmp_path):
-    flat = read(tmp_path, other("Propeller", "wing", pitch_deg=0)).forces.wing
+    flat = read(tmp_path, other("Propeller", "wing", pitch_deg=0)).wing
     assert flat.flow == flat.normal == (0.0, 1.0, 0.0)
-    quarter = read(tmp_path, other("Propeller", "wing", pitch_deg=90)).forces.wing
+    quarter = read(tmp_path, other("Propeller", "wing", pitch_deg=90)).wing
     assert quarter.flow == pytest.approx((1.0, 0.0, 0.0))
-    x_first = read(tmp_path, other("Propeller", "wing", normal=[1, 0, 0], pitch_deg=90)).forces.wing
+    x_first = read(tmp_path, other("Propeller", "wing", normal=[1, 0, 0], pitch_deg=90)).wing
     assert x_first.flow == pytest.approx((0.0, -1.0, 0.0))
 
 
@@ -51,14 +51,19 @@ def test_a_wings_flow_is_its_normal_turned_by_the_pitch(tmp_path):
             r"push\.direction: expected a direction",
         ),
         ("Flying Block", "push", {"force": -1}, r"push\.force: expected a number of at least 0"),
-        ("Propeller", "wing", {"power": 3}, r"wing\.power: expected 0, 1 or 2"),
+        ("Propeller", "wing", {"power": 3}, r"wing\.power: expected one of 0, 1, 2"),
         ("Propeller", "wing", {"coefficient": 0.04}, r"wing\.coefficient: .* at most 0\.0333"),
         ("Propeller", "wing", {"twist": 3}, r"there is no field 'twist'"),
         ("Sqr Balloon", "altitude", {"damping": 2}, r"altitude\.damping: .* at most 1\.5"),
         ("Sqr Balloon", "altitude", {"sink": "fly"}, r"altitude\.sink: expected one of rise, sink"),
-        ("Balloon", "tether", {"length": 0}, r"tether\.length: expected a number above 0"),
+        ("Balloon", "rope_mount", {"length": 0}, r"rope_mount\.length: expected a number above 0"),
         ("Spring", "spring", {"stiffness": 1e6}, r"spring\.stiffness: .* at most 1000"),
-        ("Spring", "spring", {"shortest": 1.5}, r"spring\.shortest: expected a share"),
+        (
+            "Spring",
+            "spring",
+            {"shortest": 1.5},
+            r"spring\.shortest: expected a number of at most 1",
+        ),
         ("Spring", "spring", {"contract": "pull"}, r"spring\.contract: expected one of contract"),
         ("Decoupler", "decouple", {"impulse": -5}, r"decouple\.impulse: expected .* at least 0"),
         ("Grabber", "grip", {"reach": 0}, r"grip\.reach: expected a number above 0"),

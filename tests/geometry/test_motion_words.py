@@ -77,7 +77,7 @@ def test_every_articulated_or_flying_type_says_something():
     silent = [
         name
         for name in CATALOGUE.attachable
-        if (module := CATALOGUE[name]).joint or module.forces.wing or module.forces.push
+        if (module := CATALOGUE[name]).joint or module.wing or module.push
         if line(name).count(",") == 4
     ]
     assert silent == []

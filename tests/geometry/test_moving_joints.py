@@ -9,7 +9,7 @@ import pytest
 
 from buildarena_geometry import Machine, load_catalogue, module_set
 from buildarena_geometry.errors import CatalogueError
-from buildarena_geometry.modules.joints import MOVING_SEATS
+from buildarena_geometry.modules.joints import MOVING_JOINTS
 
 FILE = resources.files("buildarena_geometry.modules").joinpath("modules.yaml")
 WOOD = next(m for m in json.loads(FILE.read_text())["modules"] if m["name"] == "Small Wooden Block")
@@ -18,14 +18,14 @@ SERVO = {"kind": "position", "rate": 90, "force": 20, "forward": "left", "backwa
 
 def _loaded(tmp_path, seat, *, actions=("left", "right"), **fields):
     module = {**copy.deepcopy(WOOD), "name": "Part", "actions": list(actions), **fields}
-    module["physics"]["seat"] = seat
+    module["physics"]["joint_type"] = seat
     file = tmp_path / "parts.json"
     file.write_text(json.dumps({"version": 1, "modules": [module]}))
     return load_catalogue(file)["Part"]
 
 
 def test_angles_are_degrees_in_files_and_radians_inside(tmp_path):
-    joint = {"axis": [1, 0, 0], "limits": [-90, 45], "drive": {**SERVO, "idle": "return"}}
+    joint = {"axis": [1, 0, 0], "limits": [-90, 45], "drive": {**SERVO, "default_mode": "return"}}
     found = _loaded(tmp_path, "hinge", joint=joint).joint
     assert found.limits == pytest.approx((-math.pi / 2, math.pi / 4))
     assert found.drive.rate == pytest.approx(math.pi / 2)
@@ -42,17 +42,17 @@ def test_a_slider_counts_in_units(tmp_path):
 
 SPEED = {"kind": "speed", "rate": 600, "force": 20}
 SENSELESS = [
-    ("attachment", {"joint": {}}, "joint: expected no joint: only one of the seats axle, hinge"),
-    ("mount", {"joint": {}}, "moves, not mount"),
-    ("hinge", {"gear": {"pitch_radius": 1}}, "no gear: a cog's seat is axle, not hinge"),
+    ("attachment", {"joint": {}}, "joint: expected no joint: only one of the joint types axle"),
+    ("mount", {"joint": {}}, "moves, found 'mount'"),
+    ("hinge", {"gear": {"pitch_radius": 1}}, "no gear: a cog's joint type is axle, not hinge"),
     ("axle", {"joint": {}, "gear": {"pitch_radius": 0}}, "pitch_radius: expected a number above 0"),
-    ("axle", {}, "the seat axle needs either a motor or a joint"),
+    ("axle", {}, "the joint type axle needs either a motor or a joint"),
     ("hinge", {"joint": {"axis": [1, 1, 0]}}, "axis: expected a direction"),
     ("hinge", {"joint": {"limits": [10, 40]}}, "limits: expected two numbers, the first at most 0"),
     ("hinge", {"joint": {"limits": [0, 0]}}, "limits: expected two numbers"),
     ("hinge", {"joint": {"limits": [-180, 90]}}, "two angles between -180 and 180 degrees"),
-    ("hinge", {"joint": {"limits": [-10]}}, "limits: expected 2 numbers"),
-    ("ball", {"joint": {"limits": [-10, 10]}}, "no limits: one of the seats hinge, slider"),
+    ("hinge", {"joint": {"limits": [-10]}}, "limits: expected a list of length 2"),
+    ("ball", {"joint": {"limits": [-10, 10]}}, "no limits: one of the joint types hinge, slider"),
     ("constant_velocity", {"joint": {"limits": [-10, 20]}}, "two opposite angles up to 150"),
     ("constant_velocity", {"joint": {"limits": [-160, 160]}}, "two opposite angles up to 150"),
     ("hinge", {"joint": {"friction": -1}}, "friction: expected a number of at least 0"),
@@ -61,20 +61,20 @@ SENSELESS = [
     (
         "ball",
         {"joint": {"drive": SERVO}},
-        "no drive: it moves one of the seats axle, hinge, slider",
+        "no drive: it moves one of the joint types axle, hinge, slider",
     ),
     ("hinge", {"joint": {"friction": 1, "drive": SERVO}}, "without a spring, a damper or friction"),
-    ("hinge", {"joint": {"drive": {**SERVO, "idle": "free"}}}, "idle: expected hold or return"),
-    ("hinge", {"joint": {"drive": {**SPEED, "idle": "return"}}}, "idle: expected hold, free or"),
+    ("hinge", {"joint": {"drive": {**SERVO, "default_mode": "free"}}}, "expected hold or return"),
+    ("hinge", {"joint": {"drive": {**SPEED, "default_mode": "return"}}}, "expected hold, free or"),
     ("hinge", {"joint": {"drive": SPEED}}, "forward: expected an action"),
     (
         "hinge",
-        {"joint": {"drive": {**SPEED, "idle": "forward", "forward": "left"}}},
+        {"joint": {"drive": {**SPEED, "default_mode": "forward", "forward": "left"}}},
         "none where it runs forward all the time",
     ),
     ("hinge", {"joint": {"drive": {**SERVO, "forward": "up"}}}, "forward: expected one of left"),
     ("hinge", {"joint": {"drive": {**SERVO, "force": 0}}}, "force: expected a number above 0"),
-    ("hinge", {"joint": {"drive": {**SERVO, "kind": "pull"}}}, "kind: expected one of speed, pos"),
+    ("hinge", {"joint": {"drive": {**SERVO, "kind": "pull"}}}, "expected one of position, speed"),
     (
         "slider",
         {"joint": {"drive": {**SERVO, "forward_sense": "clockwise"}}},
@@ -92,7 +92,9 @@ def test_senseless_joints_are_refused_with_what_belongs_there(tmp_path, seat, fi
 
 def test_every_joint_of_the_workshop_says_where_its_figures_come_from():
     moving = [
-        m for m in module_set("workshop").values() if m.physics and m.physics.seat in MOVING_SEATS
+        m
+        for m in module_set("workshop").values()
+        if m.physics and m.physics.joint_type in MOVING_JOINTS
     ]
     assert len(moving) >= 19
     for module in moving:

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import httpx
 import pytest
-from live_api import live_api
-from tenants import WITH_KEYS, new_tenant
-from working import work
+from support.clients.tenants import WITH_KEYS, new_tenant
+from support.servers.live_api import live_api
+from support.stages import work
 
 from buildarena_pipeline.runtime.context import open_context
 

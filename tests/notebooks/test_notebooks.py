@@ -9,9 +9,9 @@ from pathlib import Path
 import httpx
 import nbformat
 import pytest
-from live_api import live_api
 from nbclient import NotebookClient
-from working import work
+from support.servers.live_api import live_api
+from support.stages import work
 
 from buildarena import pages
 

@@ -11,7 +11,7 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
-from pages import in_browser, needs_pages
+from support.documents.pages import in_browser, needs_pages
 
 import buildarena as ba
 from buildarena import pages
@@ -162,7 +162,7 @@ def test_an_empty_machine_is_shown_too():
 def test_text_stands_in_for_html(machine, trial, hostile):
     assert machine._repr_mimebundle_()["text/plain"] == "Machine(3 blocks, 0 connectors)"
     first = trial._repr_mimebundle_()["text/plain"].splitlines()[0]
-    assert re.fullmatch(r"A bridge over a gap of 5: .*load [\d.,]+ mass units \(mujoco\)", first)
+    assert re.fullmatch(r"A bridge over a gap of 5: .*load [\d.,]+ mass units \(pybullet\)", first)
     assert repr(hostile).startswith(HOSTILE)
 
 

@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 
 import pytest
-from commands import run
+from support.clients.commands import run
 
 ROOT = Path(__file__).parents[2]
 README = ROOT / "clients" / "buildarena" / "README.md"

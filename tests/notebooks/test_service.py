@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import httpx
 import pytest
-from live_api import live_api
-from working import work
+from support.servers.live_api import live_api
+from support.stages import work
 
 import buildarena as ba
 from buildarena_client import ClientError, NotFoundError, UnreachableError
@@ -15,7 +15,6 @@ SWEEP = {
     "tasks": ["support-1"],
     "models": ["builtin/expert", "builtin/idle"],
     "seeds": [0],
-    "simulator": "mujoco",
 }
 
 

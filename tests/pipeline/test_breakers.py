@@ -4,7 +4,7 @@ import asyncio
 import threading
 from collections.abc import Callable
 
-from running import wait_until
+from support.servers.stacks import wait_until
 
 from buildarena_pipeline.breakers import AsyncCircuitBreaker, CircuitBreaker
 

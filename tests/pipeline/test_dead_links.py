@@ -12,13 +12,13 @@ import uvicorn
 import uvloop
 from fastapi import FastAPI
 from kombu.exceptions import OperationalError
-from running import wait_until
+from support.servers.stacks import wait_until
 
 from buildarena_api.http.rate_limits import RateLimits
 from buildarena_api.http.serving import UNANSWERED_S, Server
 from buildarena_cli.local import free_port
 from buildarena_pipeline.broker.app import LONGEST_PAUSE_S, celery_app
-from buildarena_pipeline.dead_links import socket_options, tcp_options
+from buildarena_pipeline.keepalive import socket_options, tcp_options
 from buildarena_pipeline.runtime.active_lease import LeaseKeeper
 
 

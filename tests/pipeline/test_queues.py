@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from running import wait_until
+from support.servers.stacks import wait_until
 
 from buildarena_cli.local import EmbeddedValkey
 from buildarena_pipeline.broker.queues import ENOUGH_WAITING, Queues

@@ -34,7 +34,7 @@ def test_the_papers_snapshots_are_there() -> None:
 def test_an_operator_adds_models_and_providers(tmp_path: Path) -> None:
     file = tmp_path / "models.yaml"
     file.write_text(
-        "providers:\n  mine: {wire: openai, base_url: 'http://127.0.0.1:8000/v1'}\n"
+        "providers:\n  mine: {protocol: openai, base_url: 'http://127.0.0.1:8000/v1'}\n"
         "models:\n  - {name: mine/llama, provider: mine, model: llama}\n"
     )
     registry = load_registry(file)

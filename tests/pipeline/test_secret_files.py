@@ -156,7 +156,7 @@ def test_an_artifact_store_signs_with_the_credentials_of_files(
         file.write_text(f"{name.lower()}-by-file\n")
         monkeypatch.setenv(f"{name}_FILE", str(file))
     with ThreadingHTTPServer(("127.0.0.1", 0), _Bucket) as server:
-        thread = threading.Thread(target=server.serve_forever)
+        thread = threading.Thread(target=server.serve_forever, args=(0.01,))
         thread.start()
         monkeypatch.setenv("AWS_ENDPOINT", f"http://127.0.0.1:{server.server_port}")
         monkeypatch.setenv("AWS_ALLOW_HTTP", "true")
@@ -173,7 +173,7 @@ def test_an_artifact_store_signs_with_the_credentials_of_files(
 
 def test_a_providers_key_can_stand_in_a_file(tmp_path, monkeypatch) -> None:
     entry = ModelEntry(name="x/y", provider="x", model="y")
-    provider = ProviderEntry(wire="openai", base_url="http://127.0.0.1:9", key="X_API_KEY")
+    provider = ProviderEntry(protocol="openai", base_url="http://127.0.0.1:9", key="X_API_KEY")
     with pytest.raises(PermanentError, match="X_API_KEY or X_API_KEY_FILE"):
         ProviderClient(entry, provider)
     monkeypatch.setenv("X_API_KEY_FILE", kept(tmp_path, b"shh\n"))
@@ -188,7 +188,7 @@ def test_a_providers_key_can_stand_in_a_file(tmp_path, monkeypatch) -> None:
 def test_the_command_line_reads_its_key_from_a_file(tmp_path, monkeypatch) -> None:
     monkeypatch.setenv("BUILDARENA_KEY_FILE", kept(tmp_path, b"ba_key\n"))
     client = Client("http://127.0.0.1:9")
-    assert client._wire._headers == {"Authorization": "Bearer ba_key"}
+    assert client._api._transport._headers == {"Authorization": "Bearer ba_key"}
     monkeypatch.setenv("BUILDARENA_KEY", "other")
     with pytest.raises(CommandError, match="BUILDARENA_KEY and BUILDARENA_KEY_FILE are both set"):
         Client("http://127.0.0.1:9")

@@ -11,8 +11,8 @@ from contextlib import contextmanager
 
 import httpx
 import pytest
-from live_api import live_api
-from running import wait_until
+from support.servers.live_api import live_api
+from support.servers.stacks import wait_until
 
 from buildarena_cli.local import EmbeddedValkey
 from buildarena_pipeline.broker.announcer import Announcer

@@ -45,7 +45,7 @@ class Collector(BaseHTTPRequestHandler):
 def test_a_jobs_spans_are_one_trace_at_the_collector() -> None:
     server = HTTPServer(("127.0.0.1", 0), Collector)
     server.requests = []
-    thread = threading.Thread(target=server.serve_forever)
+    thread = threading.Thread(target=server.serve_forever, args=(0.01,))
     thread.start()
     try:
         url = f"http://127.0.0.1:{server.server_port}"

@@ -3,8 +3,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
-from live_api import live_api
-from tenants import WITH_KEYS
+from support.clients.tenants import WITH_KEYS
+from support.servers.live_api import live_api
 
 from buildarena_pipeline.runtime.context import Context, open_context
 

@@ -8,7 +8,8 @@ from contextlib import contextmanager
 from hashlib import sha256
 
 import pytest
-from runner_rig import (
+from sqlalchemy import text
+from support.servers.runner_rig import (
     MISSING,
     VERSIONS,
     ended,
@@ -19,17 +20,21 @@ from runner_rig import (
     two_blocks,
     waiting,
 )
-from sqlalchemy import text
-from working import work
+from support.stages import work
 
 from buildarena_benchmark import score
 from buildarena_pipeline.errors import PermanentError
 from buildarena_pipeline.runtime.active_lease import LeaseKeeper
 from buildarena_pipeline.runtime.job_runner import JobRunner
+from buildarena_pipeline.runtime.simulators.simulator import (
+    File,
+    Simulated,
+    SimulatorFaultError,
+    Trial,
+)
 from buildarena_simulation import write_trajectory
+from buildarena_simworker.engines import EngineSimulator
 from buildarena_simworker.simulate import simulate_handler
-from buildarena_simworker.simulators.engines import EngineSimulator
-from buildarena_simworker.simulators.simulator import File, Simulated, SimulatorFaultError, Trial
 
 Next = Callable[..., bool]
 QUEUE = "simulate.mujoco"

@@ -10,19 +10,19 @@ from dataclasses import replace
 import httpx
 import httpx2
 import pytest
-from flaky_proxy import flaky_proxy
-from live_api import live_api
-from runner_rig import MUJOCO, ended, runner_key, slot, true_trajectory, waiting
 from sqlalchemy import text
-from tenants import WITH_KEYS
+from support.clients.tenants import WITH_KEYS
+from support.servers.flaky_proxy import flaky_proxy
+from support.servers.live_api import live_api
+from support.servers.runner_rig import MUJOCO, ended, runner_key, slot, true_trajectory, waiting
 
-from buildarena_pipeline.dead_links import socket_options
+from buildarena_pipeline.keepalive import socket_options
 from buildarena_pipeline.runtime.context import open_context
+from buildarena_pipeline.runtime.simulators.simulator import File, Simulated
 from buildarena_simulation import write_trajectory
+from buildarena_simworker.engines import EngineSimulator
 from buildarena_simworker.remote import api as remote_api
 from buildarena_simworker.remote.api import HeldLease, RunnerApi, tls_context
-from buildarena_simworker.simulators.engines import EngineSimulator
-from buildarena_simworker.simulators.simulator import File, Simulated
 
 
 class WithLog(EngineSimulator):
@@ -139,9 +139,9 @@ def test_an_outcome_that_comes_too_late_is_left(context, url) -> None:
 def test_nothing_is_leased_to_who_has_left(context, url) -> None:
     secret = runner_key(context)[1]
     with httpx.Client(base_url=url, headers={"Authorization": f"Bearer {secret}"}) as client:
-        wish = {"name": "gone", "simulators": MUJOCO, "wait_s": 20}
+        payload = {"name": "gone", "simulators": MUJOCO, "wait_s": 20}
         with pytest.raises(httpx.ReadTimeout):
-            client.post("/v1/runner/leases", json=wish, timeout=0.7)
+            client.post("/v1/runner/leases", json=payload, timeout=0.7)
     job = waiting(context)
     with slot(url, secret) as one:
         assert one.do_next(2)

@@ -11,7 +11,9 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from runner_rig import (
+from sqlalchemy import text
+from support.clients.tenants import everything
+from support.servers.runner_rig import (
     CARRY,
     VERSIONS,
     Caller,
@@ -20,8 +22,6 @@ from runner_rig import (
     true_trajectory,
     waiting,
 )
-from sqlalchemy import text
-from tenants import everything
 
 from buildarena_simulation import Trajectory, write_trajectory
 from buildarena_store import ArtifactStoreError

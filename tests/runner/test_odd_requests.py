@@ -8,8 +8,6 @@ from typing import Any
 
 import schemathesis
 from hypothesis import HealthCheck, given, settings
-from live_api import live_api
-from runner_rig import Caller, waiting
 from schemathesis import GenerationMode
 from schemathesis.checks import not_a_server_error
 from schemathesis.specs.openapi.checks import (
@@ -17,7 +15,9 @@ from schemathesis.specs.openapi.checks import (
     response_schema_conformance,
     status_code_conformance,
 )
-from tenants import WITH_KEYS
+from support.clients.tenants import WITH_KEYS
+from support.servers.live_api import live_api
+from support.servers.runner_rig import Caller, waiting
 
 CONTRACT = Path(__file__).parents[1] / "data" / "openapi.json"
 CHECKS = [

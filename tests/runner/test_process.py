@@ -14,10 +14,10 @@ from pathlib import Path
 
 import psutil
 import pytest
-from commands import run, run_cli
-from runner_rig import SHORT, ended, runner_key, true_trajectory, waiting
-from running import wait_until
-from tenants import ADMIN
+from support.clients.commands import run, run_cli
+from support.clients.tenants import ADMIN
+from support.servers.runner_rig import SHORT, ended, runner_key, true_trajectory, waiting
+from support.servers.stacks import wait_until
 
 from buildarena_simulation import write_trajectory
 from buildarena_simworker.remote.api import check_url, tls_context
@@ -106,7 +106,7 @@ def test_a_runner_loads_nothing_that_it_does_not_need() -> None:
         "import sys, json\n"
         "import buildarena_simworker.remote.process, buildarena_simworker.remote.engine_process\n"
         "import buildarena_simworker.remote.doctor\n"
-        "import buildarena_simworker.simulators.besiege.simulator\n"
+        "import buildarena_simworker_besiege.simulator\n"
         "print(json.dumps(sorted({name.split('.')[0] for name in sys.modules})))\n"
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, check=True)

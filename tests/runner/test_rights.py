@@ -6,11 +6,11 @@ import json
 from pathlib import Path
 
 import pytest
-from runner_rig import Caller, as_admin, runner_key, true_trajectory, waiting
 from sqlalchemy import text
-from tenants import ADMIN, everything
+from support.clients.tenants import ADMIN, everything
+from support.servers.runner_rig import Caller, as_admin, runner_key, true_trajectory, waiting
 
-from buildarena_api.runners import wishes
+from buildarena_api.runners import lease_queue
 from buildarena_simulation import write_trajectory
 
 CONTRACT = json.loads((Path(__file__).parents[1] / "data" / "openapi.json").read_text())
@@ -64,7 +64,7 @@ WRONG_KEYS = [
     ({"scopes": ["runner", "read"], "simulators": ["mujoco"]}, "stands alone"),
     ({"scopes": ["admin", "runner"], "simulators": ["mujoco"]}, "stands alone"),
     ({"scopes": ["runner"], "simulators": []}, "at least 1"),
-    ({"scopes": ["runner"], "simulators": ["unity"]}, "choose from"),
+    ({"scopes": ["runner"], "simulators": ["unity"]}, "there is no simulator 'unity'"),
     ({"scopes": ["runner"], "simulators": ["mujoco"], "job_owners": ["ada"]}, "pattern"),
     (
         {"scopes": ["runner"], "simulators": ["mujoco"], "budget": {"max_requests": 1}},
@@ -114,7 +114,7 @@ def test_only_its_simulators_jobs_are_leased(context, url) -> None:
         assert refused.status_code == expected, route
     assert "choose from pybullet" in caller.ask("POST", "/leases", json=caller.about()).text
     unknown = {**caller.about(), "simulators": {"unity": "3"}}
-    assert caller.ask("POST", "/leases", json=unknown).status_code == 422
+    assert caller.ask("POST", "/leases", json=unknown).status_code == 403
     own = {**caller.about(), "simulators": {"pybullet": "3"}}
     assert caller.ask("POST", "/leases", json=own).status_code == 204
     both = {**caller.about(), "simulators": {"pybullet": "3", "mujoco": "3"}}
@@ -202,7 +202,7 @@ def test_one_name_has_one_lease(context, url) -> None:
 
 
 def test_a_keys_leases_and_names_are_bounded(context, url, monkeypatch) -> None:
-    monkeypatch.setattr(wishes, "MAX_LEASES", 2)
+    monkeypatch.setattr(lease_queue, "MAX_LEASES", 2)
     for seed in range(3):
         waiting(context, seed=seed)
     caller = Caller(url, runner_key(context)[1])

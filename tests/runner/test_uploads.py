@@ -6,8 +6,8 @@ import hashlib
 import os
 
 import pytest
-from runner_rig import Caller, runner_key, waiting
 from sqlalchemy import text
+from support.servers.runner_rig import Caller, runner_key, waiting
 
 from buildarena_api.runners.outcomes import drop_dead_uploads
 from buildarena_store import UploadedFile, UploadError, Uploads, uploads

@@ -1,7 +1,5 @@
 """Fixtures of the simulation tests."""
 
-import sys
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -9,9 +7,6 @@ import pytest
 from buildarena_benchmark import Task, builtin_tasks
 from buildarena_simulation import ENGINES
 from buildarena_simulation.structure import clusters
-
-# The reference designs are a module of this folder, shared with the benchmarks.
-sys.path.insert(0, str(Path(__file__).parents[2]))
 
 
 @pytest.fixture(params=ENGINES)

@@ -7,7 +7,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from tests.simulation.designs import EAST, Draft, beam, replayed, rocket
+from support.machines.drafts import KeyedDraft
+from support.machines.families import beam, rocket
 
 from buildarena_benchmark import Task, failed_score, score
 from buildarena_geometry import DocumentError, Machine
@@ -20,9 +21,10 @@ from buildarena_simulation import (
     write_trajectory,
 )
 from buildarena_simulation.constants import MAX_PARTS
-from buildarena_simulation.engines import create_engine
 from buildarena_simulation.engines.base import Engine, World
+from buildarena_simulation.engines.registry import create_engine
 from buildarena_simulation.structure.motion import Motion
+from buildarena_worker.builtin.designs.drafting import EAST
 
 
 def test_an_empty_machine_is_no_machine(engine: str, tasks: dict[str, Task]) -> None:
@@ -35,7 +37,7 @@ def test_an_empty_machine_is_no_machine(engine: str, tasks: dict[str, Task]) -> 
 def test_a_machine_of_ten_thousand_blocks_is_refused_at_once(
     engine: str, tasks: dict[str, Task]
 ) -> None:
-    draft = Draft()
+    draft = KeyedDraft()
     draft.start()
 
     # Building one block by block would take long: this one only says that it is large.
@@ -46,11 +48,11 @@ def test_a_machine_of_ten_thousand_blocks_is_refused_at_once(
 
 def test_an_unknown_engine_is_named_with_the_known_ones(tasks: dict[str, Task]) -> None:
     with pytest.raises(UnknownEngineError, match="pybullet, mujoco"):
-        simulate(replayed(beam(3)), tasks["lift-1"].scenario, "havok")
+        simulate(beam(3), tasks["lift-1"].scenario, "havok")
 
 
 def test_a_machine_in_two_halves_is_simulated_as_two(engine: str, tasks: dict[str, Task]) -> None:
-    draft = Draft()
+    draft = KeyedDraft()
     far = draft.row(draft.start(), EAST, 3)
     draft.do("remove_block", block_id=far[0])
     assert draft.machine.detached
@@ -61,7 +63,7 @@ def test_a_machine_in_two_halves_is_simulated_as_two(engine: str, tasks: dict[st
 
 
 def _document_with(change: str) -> str:
-    text = json.dumps(replayed(beam(3)).to_document())
+    text = json.dumps(beam(3).to_document())
     assert "Small Wooden Block" in text
     return text.replace("Small Wooden Block", change)
 
@@ -74,14 +76,14 @@ def test_a_document_with_an_unknown_module_never_reaches_the_simulator() -> None
 def test_a_scenario_that_tracks_a_missing_block_says_so(tasks: dict[str, Task]) -> None:
     scenario = tasks["lift-1"].scenario.model_copy(update={"tracked_blocks": ("1", "77")})
     with pytest.raises(MachineNotSimulable, match="77"):
-        simulate(replayed(beam(3)), scenario, "mujoco")
+        simulate(beam(3), scenario, "mujoco")
 
 
 def test_the_process_goes_on_after_a_failed_trial(engine: str, tasks: dict[str, Task]) -> None:
     scenario = tasks["lift-1"].scenario.model_copy(update={"duration_s": 0.2})
     with pytest.raises(MachineNotSimulable):
         simulate(Machine(), scenario, engine)
-    assert simulate(replayed(beam(3)), scenario, engine).time_s[-1] == pytest.approx(0.2)
+    assert simulate(beam(3), scenario, engine).time_s[-1] == pytest.approx(0.2)
 
 
 def test_a_rollout_that_blows_up_is_reported_and_never_a_success(
@@ -102,7 +104,7 @@ def test_a_rollout_that_blows_up_is_reported_and_never_a_success(
     monkeypatch.setattr(rollout, "create_engine", fragile)
     task = tasks["lift-1"]
     scenario = task.scenario.model_copy(update={"duration_s": 2.0})
-    machine = replayed(rocket())
+    machine = rocket()
     trajectory = simulate(machine, scenario, engine)
     assert np.isfinite(trajectory.positions[:10]).all()
     assert not np.isfinite(trajectory.positions[-1]).any()

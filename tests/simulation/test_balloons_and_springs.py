@@ -5,10 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.simulation.designs import DOWN, EAST, NORTH, SOUTH, UP, WEST
-from tests.simulation.designs.workshop import WorkshopDraft
+from support.machines.drafts import KeyedDraft
 
-from buildarena_benchmark.scorers.pieces import joined_to_start
+from buildarena_benchmark.scorers.measures.components import joined_to_start
 from buildarena_geometry import KeyPress, Machine
 from buildarena_geometry.modules.sets import module_set
 from buildarena_simulation import Scenario, Trajectory, simulate
@@ -16,6 +15,7 @@ from buildarena_simulation.constants import GRAVITY
 from buildarena_simulation.machine import structure_of
 from buildarena_simulation.scenario import Control
 from buildarena_simulation.trajectory import Break
+from buildarena_worker.builtin.designs.drafting import DOWN, EAST, NORTH, SOUTH, UP, WEST
 
 WORKSHOP = module_set("workshop")
 DRIVEN = Control(mode="agent")
@@ -29,7 +29,7 @@ def _stood(machine: Machine, engine: str, seconds: float, *keys: KeyPress) -> Tr
     return simulate(machine, Scenario(duration_s=seconds, control=DRIVEN), engine, controls=keys)
 
 
-def _foot(draft: WorkshopDraft) -> str:
+def _foot(draft: KeyedDraft) -> str:
     start = draft.start()
     for side in (EAST, WEST, NORTH, SOUTH):
         draft.row(start, side, 2)
@@ -41,23 +41,23 @@ def _rope_load(trajectory: Trajectory) -> float:
 
 
 def test_a_balloon_stands_over_its_rope_and_pulls_what_it_can(engine: str) -> None:
-    draft = WorkshopDraft()
+    draft = KeyedDraft(modules="workshop")
     balloon = draft.attach(_foot(draft), UP, "Balloon")
     module = WORKSHOP["Balloon"]
     trajectory = _stood(draft.machine, engine, 12.0)
     top = trajectory.positions[-1, 0, 2] + 0.5
     at = trajectory.positions[-1, trajectory.block_ids.index(balloon)]
     assert not trajectory.breaks
-    assert at[2] - top == pytest.approx(module.forces.tether.length + module.center[2], rel=0.02)
+    assert at[2] - top == pytest.approx(module.rope_mount.length + module.center[2], rel=0.02)
     assert np.abs(at[:2] - trajectory.positions[-1, 0, :2]).max() < 0.05
-    net = module.forces.lift.force - module.mass
-    weight = structure_of(draft.machine).masses.sum() - module.forces.lift.force
+    net = module.lift.force - module.mass
+    weight = structure_of(draft.machine).masses.sum() - module.lift.force
     assert trajectory.bearing.ground[-25:].mean() == pytest.approx(weight, rel=0.02)
     assert trajectory.joint_loads[-25:, -1].mean() * 1000 == pytest.approx(net, abs=1.96)
 
 
 def test_a_balloon_that_is_pulled_along_leans_as_drag_and_lift_say(engine: str) -> None:
-    draft = WorkshopDraft()
+    draft = KeyedDraft(modules="workshop")
     start = draft.start()
     balloon = draft.attach(start, UP, "Balloon")
     for base in (draft.attach(start, NORTH), draft.attach(start, SOUTH)):
@@ -70,16 +70,16 @@ def test_a_balloon_that_is_pulled_along_leans_as_drag_and_lift_say(engine: str) 
     at = trajectory.positions[rows, trajectory.block_ids.index(balloon)].astype(float)
     speed = float(np.diff(root[:, 1]).mean()) * 25.0
     assert speed > 8.0
-    net = (module.forces.lift.force - module.mass) * GRAVITY
+    net = (module.lift.force - module.mass) * GRAVITY
     lean = math.atan2(module.physics.linear_drag * module.mass * speed, net)
-    reach = module.forces.tether.length + module.center[2]
+    reach = module.rope_mount.length + module.center[2]
     behind, above = -(at - root).mean(axis=0)[1], (at - root).mean(axis=0)[2]
     assert behind == pytest.approx(reach * math.sin(lean), rel=0.05)
     assert above == pytest.approx(reach * math.cos(lean), rel=0.02)
 
 
 def _aloft(load: int) -> tuple[Machine, str]:
-    draft = WorkshopDraft()
+    draft = KeyedDraft(modules="workshop")
     start = draft.start()
     draft.row(start, DOWN, load)
     balloon = draft.attach(start, UP, "Sqr Balloon")
@@ -91,7 +91,7 @@ def _aloft(load: int) -> tuple[Machine, str]:
 @pytest.mark.parametrize("load", [0, 6, 14])
 def test_a_balloon_holds_the_height_that_its_keys_ask_for(engine: str, load: int) -> None:
     machine, balloon = _aloft(load)
-    altitude = WORKSHOP["Sqr Balloon"].forces.altitude
+    altitude = WORKSHOP["Sqr Balloon"].altitude
     keys = (_press("UpArrow", 1.0, 4.0), _press("DownArrow", 9.0, 1.0))
     trajectory = _stood(machine, engine, 20.0, *keys)
     height = trajectory.positions[:, trajectory.block_ids.index(balloon), 2].astype(float)
@@ -104,14 +104,14 @@ def test_a_balloon_holds_the_height_that_its_keys_ask_for(engine: str, load: int
 
 def test_a_balloon_does_not_lift_more_than_it_can(engine: str) -> None:
     machine, _ = _aloft(18)
-    assert structure_of(machine).masses.sum() > WORKSHOP["Sqr Balloon"].forces.altitude.most
+    assert structure_of(machine).masses.sum() > WORKSHOP["Sqr Balloon"].altitude.most
     trajectory = _stood(machine, engine, 6.0, _press("UpArrow", 0.5, 5.0))
     assert np.ptp(trajectory.positions[:, 0, 2]) < 0.2
 
 
 def _hung(springs: int, *, bind: bool = False) -> tuple[Machine, str]:
     """A load that springs hold below an arm, built at their length at rest."""
-    draft = WorkshopDraft()
+    draft = KeyedDraft(modules="workshop")
     top = draft.row(_foot(draft), UP, 8)[-1]
     tip = draft.row(top, EAST, 3)[-1]
     load = draft.attach(tip, DOWN)
@@ -119,7 +119,7 @@ def _hung(springs: int, *, bind: bool = False) -> tuple[Machine, str]:
         draft.do("shift_block", block_id=load, shift_real=[0.0, 0.0, -0.5])
     draft.row(load, DOWN, 3)
     for _ in range(springs):
-        draft.link(tip, DOWN, load, UP, connector="Spring")
+        draft.connect(tip, load, DOWN, UP, connector="Spring")
         if bind:
             draft.bind(list(draft.machine.connectors)[-1], "contract", "UpArrow")
     return draft.machine, load
@@ -139,7 +139,7 @@ def _mass_of(machine: Machine, load: str) -> float:
 
 def test_a_load_swings_on_a_spring_as_mass_and_stiffness_say(engine: str) -> None:
     machine, load = _hung(1)
-    spring, mass = WORKSHOP["Spring"].forces.spring, _mass_of(machine, load)
+    spring, mass = WORKSHOP["Spring"].spring, _mass_of(machine, load)
     stretch = _springs_stretch(_stood(machine, engine, 4.0), load)
     period = 2 * math.pi * math.sqrt(mass / (spring.stiffness * GRAVITY))
     over = stretch - mass / spring.stiffness
@@ -155,7 +155,7 @@ def test_a_load_swings_on_a_spring_as_mass_and_stiffness_say(engine: str) -> Non
 
 def test_a_spring_bears_its_load_at_rest(engine: str) -> None:
     machine, load = _hung(1)
-    spring, mass = WORKSHOP["Spring"].forces.spring, _mass_of(machine, load)
+    spring, mass = WORKSHOP["Spring"].spring, _mass_of(machine, load)
     trajectory = _stood(machine, engine, 14.0)
     stretch = _springs_stretch(trajectory, load)
     assert stretch[-25:].mean() == pytest.approx(mass / spring.stiffness, rel=0.02)
@@ -177,7 +177,7 @@ def test_springs_between_the_same_faces_are_worth_one(engine: str) -> None:
 
 def test_a_spring_draws_together_while_its_key_is_held(engine: str) -> None:
     machine, load = _hung(1, bind=True)
-    spring, mass = WORKSHOP["Spring"].forces.spring, _mass_of(machine, load)
+    spring, mass = WORKSHOP["Spring"].spring, _mass_of(machine, load)
     built = structure_of(machine).ropes.length[0]
     trajectory = _stood(machine, engine, 15.0, _press("UpArrow", 1.0, 7.0))
     stretch = _springs_stretch(trajectory, load)
@@ -211,7 +211,7 @@ def test_a_springs_keys_are_kept_in_documents() -> None:
 
 
 def test_a_balloon_belongs_to_its_machine_until_its_rope_gives_way(engine: str) -> None:
-    draft = WorkshopDraft()
+    draft = KeyedDraft(modules="workshop")
     balloon = draft.attach(_foot(draft), UP, "Balloon")
     trajectory = _stood(draft.machine, engine, 1.0)
     assert joined_to_start(draft.machine, trajectory).all()

@@ -4,19 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from tests.simulation.designs import (
-    EAST,
-    NORTH,
-    SIDES,
-    SOUTH,
-    UP,
-    WEST,
-    Draft,
-    beam,
-    car,
-    replayed,
-    rocket,
-)
+from support.machines.drafts import KeyedDraft
+from support.machines.families import beam, car, rocket
 
 from buildarena_geometry import Machine, load_catalogue
 from buildarena_simulation import Scenario, Trajectory, simulate
@@ -28,6 +17,7 @@ from buildarena_simulation.scenario import (
     TerrainBox,
     gap_terrain,
 )
+from buildarena_worker.builtin.designs.drafting import EAST, NORTH, SIDES, SOUTH, UP, WEST
 
 BLOCK = load_catalogue()["Small Wooden Block"].physics
 FRICTION_BLOCK, LINEAR_DRAG = BLOCK.friction, BLOCK.linear_drag
@@ -36,7 +26,9 @@ WHEEL_SPEED = load_catalogue()["Powered Wheel"].motor.speed
 
 
 def _lone_block() -> Machine:
-    return replayed([{"op": "start", "params": {}}])
+    machine = Machine()
+    machine.act("start", {})
+    return machine
 
 
 def _peak(trajectory: Trajectory, joint: str) -> tuple[float, float]:
@@ -55,7 +47,7 @@ def test_a_block_falls_as_gravity_and_drag_say(engine: str) -> None:
 
 
 def _slab() -> Machine:
-    draft = Draft()
+    draft = KeyedDraft()
     middle = draft.start()
     for block in (middle, *draft.row(middle, EAST, 1), *draft.row(middle, WEST, 1)):
         draft.row(block, NORTH, 1)
@@ -92,7 +84,7 @@ def test_a_slab_stays_on_a_slope_below_the_friction_angle_and_slides_above(
 
 def test_a_cantilever_bears_its_weight_at_the_root(engine: str) -> None:
     length = 4
-    draft = Draft()
+    draft = KeyedDraft()
     middle = draft.start()
     for side in SIDES:  # a foot wide and heavy enough that nothing tips
         draft.row(middle, side, 4)
@@ -121,7 +113,7 @@ def _bending_of_beam(engine: str, cargo_mass: float) -> dict[str, float]:
         ),
         placement=SpanPlacement(gap=5.0, lowest_center=5.5),
     )
-    trajectory = simulate(replayed(beam(7)), scenario, engine)
+    trajectory = simulate(beam(7), scenario, engine)
     assert not trajectory.breaks
     return {peak.joint: peak.moment for peak in trajectory.joint_peaks}
 
@@ -148,7 +140,7 @@ def test_a_beam_on_two_supports_bears_the_moments_of_statics(engine: str) -> Non
 
 
 def test_a_rocket_climbs_as_thrust_weight_and_drag_say(engine: str) -> None:
-    machine = replayed(rocket())
+    machine = rocket()
     scenario = Scenario(duration_s=7.0, control=Control(mode="held", from_s=2.0))
     trajectory = simulate(machine, scenario, engine)
     height = trajectory.positions[:, 0, 2].astype(float)
@@ -163,7 +155,7 @@ def test_a_rocket_climbs_as_thrust_weight_and_drag_say(engine: str) -> None:
 
 
 def test_each_axle_of_a_standing_car_bears_its_share(engine: str) -> None:
-    machine = replayed(car(drive=()))
+    machine = car(drive=())
     trajectory = simulate(machine, Scenario(duration_s=2.0), engine)
     axles = {peak.joint: peak for peak in trajectory.joint_peaks if peak.kind == "axle"}
     assert len(axles) == 4
@@ -180,7 +172,7 @@ def test_each_axle_of_a_standing_car_bears_its_share(engine: str) -> None:
 
 
 def test_a_wheel_rolls_without_slip(engine: str) -> None:
-    machine = replayed(car(drive=[("UpArrow", 0.5, 10.0)]))
+    machine = car(drive=[("UpArrow", 0.5, 10.0)])
     scenario = Scenario(duration_s=4.0, control=Control(mode="agent"))
     trajectory = simulate(machine, scenario, engine)
     north = trajectory.positions[:, 0, 1].astype(float)

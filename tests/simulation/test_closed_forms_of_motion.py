@@ -5,18 +5,8 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from tests.simulation.designs import (
-    DOWN,
-    EAST,
-    NORTH,
-    SOUTH,
-    UP,
-    WEST,
-    WINCH,
-    Draft,
-    car,
-    replayed,
-)
+from support.machines.drafts import KeyedDraft
+from support.machines.families import car
 
 from buildarena_geometry import Machine, load_catalogue
 from buildarena_simulation import Scenario, Trajectory, simulate
@@ -24,6 +14,7 @@ from buildarena_simulation.constants import COLLISION_MARGIN, GRAVITY
 from buildarena_simulation.machine import structure_of
 from buildarena_simulation.scenario import Control, SpanPlacement, TerrainBox
 from buildarena_simulation.structure.clusters import find_clusters
+from buildarena_worker.builtin.designs.drafting import DOWN, EAST, NORTH, SOUTH, UP, WEST
 
 CATALOGUE = load_catalogue()
 WHEEL, BLOCK = CATALOGUE["Powered Wheel"], CATALOGUE["Small Wooden Block"]
@@ -45,14 +36,14 @@ def _gain(speeds: np.ndarray, start_s: float, end_s: float) -> tuple[float, floa
 
 
 def test_a_car_whose_wheels_spin_starts_as_friction_says(engine: str) -> None:
-    machine = replayed(car(drive=[("UpArrow", 0.5, 10.0)]))
+    machine = car(drive=[("UpArrow", 0.5, 10.0)])
     speeds = _speeds(simulate(machine, Scenario(duration_s=1.2, control=DRIVEN), engine))
     gained, mean = _gain(speeds, 0.64, 0.92)
     assert gained == pytest.approx(GRIP - DRAG * mean, rel=0.03)
 
 
 def test_a_car_that_brakes_skids_to_rest_as_friction_says(engine: str) -> None:
-    machine = replayed(car(drive=[("UpArrow", 0.5, 2.0)]))
+    machine = car(drive=[("UpArrow", 0.5, 2.0)])
     trajectory = simulate(machine, Scenario(duration_s=4.0, control=DRIVEN), engine)
     speeds = _speeds(trajectory)
     lost, mean = _gain(speeds, 2.64, 2.88)
@@ -63,7 +54,7 @@ def test_a_car_that_brakes_skids_to_rest_as_friction_says(engine: str) -> None:
 @pytest.mark.parametrize("slope_deg", [25.0, 29.0])
 def test_a_car_climbs_as_friction_and_slope_say(engine: str, slope_deg: float) -> None:
     slope = math.radians(slope_deg)
-    machine = replayed(car(drive=[("UpArrow", 0.0, 10.0)]))
+    machine = car(drive=[("UpArrow", 0.0, 10.0)])
     # A car of seven blocks is set down above a slope whose middle is 40 high.
     lowest = 40.0 + 1.0 / math.cos(slope) + 3.5 * math.tan(slope) + 1.3
     scenario = Scenario(
@@ -85,7 +76,7 @@ def test_a_car_climbs_as_friction_and_slope_say(engine: str, slope_deg: float) -
 
 def _leaning(arm: int, height: int) -> Machine:
     """A foot three wide with a column on it and an arm to the east on top."""
-    draft = Draft()
+    draft = KeyedDraft()
     middle = draft.start()
     for side in (EAST, WEST, NORTH, SOUTH):
         draft.row(middle, side, 1)
@@ -112,7 +103,7 @@ def test_a_machine_tips_when_its_weight_leaves_its_foot(engine: str) -> None:
 
 
 def test_a_rope_bears_what_hangs_on_it(engine: str) -> None:
-    draft = Draft()
+    draft = KeyedDraft()
     middle = draft.start()
     for side in (EAST, WEST, NORTH, SOUTH):
         draft.row(middle, side, 4)
@@ -122,7 +113,7 @@ def test_a_rope_bears_what_hangs_on_it(engine: str) -> None:
     for _ in range(4):
         draft.do("shift_block", block_id=load, shift_real=[0.0, 0.0, -0.5])
     below = draft.row(load, DOWN, 2)
-    draft.link(tip, DOWN, load, UP, connector=WINCH)
+    draft.connect(tip, load, DOWN, UP, connector="Winch")
     weight = 0.3 * (1 + len(below)) + 0.2
     trajectory = simulate(draft.machine, Scenario(duration_s=4.0), engine)
     rope = next(peak for peak in trajectory.joint_peaks if peak.kind == "rope")
@@ -130,7 +121,7 @@ def test_a_rope_bears_what_hangs_on_it(engine: str) -> None:
 
 
 def test_a_cannon_off_the_centre_turns_a_machine_as_its_inertia_says(engine: str) -> None:
-    draft = Draft()
+    draft = KeyedDraft()
     middle = draft.start()
     draft.row(middle, WEST, 3)
     draft.cannon(draft.row(middle, EAST, 3)[-1], EAST, UP)

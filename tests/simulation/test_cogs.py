@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from tests.simulation.designs import EAST, UP
-from tests.simulation.designs.mechanisms import Rig, catalogue, place_of, turned_by
+from support.machines.rigs import Rig, catalogue, place_of, turned_by
 
 from buildarena_simulation import Trajectory
+from buildarena_worker.builtin.designs.drafting import EAST, UP
 
 RPM_100 = 100 * 2 * math.pi / 60
 MEDIUM, LARGE = "Cog Medium Unpowered", "Cog Large Unpowered"
@@ -73,7 +73,7 @@ def test_a_row_of_cogs_turns_by_turns(engine: str) -> None:
 def test_a_cog_that_is_held_stalls_the_other(engine: str) -> None:
     rig, motor, cog = _pair(MEDIUM, 2)
     arm = rig.attach(cog, UP)
-    rig.link(arm, EAST, rig.attach(rig.top, (0, 1, 0)), EAST)
+    rig.connect(arm, rig.attach(rig.top, (0, 1, 0)), EAST, EAST)
     driving, driven = _speeds(rig.tried(engine, 1.2), motor, cog)
     assert abs(driving).max() < 0.02
     assert abs(driven).max() < 0.02

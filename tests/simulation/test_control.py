@@ -4,19 +4,9 @@ import math
 
 import numpy as np
 import pytest
-from tests.simulation.designs import (
-    DOWN,
-    EAST,
-    NORTH,
-    UP,
-    WEST,
-    WINCH,
-    Draft,
-    car,
-    replayed,
-    rocket,
-)
-from tests.simulation.references import REFERENCES, load_machine
+from support.machines.drafts import KeyedDraft
+from support.machines.families import car, rocket
+from support.machines.references import REFERENCES, load_machine
 
 from buildarena_benchmark import Task
 from buildarena_geometry import KeyPress, Machine, load_catalogue
@@ -25,6 +15,7 @@ from buildarena_simulation import Scenario, simulate
 from buildarena_simulation.control import heated_cannons, plan_schedule
 from buildarena_simulation.machine import bindings_of, structure_of
 from buildarena_simulation.scenario import Control, SpanPlacement
+from buildarena_worker.builtin.designs.drafting import DOWN, EAST, NORTH, UP, WEST
 
 MOTOR = load_catalogue()["Powered Wheel"].motor
 WHEEL_SPEED, WHEEL_LAG_RATE = MOTOR.speed, MOTOR.lag_per_s
@@ -46,7 +37,7 @@ def _speeds(machine: Machine, *keys: KeyPress) -> np.ndarray:
 
 
 def test_a_wheel_follows_its_key_with_a_lag() -> None:
-    speeds = np.abs(_speeds(replayed(car()), _press("UpArrow", 0.5, 1.0))[:, 0])
+    speeds = np.abs(_speeds(car(), _press("UpArrow", 0.5, 1.0))[:, 0])
     assert (speeds[:50] == 0.0).all()
     reached = WHEEL_SPEED * (1 - math.exp(-WHEEL_LAG_RATE * 0.1))
     assert speeds[59] == pytest.approx(reached)
@@ -56,11 +47,11 @@ def test_a_wheel_follows_its_key_with_a_lag() -> None:
 
 def test_keys_for_both_directions_brake() -> None:
     both = _press("UpArrow", 0.0, 3.0), _press("DownArrow", 0.0, 3.0)
-    assert (_speeds(replayed(car()), *both) == 0.0).all()
+    assert (_speeds(car(), *both) == 0.0).all()
 
 
 def test_wheels_on_both_sides_roll_the_same_way_once_flipped() -> None:
-    machine = replayed(car())
+    machine = car()
     structure = structure_of(machine)
     speeds = _speeds(machine, _press("UpArrow", 0.0, 3.0))[-1]
     spin = speeds[:, None] * structure.directions[structure.wheels]
@@ -70,7 +61,7 @@ def test_wheels_on_both_sides_roll_the_same_way_once_flipped() -> None:
 
 def test_given_controls_replace_the_machines_own(tasks: dict[str, Task]) -> None:
     scenario = tasks["transport-1"].scenario.model_copy(update={"duration_s": 2.0})
-    machine = replayed(car(drive=()))
+    machine = car(drive=())
     keys = (_press("UpArrow", 0.0, 2.0), _press("Alpha9", 0.0, 1.0))
     trajectory = simulate(machine, scenario, "mujoco", controls=keys)
     assert trajectory.positions[-1, 0, 1] > 10.0
@@ -79,7 +70,7 @@ def test_given_controls_replace_the_machines_own(tasks: dict[str, Task]) -> None
 
 def _heated(flame: tuple[float, float, float]) -> bool:
     """Whether a flame heats a cannon at the origin that sprays down."""
-    structure = structure_of(replayed(rocket((EAST,))))
+    structure = structure_of(rocket((EAST,)))
     shown = np.zeros((len(structure), 3))
     directions = np.zeros((len(structure), 3))
     directions[structure.cannons] = DOWN
@@ -119,7 +110,7 @@ def test_a_small_flame_at_the_waist_misses() -> None:
 
 def _hanging_block() -> Machine:
     """A gallows whose arm holds a loose block by a winch."""
-    draft = Draft()
+    draft = KeyedDraft()
     foot = draft.start()
     for side in (EAST, WEST, NORTH, (0, -1, 0)):
         draft.row(foot, side, 3)
@@ -127,7 +118,7 @@ def _hanging_block() -> Machine:
     arm = draft.row(mast, EAST, 2)[-1]
     hook = draft.row(arm, DOWN, 2)
     draft.do("remove_block", block_id=hook[0])
-    draft.link(arm, DOWN, hook[-1], UP, connector=WINCH)
+    draft.connect(arm, hook[-1], DOWN, UP, connector="Winch")
     return draft.machine
 
 
@@ -144,10 +135,10 @@ def test_a_rope_holds_what_hangs_on_it(engine: str) -> None:
 
 
 def test_a_rope_does_not_push(engine: str) -> None:
-    draft = Draft()
+    draft = KeyedDraft()
     low = draft.start()
     middle, high = draft.row(low, UP, 2)
-    draft.link(low, UP, high, DOWN, connector=WINCH)
+    draft.connect(low, high, UP, DOWN, connector="Winch")
     draft.do("remove_block", block_id=middle)
     scenario = Scenario(duration_s=2.0, placement=SpanPlacement(gap=1.0, lowest_center=0.6))
     trajectory = simulate(draft.machine, scenario, engine)

@@ -9,17 +9,17 @@ PROGRAM = """
 import hashlib, sys
 from buildarena_benchmark import builtin_tasks
 from buildarena_simulation import simulate, write_trajectory
-from tests.simulation.references import load_machine
+from support.machines.references import load_machine
 task = builtin_tasks()[sys.argv[3]]
 scenario = task.scenario.model_copy(update={"duration_s": 2.6})
 data = write_trajectory(simulate(load_machine(sys.argv[2]), scenario, sys.argv[1]))
 print(hashlib.sha256(data).hexdigest())
 """
-ROOT = Path(__file__).parents[2]
+TESTS = Path(__file__).parents[1]
 
 
 def _hash_in_new_process(engine: str, name: str, task: str, hash_seed: str) -> str:
-    environment = {**os.environ, "PYTHONHASHSEED": hash_seed, "PYTHONPATH": str(ROOT)}
+    environment = {**os.environ, "PYTHONHASHSEED": hash_seed, "PYTHONPATH": str(TESTS)}
     done = subprocess.run(
         [sys.executable, "-c", PROGRAM, engine, name, task],
         env=environment,

@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from tests.simulation.designs import DOWN, EAST, NORTH, SOUTH, UP, WEST
-from tests.simulation.designs.mechanisms import Rig, catalogue, place_of, turned_by
+from support.machines.rigs import Rig, catalogue, place_of, turned_by
 
 from buildarena_simulation.constants import GRAVITY
+from buildarena_worker.builtin.designs.drafting import DOWN, EAST, NORTH, SOUTH, UP, WEST
 
 pytestmark = pytest.mark.usefixtures("root")
 RPM_100 = 100 * 2 * math.pi / 60

@@ -5,8 +5,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 import pytest
-from tests.simulation.designs import DOWN, EAST, NORTH, SOUTH, UP, WEST, Direction
-from tests.simulation.designs.workshop import WorkshopDraft
+from support.machines.drafts import KeyedDraft
 
 from buildarena_geometry import KeyPress, Machine
 from buildarena_geometry.modules.sets import module_set
@@ -15,6 +14,7 @@ from buildarena_simulation.constants import GRAVITY
 from buildarena_simulation.machine import structure_of
 from buildarena_simulation.scenario import Control, ReleasedPlacement
 from buildarena_simulation.structure.aerodynamics import wings_of
+from buildarena_worker.builtin.designs.drafting import DOWN, EAST, NORTH, SOUTH, UP, WEST, Direction
 
 WORKSHOP = module_set("workshop")
 DRIVEN = Control(mode="agent")
@@ -55,12 +55,12 @@ def _way(trajectory: Trajectory) -> np.ndarray:
 
 @pytest.mark.parametrize("load", [1, 9, 14])
 def test_a_fan_lifts_and_drops_its_load_as_thrust_and_weight_say(engine: str, load: int) -> None:
-    draft = WorkshopDraft()
+    draft = KeyedDraft(modules="workshop")
     start = draft.start()
     draft.row(start, DOWN, load)
     fan = draft.attach(start, UP, "Flying Block")
     draft.bind(fan, "fly", "UpArrow")
-    thrust = WORKSHOP["Flying Block"].forces.push.force * GRAVITY
+    thrust = WORKSHOP["Flying Block"].push.force * GRAVITY
     found = _way(_released(draft.machine, engine, seconds=2.0))
     expected = _path(draft.machine, lambda _: np.array([0.0, 0.0, thrust]), (0, 0, 0), 2.0)
     assert found[2] == pytest.approx(expected[2], rel=0.02)
@@ -69,7 +69,7 @@ def test_a_fan_lifts_and_drops_its_load_as_thrust_and_weight_say(engine: str, lo
 
 def _pair(module: str, y_axis: Direction) -> Machine:
     """The same on both sides, so that nothing turns."""
-    draft = WorkshopDraft()
+    draft = KeyedDraft(modules="workshop")
     start = draft.start()
     for side in (EAST, WEST):
         draft.placed(start, side, module, y_axis)
@@ -78,7 +78,7 @@ def _pair(module: str, y_axis: Direction) -> Machine:
 
 def _plate(v: np.ndarray) -> np.ndarray:
     """The air's force on two wing panels that lie level."""
-    wing = WORKSHOP["Wing Panel"].forces.wing
+    wing = WORKSHOP["Wing Panel"].wing
     size = -2 * wing.coefficient * v[2] * min(v @ v, wing.cap_speed**2)
     return np.array([0.0, 0.0, size])
 
@@ -101,14 +101,14 @@ def test_a_glider_of_a_few_panels_flies_at_a_sensible_speed() -> None:
     mass = WORKSHOP.start.mass + 4 * wing.mass + 2 * 0.3
     flown = {}
     for speed in (15.0, 25.0):
-        normal = GRAVITY * mass / (4 * wing.forces.wing.coefficient * speed**2)
+        normal = GRAVITY * mass / (4 * wing.wing.coefficient * speed**2)
         flown[speed] = math.degrees(math.asin(normal / speed))
     assert 2.0 < flown[25.0] < flown[15.0] < 25.0, "angles of attack that carry it"
 
 
 @pytest.mark.parametrize("name", ["Propeller", "Small Propeller"])
 def test_the_published_law_holds_for_any_flow(name: str) -> None:
-    wing = WORKSHOP[name].forces.wing
+    wing = WORKSHOP[name].wing
     rng = np.random.default_rng(7)
     velocity = 20.0 * rng.normal(size=(200, 3))
     pitch = math.radians({"Propeller": 23.069, "Small Propeller": 22.845}[name])
@@ -123,7 +123,7 @@ def test_the_published_law_holds_for_any_flow(name: str) -> None:
 
 def _lifted(engine: str, module: str, y_axis: Direction, flip: bool) -> float:
     """By how much two blades that a wheel turns lighten what stands on the ground, mass·g."""
-    draft = WorkshopDraft()
+    draft = KeyedDraft(modules="workshop")
     start = draft.start()
     for side in (EAST, WEST, NORTH, SOUTH):
         draft.row(start, side, 4)
@@ -150,7 +150,7 @@ def test_blades_on_a_wheel_pull_as_the_published_law_says(
     module = WORKSHOP[name]
     radius = 0.5 + structure_of(_pair(name, UP)).positions[1, 0] - 0.5
     speed = WORKSHOP["Powered Wheel"].motor.speed * radius
-    pitch = math.radians(module.forces.wing.pitch_deg)
+    pitch = math.radians(module.wing.pitch_deg)
     pull = 2 * 0.015 * speed * math.sin(pitch) * min(speed**2, 900.0) / GRAVITY
     one, other = (_lifted(engine, name, y_axis, flip) for flip in (False, True))
     assert sorted((one, other)) == pytest.approx([-pull, pull], rel=0.03)
@@ -159,7 +159,7 @@ def test_blades_on_a_wheel_pull_as_the_published_law_says(
 @pytest.mark.parametrize("y_axis", [UP, DOWN])
 def test_bowls_fall_as_fast_as_their_drag_says(engine: str, y_axis: Direction) -> None:
     machine = _pair("Drag Block", y_axis)
-    wing = WORKSHOP["Drag Block"].forces.wing
+    wing = WORKSHOP["Drag Block"].wing
     # The bowl opens against its y axis: what falls with it down is braked.
     coefficient = 2 * wing.coefficient if y_axis == UP else 0.0
     structure = structure_of(machine)

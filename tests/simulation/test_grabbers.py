@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from tests.simulation.designs import DOWN, EAST, NORTH, SOUTH, UP, WEST
-from tests.simulation.designs.workshop import WorkshopDraft
+from support.machines.drafts import KeyedDraft
 
 from buildarena_geometry import KeyPress, Machine
 from buildarena_geometry.modules.sets import module_set
@@ -11,9 +10,10 @@ from buildarena_simulation import Scenario, Trajectory, simulate
 from buildarena_simulation.constants import COLLISION_MARGIN, GRAVITY, JOINT_STRENGTH
 from buildarena_simulation.machine import structure_of
 from buildarena_simulation.scenario import Cargo, Control, TerrainBox
+from buildarena_worker.builtin.designs.drafting import DOWN, EAST, NORTH, SOUTH, UP, WEST
 
 WORKSHOP = module_set("workshop")
-GRIP = WORKSHOP["Grabber"].forces.grip
+GRIP = WORKSHOP["Grabber"].grip
 DRIVEN = Control(mode="agent")
 
 
@@ -27,7 +27,7 @@ END = 3.0 - COLLISION_MARGIN
 
 def _stool(*, bound: bool = True) -> tuple[Machine, str]:
     """Four legs, between which a grabber looks down from the starting block."""
-    draft = WorkshopDraft()
+    draft = KeyedDraft(modules="workshop")
     start = draft.start()
     for side in (EAST, WEST, NORTH, SOUTH):
         draft.row(draft.row(start, side, 2)[-1], DOWN, 4)
@@ -107,7 +107,7 @@ def test_a_released_grabber_stays_open_until_it_is_told_to_grab(engine: str) -> 
 
 def _anchored() -> Machine:
     """Fans that would lift it, and a grabber on the ground."""
-    draft = WorkshopDraft()
+    draft = KeyedDraft(modules="workshop")
     start = draft.start()
     for side in (EAST, WEST):
         block = draft.attach(start, side)
@@ -124,7 +124,7 @@ def test_a_grabber_holds_the_ground(engine: str) -> None:
     assert _told(trajectory) == [("grabbed", "ground"), ("released", "ground")]
     height = trajectory.positions[:, 0, 2].astype(float)
     assert np.ptp(height[:30]) < 0.05
-    lift = 2 * WORKSHOP["Flying Block"].forces.push.force
+    lift = 2 * WORKSHOP["Flying Block"].push.force
     mass = structure_of(machine).masses.sum()
     rise = 0.5 * (lift / mass - 1.0) * GRAVITY * 0.6**2
     assert height[45] - height[30] == pytest.approx(rise, rel=0.15)
@@ -147,7 +147,7 @@ def test_a_grabber_holds_a_block_of_another_piece(engine: str) -> None:
 
 
 def test_an_arm_carries_what_it_holds(engine: str) -> None:
-    draft = WorkshopDraft()
+    draft = KeyedDraft(modules="workshop")
     start = draft.start()
     for side in (EAST, WEST, NORTH, SOUTH):
         draft.row(start, side, 3)

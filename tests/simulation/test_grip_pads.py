@@ -4,20 +4,20 @@ import math
 
 import numpy as np
 import pytest
-from tests.simulation.designs import DOWN, EAST, NORTH, SOUTH, WEST
-from tests.simulation.designs.workshop import WorkshopDraft
+from support.machines.drafts import KeyedDraft
 
 from buildarena_geometry.modules.sets import module_set
 from buildarena_simulation import Scenario, simulate
 from buildarena_simulation.constants import GRAVITY
 from buildarena_simulation.scenario import SpanPlacement, TerrainBox
+from buildarena_worker.builtin.designs.drafting import DOWN, EAST, NORTH, SOUTH, WEST
 
 PAD = module_set("workshop")["Grip Pad"]
 
 
 def _slid(engine: str, slope_deg: float, *, pads: bool) -> np.ndarray:
     """Way down a slope of a sled, with or without pads below it."""
-    draft = WorkshopDraft()
+    draft = KeyedDraft(modules="workshop")
     start = draft.start()
     for side in (EAST, WEST, NORTH, SOUTH):
         block = draft.attach(start, side)

@@ -3,24 +3,17 @@
 from typing import Any
 
 import pytest
-from long_tests import long
-from tests.benchmarks.simulation.bench_agreement import compared
-from tests.simulation.designs import (
-    EAST,
-    NORTH,
-    SOUTH,
-    WEST,
-    Draft,
-    beam,
-    deck,
-    replayed,
-)
-from tests.simulation.designs.random_machines import TASKS, random_machine
+from benchmarks.simulation.bench_agreement import compared
+from support.long_tests import long, slow_on_pybullet
+from support.machines.drafts import KeyedDraft
+from support.machines.families import beam, deck
+from support.machines.random_machines import TASKS, random_machine
 
 from buildarena_benchmark import Score, Task, score
 from buildarena_geometry import Machine
 from buildarena_simulation import simulate
 from buildarena_simulation.scenario import TerrainBox
+from buildarena_worker.builtin.designs.drafting import EAST, NORTH, SOUTH, WEST
 
 TOLERANCE = {"mujoco": 0.02, "pybullet": 0.05}
 
@@ -36,13 +29,13 @@ def _tried(task: Task, machine: Machine, engine: str, **changes: Any) -> Score:
     return score(task, machine, simulate(machine, scenario, engine))
 
 
+@slow_on_pybullet
 @pytest.mark.parametrize("yaw_deg", [90, long(180), long(270)])
 def test_a_turned_bridge_carries_the_same(
     engine: str, tasks: dict[str, Task], yaw_deg: int
 ) -> None:
     task = tasks["support-1"]
-    for actions in (deck(5, 7), beam(9, "t")):
-        machine = replayed(actions)
+    for machine in (deck(5, 7), beam(9, "t")):
         # A deck is as long across as along, so the gap turns with it.
         terrain = task.scenario.terrain
         if yaw_deg != 180:
@@ -66,7 +59,7 @@ def _unturned(task: Task) -> dict[str, Any]:
 
 def _turning_car(*, mirrored: bool) -> Machine:
     """A car that drives ahead with its wheels on one side a little longer."""
-    draft = Draft()
+    draft = KeyedDraft()
     middle = draft.start()
     front, back = draft.row(middle, NORTH, 2)[-1], draft.row(middle, SOUTH, 2)[-1]
     fast, slow = (WEST, EAST) if mirrored else (EAST, WEST)

@@ -2,14 +2,14 @@
 
 import numpy as np
 import pytest
-from tests.simulation.designs import DOWN, EAST, NORTH, UP, WEST
-from tests.simulation.designs.mechanisms import Rig
+from support.machines.rigs import Rig
 
 from buildarena_simulation import Scenario, Trajectory, simulate
 from buildarena_simulation.constants import JOINT_STRENGTH, JointKind
 from buildarena_simulation.machine import structure_of
 from buildarena_simulation.rollout import simulate_structure
 from buildarena_simulation.scenario import Control
+from buildarena_worker.builtin.designs.drafting import DOWN, EAST, NORTH, UP, WEST
 
 KINDS = {
     "Hinge": "hinge",

@@ -2,23 +2,23 @@
 
 import numpy as np
 import pytest
-from tests.simulation.designs import DOWN, EAST, UP, WEST
-from tests.simulation.designs.workshop import WorkshopDraft
+from support.machines.drafts import KeyedDraft
 
 from buildarena_geometry import KeyPress, Machine
 from buildarena_geometry.modules.sets import module_set
 from buildarena_simulation import Scenario, Trajectory, read_trajectory, simulate, write_trajectory
 from buildarena_simulation.machine import structure_of
 from buildarena_simulation.scenario import Control, ReleasedPlacement
+from buildarena_worker.builtin.designs.drafting import DOWN, EAST, UP, WEST
 
 WORKSHOP = module_set("workshop")
-IMPULSE = WORKSHOP["Decoupler"].forces.decouple.impulse
+IMPULSE = WORKSHOP["Decoupler"].decouple.impulse
 PRESSED = (KeyPress(time_s=0.4, key="UpArrow", hold_for_s=0.1),)
 
 
 def _staged(below: int, above: int, *, across: bool = False) -> tuple[Machine, list[str]]:
     """A row with a decoupler in it, and the blocks that leave with it."""
-    draft = WorkshopDraft()
+    draft = KeyedDraft(modules="workshop")
     start = draft.start()
     draft.row(start, WEST if across else DOWN, below)
     way = EAST if across else UP
@@ -79,7 +79,7 @@ def test_without_its_key_it_holds(engine: str) -> None:
 
 
 def test_one_that_is_braced_across_lets_go_and_stays(engine: str) -> None:
-    draft = WorkshopDraft()
+    draft = KeyedDraft(modules="workshop")
     start = draft.start()
     decoupler = draft.attach(start, UP, "Decoupler")
     top = draft.attach(decoupler, UP)

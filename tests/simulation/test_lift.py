@@ -1,21 +1,14 @@
 """Rockets: heat, thrust, balance."""
 
-from tests.simulation.designs import (
-    EAST,
-    WEST,
-    Actions,
-    assembled,
-    replayed,
-    rocket,
-    rocket_assembly,
-)
+from support.machines.families import rocket, rocket_assembly
 
 from buildarena_benchmark import Score, Task, score
+from buildarena_geometry import Machine
 from buildarena_simulation import Trajectory, simulate
+from buildarena_worker.builtin.designs.drafting import EAST, WEST
 
 
-def _trial(task: Task, actions: Actions, engine: str) -> tuple[Score, Trajectory]:
-    machine = replayed(actions)
+def _trial(task: Task, machine: Machine, engine: str) -> tuple[Score, Trajectory]:
     trajectory = simulate(machine, task.scenario, engine)
     return score(task, machine, trajectory), trajectory
 
@@ -52,7 +45,7 @@ def test_cannons_fire_only_from_two_seconds_on(engine: str, tasks: dict[str, Tas
 
 
 def test_an_assembly_joined_by_braces_flies_as_one(engine: str, tasks: dict[str, Task]) -> None:
-    machine = assembled(rocket_assembly())
+    machine = rocket_assembly()
     trajectory = simulate(machine, tasks["lift-3"].scenario, engine)
     result = score(tasks["lift-3"], machine, trajectory)
     assert result.success

@@ -6,8 +6,8 @@ from pathlib import Path
 import av
 import pytest
 from PIL import Image
-from tests.simulation.designs import beam, loose_cannon, replayed
-from tests.simulation.references import DATA
+from support.machines.families import beam
+from support.machines.references import DATA, actions_of, load_machine
 from typer.testing import CliRunner
 
 from buildarena_cli.commands.machine import app
@@ -51,11 +51,11 @@ def test_json_tells_the_score_and_nothing_else(run) -> None:
 
 
 def test_a_document_a_log_and_a_bare_list_are_the_same_machine(run, tmp_path: Path) -> None:
-    machine = replayed(beam(7))
+    machine = beam(7)
     forms = {
         "document.json": machine.to_document(),
-        "list.json": beam(7),
-        "log.json": [{"name": a["op"], "arguments": a["params"]} for a in beam(7)],
+        "list.json": actions_of("beam"),
+        "log.json": [{"name": a["op"], "arguments": a["params"]} for a in actions_of("beam")],
     }
     reports = []
     for name, content in forms.items():
@@ -140,7 +140,7 @@ def test_an_empty_machine_is_a_failed_trial_not_a_crash(run, tmp_path: Path) -> 
     ("content", "arguments", "rendered"),
     [
         ("{", [], "not valid JSON"),
-        ('{"blocks": 3}', [], "version is missing"),
+        ('{"blocks": 3}', [], "blocks: expected a list"),
         ('{"hello": 1}', [], "neither a machine document nor an action log"),
         ("[]", ["--engine", "havok"], "pybullet, mujoco"),
     ],
@@ -151,7 +151,7 @@ def test_bad_input_is_reported_in_one_line(
     file = tmp_path / "machine.json"
     file.write_text(content, encoding="utf-8")
     if "--engine" in arguments:
-        file.write_text(json.dumps(beam(3)), encoding="utf-8")
+        file.write_text(json.dumps(beam(3).to_document()), encoding="utf-8")
     done = run("simulate", str(file), *arguments)
     assert done.exit_code == 1
     assert rendered in done.output
@@ -168,8 +168,9 @@ def test_an_unknown_task_is_reported_with_the_known_ones(run) -> None:
 def test_a_machine_that_breaks_a_constraint_is_not_simulated(
     run, tmp_path: Path, form: str
 ) -> None:
-    machine = replayed(loose_cannon())
-    content = loose_cannon() if form == "log" else machine.to_document()
+    name = "rule-breakers/loose-cannon"
+    machine = load_machine(name)
+    content = actions_of(name) if form == "log" else machine.to_document()
     file = tmp_path / "loose.json"
     file.write_text(json.dumps(content), encoding="utf-8")
     done = run("simulate", str(file), "--json", task_name="lift-2")

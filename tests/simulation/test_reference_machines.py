@@ -4,7 +4,7 @@ import json
 from typing import Any
 
 import pytest
-from tests.simulation.references import GOLDENS, REFERENCES, load_machine, outcome
+from support.machines.references import GOLDENS, REFERENCES, outcome
 
 EXPECTED: dict[str, dict[str, dict[str, Any]]] = json.loads(GOLDENS.read_text(encoding="utf-8"))
 
@@ -26,16 +26,6 @@ def test_a_reference_machine_gives_what_it_gave(name: str, engine: str) -> None:
     assert found["flags"] == expected["flags"]
     if expected["success"]:
         assert found["indicator"] == pytest.approx(expected["indicator"], rel=0.05)
-
-
-@pytest.mark.parametrize("name", REFERENCES)
-def test_a_design_gives_the_log_in_its_file(name: str) -> None:
-    parts, actions = REFERENCES[name].logs()
-    machine = load_machine(name)
-    assert [(record.name, record.arguments) for record in machine.log] == [
-        (action["op"], json.loads(json.dumps(action["params"]))) for action in actions
-    ]
-    assert set(machine.available) == set(parts)
 
 
 def test_every_task_has_good_and_bad_machines() -> None:

@@ -1,7 +1,7 @@
 """Which blocks rest on terrain, ground or under the cargo."""
 
 import numpy as np
-from tests.simulation.designs import beam, replayed
+from support.machines.families import beam
 
 from buildarena_simulation.engines.base import CargoBox, CargoPose, World
 from buildarena_simulation.machine import structure_of
@@ -14,7 +14,7 @@ from buildarena_simulation.structure.motion import at_rest
 
 def _beside(height: float, cargo_height: float, *, turn: np.ndarray | None = None) -> ContactForces:
     """What is found for a beam over a gap of 5 whose first end block alone is in touch."""
-    structure = structure_of(replayed(beam(7)))
+    structure = structure_of(beam(7))
     clusters = find_clusters(structure, np.ones(len(structure.members), dtype=bool))
     box = CargoBox(size=np.array([2.5, 2.5, 1.5]), position=np.zeros(3), mass=5.0)
     world = World(
@@ -45,7 +45,7 @@ def _beside(height: float, cargo_height: float, *, turn: np.ndarray | None = Non
 
 def test_both_ends_and_all_blocks_below_the_cargo_rest() -> None:
     found = _beside(5.5 + 0.01, 0.01)
-    structure = structure_of(replayed(beam(7)))
+    structure = structure_of(beam(7))
     across = np.round(structure.positions[found.block, 1]).astype(int)
     assert sorted(across[found.other == WORLD]) == [-3, -3, 3]
     assert sorted(across[found.other == CARGO]) == [-1, 0, 1]

@@ -6,19 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.simulation.designs import (
-    DOWN,
-    EAST,
-    NORTH,
-    SOUTH,
-    UP,
-    WEST,
-    Draft,
-    beam,
-    car,
-    deck,
-    replayed,
-)
+from support.machines.drafts import KeyedDraft
+from support.machines.families import beam, car, deck
 
 from buildarena_geometry import Machine
 from buildarena_simulation.constants import JointKind
@@ -27,6 +16,7 @@ from buildarena_simulation.structure.clusters import Clusters, find_clusters
 from buildarena_simulation.structure.contacts import ContactForces, EvenSharing
 from buildarena_simulation.structure.model import JOINT_KINDS, Structure
 from buildarena_simulation.structure.motion import Motion
+from buildarena_worker.builtin.designs.drafting import DOWN, EAST, NORTH, SOUTH, UP, WEST
 
 
 def _clusters(structure: Structure) -> Clusters:
@@ -38,8 +28,8 @@ def _kinds(machine: Machine) -> list[JointKind]:
 
 
 def test_a_beam_is_one_cluster_and_a_car_five() -> None:
-    assert len(_clusters(structure_of(replayed(beam(7))))) == 1
-    clusters = _clusters(structure_of(replayed(car())))
+    assert len(_clusters(structure_of(beam(7)))) == 1
+    clusters = _clusters(structure_of(car()))
     assert len(clusters) == 5
     assert len(clusters.pieces) == 1
     assert (clusters.parent[1:] == 0).all()
@@ -47,7 +37,7 @@ def test_a_beam_is_one_cluster_and_a_car_five() -> None:
 
 
 def test_a_block_on_a_wheels_outer_face_turns_with_it() -> None:
-    draft = Draft()
+    draft = KeyedDraft()
     wheel = draft.wheel(draft.start(), EAST)
     draft.attach(wheel, EAST)
     structure = structure_of(draft.machine)
@@ -58,7 +48,7 @@ def test_a_block_on_a_wheels_outer_face_turns_with_it() -> None:
 
 
 def test_a_brace_across_an_axle_locks_it() -> None:
-    draft = Draft()
+    draft = KeyedDraft()
     middle = draft.start()
     wheel = draft.wheel(middle, EAST)
     outer = draft.attach(wheel, EAST)
@@ -67,7 +57,7 @@ def test_a_brace_across_an_axle_locks_it() -> None:
 
 
 def test_a_second_axle_on_the_same_line_leaves_the_first_free() -> None:
-    draft = Draft()
+    draft = KeyedDraft()
     middle = draft.start()
     right = draft.attach(draft.wheel(middle, EAST), EAST)
     left = draft.attach(draft.wheel(middle, WEST), WEST)
@@ -76,7 +66,7 @@ def test_a_second_axle_on_the_same_line_leaves_the_first_free() -> None:
 
 
 def test_a_second_axle_beside_the_first_locks_both() -> None:
-    draft = Draft()
+    draft = KeyedDraft()
     middle = draft.start()
     other = draft.row(middle, NORTH, 2)[-1]
     first = draft.attach(draft.wheel(middle, EAST), EAST)
@@ -86,7 +76,7 @@ def test_a_second_axle_beside_the_first_locks_both() -> None:
 
 
 def test_a_small_blocks_far_end_grabs_what_it_touches() -> None:
-    draft = Draft()
+    draft = KeyedDraft()
     middle = draft.start()
     draft.row(middle, UP, 2)
     corner = draft.row(draft.row(middle, EAST, 2)[-1], UP, 2)[-1]
@@ -97,7 +87,7 @@ def test_a_small_blocks_far_end_grabs_what_it_touches() -> None:
 
 
 def test_a_joint_moved_too_far_apart_does_not_hold() -> None:
-    draft = Draft()
+    draft = KeyedDraft()
     middle = draft.start()
     block = draft.attach(middle, NORTH)
     assert len(_clusters(structure_of(draft.machine))) == 1
@@ -107,12 +97,12 @@ def test_a_joint_moved_too_far_apart_does_not_hold() -> None:
 
 
 def test_mass_and_inertia_are_those_of_the_blocks_and_brace_halves() -> None:
-    machine = replayed(deck(3, 5, cross=True))
+    machine = deck(3, 5, cross=True)
     structure = structure_of(machine)
     clusters = _clusters(structure)
     assert clusters.mass[0] == pytest.approx(machine.mass)
     assert clusters.center_of_mass[0] == pytest.approx(machine.center_of_mass, abs=1e-9)
-    lone = structure_of(replayed(beam(7)))
+    lone = structure_of(beam(7))
     along, across = sorted(np.linalg.eigvalsh(_clusters(lone).inertia[0]))[::2]
     masses = [0.25, *[0.3] * 6]
     assert along == pytest.approx(sum(masses) / 6)
@@ -129,7 +119,7 @@ vectors = st.tuples(*[st.floats(-5, 5)] * 3).map(np.array)
 def test_a_break_keeps_linear_and_angular_momentum(
     velocity: np.ndarray, spin: np.ndarray, broken: int
 ) -> None:
-    structure = structure_of(replayed(deck(3, 7)))
+    structure = structure_of(deck(3, 7))
     before = _clusters(structure)
     holds = np.ones(len(structure.members), dtype=bool)
     holds[broken % len(holds)] = False
@@ -187,6 +177,6 @@ def test_sharing_a_patch_evenly_keeps_its_resultant(
 
 def test_south_and_down_faces_carry_as_north_and_up_do() -> None:
     for way in (NORTH, SOUTH, UP, DOWN):
-        draft = Draft()
+        draft = KeyedDraft()
         draft.row(draft.start(), way, 3)
         assert _kinds(draft.machine) == [JointKind.ATTACHMENT] * 3

@@ -4,33 +4,24 @@ import itertools
 from collections.abc import Sequence
 
 import pytest
-from long_tests import long
-from tests.simulation.designs import (
-    BRACE,
-    EAST,
-    NORTH,
-    SOUTH,
-    UP,
-    WINCH,
-    Actions,
-    Draft,
-    beam,
-    deck,
-    one_shot_bridge,
-    replayed,
-)
+from support.long_tests import long, slow_on_pybullet
+from support.machines.drafts import KeyedDraft
+from support.machines.families import beam, deck
+from support.machines.references import load_machine
 
 from buildarena_benchmark import Score, Task, score
+from buildarena_geometry import Machine
 from buildarena_simulation import Trajectory, simulate
 from buildarena_simulation.scenario import SpanPlacement, gap_terrain
+from buildarena_worker.builtin.designs.drafting import BRACE, EAST, NORTH, SOUTH, UP
 
 
-def _trial(task: Task, actions: Actions, engine: str) -> tuple[Score, Trajectory]:
-    machine = replayed(actions)
+def _trial(task: Task, machine: Machine, engine: str) -> tuple[Score, Trajectory]:
     trajectory = simulate(machine, task.scenario, engine)
     return score(task, machine, trajectory), trajectory
 
 
+@slow_on_pybullet
 def test_more_bracing_carries_more(engine: str, tasks: dict[str, Task]) -> None:
     beams = [beam(7, braces) for braces in ("", "t", "tb", "12")]
     loads = [_trial(tasks["support-1"], actions, engine)[0].indicator for actions in beams]
@@ -48,7 +39,7 @@ def test_a_braced_deck_carries_more_than_a_bare_one(engine: str, tasks: dict[str
 
 
 def test_the_one_shot_bridge_stands_in_the_gap(engine: str, tasks: dict[str, Task]) -> None:
-    result, _ = _trial(tasks["support-1"], one_shot_bridge(), engine)
+    result, _ = _trial(tasks["support-1"], load_machine("one-shot-bridge"), engine)
     assert result.metrics["load_when_decided"] >= 900.0
     assert (result.success, result.indicator) == (False, 0.0)
     assert result.flags == ("does_not_span",)
@@ -65,10 +56,11 @@ def test_the_one_shot_bridge_breaks_where_the_paper_reports_its_load(
             "placement": SpanPlacement(gap=5.0, lowest_center=26.0),
         }
     )
-    first = simulate(replayed(one_shot_bridge()), deep, engine).breaks[0]
+    first = simulate(load_machine("one-shot-bridge"), deep, engine).breaks[0]
     assert first.cargo_mass == pytest.approx(1000.0, rel=0.03)
 
 
+@slow_on_pybullet
 def test_overlap_on_the_terrain_never_hurts(engine: str, tasks: dict[str, Task]) -> None:
     loads = [
         _trial(tasks["support-1"], beam(length), engine)[0].metrics["load_at_first_break"]
@@ -80,16 +72,17 @@ def test_overlap_on_the_terrain_never_hurts(engine: str, tasks: dict[str, Task])
 
 def _beam_with(
     braces: Sequence[tuple[int, int]], length: int = 7, connector: str = BRACE
-) -> Actions:
-    draft = Draft()
+) -> Machine:
+    draft = KeyedDraft()
     middle = draft.start()
     ahead = draft.row(middle, NORTH, length // 2)
     row = [*reversed(draft.row(middle, SOUTH, length // 2)), middle, *ahead]
     for first, second in braces:
         draft.connect(row[first], row[second], UP, connector=connector)
-    return draft.actions
+    return draft.machine
 
 
+@slow_on_pybullet
 @pytest.mark.parametrize(
     "spans",
     [
@@ -108,12 +101,13 @@ def test_connectors_stacked_on_the_same_faces_are_worth_one(
     assert _trial(task, _beam_with(spans * 5), engine)[0].indicator < 1000.0
 
 
+@slow_on_pybullet
 def test_winches_stacked_between_the_same_faces_are_one_rope(
     engine: str, tasks: dict[str, Task]
 ) -> None:
     spans = ((0, 3), (3, 6), (0, 6))
     loads = [
-        _trial(tasks["support-1"], _beam_with(spans * n, connector=WINCH), engine)[0].indicator
+        _trial(tasks["support-1"], _beam_with(spans * n, connector="Winch"), engine)[0].indicator
         for n in (1, 4)
     ]
     assert loads[1] <= 1.05 * loads[0]
@@ -127,6 +121,7 @@ def test_a_beam_that_is_too_short_for_the_gap_scores_nothing(
     assert result.indicator == 0.0
 
 
+@slow_on_pybullet
 def test_a_bridge_built_along_the_gap_is_turned_across_it(
     engine: str, tasks: dict[str, Task]
 ) -> None:

@@ -4,19 +4,9 @@ import dataclasses
 
 import numpy as np
 import pytest
-from tests.simulation.designs import (
-    NORTH,
-    SOUTH,
-    UP,
-    WINCH,
-    Draft,
-    beam,
-    car,
-    deck,
-    one_shot_bridge,
-    replayed,
-    rocket,
-)
+from support.machines.drafts import KeyedDraft
+from support.machines.families import beam, car, deck, rocket
+from support.machines.references import load_machine
 
 from buildarena_benchmark import Task
 from buildarena_simulation import (
@@ -31,6 +21,7 @@ from buildarena_simulation import (
     write_trajectory,
 )
 from buildarena_simulation.engines.base import rotation_of
+from buildarena_worker.builtin.designs.drafting import NORTH, SOUTH, UP
 
 
 def _equal(first: object, second: object) -> bool:
@@ -43,9 +34,9 @@ def _equal(first: object, second: object) -> bool:
 
 
 def test_a_file_gives_back_the_trajectory(tasks: dict[str, Task]) -> None:
-    bridge = simulate(replayed(one_shot_bridge()), tasks["support-1"].scenario, "mujoco")
+    bridge = simulate(load_machine("one-shot-bridge"), tasks["support-1"].scenario, "mujoco")
     scenario = tasks["lift-1"].scenario.model_copy(update={"duration_s": 1.0})
-    engine = simulate(replayed(rocket()), scenario, "mujoco")
+    engine = simulate(rocket(), scenario, "mujoco")
     for trajectory in (bridge, engine):
         data = write_trajectory(trajectory)
         assert _equal(read_trajectory(data), trajectory)
@@ -56,7 +47,7 @@ def test_a_file_gives_back_the_trajectory(tasks: dict[str, Task]) -> None:
 def test_a_trajectory_tells_what_bears_the_machine_and_what_it_bears(
     engine: str, tasks: dict[str, Task]
 ) -> None:
-    machine = replayed(deck(5, 7))
+    machine = deck(5, 7)
     cargo = tasks["support-1"].scenario.cargo.model_copy(update={"final_mass": 100.0})
     scenario = tasks["support-1"].scenario.model_copy(update={"cargo": cargo})
     bearing = simulate(machine, scenario, engine).bearing
@@ -66,16 +57,16 @@ def test_a_trajectory_tells_what_bears_the_machine_and_what_it_bears(
     assert bearing.ground[settled] == pytest.approx(0.0, abs=0.1)
     half = (100.0 + machine.mass) / 2
     assert bearing.terrain[settled] == pytest.approx(half, rel=0.03)
-    wheels = simulate(replayed(car(drive=())), tasks["transport-1"].scenario, engine).bearing
+    wheels = simulate(car(drive=()), tasks["transport-1"].scenario, engine).bearing
     assert wheels is not None
-    assert wheels.wheels[settled].sum(axis=1) == pytest.approx(replayed(car()).mass, rel=0.02)
+    assert wheels.wheels[settled].sum(axis=1) == pytest.approx(car().mass, rel=0.02)
     assert len(wheels.wheel_ids) == 4
 
 
 def test_a_trajectory_tells_what_each_joint_bears_over_time(
     engine: str, tasks: dict[str, Task]
 ) -> None:
-    trajectory = simulate(replayed(beam(7)), tasks["support-1"].scenario, engine)
+    trajectory = simulate(beam(7), tasks["support-1"].scenario, engine)
     loads = trajectory.joint_loads
     assert loads is not None
     assert loads.dtype == np.float32
@@ -100,11 +91,11 @@ def test_a_trajectory_tells_what_each_joint_bears_over_time(
 
 
 def test_ropes_bear_their_share_too(engine: str, tasks: dict[str, Task]) -> None:
-    draft = Draft()
+    draft = KeyedDraft()
     middle = draft.start()
     row = [*draft.row(middle, NORTH, 3), *draft.row(middle, SOUTH, 3)]
-    draft.connect(row[2], row[5], UP, connector=WINCH)
-    trajectory = simulate(replayed(draft.actions), tasks["support-1"].scenario, engine)
+    draft.connect(row[2], row[5], UP, connector="Winch")
+    trajectory = simulate(draft.machine, tasks["support-1"].scenario, engine)
     loads = trajectory.joint_loads
     assert loads is not None
     peaks = trajectory.joint_peaks
@@ -115,7 +106,7 @@ def test_ropes_bear_their_share_too(engine: str, tasks: dict[str, Task]) -> None
 
 def test_older_files_are_read_and_can_be_written(tasks: dict[str, Task]) -> None:
     scenario = tasks["support-1"].scenario.model_copy(update={"duration_s": 1.0})
-    trajectory = simulate(replayed(beam(7)), scenario, "mujoco")
+    trajectory = simulate(beam(7), scenario, "mujoco")
     old = write_trajectory(trajectory, schema=2)
     assert (schema_of(old), schema_of(write_trajectory(trajectory))) == (2, 3)
     again = read_trajectory(old)
@@ -129,7 +120,7 @@ def test_older_files_are_read_and_can_be_written(tasks: dict[str, Task]) -> None
 
 
 def test_a_break_makes_pieces(tasks: dict[str, Task]) -> None:
-    trajectory = simulate(replayed(beam(7)), tasks["support-1"].scenario, "mujoco")
+    trajectory = simulate(beam(7), tasks["support-1"].scenario, "mujoco")
     assert trajectory.pieces is not None
     assert len(set(trajectory.pieces[0])) == 1
     assert len(set(trajectory.pieces[-1])) > 1
@@ -140,7 +131,7 @@ def test_a_break_makes_pieces(tasks: dict[str, Task]) -> None:
 
 def test_a_trajectory_tells_where_it_is_from(engine: str, tasks: dict[str, Task]) -> None:
     scenario = tasks["lift-1"].scenario.model_copy(update={"duration_s": 0.4})
-    trajectory = simulate(replayed(rocket()), scenario, engine)
+    trajectory = simulate(rocket(), scenario, engine)
     assert (trajectory.engine, trajectory.engine_version) == (engine, engine_version(engine))
     assert trajectory.simulation_version == SIMULATION_VERSION
     assert {"time_step_s", "gravity", "scenario"} <= set(trajectory.settings)
@@ -148,7 +139,7 @@ def test_a_trajectory_tells_where_it_is_from(engine: str, tasks: dict[str, Task]
 
 def test_samples_are_taken_at_25_hz_from_the_start_on(tasks: dict[str, Task]) -> None:
     scenario = tasks["support-1"].scenario.model_copy(update={"duration_s": 2.0})
-    trajectory = simulate(replayed(one_shot_bridge()), scenario, "mujoco")
+    trajectory = simulate(load_machine("one-shot-bridge"), scenario, "mujoco")
     assert np.allclose(trajectory.time_s, np.arange(51) / 25)
     assert trajectory.cargo_mass is not None
     assert trajectory.cargo_mass[0] == pytest.approx(5 + 1495 * 0.005)
@@ -156,7 +147,7 @@ def test_samples_are_taken_at_25_hz_from_the_start_on(tasks: dict[str, Task]) ->
 
 
 def test_positions_are_the_points_shown_to_models(engine: str, tasks: dict[str, Task]) -> None:
-    machine = replayed(car())
+    machine = car()
     scenario = tasks["transport-1"].scenario.model_copy(update={"duration_s": 0.04})
     trajectory = simulate(machine, scenario, engine)
     lift = trajectory.positions[0, 0] - machine.blocks["1"].center
@@ -170,14 +161,14 @@ def test_only_tracked_blocks_are_recorded(tasks: dict[str, Task]) -> None:
     scenario = tasks["transport-1"].scenario.model_copy(
         update={"duration_s": 0.2, "tracked_blocks": ("1", "3")}
     )
-    trajectory = simulate(replayed(car()), scenario, "mujoco")
+    trajectory = simulate(car(), scenario, "mujoco")
     assert trajectory.block_ids == ("1", "3")
     assert trajectory.positions.shape == (6, 2, 3)
 
 
 def test_arrays_are_read_only(tasks: dict[str, Task]) -> None:
     scenario = tasks["lift-1"].scenario.model_copy(update={"duration_s": 0.2})
-    trajectory = simulate(replayed(rocket()), scenario, "mujoco")
+    trajectory = simulate(rocket(), scenario, "mujoco")
     with pytest.raises(ValueError, match="read-only"):
         trajectory.positions[0] = 0.0
 

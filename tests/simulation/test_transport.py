@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
-from tests.simulation.designs import Actions, car, replayed, stool
+from support.machines.families import car
+from support.machines.references import load_machine
 
 from buildarena_benchmark import Score, Task, score
+from buildarena_geometry import Machine
 from buildarena_simulation import Trajectory, simulate
 from buildarena_simulation.engines.base import rotation_of
 
@@ -12,9 +14,8 @@ STRAIGHT = [("UpArrow", 1.0, 3.0)]
 
 
 def _trial(
-    task: Task, actions: Actions, engine: str, duration_s: float
+    task: Task, machine: Machine, engine: str, duration_s: float
 ) -> tuple[Score, Trajectory]:
-    machine = replayed(actions)
     scenario = task.scenario.model_copy(update={"duration_s": duration_s})
     trajectory = simulate(machine, scenario, engine)
     return score(task, machine, trajectory), trajectory
@@ -69,10 +70,12 @@ def test_the_large_cargo_stays_on_a_long_deck(engine: str, tasks: dict[str, Task
     assert trajectory.cargo_position[-1, 2] > 1.5
 
 
-@pytest.mark.parametrize("actions", [car(bound=False), car(drive=()), stool()])
+@pytest.mark.parametrize(
+    "machine", [car(bound=False), car(drive=()), load_machine("stool-with-wheels-on-top")]
+)
 def test_a_machine_nothing_drives_fails(
-    engine: str, tasks: dict[str, Task], actions: Actions
+    engine: str, tasks: dict[str, Task], machine: Machine
 ) -> None:
-    result, _ = _trial(tasks["transport-1"], actions, engine, 4.0)
+    result, _ = _trial(tasks["transport-1"], machine, engine, 4.0)
     assert not result.success
     assert result.indicator < 1.0

@@ -4,20 +4,13 @@ import math
 
 import numpy as np
 import pytest
-from tests.simulation.designs import DOWN, EAST, NORTH, SOUTH, UP, WEST
-from tests.simulation.designs.mechanisms import (
-    Rig,
-    period_of,
-    place_of,
-    rotation_of,
-    tried,
-    turned_by,
-)
+from support.machines.rigs import Rig, period_of, place_of, rotation_of, tried, turned_by
 
 from buildarena_simulation import Scenario, simulate
 from buildarena_simulation.constants import GRAVITY
 from buildarena_simulation.scenario import Control, SpanPlacement, TerrainBox
 from buildarena_simulation.structure.model import Structure
+from buildarena_worker.builtin.designs.drafting import DOWN, EAST, NORTH, SOUTH, UP, WEST
 
 pytestmark = pytest.mark.usefixtures("root")
 

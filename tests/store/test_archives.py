@@ -10,9 +10,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from emptying import empty
 from sqlalchemy import text
-from working import work
+from support.servers.databases import empty
+from support.stages import work
 
 from buildarena_api.routes.tasks import EXAMPLE
 from buildarena_benchmark import parse_custom_task

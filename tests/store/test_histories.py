@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from sqlalchemy import text
-from working import work
+from support.stages import work
 
 from buildarena_pipeline.catalog.specs import SweepSpec
 from buildarena_pipeline.runtime.context import Context

@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import random
-import sys
-from pathlib import Path
 
 import pytest
+from benchmarks.scale.filling import TRACKS, Amount, fill
 from sqlalchemy import delete, func, select, text, update
 
 from buildarena_store import STAGE_SECONDS, TrialFilter
+from buildarena_store.derived_tables import figure_changes
 from buildarena_store.jobs.pages import JobFilter, Order
-from buildarena_store.made_tables import figure_changes
 from buildarena_store.tables import attempts, jobs, sweep_jobs
-
-sys.path.append(str(Path(__file__).parents[1] / "benchmarks" / "scale"))
-from filling import TRACKS, Amount, fill
 
 
 @pytest.fixture
@@ -28,7 +24,7 @@ def counted(context) -> object:
     """The figures after counting anew; how long the oldest has waited goes on."""
     with context.store.database.transaction() as connection:
         connection.execute(text("SELECT recount_jobs()"))
-    return as_said(context.store.figures.read())
+    return as_said(context.store.metrics.read())
 
 
 def as_said(figures) -> object:
@@ -70,8 +66,8 @@ def test_kept_counts_are_those_that_counting_finds(filled) -> None:
             else:
                 store.leases.give_up(lease, "gone", reason="lost_worker")
         if step % 4 == 0:
-            store.figures.read()
-    kept = as_said(store.figures.read())
+            store.metrics.read()
+    kept = as_said(store.metrics.read())
     with store.database.transaction() as connection:
         # Attempts that were taken out have been counted.
         connection.execute(text("CREATE TEMP TABLE stages AS SELECT * FROM figures"))
@@ -80,7 +76,7 @@ def test_kept_counts_are_those_that_counting_finds(filled) -> None:
 
 
 def test_attempts_are_counted_by_how_long_they_took(filled) -> None:
-    assert as_said(filled.store.figures.read()) == counted(filled)
+    assert as_said(filled.store.metrics.read()) == counted(filled)
     store = filled.store
     with store.database.transaction() as connection:
         for number, bound in enumerate(STAGE_SECONDS):
@@ -93,13 +89,13 @@ def test_attempts_are_counted_by_how_long_they_took(filled) -> None:
                     ),
                     {"token": 100 + 2 * number + way, "seconds": bound + (way - 0.5) / 1000},
                 )
-    assert as_said(store.figures.read()) == counted(filled)
+    assert as_said(store.metrics.read()) == counted(filled)
 
 
 def test_changes_are_gathered(filled) -> None:
     store = filled.store
     store.leases.claim("construct", owner="w")
-    store.figures.read()
+    store.metrics.read()
     with store.database.transaction() as connection:
         assert connection.execute(select(func.count()).select_from(figure_changes)).scalar() == 0
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from alembic import command
 from sqlalchemy import create_engine, text
-from working import work
+from support.stages import work
 
 from buildarena_pipeline.catalog.models import load_registry
 from buildarena_pipeline.catalog.specs import Budget

@@ -17,3 +17,9 @@ LONG: Final = bool(os.environ.get("BUILDARENA_TEST_LONG"))
 def long(*values: Any, id: str | None = None) -> Any:  # noqa: A002 - pytest's name
     """A variant for `make test-long` alone."""
     return pytest.param(*values, id=id, marks=pytest.mark.long)
+
+
+slow_on_pybullet: Final = pytest.mark.parametrize(
+    "engine", ["mujoco", long("pybullet")], indirect=True
+)
+"""A rule that MuJoCo shows in seconds; PyBullet takes several times as long."""

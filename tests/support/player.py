@@ -15,7 +15,7 @@ from buildarena_pipeline.catalog.specs import Decoding
 from buildarena_pipeline.runtime.active_lease import ActiveLease
 from buildarena_pipeline.submission.submission import model_config
 from buildarena_store import JournalEntry, RolloutRecord
-from buildarena_worker.providers import ModelClients
+from buildarena_worker.providers.clients import ModelClients
 from buildarena_worker.session.budget_guard import BudgetGuard
 from buildarena_worker.session.concurrency_gate import ConcurrencyGate
 from buildarena_worker.session.host import LiveHost, ReplayHost
@@ -54,7 +54,7 @@ class Played:
         return None if self.suspended or self.end else self.result
 
 
-class KeptInMemory:
+class StoredInMemory:
     """A journal in memory."""
 
     def __init__(self, entries: list[JournalEntry], append: Any) -> None:
@@ -107,7 +107,7 @@ class Player:
             host = LiveHost(
                 kept=host,
                 client=client,
-                journal=KeptInMemory(written, append),  # type: ignore[arg-type]
+                journal=StoredInMemory(written, append),  # type: ignore[arg-type]
                 active=active,
                 guard=BudgetGuard(budgets, active, lambda *_: Decimal()),
                 gate=gate,

@@ -6,16 +6,14 @@ import argparse
 import os
 import shutil
 import subprocess
-import sys
 import tempfile
 from pathlib import Path
 
 import httpx
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "tests" / "support"))
 
-from running import finished, running_stack  # noqa: E402 - the folder is no package
+from support.servers.stacks import finished, running_stack  # noqa: E402 - the folder is no package
 
 IMAGES = ROOT / "docs" / "images"
 MAX_BYTES = 300_000

@@ -8,15 +8,15 @@ from pathlib import Path
 import httpx
 import psutil
 import pytest
-from long_tests import LONG
-from pages import in_browser, needs_pages
-from provider_standin import ProviderStandIn
-from running import finished, running_stack
+from support.documents.pages import in_browser, needs_pages
+from support.long_tests import LONG
+from support.providers.stand_in import ProviderStandIn
+from support.servers.stacks import finished, running_stack
 from tests.web.random_machines import built_session
 
 pytestmark = needs_pages
 
-MACHINES, A_SESSION = (50, 10) if LONG else (15, 5)
+MACHINES, A_SESSION = (50, 10) if LONG else (8, 4)
 LATENCY_S = 0.3
 SWEEP = {
     "name": "room",
@@ -56,12 +56,12 @@ def test_a_session_is_watched_while_processes_die(tmp_path: Path) -> None:
     with ProviderStandIn("expert", latency_s=LATENCY_S) as standin:
         models = tmp_path / "models.yaml"
         models.write_text(
-            f"providers:\n  standin: {{wire: openai, base_url: '{standin.url}/v1'}}\n"
+            f"providers:\n  standin: {{protocol: openai, base_url: '{standin.url}/v1'}}\n"
             "models:\n  - {name: standin/expert, provider: standin, model: expert}\n"
         )
         with running_stack(tmp_path, models_file=models) as stack:
-            wish = {"task": "support-1", "model": "standin/expert", "simulator": "mujoco"}
-            job = httpx.post(f"{stack.url}/v1/jobs", json=wish).raise_for_status().json()["id"]
+            payload = {"task": "support-1", "model": "standin/expert", "simulator": "mujoco"}
+            job = httpx.post(f"{stack.url}/v1/jobs", json=payload).raise_for_status().json()["id"]
             print(  # noqa: T201 - the measured figures, for who asks with -s
                 in_browser(
                     stack.url,

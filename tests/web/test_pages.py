@@ -7,10 +7,10 @@ from pathlib import Path
 
 import httpx
 import pytest
-from pages import BUILDARENA, in_browser, needs_pages
 from pydantic import SecretStr
-from reverse_proxy import ProxyRules, reverse_proxy
-from running import finished, running_stack
+from support.documents.pages import BUILDARENA, in_browser, needs_pages
+from support.servers.reverse_proxy import ProxyRules, reverse_proxy
+from support.servers.stacks import finished, running_stack
 
 SWEEP = {
     "name": "pages",

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import httpx
 import pytest
-from pages import BUILDARENA, in_browser, needs_pages
-from running import finished, running_stack
+from support.documents.pages import BUILDARENA, in_browser, needs_pages
+from support.servers.stacks import finished, running_stack
 
 pytestmark = needs_pages
 
@@ -41,7 +41,7 @@ def file_server(folder: Path) -> Iterator[str]:
             """Browsers hang up when a page is closed."""
 
     server = Server(("127.0.0.1", 0), partial(Quiet, directory=str(folder)))
-    thread = threading.Thread(target=server.serve_forever)
+    thread = threading.Thread(target=server.serve_forever, args=(0.01,))
     thread.start()
     try:
         yield f"http://127.0.0.1:{server.server_port}/"

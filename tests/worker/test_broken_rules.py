@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from working import work
+from support.stages import work
 
-from buildarena_pipeline.agents import handing_in
+from buildarena_pipeline.agents import submission
 from buildarena_pipeline.agents.sessions import ExternalSessions
 from buildarena_worker.wiring import verifier
 
@@ -28,7 +28,7 @@ def _submitted(context) -> str:
 
 
 def test_a_machine_that_was_let_through_fails_verification(context, monkeypatch) -> None:
-    monkeypatch.setattr(handing_in, "broken_constraint", lambda *_: None)
+    monkeypatch.setattr(submission, "broken_constraint", lambda *_: None)
     job = _submitted(context)
     assert context.store.jobs.get(job).outcome == "unsuccessful"
     report = verifier(context).verify(job)

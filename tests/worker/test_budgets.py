@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from working import work
+from support.stages import work
 
 from buildarena_pipeline.catalog.specs import Budget, SweepSpec
 
-WISH = {"tasks": ["lift-1"], "models": ["builtin/expert"], "simulator": "mujoco"}
+PAYLOAD = {"tasks": ["lift-1"], "models": ["builtin/expert"], "simulator": "mujoco"}
 
 
 def test_a_sweep_stops_at_its_budget_and_goes_on_with_more(context, submissions) -> None:
-    spec = SweepSpec(**WISH, seeds=[0, 1, 2, 3, 4, 5], budget=Budget(max_requests=20))
+    spec = SweepSpec(**PAYLOAD, seeds=[0, 1, 2, 3, 4, 5], budget=Budget(max_requests=20))
     sweep_id = submissions.submit_sweep(spec).sweep.id
     work(context, threads=4)
     assert context.store.sweeps.get(sweep_id).state == "budget_exhausted"
@@ -34,7 +34,7 @@ def test_a_sweep_stops_at_its_budget_and_goes_on_with_more(context, submissions)
 
 
 def test_a_small_token_budget_stops_before_the_first_request(context, submissions) -> None:
-    spec = SweepSpec(**WISH, seeds=[0], budget=Budget(max_tokens=1000))
+    spec = SweepSpec(**PAYLOAD, seeds=[0], budget=Budget(max_tokens=1000))
     sweep_id = submissions.submit_sweep(spec).sweep.id
     work(context, threads=4)
     assert context.store.sweeps.get(sweep_id).state == "budget_exhausted"
@@ -45,10 +45,10 @@ def test_a_small_token_budget_stops_before_the_first_request(context, submission
 
 
 def test_resuming_a_finished_sweep_does_nothing_twice(context, submissions) -> None:
-    spec = SweepSpec(**WISH, seeds=[0])
+    spec = SweepSpec(**PAYLOAD, seeds=[0])
     first = submissions.submit_sweep(spec)
     work(context, threads=4)
     second = submissions.submit_sweep(spec, resume=True)
     assert (second.sweep.id, second.added) == (first.sweep.id, 0)
-    other = submissions.submit_sweep(SweepSpec(**WISH, seeds=[0, 1]), resume=True)
+    other = submissions.submit_sweep(SweepSpec(**PAYLOAD, seeds=[0, 1]), resume=True)
     assert (other.resumed, other.added) == (False, 1)

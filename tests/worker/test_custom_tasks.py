@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 import yaml
-from suspension_bridge import suspension_bridge
-from working import work
+from support.machines.suspension_bridge import suspension_bridge
+from support.stages import work
 
 from buildarena_api.routes.tasks import EXAMPLE
 from buildarena_benchmark import builtin_tasks, parse_custom_task

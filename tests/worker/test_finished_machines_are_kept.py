@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import pytest
-from scripted import call
+from support.providers.scripted import call
 
 from buildarena_store import Usage
 from buildarena_worker.builtin import BuiltinClient
-from buildarena_worker.session.messages import Answer, Reply, Request
+from buildarena_worker.session.messages import Completion, Reply, Request
 from buildarena_worker.workflow.plan import read_plan
 
 
@@ -19,8 +19,8 @@ class Spoiling:
         self._guidance, self._builder = guidance, builder
         self._left = 3
 
-    def complete(self, request: Request, patience: object = None) -> Answer:
-        del patience
+    def complete(self, request: Request, options: object = None) -> Completion:
+        del options
         text = "\n".join(message.text for message in request.messages)
         if "## Refinement of: " not in text:
             return self._expert.complete(request)
@@ -30,7 +30,7 @@ class Spoiling:
         else:
             reply = self._builder if builds else Reply(text="Do it.")
             self._left -= not builds
-        return Answer(reply=reply, usage=Usage(requests=1), latency_s=0.0)
+        return Completion(reply=reply, usage=Usage(requests=1), latency_s=0.0)
 
 
 @pytest.mark.parametrize(

@@ -11,11 +11,11 @@ import time
 from decimal import Decimal
 
 import pytest
-from crew import crew, models_file
-from provider_standin import ProviderStandIn
-from running import wait_until
 from sqlalchemy import text
-from working import work
+from support.providers.stand_in import ProviderStandIn
+from support.servers.construct_threads import crew, models_file
+from support.servers.stacks import wait_until
+from support.stages import work
 
 from buildarena_pipeline.catalog.models import load_registry
 from buildarena_pipeline.catalog.specs import JobSpec

@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from working import work
+from support.stages import work
 
 from buildarena_pipeline.catalog.specs import JobSpec
 from buildarena_worker import builtin

@@ -6,7 +6,7 @@ import json
 from dataclasses import replace
 
 import pytest
-from scripted import Recording, Scripted, call
+from support.providers.scripted import Recording, Scripted, call
 
 from buildarena_benchmark import builtin_tasks
 from buildarena_geometry import LOOKUP, module_set, tool_definitions
@@ -31,21 +31,21 @@ def texts(request):
 @pytest.mark.parametrize("workflow", ["five-role", "guidance-builder", "builder"])
 def test_the_expert_plays_as_well_where_it_looks_up(play, workflow):
     machines = {}
-    for how in ("told", "looked_up"):
+    for how in ("inline", "on_demand"):
         model = Recording()
         played = play(task=task(how), client=model, workflow=workflow)
         assert played.suspended is not None, played.failure
         machines[how] = played.session.machine
         held = {tool.name for request in model.requests for tool in request.tools}
-        assert held >= LOOKUPS if how == "looked_up" else not held & LOOKUPS
+        assert held >= LOOKUPS if how == "on_demand" else not held & LOOKUPS
         told = any(HINGE.description in texts(request) for request in model.requests)
-        assert told == (how == "told")
-    assert machines["told"] == machines["looked_up"]
+        assert told == (how == "inline")
+    assert machines["inline"] == machines["on_demand"]
 
 
 def test_what_one_role_looks_up_no_other_reads(play):
     model = Recording()
-    played = play(task=task("looked_up"), client=model)
+    played = play(task=task("on_demand"), client=model)
     wheel = module_set("workshop")["Powered Wheel"].description
     readers = {
         turn.role
@@ -57,7 +57,7 @@ def test_what_one_role_looks_up_no_other_reads(play):
 
 def test_builders_that_only_carry_out_have_no_lookups(play):
     model = Recording()
-    played = play(task=task("looked_up"), client=model)
+    played = play(task=task("on_demand"), client=model)
     for turn, request in zip(played.session.transcript.turns, model.requests, strict=True):
         held = {tool.name for tool in request.tools} & LOOKUPS
         assert held == (
@@ -67,7 +67,7 @@ def test_builders_that_only_carry_out_have_no_lookups(play):
 
 def test_a_role_that_only_looks_up_comes_to_its_end(play):
     model = Scripted(last=call("list_modules", category="basic"))
-    played = play(task=task("looked_up"), client=model)
+    played = play(task=task("on_demand"), client=model)
     assert played.failure.reason == "plan_unreadable"
     assert len(model.requests) == 5 * (1 + MAX_LOOKUPS)
 
@@ -78,7 +78,7 @@ def test_a_lookup_that_is_refused_says_what_there_is(play):
         call("describe_module", module="Hinje, Swivel"),
         call("describe_module", module="hinge, SWIVEL"),
     )
-    played = play(task=task("looked_up"), client=model, workflow="builder")
+    played = play(task=task("on_demand"), client=model, workflow="builder")
     answers = [
         action.feedback for turn in played.session.transcript.turns for action in turn.actions
     ]

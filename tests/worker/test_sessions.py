@@ -3,7 +3,7 @@ from __future__ import annotations
 import itertools
 
 import pytest
-from scripted import Scripted, call
+from support.providers.scripted import Scripted, call
 
 from buildarena_store import StaleLeaseError, Usage
 from buildarena_worker.session.messages import Message, Reply, ToolCall

@@ -3,7 +3,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from scripted import Scripted, call
+from support.providers.scripted import Scripted, call
 
 from buildarena_benchmark import builtin_tasks
 from buildarena_geometry import Machine

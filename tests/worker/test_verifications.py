@@ -6,7 +6,7 @@ import threading
 import time
 
 import pytest
-from running import wait_until
+from support.servers.stacks import wait_until
 
 from buildarena_pipeline.catalog.specs import SweepSpec
 from buildarena_worker.verify import AT_ONCE, VerificationRunner

@@ -8,8 +8,8 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 
 import pytest
-from scripted import Recording
-from what_a_model_sees import PAGE, page
+from support.documents.what_a_model_sees import PAGE, page
+from support.providers.scripted import Recording
 
 from buildarena_benchmark import builtin_tasks
 from buildarena_geometry import load_catalogue, tool_definitions

@@ -17,7 +17,11 @@ afterAll(async () => {
 });
 
 /** Frames a second that the page gets done, and its slowest, while something goes on for some seconds. */
-async function frames(page: Page, seconds: number, eachFrame: "scroll" | "turn" | "none"): Promise<{ fps: number; worst: number }> {
+async function frames(
+  page: Page,
+  seconds: number,
+  eachFrame: "scroll" | "turn" | "none",
+): Promise<{ fps: number; worst: number }> {
   return page.evaluate(
     async ([length, kind]) => {
       const box = document.querySelector('[aria-label="Transcript, scrolls"]');
@@ -26,10 +30,31 @@ async function frames(page: Page, seconds: number, eachFrame: "scroll" | "turn" 
       const began = performance.now();
       let before = began;
       let x = 100;
-      if (kind === "turn") canvas?.dispatchEvent(new PointerEvent("pointerdown", { bubbles: true, pointerId: 1, button: 0, buttons: 1, clientX: x, clientY: 100, pointerType: "mouse" }));
+      if (kind === "turn")
+        canvas?.dispatchEvent(
+          new PointerEvent("pointerdown", {
+            bubbles: true,
+            pointerId: 1,
+            button: 0,
+            buttons: 1,
+            clientX: x,
+            clientY: 100,
+            pointerType: "mouse",
+          }),
+        );
       while (before - began < length * 1000) {
         if (kind === "scroll" && box !== null) box.scrollTop += 120;
-        if (kind === "turn") canvas?.dispatchEvent(new PointerEvent("pointermove", { bubbles: true, pointerId: 1, buttons: 1, clientX: (x += 3), clientY: 100, pointerType: "mouse" }));
+        if (kind === "turn")
+          canvas?.dispatchEvent(
+            new PointerEvent("pointermove", {
+              bubbles: true,
+              pointerId: 1,
+              buttons: 1,
+              clientX: (x += 3),
+              clientY: 100,
+              pointerType: "mouse",
+            }),
+          );
         const now = await new Promise<number>((resolve) => requestAnimationFrame(resolve));
         gaps.push(now - before);
         before = now;
@@ -51,7 +76,6 @@ describe.skipIf(large === "")("speed", () => {
     await page.waitForTimeout(500);
     figures.fps_trial_100_blocks = (await frames(page, 5, "none")).fps;
     await page.close();
-
   });
 
   it("of a long transcript", async () => {

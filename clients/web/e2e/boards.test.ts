@@ -16,7 +16,10 @@ const WAITING = { tasks: [TASK], models: ["builtin/expert"], simulator: "pybulle
 let browser: Browser;
 
 async function ask<Data>(path: string, body?: unknown): Promise<Data> {
-  const init = body === undefined ? {} : { method: "POST", body: JSON.stringify(body), headers: { "Content-Type": "application/json" } };
+  const init =
+    body === undefined
+      ? {}
+      : { method: "POST", body: JSON.stringify(body), headers: { "Content-Type": "application/json" } };
   const answer = await fetch(URL_OF_SERVICE + path, init);
   expect(answer.ok, path).toBe(true);
   return (await answer.json()) as Data;
@@ -27,23 +30,40 @@ function opened(path: string, url = URL_OF_SERVICE, width = 1280): Promise<Visit
 }
 
 async function textsOf(page: Page, table: string): Promise<string[][]> {
-  return page.locator(table).evaluate((found) => [...found.querySelectorAll("tbody tr")].map((row) => [...row.children].map((cell) => (cell as HTMLElement).textContent.trim())));
+  return page
+    .locator(table)
+    .evaluate((found) =>
+      [...found.querySelectorAll("tbody tr")].map((row) =>
+        [...row.children].map((cell) => (cell as HTMLElement).textContent.trim()),
+      ),
+    );
 }
 
 /** The rows of a Markdown table that follows a heading, by column. */
 function reported(heading: string): Record<string, string>[] {
   const after = readFileSync(REPORT, "utf8").split(`## ${heading}\n`)[1] ?? "";
-  const lines = after.split("\n## ")[0]?.split("\n").filter((line) => line.startsWith("|")) ?? [];
-  const cells = (line: string): string[] => line.split("|").slice(1, -1).map((cell) => cell.trim().replaceAll("\\", ""));
+  const lines =
+    after
+      .split("\n## ")[0]
+      ?.split("\n")
+      .filter((line) => line.startsWith("|")) ?? [];
+  const cells = (line: string): string[] =>
+    line
+      .split("|")
+      .slice(1, -1)
+      .map((cell) => cell.trim().replaceAll("\\", ""));
   const columns = cells(lines[0] ?? "");
-  return lines.slice(2).map((line) => Object.fromEntries(cells(line).map((cell, index) => [`${index} ${columns[index] ?? ""}`, cell])));
+  return lines
+    .slice(2)
+    .map((line) => Object.fromEntries(cells(line).map((cell, index) => [`${index} ${columns[index] ?? ""}`, cell])));
 }
 
 /** Equal as far as both tell: what one rounds to fewer places, the other may have more exactly. */
 function agree(page: string, report: string): boolean {
   const told = [page, report].map((text) => text.replace(/[^\d.,-]/g, "").replaceAll(",", ""));
   const [one, another] = told.map(Number);
-  if (told.some((text) => text === "") || one === undefined || another === undefined) return told[0] === told[1] || told.every((text) => text === "" || text === "-");
+  if (told.some((text) => text === "") || one === undefined || another === undefined)
+    return told[0] === told[1] || told.every((text) => text === "" || text === "-");
   const digits = Math.min(...told.map((text) => text.split(".")[1]?.length ?? 0));
   return Math.abs(one - another) <= 0.5 * 10 ** -digits + 1e-9;
 }
@@ -75,7 +95,15 @@ describe("every figure of the board", () => {
       const place = places(row.rank_low, row.rank_high);
       expect(shown[index]?.[0]).toContain(row.model);
       expect(shown[index]?.[0]?.includes("Pareto")).toBe(row.pareto);
-      expect(shown[index]?.slice(1)).toEqual([`${row.rank ?? "–"}${tied ? "tied" : ""}`, place, number(row.mean_rank, 2), percent(row.success_rate_mean, 1), dollars(row.cost_usd_mean), count(row.output_tokens_mean), count(row.trials)]);
+      expect(shown[index]?.slice(1)).toEqual([
+        `${row.rank ?? "–"}${tied ? "tied" : ""}`,
+        place,
+        number(row.mean_rank, 2),
+        percent(row.success_rate_mean, 1),
+        dollars(row.cost_usd_mean),
+        count(row.output_tokens_mean),
+        count(row.trials),
+      ]);
     });
   });
 
@@ -86,25 +114,53 @@ describe("every figure of the board", () => {
       task.rows.forEach((row, index) => {
         const [model, rank, place, success, indicator, best, parts, cost, refused] = shown[index] ?? [];
         const atLeast = row.censored > 0 ? "≥ " : "";
-        const spread = row.indicator_low === null ? (row.too_few_data ? "too few data" : "") : `${number(row.indicator_low)} to ${number(row.indicator_high)}`;
+        const spread =
+          row.indicator_low === null
+            ? row.too_few_data
+              ? "too few data"
+              : ""
+            : `${number(row.indicator_low)} to ${number(row.indicator_high)}`;
         expect(model).toContain(row.model);
         expect(rank?.replace(" tied", "")).toBe(String(row.rank ?? "–"));
         expect(place).toBe(places(row.rank_low, row.rank_high));
-        expect(success).toBe(`${percent(row.success_rate)} (${row.successes} of ${row.trials})${percent(row.success_low)} to ${percent(row.success_high)}`);
+        expect(success).toBe(
+          `${percent(row.success_rate)} (${row.successes} of ${row.trials})${percent(row.success_low)} to ${percent(row.success_high)}`,
+        );
         expect(indicator).toBe(`${row.indicator_mean === null ? "" : atLeast}${number(row.indicator_mean)}${spread}`);
         expect(best).toBe(`${row.indicator_best === null ? "" : atLeast}${number(row.indicator_best)}`);
-        expect([parts, cost, refused]).toEqual([count(row.parts_mean), dollars(row.cost_per_success_usd), percent(row.invalid_action_rate)]);
+        expect([parts, cost, refused]).toEqual([
+          count(row.parts_mean),
+          dollars(row.cost_per_success_usd),
+          percent(row.invalid_action_rate),
+        ]);
       });
     }
   });
 
   it("of the drawings is the service's", async () => {
     const front = await textsOf(page, 'table[aria-label="Cost and performance"]');
-    expect(front).toEqual(figures.front.map((row) => [row.model, number(row.mean_rank, 2), percent(row.success_rate_mean, 1), dollars(row.cost_usd_mean), count(row.output_tokens_mean), row.pareto ? "yes" : "no"]));
+    expect(front).toEqual(
+      figures.front.map((row) => [
+        row.model,
+        number(row.mean_rank, 2),
+        percent(row.success_rate_mean, 1),
+        dollars(row.cost_usd_mean),
+        count(row.output_tokens_mean),
+        row.pareto ? "yes" : "no",
+      ]),
+    );
     const radar = await textsOf(page, 'table[aria-label="Difficulty dimensions"]');
-    expect(radar).toEqual(figures.dimensions.map((row) => [row.model, ...Object.values(row.dimensions).map((score) => number(score, 2))]));
+    expect(radar).toEqual(
+      figures.dimensions.map((row) => [row.model, ...Object.values(row.dimensions).map((score) => number(score, 2))]),
+    );
     const ends = await textsOf(page, 'table[aria-label="How jobs end"]');
-    expect(ends.map((row) => row.slice(0, 3).join(" ")).sort()).toEqual(figures.failures.flatMap((row) => Object.entries(row.outcomes).map(([name, n]) => `${row.model} ${name.replaceAll("_", " ")} ${n}`)).sort());
+    expect(ends.map((row) => row.slice(0, 3).join(" ")).sort()).toEqual(
+      figures.failures
+        .flatMap((row) =>
+          Object.entries(row.outcomes).map(([name, n]) => `${row.model} ${name.replaceAll("_", " ")} ${n}`),
+        )
+        .sort(),
+    );
   });
 
   it("is the report's", async () => {
@@ -116,8 +172,15 @@ describe("every figure of the board", () => {
       expect(shown?.[1]?.replace("tied", "")).toBe(row["1 rank"]);
       const ends = (row["2 95 % of place"] ?? "").split("-");
       expect(shown?.[2]).toBe([...new Set(ends)].join("–"));
-      for (const [column, name] of [[3, "3 mean rank"], [4, "4 success"], [5, "5 USD"]] as const) {
-        expect(agree(shown?.[column] ?? "", row[name] ?? ""), `${row["0 model"] ?? ""} ${name}: ${shown?.[column] ?? ""} and ${row[name] ?? ""}`).toBe(true);
+      for (const [column, name] of [
+        [3, "3 mean rank"],
+        [4, "4 success"],
+        [5, "5 USD"],
+      ] as const) {
+        expect(
+          agree(shown?.[column] ?? "", row[name] ?? ""),
+          `${row["0 model"] ?? ""} ${name}: ${shown?.[column] ?? ""} and ${row[name] ?? ""}`,
+        ).toBe(true);
       }
     }
     const cells = await textsOf(page, `table[aria-label="Models on ${TASK}"]`);
@@ -128,7 +191,9 @@ describe("every figure of the board", () => {
       expect(shown[1]?.replace(" tied", "")).toBe(row["2 rank"]);
       expect(shown[3]).toContain(`(${(row["3 of scored"] ?? "").replace("/", " of ")})`);
       expect(agree((shown[3] ?? "").split("(")[0] ?? "", row["5 success"] ?? "")).toBe(true);
-      expect(agree(/^[≥\d.,–-]+/.exec((shown[4] ?? "").replace("≥ ", ""))?.[0] ?? "", (row["8 indicator"] ?? ""))).toBe(true);
+      expect(agree(/^[≥\d.,–-]+/.exec((shown[4] ?? "").replace("≥ ", ""))?.[0] ?? "", row["8 indicator"] ?? "")).toBe(
+        true,
+      );
       expect(agree(shown[5] ?? "", row["10 best"] ?? "")).toBe(true);
     }
   });
@@ -144,14 +209,25 @@ describe("every figure of the board", () => {
 
 describe("sweeps", () => {
   it.each([
-    ["/sweeps/new", 1280], ["/sweeps/new", 390], ["/sweeps/compare", 1280], ["/tasks/lift-1", 390],
+    ["/sweeps/new", 1280],
+    ["/sweeps/new", 390],
+    ["/sweeps/compare", 1280],
+    ["/tasks/lift-1", 390],
   ] as const)("%s at %d px has no serious fault", async (path, width) => {
     const { page, context } = await opened(path, URL_OF_SERVICE, width);
     if (path === "/sweeps/new") await page.getByText("YAML", { exact: true }).click();
     if (path === "/sweeps/new") await page.locator(".cm-content").waitFor();
     const { violations } = await new AxeBuilder({ page }).analyze();
     const serious = violations.filter((one) => one.impact === "serious" || one.impact === "critical");
-    expect(serious.map((one) => `${one.id}: ${one.nodes.map((node) => node.html.slice(0, 160)).slice(0, 3).join(" | ")}`)).toEqual([]);
+    expect(
+      serious.map(
+        (one) =>
+          `${one.id}: ${one.nodes
+            .map((node) => node.html.slice(0, 160))
+            .slice(0, 3)
+            .join(" | ")}`,
+      ),
+    ).toEqual([]);
     expect(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth)).toBe(true);
     await context.close();
   });
@@ -159,7 +235,11 @@ describe("sweeps", () => {
   it("are submitted once, however often the button is clicked", async () => {
     const before = (await ask<Schemas["SweepPage"]>("/v1/sweeps?limit=100")).sweeps.length;
     const { page, context } = await opened("/sweeps/new");
-    await page.getByRole("textbox", { name: "Simulator" }).or(page.getByRole("combobox", { name: "Simulator" })).first().fill("pybullet");
+    await page
+      .getByRole("textbox", { name: "Simulator" })
+      .or(page.getByRole("combobox", { name: "Simulator" }))
+      .first()
+      .fill("pybullet");
     await page.getByLabel("Name", { exact: true }).fill("clicked twice");
     const button = page.getByRole("button", { name: "Submit the sweep" });
     await expect.poll(() => button.isEnabled(), { timeout: 10_000 }).toBe(true);
@@ -191,7 +271,11 @@ describe("sweeps", () => {
   });
 
   it("change on the page as they change in the service", async () => {
-    const { id } = await ask<Schemas["SweepAccepted"]>("/v1/sweeps", { ...WAITING, name: "watched", seeds: [101, 102] });
+    const { id } = await ask<Schemas["SweepAccepted"]>("/v1/sweeps", {
+      ...WAITING,
+      name: "watched",
+      seeds: [101, 102],
+    });
     const { page, context } = await opened(`/sweeps/${id}`);
     await page.getByText("live", { exact: true }).waitFor();
     const reads: string[] = [];
@@ -215,7 +299,9 @@ describe("sweeps", () => {
 it("a link on another site opens a page", async () => {
   const context = await browser.newContext();
   const page = await context.newPage();
-  await page.route("http://elsewhere.example/", (route) => route.fulfill({ contentType: "text/html", body: `<a href="${URL_OF_SERVICE}/tasks">here</a>` }));
+  await page.route("http://elsewhere.example/", (route) =>
+    route.fulfill({ contentType: "text/html", body: `<a href="${URL_OF_SERVICE}/tasks">here</a>` }),
+  );
   await page.goto("http://elsewhere.example/");
   await page.getByText("here").click();
   await page.getByRole("heading", { name: "Tasks", level: 1 }).waitFor();

@@ -5,7 +5,12 @@ export const URL_OF_SERVICE = process.env.BUILDARENA_WEB_URL ?? "";
 export const LONG = (process.env.BUILDARENA_TEST_LONG ?? "") !== "";
 const CHROMIUM = process.env.BUILDARENA_CHROMIUM ?? "/usr/bin/chromium";
 // A machine without a graphics card draws 3D all the same; tests step faster than people.
-const ARGUMENTS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-ipc-flooding-protection"];
+const ARGUMENTS = [
+  "--no-sandbox",
+  "--use-angle=swiftshader",
+  "--enable-unsafe-swiftshader",
+  "--disable-ipc-flooding-protection",
+];
 
 const FACES = "ABCDEF";
 /** Arguments that put a block on a face of another. */
@@ -36,7 +41,11 @@ export interface Visit {
 export async function visit(
   browser: Browser,
   path: string,
-  { url = URL_OF_SERVICE, width = 1280, scheme = "light" }: { url?: string; width?: number; scheme?: "light" | "dark" } = {},
+  {
+    url = URL_OF_SERVICE,
+    width = 1280,
+    scheme = "light",
+  }: { url?: string; width?: number; scheme?: "light" | "dark" } = {},
 ): Promise<Visit> {
   const context = await browser.newContext({ viewport: { width, height: 900 }, colorScheme: scheme });
   const page = await context.newPage();

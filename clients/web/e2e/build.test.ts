@@ -21,7 +21,12 @@ async function onPage(page: Page, point: Point): Promise<{ x: number; y: number 
       y: number;
       project: (camera: unknown) => Vector;
     }
-    const canvas = document.querySelector(".stage-3d canvas") as HTMLCanvasElement & { camera: { position: { clone: () => Vector & { set: (...place: number[]) => Vector } }; updateMatrixWorld: () => void } };
+    const canvas = document.querySelector(".stage-3d canvas") as HTMLCanvasElement & {
+      camera: {
+        position: { clone: () => Vector & { set: (...place: number[]) => Vector } };
+        updateMatrixWorld: () => void;
+      };
+    };
     canvas.camera.updateMatrixWorld();
     const at = canvas.camera.position.clone().set(x, y, z).project(canvas.camera);
     const box = canvas.getBoundingClientRect();
@@ -37,7 +42,11 @@ interface Side {
 }
 
 interface Bench {
-  parts: { id: string; module: string; faces: { label: string; center: Point; normal: Point; taken_by: string | null }[] }[];
+  parts: {
+    id: string;
+    module: string;
+    faces: { label: string; center: Point; normal: Point; taken_by: string | null }[];
+  }[];
   control_sequence: unknown[];
 }
 
@@ -49,7 +58,9 @@ async function bench(page: Page): Promise<Bench> {
 
 async function sideOf(page: Page, part: string, looks: Point): Promise<Side> {
   const found = (await bench(page)).parts.find((one) => one.id === part);
-  const face = found?.faces.find((one) => looks.every((value, axis) => Math.abs(value - (one.normal[axis] ?? NaN)) < 0.01));
+  const face = found?.faces.find((one) =>
+    looks.every((value, axis) => Math.abs(value - (one.normal[axis] ?? NaN)) < 0.01),
+  );
   if (face === undefined) throw new Error(`part ${part} has no face that looks to ${looks.join()}`);
   return { part, face: face.label, center: face.center, normal: face.normal };
 }
@@ -75,17 +86,24 @@ async function clickFace(page: Page, side: Side): Promise<void> {
 }
 
 async function lookAt(page: Page, { center, normal }: Side): Promise<void> {
-  await page.evaluate(({ center, normal }) => {
-    interface Placed {
-      position: { set: (...place: number[]) => void };
-      lookAt: (...place: number[]) => void;
-      updateMatrixWorld: () => void;
-    }
-    const { camera } = document.querySelector(".stage-3d canvas") as unknown as { camera: Placed };
-    camera.position.set(center[0] + 7 * normal[0] + 0.8, center[1] + 7 * normal[1] + 0.8, center[2] + 7 * normal[2] + 0.8);
-    camera.lookAt(...center);
-    camera.updateMatrixWorld();
-  }, { center, normal });
+  await page.evaluate(
+    ({ center, normal }) => {
+      interface Placed {
+        position: { set: (...place: number[]) => void };
+        lookAt: (...place: number[]) => void;
+        updateMatrixWorld: () => void;
+      }
+      const { camera } = document.querySelector(".stage-3d canvas") as unknown as { camera: Placed };
+      camera.position.set(
+        center[0] + 7 * normal[0] + 0.8,
+        center[1] + 7 * normal[1] + 0.8,
+        center[2] + 7 * normal[2] + 0.8,
+      );
+      camera.lookAt(...center);
+      camera.updateMatrixWorld();
+    },
+    { center, normal },
+  );
 }
 
 async function accepted(page: Page, act: () => Promise<void>): Promise<void> {
@@ -112,125 +130,161 @@ const EAST: Point = [1, 0, 0];
 const SOUTH: Point = [0, -1, 0];
 
 describe("building by hand", () => {
-  it("a car is clicked together, driven and scored", async () => {
-    const page = await begun(`mouse-${process.pid}`);
-    await accepted(page, () => page.getByRole("button", { name: "Place the starting block" }).click());
-    await page.locator(".stage-3d canvas").scrollIntoViewIfNeeded();
-    await page.waitForFunction(() => "camera" in (document.querySelector(".stage-3d canvas") ?? {}));
-    const attach = (module: string) => page.getByRole("button", { name: `Attach ${module}` }).click();
-    let head = "1";
-    for (const place of [2, 3]) {
-      await clickFace(page, await sideOf(page, head, SOUTH));
-      await accepted(page, () => attach("Small Wooden Block"));
-      head = String(place);
-    }
-    const wheels: string[] = [];
-    for (const [block, side] of [["1", EAST], ["1", WEST], ["3", EAST], ["3", WEST]] as const) {
-      await clickFace(page, await sideOf(page, block, side));
-      await accepted(page, () => attach("Powered Wheel"));
-      const made = (await bench(page)).parts.at(-1);
-      expect(made?.module).toBe("Powered Wheel");
-      if (side === WEST) {
-        await page.getByRole("tab", { name: "Part" }).click();
-        await accepted(page, () => page.getByRole("button", { name: "Flip its spin" }).click());
-        await page.getByRole("tab", { name: "Attach" }).click();
+  it(
+    "a car is clicked together, driven and scored",
+    async () => {
+      const page = await begun(`mouse-${process.pid}`);
+      await accepted(page, () => page.getByRole("button", { name: "Place the starting block" }).click());
+      await page.locator(".stage-3d canvas").scrollIntoViewIfNeeded();
+      await page.waitForFunction(() => "camera" in (document.querySelector(".stage-3d canvas") ?? {}));
+      const attach = (module: string) => page.getByRole("button", { name: `Attach ${module}` }).click();
+      let head = "1";
+      for (const place of [2, 3]) {
+        await clickFace(page, await sideOf(page, head, SOUTH));
+        await accepted(page, () => attach("Small Wooden Block"));
+        head = String(place);
       }
-      wheels.push(made?.id ?? "");
-    }
-    // A refusal is told in the words that a model reads, and changes nothing.
-    const taken = await sideOf(page, "1", EAST);
-    await page.getByRole("listbox", { name: "Parts" }).getByText("1 Starting Block").click();
-    await page.getByRole("listbox", { name: "Faces of part 1" }).getByText(new RegExp(`^${taken.face} `)).click();
-    await attach("Torch");
-    await page.getByText(/is taken. Its free faces:/).first().waitFor();
-    expect((await bench(page)).parts).toHaveLength(7);
-    // A reload finds the session as it is.
-    await page.reload();
-    await page.getByText("7 parts").first().waitFor();
-    await page.getByRole("tab", { name: "Keys" }).click();
-    await accepted(page, () => page.getByRole("button", { name: "Bind", exact: true }).click());
-    await accepted(page, () => page.getByRole("button", { name: "Add", exact: true }).click());
-    expect((await bench(page)).control_sequence).toHaveLength(1);
-    const { violations } = await new AxeBuilder({ page }).analyze();
-    expect(violations.filter((one) => one.impact === "serious" || one.impact === "critical").map((one) => `${one.id} ${one.nodes[0]?.html}`)).toEqual([]);
-    await page.getByRole("button", { name: "Start the trial" }).click();
-    await page.getByRole("button", { name: "Start it" }).click();
-    await page.locator("[data-outcome]").waitFor({ timeout: LONG_MS });
-    expect(await page.locator("[data-outcome]").getAttribute("data-outcome")).toBe("success");
-    await page.getByRole("button", { name: "Play" }).click();
-    await page.getByRole("link", { name: "Leaderboard", exact: true }).last().click();
-    await page.getByText(`human/mouse-${process.pid}`).first().waitFor();
-    await page.close();
-  }, LONG_MS * 2);
+      const wheels: string[] = [];
+      for (const [block, side] of [
+        ["1", EAST],
+        ["1", WEST],
+        ["3", EAST],
+        ["3", WEST],
+      ] as const) {
+        await clickFace(page, await sideOf(page, block, side));
+        await accepted(page, () => attach("Powered Wheel"));
+        const made = (await bench(page)).parts.at(-1);
+        expect(made?.module).toBe("Powered Wheel");
+        if (side === WEST) {
+          await page.getByRole("tab", { name: "Part" }).click();
+          await accepted(page, () => page.getByRole("button", { name: "Flip its spin" }).click());
+          await page.getByRole("tab", { name: "Attach" }).click();
+        }
+        wheels.push(made?.id ?? "");
+      }
+      // A refusal is told in the words that a model reads, and changes nothing.
+      const taken = await sideOf(page, "1", EAST);
+      await page.getByRole("listbox", { name: "Parts" }).getByText("1 Starting Block").click();
+      await page
+        .getByRole("listbox", { name: "Faces of part 1" })
+        .getByText(new RegExp(`^${taken.face} `))
+        .click();
+      await attach("Torch");
+      await page
+        .getByText(/is taken. Its free faces:/)
+        .first()
+        .waitFor();
+      expect((await bench(page)).parts).toHaveLength(7);
+      // A reload finds the session as it is.
+      await page.reload();
+      await page.getByText("7 parts").first().waitFor();
+      await page.getByRole("tab", { name: "Keys" }).click();
+      await accepted(page, () => page.getByRole("button", { name: "Bind", exact: true }).click());
+      await accepted(page, () => page.getByRole("button", { name: "Add", exact: true }).click());
+      expect((await bench(page)).control_sequence).toHaveLength(1);
+      const { violations } = await new AxeBuilder({ page }).analyze();
+      expect(
+        violations
+          .filter((one) => one.impact === "serious" || one.impact === "critical")
+          .map((one) => `${one.id} ${one.nodes[0]?.html}`),
+      ).toEqual([]);
+      await page.getByRole("button", { name: "Start the trial" }).click();
+      await page.getByRole("button", { name: "Start it" }).click();
+      await page.locator("[data-outcome]").waitFor({ timeout: LONG_MS });
+      expect(await page.locator("[data-outcome]").getAttribute("data-outcome")).toBe("success");
+      await page.getByRole("button", { name: "Play" }).click();
+      await page.getByRole("link", { name: "Leaderboard", exact: true }).last().click();
+      await page.getByText(`human/mouse-${process.pid}`).first().waitFor();
+      await page.close();
+    },
+    LONG_MS * 2,
+  );
 
-  it("the same goes by the keyboard alone", async () => {
-    const page = await opened(browser, `/build?task=${TASK}`);
-    const { keyboard } = page;
-    /** Walks to a control as somebody without a mouse does. */
-    const reach = async (wanted: string): Promise<void> => {
-      for (let step = 0; step < 150; step += 1) {
-        const seen = await page.evaluate(() => {
-          const at = document.activeElement;
-          if (at === null || at === document.body) return "";
-          const labels = at instanceof HTMLInputElement ? [...(at.labels ?? [])].map((label) => label.textContent) : [];
-          return [at.getAttribute("aria-label"), ...labels, at.textContent].find((text) => text !== null && text !== "") ?? "";
-        });
-        if (seen.replace(/\s*\*$/, "").trim() === wanted) return;
-        await keyboard.press("Tab");
+  it(
+    "the same goes by the keyboard alone",
+    async () => {
+      const page = await opened(browser, `/build?task=${TASK}`);
+      const { keyboard } = page;
+      /** Walks to a control as somebody without a mouse does. */
+      const reach = async (wanted: string): Promise<void> => {
+        for (let step = 0; step < 150; step += 1) {
+          const seen = await page.evaluate(() => {
+            const at = document.activeElement;
+            if (at === null || at === document.body) return "";
+            const labels =
+              at instanceof HTMLInputElement ? [...(at.labels ?? [])].map((label) => label.textContent) : [];
+            return (
+              [at.getAttribute("aria-label"), ...labels, at.textContent].find((text) => text !== null && text !== "") ??
+              ""
+            );
+          });
+          if (seen.replace(/\s*\*$/, "").trim() === wanted) return;
+          await keyboard.press("Tab");
+        }
+        throw new Error(`no way to ${wanted} by the keyboard`);
+      };
+      const choose = async (list: string, option: RegExp): Promise<void> => {
+        await reach(list);
+        await keyboard.press("Home");
+        for (let step = 0; step < 20; step += 1) {
+          const active = await page.evaluate(
+            () =>
+              document.getElementById(document.activeElement?.getAttribute("aria-activedescendant") ?? "")
+                ?.textContent ?? "",
+          );
+          if (option.test(active)) return;
+          await keyboard.press("ArrowDown");
+        }
+        throw new Error(`${list} has no ${option.source}`);
+      };
+      const press = async (button: string): Promise<void> => {
+        await reach(button);
+        await accepted(page, () => keyboard.press("Enter"));
+      };
+      await reach("Your name on the board");
+      await keyboard.type(`keys-${process.pid}`);
+      await keyboard.press("Enter");
+      await page.waitForURL(/session=job_/);
+      await page.getByRole("button", { name: "Place the starting block" }).waitFor();
+      await press("Place the starting block");
+      const attach = async (part: string, looks: Point, module: string): Promise<void> => {
+        const side = await sideOf(page, part, looks);
+        await choose("Parts", new RegExp(`^${part} `));
+        await choose(`Faces of part ${part}`, new RegExp(`^${side.face} `));
+        await press(`Attach ${module}`);
+      };
+      await attach("1", SOUTH, "Small Wooden Block");
+      await attach("2", SOUTH, "Small Wooden Block");
+      for (const [block, side] of [
+        ["1", EAST],
+        ["1", WEST],
+        ["3", EAST],
+        ["3", WEST],
+      ] as const) {
+        await attach(block, side, "Powered Wheel");
+        if (side !== WEST) continue;
+        await reach("Attach");
+        await keyboard.press("ArrowRight");
+        await press("Flip its spin");
+        await reach("Part");
+        await keyboard.press("ArrowLeft");
       }
-      throw new Error(`no way to ${wanted} by the keyboard`);
-    };
-    const choose = async (list: string, option: RegExp): Promise<void> => {
-      await reach(list);
-      await keyboard.press("Home");
-      for (let step = 0; step < 20; step += 1) {
-        const active = await page.evaluate(() => document.getElementById(document.activeElement?.getAttribute("aria-activedescendant") ?? "")?.textContent ?? "");
-        if (option.test(active)) return;
-        await keyboard.press("ArrowDown");
-      }
-      throw new Error(`${list} has no ${option.source}`);
-    };
-    const press = async (button: string): Promise<void> => {
-      await reach(button);
-      await accepted(page, () => keyboard.press("Enter"));
-    };
-    await reach("Your name on the board");
-    await keyboard.type(`keys-${process.pid}`);
-    await keyboard.press("Enter");
-    await page.waitForURL(/session=job_/);
-    await page.getByRole("button", { name: "Place the starting block" }).waitFor();
-    await press("Place the starting block");
-    const attach = async (part: string, looks: Point, module: string): Promise<void> => {
-      const side = await sideOf(page, part, looks);
-      await choose("Parts", new RegExp(`^${part} `));
-      await choose(`Faces of part ${part}`, new RegExp(`^${side.face} `));
-      await press(`Attach ${module}`);
-    };
-    await attach("1", SOUTH, "Small Wooden Block");
-    await attach("2", SOUTH, "Small Wooden Block");
-    for (const [block, side] of [["1", EAST], ["1", WEST], ["3", EAST], ["3", WEST]] as const) {
-      await attach(block, side, "Powered Wheel");
-      if (side !== WEST) continue;
       await reach("Attach");
       await keyboard.press("ArrowRight");
-      await press("Flip its spin");
-      await reach("Part");
-      await keyboard.press("ArrowLeft");
-    }
-    await reach("Attach");
-    await keyboard.press("ArrowRight");
-    await keyboard.press("ArrowRight");
-    await press("Bind");
-    await press("Add");
-    await reach("Start the trial");
-    await keyboard.press("Enter");
-    await page.getByRole("button", { name: "Start it" }).waitFor();
-    await reach("Start it");
-    await keyboard.press("Enter");
-    await page.locator("[data-outcome]").waitFor({ timeout: LONG_MS });
-    expect(await page.locator("[data-outcome]").getAttribute("data-outcome")).toBe("success");
-    await page.close();
-  }, LONG_MS * 2);
+      await keyboard.press("ArrowRight");
+      await press("Bind");
+      await press("Add");
+      await reach("Start the trial");
+      await keyboard.press("Enter");
+      await page.getByRole("button", { name: "Start it" }).waitFor();
+      await reach("Start it");
+      await keyboard.press("Enter");
+      await page.locator("[data-outcome]").waitFor({ timeout: LONG_MS });
+      expect(await page.locator("[data-outcome]").getAttribute("data-outcome")).toBe("success");
+      await page.close();
+    },
+    LONG_MS * 2,
+  );
 
   it("a bad name is refused in words", async () => {
     const page = await opened(browser, "/build", 390);
@@ -239,7 +293,9 @@ describe("building by hand", () => {
     await page.getByText("letters, digits, dots, dashes and underscores").first().waitFor();
     expect(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth)).toBe(true);
     const { violations } = await new AxeBuilder({ page }).analyze();
-    expect(violations.filter((one) => one.impact === "serious" || one.impact === "critical").map((one) => one.id)).toEqual([]);
+    expect(
+      violations.filter((one) => one.impact === "serious" || one.impact === "critical").map((one) => one.id),
+    ).toEqual([]);
     await page.close();
   });
 });
@@ -247,7 +303,12 @@ describe("building by hand", () => {
 describe("in the dark, at 390", () => {
   it.each(["/build", "/machine", "room"])("%s has no serious fault and does not scroll sideways", async (path) => {
     const ask = { task: "support-1", agent: `dark-${process.pid}`, seed: 0, simulator: "mujoco", kind: "human" };
-    const post = (to: string, body: unknown) => fetch(`${URL_OF_SERVICE}${to}`, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(body) });
+    const post = (to: string, body: unknown) =>
+      fetch(`${URL_OF_SERVICE}${to}`, {
+        method: "POST",
+        headers: { "Content-Type": "application/json" },
+        body: JSON.stringify(body),
+      });
     let where = path;
     if (path === "room") {
       const { id } = (await (await post("/v1/sessions", ask)).json()) as { id: string };
@@ -260,7 +321,11 @@ describe("in the dark, at 390", () => {
       if (tab !== "") await page.getByRole("tab", { name: tab }).click();
       if (tab === "Part") await page.getByText("1 Starting Block").click();
       const { violations } = await new AxeBuilder({ page }).analyze();
-      expect(violations.filter((one) => one.impact === "serious" || one.impact === "critical").map((one) => `${tab} ${one.id} ${one.nodes[0]?.html}`)).toEqual([]);
+      expect(
+        violations
+          .filter((one) => one.impact === "serious" || one.impact === "critical")
+          .map((one) => `${tab} ${one.id} ${one.nodes[0]?.html}`),
+      ).toEqual([]);
       expect(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth)).toBe(true);
     }
     await page.close();
@@ -271,43 +336,64 @@ describe("a machine from a file", () => {
   const brick = { tool: "attach_block_to", arguments: { base_block: "1", face: "E", new_block: "Small Wooden Block" } };
 
   async function machineDocument(): Promise<string> {
-    const ask = async (path: string, body: unknown): Promise<{ id: string }> => (await (await fetch(`${URL_OF_SERVICE}${path}`, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(body) })).json()) as { id: string };
-    const { id } = await ask("/v1/sessions", { task: "support-1", agent: `filed-${process.pid}`, seed: 0, simulator: "mujoco" });
+    const ask = async (path: string, body: unknown): Promise<{ id: string }> =>
+      (await (
+        await fetch(`${URL_OF_SERVICE}${path}`, {
+          method: "POST",
+          headers: { "Content-Type": "application/json" },
+          body: JSON.stringify(body),
+        })
+      ).json()) as { id: string };
+    const { id } = await ask("/v1/sessions", {
+      task: "support-1",
+      agent: `filed-${process.pid}`,
+      seed: 0,
+      simulator: "mujoco",
+    });
     await ask(`/v1/sessions/${id}/calls`, { tool: "start", arguments: {} });
     await ask(`/v1/sessions/${id}/calls`, brick);
     await ask(`/v1/sessions/${id}/submit`, {});
     return (await fetch(`${URL_OF_SERVICE}/v1/jobs/${id}/machine`)).text();
   }
 
-  it("is looked at, checked and tried", async () => {
-    const page = await opened(browser, "/machine");
-    const drop = (name: string, buffer: Buffer) => page.locator("input[type=file]").setInputFiles({ name, mimeType: "application/octet-stream", buffer });
-    const text = await machineDocument();
-    await drop("bridge.json", Buffer.from(text));
-    await page.getByText("✓ it is a sound machine").waitFor();
-    await page.locator(".stage-3d canvas").waitFor();
-    await page.getByRole("button", { name: "Start the trial" }).click();
-    await page.locator("[data-outcome]").waitFor({ timeout: LONG_MS });
-    const { violations } = await new AxeBuilder({ page }).analyze();
-    expect(violations.filter((one) => one.impact === "serious" || one.impact === "critical").map((one) => one.id)).toEqual([]);
-    for (const [name, content, says] of [
-      ["noise.bsg", "\u0000\u0001nothing", "neither a machine document"],
-      ["page.bsg", "<html><script>document.title='run'</script></html>", "page.bsg"],
-      ["shapes.glb", "glTF and no more than that", "glTF version"],
-      ["other.json", text.replaceAll("Small Wooden Block", "<img src=x onerror=alert(1)>"), "Small Wooden Block"],
-    ] as const) {
-      await drop(name, Buffer.from(content));
-      await expect.poll(() => page.getByRole("alert").textContent(), { timeout: 10_000 }).toContain(says);
-      expect(await page.getByRole("alert").textContent()).toContain(name);
-    }
-    expect(await page.title()).not.toBe("run");
-    await page.close();
-  }, LONG_MS * 2);
+  it(
+    "is looked at, checked and tried",
+    async () => {
+      const page = await opened(browser, "/machine");
+      const drop = (name: string, buffer: Buffer) =>
+        page.locator("input[type=file]").setInputFiles({ name, mimeType: "application/octet-stream", buffer });
+      const text = await machineDocument();
+      await drop("bridge.json", Buffer.from(text));
+      await page.getByText("✓ it is a sound machine").waitFor();
+      await page.locator(".stage-3d canvas").waitFor();
+      await page.getByRole("button", { name: "Start the trial" }).click();
+      await page.locator("[data-outcome]").waitFor({ timeout: LONG_MS });
+      const { violations } = await new AxeBuilder({ page }).analyze();
+      expect(
+        violations.filter((one) => one.impact === "serious" || one.impact === "critical").map((one) => one.id),
+      ).toEqual([]);
+      for (const [name, content, says] of [
+        ["noise.bsg", "\u0000\u0001nothing", "neither a machine document"],
+        ["page.bsg", "<html><script>document.title='run'</script></html>", "page.bsg"],
+        ["shapes.glb", "glTF and no more than that", "glTF version"],
+        ["other.json", text.replaceAll("Small Wooden Block", "<img src=x onerror=alert(1)>"), "Small Wooden Block"],
+      ] as const) {
+        await drop(name, Buffer.from(content));
+        await expect.poll(() => page.getByRole("alert").textContent(), { timeout: 10_000 }).toContain(says);
+        expect(await page.getByRole("alert").textContent()).toContain(name);
+      }
+      expect(await page.title()).not.toBe("run");
+      await page.close();
+    },
+    LONG_MS * 2,
+  );
 
   it("may be a GLB, which is looked at", async () => {
     const page = await opened(browser, "/machine", 390);
     const glb = Buffer.from(await (await fetch(`${URL_OF_SERVICE}/v1/modules/Powered%20Wheel.glb`)).arrayBuffer());
-    await page.locator("input[type=file]").setInputFiles({ name: "wheel.glb", mimeType: "model/gltf-binary", buffer: glb });
+    await page
+      .locator("input[type=file]")
+      .setInputFiles({ name: "wheel.glb", mimeType: "model/gltf-binary", buffer: glb });
     await page.getByText("A GLB holds shapes only").waitFor();
     await page.locator(".stage-3d canvas").waitFor();
     expect(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth)).toBe(true);

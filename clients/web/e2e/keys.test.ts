@@ -23,7 +23,10 @@ describe.skipIf(GUARDED === "")("with keys required", () => {
     return ((await answer.json()) as { secret: string }).secret;
   }
 
-  it.each([["read", 0], ["submit", 1]])("a key of the scope %s has %d ways to submit, and is gone with its tab", async (scope, buttons) => {
+  it.each([
+    ["read", 0],
+    ["submit", 1],
+  ])("a key of the scope %s has %d ways to submit, and is gone with its tab", async (scope, buttons) => {
     const secret = await made(scope);
     const context = await browser.newContext();
     const page = await context.newPage();

@@ -7,7 +7,10 @@ const WORKERS = pids(process.env.BUILDARENA_WEB_WORKERS);
 const APIS = pids(process.env.BUILDARENA_WEB_APIS);
 
 function pids(named: string | undefined): number[] {
-  return (named ?? "").split(",").filter((pid) => pid !== "").map(Number);
+  return (named ?? "")
+    .split(",")
+    .filter((pid) => pid !== "")
+    .map(Number);
 }
 
 function kill(processes: readonly number[]): void {
@@ -23,17 +26,25 @@ async function watched(browser: Browser, job: string): Promise<Page> {
 }
 
 async function steps(page: Page, count: number): Promise<void> {
-  await page.waitForFunction((least) => Number(document.querySelector("[data-steps]")?.getAttribute("data-steps") ?? 0) >= least, count, { timeout: 40_000 });
+  await page.waitForFunction(
+    (least) => Number(document.querySelector("[data-steps]")?.getAttribute("data-steps") ?? 0) >= least,
+    count,
+    { timeout: 40_000 },
+  );
 }
 
 /** Which turns a page shows as it is scrolled through; none twice at a time. */
 async function turnsShown(page: Page): Promise<number[]> {
   const seen = new Set<number>();
   const box = page.getByRole("region", { name: "Transcript, scrolls" });
-  await box.evaluate((element) => { element.scrollTop = 0; });
+  await box.evaluate((element) => {
+    element.scrollTop = 0;
+  });
   for (;;) {
     await page.waitForTimeout(40);
-    const now = await page.locator("[data-turn]").evaluateAll((found) => found.map((one) => Number(one.getAttribute("data-turn"))));
+    const now = await page
+      .locator("[data-turn]")
+      .evaluateAll((found) => found.map((one) => Number(one.getAttribute("data-turn"))));
     expect(new Set(now).size).toBe(now.length);
     for (const one of now) seen.add(one);
     const more = await box.evaluate((element) => {
@@ -73,14 +84,24 @@ describe.skipIf(PLAYED === "")("a session under way", () => {
     const before = 31;
     for (let turn = 0; turn < total; turn += 1) {
       const began = performance.now();
-      await act(session, turn === 0 ? "start" : "attach_block_to", turn === 0 ? {} : ATTACH(1 + Math.floor(turn / 3), turn));
+      await act(
+        session,
+        turn === 0 ? "start" : "attach_block_to",
+        turn === 0 ? {} : ATTACH(1 + Math.floor(turn / 3), turn),
+      );
       await steps(page, turn + 1);
       if (turn < before) waits.push(performance.now() - began);
       if (turn === before - 1) kill(APIS);
     }
     waits.sort((a, b) => a - b);
     const median = waits[before >> 1] ?? Infinity;
-    console.log(JSON.stringify({ live_turns: waits.length, median_ms: Math.round(median), worst_ms: Math.round(waits.at(-1) ?? 0) }));
+    console.log(
+      JSON.stringify({
+        live_turns: waits.length,
+        median_ms: Math.round(median),
+        worst_ms: Math.round(waits.at(-1) ?? 0),
+      }),
+    );
     expect(median).toBeLessThan(1500);
     expect(await page.getByText(`${total} turns`, { exact: true }).count()).toBe(1);
     expect(await turnsShown(page)).toEqual([...Array(total).keys()]);

@@ -34,19 +34,33 @@ const PAGES: readonly (readonly [string, () => string])[] = [
   ["model", () => "/models/builtin/expert"],
 ];
 
-const LOOKS = [[1280, "light"], [390, "dark"]] as const;
+const LOOKS = [
+  [1280, "light"],
+  [390, "dark"],
+] as const;
 
 // Every page in one look, alternately; in both in the long tests.
 describe.each(PAGES.map((page, index) => [...page, index] as const))("the page of the %s", (_, path, index) => {
-  it.each(LOOKS.filter((__, look) => LONG || look === index % 2))("at %d px, %s, has no serious fault", async (width, scheme) => {
-    const { page, faults, context } = await open(path(), width, scheme);
-    const { violations } = await new AxeBuilder({ page }).analyze();
-    const serious = violations.filter((one) => one.impact === "serious" || one.impact === "critical");
-    expect(serious.map((one) => `${one.id}: ${one.nodes.map((node) => node.html.slice(0, 160)).slice(0, 3).join(" | ")}`)).toEqual([]);
-    expect(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth)).toBe(true);
-    expect(faults).toEqual([]);
-    await context.close();
-  });
+  it.each(LOOKS.filter((__, look) => LONG || look === index % 2))(
+    "at %d px, %s, has no serious fault",
+    async (width, scheme) => {
+      const { page, faults, context } = await open(path(), width, scheme);
+      const { violations } = await new AxeBuilder({ page }).analyze();
+      const serious = violations.filter((one) => one.impact === "serious" || one.impact === "critical");
+      expect(
+        serious.map(
+          (one) =>
+            `${one.id}: ${one.nodes
+              .map((node) => node.html.slice(0, 160))
+              .slice(0, 3)
+              .join(" | ")}`,
+        ),
+      ).toEqual([]);
+      expect(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth)).toBe(true);
+      expect(faults).toEqual([]);
+      await context.close();
+    },
+  );
 });
 
 describe("the leaderboard", () => {
@@ -79,7 +93,9 @@ it("leads in three clicks to a bridge that builds itself and breaks under its ca
   await page.waitForFunction(() => Number(document.querySelector("[data-step]")?.getAttribute("data-step")) < 3);
   await page.waitForURL(/view=trial/, { timeout: 600 * steps + 10_000 });
   const time = page.getByText(/^\d+\.\d \/ \d+ s$/);
-  await expect.poll(async () => Number.parseFloat((await time.textContent()) ?? ""), { timeout: 15_000 }).toBeGreaterThan(0);
+  await expect
+    .poll(async () => Number.parseFloat((await time.textContent()) ?? ""), { timeout: 15_000 })
+    .toBeGreaterThan(0);
   await page.getByText(/joints? broke/).waitFor();
   await context.close();
 });

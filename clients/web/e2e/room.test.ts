@@ -30,12 +30,25 @@ async function walked(page: Page, expected: Expected): Promise<string[]> {
     }
     const NEAR = 1e-5;
     const scene = (document.querySelector("canvas") as unknown as { scene: Node }).scene;
-    const apart = (a: ArrayLike<number>, b: readonly number[]): number => Math.max(...b.map((value, k) => Math.abs((a[k] ?? NaN) - value)));
+    const apart = (a: ArrayLike<number>, b: readonly number[]): number =>
+      Math.max(...b.map((value, k) => Math.abs((a[k] ?? NaN) - value)));
     const matrixOf = ([x = 0, y = 0, z = 0, w = 1, i = 0, j = 0, k = 0]: readonly number[]): number[] => [
-      1 - 2 * (j * j + k * k), 2 * (i * j + k * w), 2 * (i * k - j * w), 0,
-      2 * (i * j - k * w), 1 - 2 * (i * i + k * k), 2 * (j * k + i * w), 0,
-      2 * (i * k + j * w), 2 * (j * k - i * w), 1 - 2 * (i * i + j * j), 0,
-      x, y, z, 1,
+      1 - 2 * (j * j + k * k),
+      2 * (i * j + k * w),
+      2 * (i * k - j * w),
+      0,
+      2 * (i * j - k * w),
+      1 - 2 * (i * i + k * k),
+      2 * (j * k + i * w),
+      0,
+      2 * (i * k + j * w),
+      2 * (j * k - i * w),
+      1 - 2 * (i * i + j * j),
+      0,
+      x,
+      y,
+      z,
+      1,
     ];
     const fault = (step: (typeof steps)[number]): string | null => {
       const blocks = new Map<string, Float32Array>();
@@ -47,8 +60,10 @@ async function walked(page: Page, expected: Expected): Promise<string[]> {
         node.userData.rods?.forEach((id, index) => rods.set(id, matrices.slice(16 * index, 16 * index + 16)));
         if (node.userData.ghost !== undefined) ghosts.push(node.matrixWorld.elements);
       });
-      if (blocks.size !== Object.keys(step.blocks).length) return `${blocks.size} blocks, not ${Object.keys(step.blocks).length}`;
-      if (rods.size !== Object.keys(step.rods).length) return `${rods.size} connectors, not ${Object.keys(step.rods).length}`;
+      if (blocks.size !== Object.keys(step.blocks).length)
+        return `${blocks.size} blocks, not ${Object.keys(step.blocks).length}`;
+      if (rods.size !== Object.keys(step.rods).length)
+        return `${rods.size} connectors, not ${Object.keys(step.rods).length}`;
       for (const [id, pose] of Object.entries(step.blocks)) {
         const off = apart(blocks.get(id) ?? [], matrixOf(pose));
         if (!(off <= NEAR)) return `block ${id} is off by ${off}`;
@@ -84,16 +99,21 @@ async function walked(page: Page, expected: Expected): Promise<string[]> {
 }
 
 describe.skipIf(sessions.length === 0)("random machines", () => {
-  it.each(sessions.map((one, index) => [index, one] as const))("of session %d stand where the geometry library says, step by step", async (_, expected) => {
-    const page = await opened(browser, `/jobs/${expected.job}?step=0`, 390);
-    await page.locator("canvas").waitFor();
-    await page.waitForFunction(() => "scene" in (document.querySelector("canvas") ?? {}));
-    // What is drawn is small: poses are read, and software draws slowly.
-    await page.locator(".stage-3d").evaluate((stage) => { stage.style.height = "60px"; });
-    expect(await page.locator("[data-steps]").getAttribute("data-steps")).toBe(String(expected.steps.length));
-    expect(await walked(page, expected)).toEqual([]);
-    await page.close();
-  });
+  it.each(sessions.map((one, index) => [index, one] as const))(
+    "of session %d stand where the geometry library says, step by step",
+    async (_, expected) => {
+      const page = await opened(browser, `/jobs/${expected.job}?step=0`, 390);
+      await page.locator("canvas").waitFor();
+      await page.waitForFunction(() => "scene" in (document.querySelector("canvas") ?? {}));
+      // What is drawn is small: poses are read, and software draws slowly.
+      await page.locator(".stage-3d").evaluate((stage) => {
+        stage.style.height = "60px";
+      });
+      expect(await page.locator("[data-steps]").getAttribute("data-steps")).toBe(String(expected.steps.length));
+      expect(await walked(page, expected)).toEqual([]);
+      await page.close();
+    },
+  );
 
   it("show which action made a part, and which part an action made", async () => {
     const session = await openSession("chooser");
@@ -118,13 +138,17 @@ describe.skipIf(sessions.length === 0)("random machines", () => {
 
 describe.skipIf(sessions.length === 0)("two jobs", () => {
   it("stand side by side, seen by cameras that turn together", async () => {
-    const { jobs } = (await (await fetch(`${URL_OF_SERVICE}/v1/jobs?task=support-1&state=done&outcome=success`)).json()) as { jobs: { id: string }[] };
+    const { jobs } = (await (
+      await fetch(`${URL_OF_SERVICE}/v1/jobs?task=support-1&state=done&outcome=success`)
+    ).json()) as { jobs: { id: string }[] };
     const [a, b] = [jobs[0]?.id ?? "", jobs[1]?.id ?? ""];
     const page = await opened(browser, `/compare?a=${a}&b=${b}`);
     await page.getByRole("tab", { name: "Trials, by one clock" }).click();
     await page.locator("[data-trial=b] canvas").waitFor();
     const { violations } = await new AxeBuilder({ page }).analyze();
-    expect(violations.filter((one) => one.impact === "serious" || one.impact === "critical").map((one) => one.id)).toEqual([]);
+    expect(
+      violations.filter((one) => one.impact === "serious" || one.impact === "critical").map((one) => one.id),
+    ).toEqual([]);
     const eyes = (): Promise<number[][]> =>
       page.evaluate(() =>
         [...document.querySelectorAll("[data-trial] .stage-3d canvas")].map((canvas) => {
@@ -144,9 +168,7 @@ describe.skipIf(sessions.length === 0)("two jobs", () => {
       return (await eyes())[0];
     };
     await expect.poll(turned, { timeout: 40_000, interval: 500 }).not.toEqual(before);
-    await expect
-      .poll(async () => new Set((await eyes()).map((eye) => eye.join())).size, { timeout: 10_000 })
-      .toBe(1);
+    await expect.poll(async () => new Set((await eyes()).map((eye) => eye.join())).size, { timeout: 10_000 }).toBe(1);
     await page.close();
   });
 });

@@ -30,7 +30,11 @@ async function asked<Data>(path: string): Promise<Data> {
 
 /** Opens a page of a site, and lets no request leave it; `faults` is what it should not have done. */
 async function opened(base: string, path: string, width = 1280): Promise<{ page: Page; faults: string[] }> {
-  const context = await browser.newContext({ viewport: { width, height: 900 }, colorScheme: width < 800 ? "dark" : "light", reducedMotion: "reduce" });
+  const context = await browser.newContext({
+    viewport: { width, height: 900 },
+    colorScheme: width < 800 ? "dark" : "light",
+    reducedMotion: "reduce",
+  });
   const page = await context.newPage();
   const faults: string[] = [];
   await page.route("**/*", (route) => {
@@ -80,26 +84,45 @@ describe.skipIf(WHOLE === "")("a published site", () => {
     ["a new sweep", 1280, () => "/sweeps/new"],
   ];
 
-  it.each(PAGES.filter((_, index) => LONG || index % 2 === 0))("shows %s at %d px without a fault, from its own files", async (_, width, path) => {
-    const { page, faults } = await opened(WHOLE, path(), width);
-    const { violations } = await new AxeBuilder({ page }).analyze();
-    const serious = violations.filter((one) => one.impact === "serious" || one.impact === "critical");
-    expect(serious.map((one) => `${one.id}: ${one.nodes.map((node) => node.html.slice(0, 160)).slice(0, 3).join(" | ")}`)).toEqual([]);
-    expect(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth)).toBe(true);
-    expect(await page.getByRole("alert").filter({ hasText: "Try again" }).count()).toBe(0);
-    expect(faults).toEqual([]);
-    for (const name of ["Verify", "Give an API key", "Submit the sweep", "Pause", "Cancel…"]) expect(await page.getByRole("button", { name }).count(), name).toBe(0);
-    await page.context().close();
-  });
+  it.each(PAGES.filter((_, index) => LONG || index % 2 === 0))(
+    "shows %s at %d px without a fault, from its own files",
+    async (_, width, path) => {
+      const { page, faults } = await opened(WHOLE, path(), width);
+      const { violations } = await new AxeBuilder({ page }).analyze();
+      const serious = violations.filter((one) => one.impact === "serious" || one.impact === "critical");
+      expect(
+        serious.map(
+          (one) =>
+            `${one.id}: ${one.nodes
+              .map((node) => node.html.slice(0, 160))
+              .slice(0, 3)
+              .join(" | ")}`,
+        ),
+      ).toEqual([]);
+      expect(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth)).toBe(true);
+      expect(await page.getByRole("alert").filter({ hasText: "Try again" }).count()).toBe(0);
+      expect(faults).toEqual([]);
+      for (const name of ["Verify", "Give an API key", "Submit the sweep", "Pause", "Cancel…"])
+        expect(await page.getByRole("button", { name }).count(), name).toBe(0);
+      await page.context().close();
+    },
+  );
 
   it("has the board of the service", async () => {
     const board = await asked<Board>(`/v1/leaderboard?${site.sweeps.map((id) => `sweep=${id}`).join("&")}`);
     expect(board.overall.length).toBeGreaterThan(1);
     const { page } = await opened(WHOLE, "/");
-    const shown = await page.locator("section[aria-label=Overall] tbody tr").evaluateAll((found) => found.map((row) => [...row.children].map((cell) => cell.textContent.trim())));
+    const shown = await page
+      .locator("section[aria-label=Overall] tbody tr")
+      .evaluateAll((found) => found.map((row) => [...row.children].map((cell) => cell.textContent.trim())));
     board.overall.forEach((row, index) => {
       expect(shown[index]?.[0]).toContain(row.model);
-      expect([shown[index]?.[2], shown[index]?.[3], shown[index]?.[4], shown[index]?.[7]]).toEqual([places(row.rank_low, row.rank_high), number(row.mean_rank, 2), percent(row.success_rate_mean, 1), count(row.trials)]);
+      expect([shown[index]?.[2], shown[index]?.[3], shown[index]?.[4], shown[index]?.[7]]).toEqual([
+        places(row.rank_low, row.rank_high),
+        number(row.mean_rank, 2),
+        percent(row.success_rate_mean, 1),
+        count(row.trials),
+      ]);
     });
     expect(shown).toHaveLength(board.overall.length);
     await page.context().close();
@@ -108,7 +131,11 @@ describe.skipIf(WHOLE === "")("a published site", () => {
   it("leads from the board to a machine that builds itself and a trial that plays", async () => {
     const { page, faults } = await opened(WHOLE, "/");
     await page.locator("a.heat-cell").first().click();
-    await page.getByRole("region", { name: /jobs, scrolls/ }).getByRole("link").first().click();
+    await page
+      .getByRole("region", { name: /jobs, scrolls/ })
+      .getByRole("link")
+      .first()
+      .click();
     await page.getByRole("button", { name: "First step" }).click();
     await expect.poll(() => page.locator("[data-step]").getAttribute("data-step")).toBe("0");
     await page.getByRole("button", { name: "Last step" }).click();
@@ -132,13 +159,21 @@ describe.skipIf(WHOLE === "")("a published site", () => {
 
   it("gives files to keep", async () => {
     const { page, faults } = await opened(WHOLE, `/jobs/${built}`);
-    for (const [button, ending] of [["GLB", ".glb"], ["Save machine", ".json"]] as const) {
+    for (const [button, ending] of [
+      ["GLB", ".glb"],
+      ["Save machine", ".json"],
+    ] as const) {
       const waiting = page.waitForEvent("download");
       await page.getByRole("button", { name: button, exact: true }).click();
       expect((await waiting).suggestedFilename()).toContain(ending);
     }
     await page.goto(`${WHOLE}#/`);
-    for (const [format, ending] of [["CSV", "csv"], ["Parquet", "parquet"], ["LaTeX table", "tex"], ["JSON", "json"]] as const) {
+    for (const [format, ending] of [
+      ["CSV", "csv"],
+      ["Parquet", "parquet"],
+      ["LaTeX table", "tex"],
+      ["JSON", "json"],
+    ] as const) {
       await page.getByRole("button", { name: "Export" }).click();
       const waiting = page.waitForEvent("download");
       await page.getByRole("menuitem", { name: format, exact: true }).click();
@@ -149,10 +184,10 @@ describe.skipIf(WHOLE === "")("a published site", () => {
   });
 
   it("keeps what its switches lead to, and says what it lacks", async () => {
-    const { page, faults } = await opened(WHOLE, "/?task=support-1&reading=published");
+    const { page, faults } = await opened(WHOLE, "/?task=support-1&policy=published");
     expect(await page.locator("a.heat-cell").count()).toBeGreaterThan(0);
     await page.getByText("count as failures").click();
-    await page.waitForFunction(() => !location.hash.includes("reading"));
+    await page.waitForFunction(() => !location.hash.includes("policy"));
     await page.goto(`${WHOLE}#/?since=2020-01-01`);
     await page.getByText("other choices need a running service").waitFor();
     await page.goto(`${WHOLE}#/compare?models=no%2Fone,builtin%2Fidle`);
@@ -189,12 +224,27 @@ describe.skipIf(WHOLE === "")("a published site", () => {
     const [one] = rows.jobs;
     const middle = rows.jobs.map((job) => job.finished_at ?? "").sort()[Math.floor(rows.jobs.length / 2)] ?? "";
     const filters: Record<string, string>[] = [
-      {}, { task: "support-1" }, { model: "builtin/random" }, { outcome: "success" }, { state: "done" }, { state: "running" },
-      { text: "SUPPORT" }, { text: "unreadable" }, { indicator_min: "1" }, { indicator_max: "0" }, { since: middle }, { until: middle },
-      { id_prefix: one?.id.slice(0, 8) ?? "" }, { configuration: one?.configuration ?? "" }, { task_version: one?.task_version ?? "" },
+      {},
+      { task: "support-1" },
+      { model: "builtin/random" },
+      { outcome: "success" },
+      { state: "done" },
+      { state: "running" },
+      { text: "SUPPORT" },
+      { text: "unreadable" },
+      { indicator_min: "1" },
+      { indicator_max: "0" },
+      { since: middle },
+      { until: middle },
+      { id_prefix: one?.id.slice(0, 8) ?? "" },
+      { configuration: one?.configuration ?? "" },
+      { task_version: one?.task_version ?? "" },
     ];
     for (const sweep of site.sweeps) {
-      const queries: Record<string, string>[] = [...filters.map((filter) => ({ ...filter, sweep })), ...sorts.flatMap((sort) => ["asc", "desc"].map((order) => ({ sort, order, sweep })))];
+      const queries: Record<string, string>[] = [
+        ...filters.map((filter) => ({ ...filter, sweep })),
+        ...sorts.flatMap((sort) => ["asc", "desc"].map((order) => ({ sort, order, sweep }))),
+      ];
       for (const query of queries) {
         const words = new URLSearchParams(query);
         const wanted = await asked<JobPage>(`/v1/jobs?limit=1000&${words.toString()}`);
@@ -203,11 +253,13 @@ describe.skipIf(WHOLE === "")("a published site", () => {
       }
     }
     const pages: string[] = [];
-    for (let cursor: string | null = "0"; cursor !== null; ) {
+    for (let cursor: string | null = "0"; cursor !== null;) {
       const page: JobPage = listed(rows, new URLSearchParams({ limit: "4", cursor, sort: "indicator" }));
       pages.push(...page.jobs.map((job) => job.id));
       cursor = page.next_cursor;
     }
-    expect(pages).toEqual(listed(rows, new URLSearchParams({ limit: "1000", sort: "indicator" })).jobs.map((job) => job.id));
+    expect(pages).toEqual(
+      listed(rows, new URLSearchParams({ limit: "1000", sort: "indicator" })).jobs.map((job) => job.id),
+    );
   });
 });

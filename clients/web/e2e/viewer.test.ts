@@ -8,7 +8,11 @@ import { launched } from "./browser";
 const FOLDER = process.env.BUILDARENA_VIEWER_PAGES ?? "";
 
 interface Drawn {
-  scene?: { traverse: (visit: (found: { userData: { blocks?: string[] }; instanceMatrix?: { array: ArrayLike<number> } }) => void) => void };
+  scene?: {
+    traverse: (
+      visit: (found: { userData: { blocks?: string[] }; instanceMatrix?: { array: ArrayLike<number> } }) => void,
+    ) => void;
+  };
 }
 
 let browser: Browser;
@@ -48,7 +52,10 @@ async function drawn(frame: Frame): Promise<{ blocks: string[]; places: number }
     (document.querySelector("canvas") as Drawn | null)?.scene?.traverse((found) => {
       if (found.userData.blocks === undefined) return;
       blocks.push(...found.userData.blocks);
-      places = Array.from(found.instanceMatrix?.array ?? []).reduce((sum, value, index) => sum + (index + 1) * value, places);
+      places = Array.from(found.instanceMatrix?.array ?? []).reduce(
+        (sum, value, index) => sum + (index + 1) * value,
+        places,
+      );
     });
     return { blocks, places };
   });
@@ -70,9 +77,14 @@ async function colours(page: Page): Promise<number> {
     const image = new Image();
     image.src = `data:image/png;base64,${data}`;
     await image.decode();
-    const context = Object.assign(document.createElement("canvas"), { width: image.width, height: image.height }).getContext("2d");
+    const context = Object.assign(document.createElement("canvas"), {
+      width: image.width,
+      height: image.height,
+    }).getContext("2d");
     context?.drawImage(image, 0, 0);
-    const pixels = new Uint32Array(context?.getImageData(0, 0, image.width, image.height).data.buffer ?? new ArrayBuffer(0));
+    const pixels = new Uint32Array(
+      context?.getImageData(0, 0, image.width, image.height).data.buffer ?? new ArrayBuffer(0),
+    );
     return new Set(pixels).size;
   }, picture);
   await other.close();

@@ -25,7 +25,12 @@ const complete = performance.now() - start;
 const loadedAt = await page.evaluate(() => performance.now());
 
 const clicks = [];
-const jobsShown = () => page.getByText(/^construction failed: /).first().textContent({ timeout: 2_000 }).catch(() => null);
+const jobsShown = () =>
+  page
+    .getByText(/^construction failed: /)
+    .first()
+    .textContent({ timeout: 2_000 })
+    .catch(() => null);
 const before = await jobsShown();
 const memory = () => page.evaluate(() => performance.memory.usedJSHeapSize / 2 ** 20);
 const heap = [await memory()];
@@ -41,7 +46,10 @@ while (performance.now() < end) {
       return performance.now() - at;
     }),
   );
-  await page.locator("[role=region][aria-label$=scrolls]").last().evaluate((frame) => frame.scrollBy(0, 2000));
+  await page
+    .locator("[role=region][aria-label$=scrolls]")
+    .last()
+    .evaluate((frame) => frame.scrollBy(0, 2000));
   heap.push(await memory());
   await page.waitForTimeout(1_000);
 }
@@ -54,7 +62,9 @@ console.log(
     first_shown_ms: round(firstShown),
     grid_shown_ms: round(gridShown),
     all_jobs_read_ms: round(complete),
-    longest_task_while_loading_ms: round(Math.max(0, ...tasks.filter((task) => task.at <= loadedAt).map((task) => task.took))),
+    longest_task_while_loading_ms: round(
+      Math.max(0, ...tasks.filter((task) => task.at <= loadedAt).map((task) => task.took)),
+    ),
     long_tasks_after_load: after.length,
     longest_task_after_load_ms: round(Math.max(0, ...after.map((task) => task.took))),
     click_median_ms: round(clicks[Math.floor(clicks.length / 2)]),

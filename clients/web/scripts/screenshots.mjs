@@ -13,7 +13,9 @@ const first = async (path) => (await ask(path)).jobs?.[0]?.id;
 
 async function pages() {
   const [newest, other] = (await ask("/v1/sweeps")).sweeps;
-  const built = (await first("/v1/jobs?task=support-1&outcome=success&model=builtin/expert")) ?? (await first("/v1/jobs?outcome=success"));
+  const built =
+    (await first("/v1/jobs?task=support-1&outcome=success&model=builtin/expert")) ??
+    (await first("/v1/jobs?outcome=success"));
   const failed = (await first("/v1/jobs?outcome=unsuccessful")) ?? built;
   return {
     board: "/?paper=yes",
@@ -37,8 +39,14 @@ async function opened(browser, path, width, colorScheme, height = 900) {
   const context = await browser.newContext({ viewport: { width, height }, colorScheme, reducedMotion: "reduce" });
   const page = await context.newPage();
   await page.goto(url + path);
-  await page.locator("h1").first().waitFor({ timeout: 20_000 }).catch(() => undefined);
-  await page.waitForFunction(() => document.querySelector("[aria-busy=true]") === null, undefined, { timeout: 30_000 }).catch(() => undefined);
+  await page
+    .locator("h1")
+    .first()
+    .waitFor({ timeout: 20_000 })
+    .catch(() => undefined);
+  await page
+    .waitForFunction(() => document.querySelector("[aria-busy=true]") === null, undefined, { timeout: 30_000 })
+    .catch(() => undefined);
   await page.waitForTimeout(1_000);
   return { page, context };
 }
@@ -83,5 +91,10 @@ const browser = await chromium.launch({
   executablePath: process.env.BUILDARENA_CHROMIUM ?? "/usr/bin/chromium",
   args: ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"],
 });
-await (options.includes("--all") ? all(browser, options.filter((one) => !one.startsWith("--"))) : shown(browser));
+await (options.includes("--all")
+  ? all(
+      browser,
+      options.filter((one) => !one.startsWith("--")),
+    )
+  : shown(browser));
 await browser.close();

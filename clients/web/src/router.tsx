@@ -1,9 +1,15 @@
-import { createHashHistory, createRootRoute, createRoute, createRouter, lazyRouteComponent } from "@tanstack/react-router";
+import {
+  createHashHistory,
+  createRootRoute,
+  createRoute,
+  createRouter,
+  lazyRouteComponent,
+} from "@tanstack/react-router";
 import { BASE, isSite } from "./api/site";
-import { readSearch } from "./pages/board/search";
-import { readBuildSearch } from "./pages/build/search";
+import { readSearch } from "./api/board-search";
+import { readBuildSearch } from "./pages/workbench/search";
 import { readCompareSearch } from "./pages/compare/search";
-import { readJobSearch, readJobsSearch } from "./pages/job/search";
+import { readJobSearch, readJobsSearch } from "./api/jobs-search";
 import { Missing, RootError, Shell } from "./parts/Shell";
 
 function readTrack(raw: Record<string, unknown>): { track?: string } {
@@ -82,7 +88,7 @@ const build = createRoute({
   getParentRoute: () => root,
   path: "/build",
   validateSearch: readBuildSearch,
-  component: lazyRouteComponent(() => import("./pages/build/BuildPage")),
+  component: lazyRouteComponent(() => import("./pages/workbench/BuildPage")),
 });
 const machine = createRoute({
   getParentRoute: () => root,
@@ -91,7 +97,21 @@ const machine = createRoute({
 });
 
 export const router = createRouter({
-  routeTree: root.addChildren([board, sweeps, newSweep, twoSweeps, sweep, jobs, job, compare, tasks, task, model, build, machine]),
+  routeTree: root.addChildren([
+    board,
+    sweeps,
+    newSweep,
+    twoSweeps,
+    sweep,
+    jobs,
+    job,
+    compare,
+    tasks,
+    task,
+    model,
+    build,
+    machine,
+  ]),
   // A file server knows one page only, so the rest of the address stands behind its #.
   history: isSite ? createHashHistory() : undefined,
   basepath: BASE === "" ? "/" : BASE,

@@ -7,7 +7,8 @@ import { goalOf } from "./pages/tasks/goal";
 
 describe("figures", () => {
   it("say when there is none", () => {
-    for (const shown of [number(null), number(NaN), percent(undefined), dollars(null), duration(null), places(null, 2)]) expect(shown).toBe("–");
+    for (const shown of [number(null), number(NaN), percent(undefined), dollars(null), duration(null), places(null, 2)])
+      expect(shown).toBe("–");
   });
 
   it("keep small amounts visible and large ones readable", () => {
@@ -41,15 +42,30 @@ describe("problems", () => {
   });
 });
 
-const turn = (index: number, change: Partial<Turn>): Turn => ({ index, stage: "build", sub_structure: null, role: "builder", text: "", actions: [], ...change });
-const refused = { name: "attach_block_to", arguments: { base: "1" }, ok: false, reason: "overlap", feedback: "It OVERLAPS block 3" };
+const turn = (index: number, change: Partial<Turn>): Turn => ({
+  index,
+  stage: "build",
+  sub_structure: null,
+  role: "builder",
+  text: "",
+  actions: [],
+  ...change,
+});
+const refused = {
+  name: "attach_block_to",
+  arguments: { base: "1" },
+  ok: false,
+  reason: "overlap",
+  feedback: "It OVERLAPS block 3",
+};
 
 describe("turns", () => {
   const turns = [turn(0, { role: "planner", text: "A bridge" }), turn(1, { actions: [refused] }), turn(2, {})];
   const all = { role: null, refusedOnly: false, text: "" };
 
   it("are chosen by role, refusals and text, also of feedback", () => {
-    const chosen = (filter: Partial<typeof all> | { role: string }) => chosenTurns(turns, { ...all, ...filter }).map((one) => one.index);
+    const chosen = (filter: Partial<typeof all> | { role: string }) =>
+      chosenTurns(turns, { ...all, ...filter }).map((one) => one.index);
     expect(chosen({})).toEqual([0, 1, 2]);
     expect(chosen({ role: "planner" })).toEqual([0]);
     expect(chosen({ refusedOnly: true })).toEqual([1]);

@@ -45,7 +45,8 @@ def test_the_checker_is_content_with_other_arguments(arguments) -> None:
 @pytest.mark.parametrize("name", IDS)
 def test_the_expert_scores_what_it_scores_elsewhere(name, actions, experts) -> None:
     task = task_of(name)
-    environment = gymnasium.make(name, rewards={"success": 1.0, "indicator": 2.0})
+    rewards = {"success": 1.0, "indicator": 2.0}
+    environment = gymnasium.make(name, simulator="mujoco", rewards=rewards)
     briefing, info = environment.reset(seed=3)
     assert f"# Task: {task}" in briefing
     assert UNKNOWN * 2 not in briefing
@@ -143,9 +144,9 @@ def test_starts_vary_when_asked_for_and_only_then(actions) -> None:
             "indicator"
         ]
 
-    exact = gymnasium.make(IDS[0])
+    exact = gymnasium.make(IDS[0], simulator="mujoco")
     assert indicator(exact, seed=1) == indicator(exact, seed=2) == indicator(exact)
-    varied = gymnasium.make(IDS[0], varied_start=True)
+    varied = gymnasium.make(IDS[0], simulator="mujoco", varied_start=True)
     first, second = indicator(varied, seed=1), indicator(varied)
     assert len({first, second, indicator(exact)}) == 3
     assert (indicator(varied, seed=1), indicator(varied)) == (first, second)

@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 import pytest
-from documented import run_document
+from support.documents.code_blocks import run_document
 
 README = Path(__file__).parents[1] / "README.md"
 

@@ -17,7 +17,7 @@ def test_each_environment_of_a_vector_plays_its_own_episode(kind, actions, exper
     vector = kind(
         [
             lambda task=task: gymnasium.make(
-                f"buildarena_gymnasium:BuildArena/{task.capitalize()}-v0"
+                f"buildarena_gymnasium:BuildArena/{task.capitalize()}-v0", simulator="mujoco"
             )
             for task in TASKS
         ]

@@ -13,6 +13,7 @@ from inspect_ai.model import ChatMessage, Model, ModelOutput, ModelUsage, get_mo
 from buildarena_benchmark import builtin_tasks
 from buildarena_environment import Trial, try_machine
 from buildarena_environment.workbench import Workbench
+from buildarena_simulation import DEFAULT_ENGINE
 
 ROOT = Path(__file__).parents[3]
 EXPERTS = json.loads((ROOT / "tests/data/expert_calls.json").read_text(encoding="utf-8"))
@@ -65,12 +66,12 @@ def listed(*outputs: ModelOutput) -> Answer:
     return answer
 
 
-def tried(task: str) -> Trial:
+def tried(task: str, simulator: str = DEFAULT_ENGINE) -> Trial:
     """What the library itself says of the expert's machine."""
     bench = Workbench(builtin_tasks()[task].constraints.catalogue)
     for made in EXPERTS[task]["calls"]:
         assert bench.act(made["machine"], made["tool"], made["arguments"]).ok
-    return try_machine(builtin_tasks()[task], bench.submitted())
+    return try_machine(builtin_tasks()[task], bench.submitted(), simulator)
 
 
 def only(log: EvalLog) -> EvalSample:

@@ -39,9 +39,13 @@ def five_roles(messages: list[ChatMessage], seed: int = 0) -> ModelOutput:
     return ModelOutput.from_content("mockllm", reply.text)
 
 
+ROLES = {"solver": "roles", "simulator": "mujoco"}
+"""The stored scores are MuJoCo's."""
+
+
 @pytest.mark.parametrize("task", ["support-1", "lift-3", "transport-1"])
 def test_the_workflow_builds_what_it_builds_in_the_service(run, task) -> None:
-    log = run(f"buildarena/{task.replace('-', '_')}", five_roles, task_args={"solver": "roles"})
+    log = run(f"buildarena/{task.replace('-', '_')}", five_roles, task_args=ROLES)
     sample = only(log)
     told = sample.scores["success"].metadata
     assert told["indicator"] == pytest.approx(EXPERTS[task]["score"]["indicator"], rel=0.02)
@@ -54,12 +58,12 @@ def test_the_workflow_builds_what_it_builds_in_the_service(run, task) -> None:
 
 @pytest.mark.parametrize("task", ["lift-3", "transport-1"])
 def test_its_calls_build_the_same_machine_by_hand(run, task) -> None:
-    log = run(f"buildarena/{task.replace('-', '_')}", five_roles, task_args={"solver": "roles"})
+    log = run(f"buildarena/{task.replace('-', '_')}", five_roles, task_args=ROLES)
     sample = only(log)
     bench = Workbench()
     for made in sample.store["buildarena:calls"]:
         assert bench.act(made["machine"], made["tool"], made["arguments"]).ok
-    again = try_machine(builtin_tasks()[task], bench.submitted())
+    again = try_machine(builtin_tasks()[task], bench.submitted(), "mujoco")
     assert again.score.indicator == sample.scores["indicator"].value
 
 
@@ -76,7 +80,7 @@ def test_of_several_drives_the_best_counts_with_its_machine_and_calls(run) -> No
             press["hold_for"] /= 10**drives
         return ModelOutput.from_content("mockllm", json.dumps(program))
 
-    sample = only(run("buildarena/transport_1", tiring, task_args={"solver": "roles"}))
+    sample = only(run("buildarena/transport_1", tiring, task_args=ROLES))
     told = sample.scores["success"].metadata
     assert told["trials"] == 3
     assert told["indicator"] == pytest.approx(
@@ -93,7 +97,7 @@ def test_a_session_that_fails_is_scored_as_one(run) -> None:
     def silent(_: list[ChatMessage]) -> ModelOutput:
         return ModelOutput.from_content("mockllm", "I do not know.")
 
-    sample = only(run("buildarena/support_1", silent, task_args={"solver": "roles"}))
+    sample = only(run("buildarena/support_1", silent, task_args=ROLES))
     told = sample.scores["success"].metadata
     assert (sample.scores["success"].value, told["indicator"]) == ("I", 0.0)
     assert told["reason"]

@@ -63,7 +63,8 @@ def served(*arguments: str) -> Iterator[tuple[str, subprocess.Popen]]:
 
 @pytest.fixture(scope="session")
 def server() -> Iterator[tuple[str, subprocess.Popen]]:
-    with served("--max-sessions", "12", "--processes", "1", "--max-steps", "300") as found:
+    more = ("--max-steps", "300", "--simulator", "mujoco")
+    with served("--max-sessions", "12", "--processes", "1", *more) as found:
         yield found
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import psutil
 import pytest
-from documented import run_document
+from support.documents.code_blocks import run_document
 
 README = Path(__file__).parents[1] / "README.md"
 

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 from conftest import SUBMIT
-from documented import run_document
 from stand_in import serving
+from support.documents.code_blocks import run_document
 from test_rollouts import several
 
 README = Path(__file__).parents[1] / "README.md"

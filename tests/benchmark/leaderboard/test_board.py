@@ -8,7 +8,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from buildarena_benchmark.flags import DISQUALIFYING, INFORMATIVE, PUBLISHED, Reading
+from buildarena_benchmark.flags import ScoringPolicy
 from buildarena_benchmark.leaderboard import (
     BoardQuery,
     EndedJob,
@@ -16,6 +16,7 @@ from buildarena_benchmark.leaderboard import (
     compare_models,
     summarise,
 )
+from buildarena_benchmark.scorers.registry import known_flags
 from buildarena_benchmark.statistics import holm
 
 START = datetime(2026, 1, 1, tzinfo=UTC)
@@ -24,6 +25,8 @@ WEIGHTS = {
     "lift-1": {"precision": 3, "ambiguity": 1},
     "support-1": {"precision": 1, "ambiguity": 1},
 }
+
+KNOWN = known_flags()
 
 
 def trials(task: str, model: str, successes: int, of: int, **values: object) -> list[EndedJob]:
@@ -75,7 +78,7 @@ def test_a_cell_of_a_hand_worked_case() -> None:
     assert cell.outcomes["construction_failed"] == 1
 
 
-@pytest.mark.parametrize("flag", DISQUALIFYING)
+@pytest.mark.parametrize("flag", [name for name, flag in KNOWN.items() if flag.disqualifying])
 def test_a_disqualified_success_is_a_failure_with_nothing_in_our_reading(flag) -> None:
     found = trials("lift-1", "a", 3, 4)
     found[0] = replace(found[0], flags=("never_fell", flag), indicator=900.0)
@@ -86,7 +89,10 @@ def test_a_disqualified_success_is_a_failure_with_nothing_in_our_reading(flag) -
     assert ours.flags == {"never_fell": 1, flag: 1}
 
 
-@pytest.mark.parametrize("flag", [*INFORMATIVE, "a flag of tomorrow"])
+@pytest.mark.parametrize(
+    "flag",
+    [*(name for name, flag in KNOWN.items() if not flag.disqualifying), "a flag of tomorrow"],
+)
 def test_an_informative_flag_changes_no_figure_of_a_rank(flag) -> None:
     plain = trials("lift-1", "a", 3, 4)
     cell, without = summarise([replace(t, flags=(flag,)) for t in plain]), summarise(plain)
@@ -96,19 +102,19 @@ def test_an_informative_flag_changes_no_figure_of_a_rank(flag) -> None:
     assert cell.censored == (3 if flag == "never_fell" else 0)
 
 
-@pytest.mark.parametrize("flag", sorted(PUBLISHED))
+@pytest.mark.parametrize("flag", [name for name, flag in KNOWN.items() if flag.published])
 @pytest.mark.parametrize("success", [True, False])
 def test_the_published_reading_leaves_out_what_it_calls_hacked(flag, success) -> None:
     found = trials("lift-1", "a", 3, 4)
     found[0] = replace(found[0], flags=(flag,), success=success)
-    cell = summarise(found, reading=Reading.PUBLISHED)
+    cell = summarise(found, policy=ScoringPolicy.PUBLISHED)
     assert (cell.flagged, cell.successes, cell.trials, cell.ended) == (1, 2, 3, 4)
 
 
-@pytest.mark.parametrize("flag", sorted({*DISQUALIFYING, *INFORMATIVE} - PUBLISHED))
+@pytest.mark.parametrize("flag", [name for name, flag in KNOWN.items() if not flag.published])
 def test_the_published_reading_knows_no_flags_but_its_own(flag) -> None:
     found = [replace(t, flags=(flag,)) for t in trials("lift-1", "a", 3, 4)]
-    cell = summarise(found, reading=Reading.PUBLISHED)
+    cell = summarise(found, policy=ScoringPolicy.PUBLISHED)
     assert (cell.flagged, cell.successes, cell.trials) == (0, 3, 4)
 
 
@@ -122,13 +128,13 @@ def test_a_bridge_that_carries_everything_is_the_best_result() -> None:
     first, second = board.board(ALL).tasks[0].rows
     assert (first.cell.model, first.rank, first.cell.censored) == ("all", 1, 40)
     assert (second.cell.model, second.rank) == ("some", 2)
-    published = board.board(BoardQuery(reading=Reading.PUBLISHED)).tasks[0].rows
+    published = board.board(BoardQuery(policy=ScoringPolicy.PUBLISHED)).tasks[0].rows
     assert [(row.cell.model, row.cell.trials) for row in published] == [("some", 64), ("all", 24)]
     assert board.board(ALL).tasks[0].rows[0].cell.successes == 40
 
 
 def test_who_cheats_does_not_gain_by_it() -> None:
-    """Not in our reading: neither by far-off figures nor by having few trials that count."""
+    """Not in our policy: neither by far-off figures nor by having few trials that count."""
     cheat = [
         replace(t, flags=("not_driven",), indicator=1e6) for t in trials("lift-1", "a", 60, 64)
     ]

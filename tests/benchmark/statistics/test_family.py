@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from made_up_trials import LOADS, board, rankings
+from support.boards.made_up_trials import LOADS, board, rankings
 
 MODELS, TASKS = 12, 9
 

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from made_up_trials import LOADS, coverage
 from scipy.stats import binom, binomtest
+from support.boards.made_up_trials import LOADS, coverage
 
 from buildarena_benchmark.statistics import (
     MIN_SUCCESSES,

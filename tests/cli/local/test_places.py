@@ -7,7 +7,7 @@ import signal
 
 import httpx
 import pytest
-from elsewhere import Case, run_elsewhere, start_elsewhere
+from support.odd_places import Case, run_elsewhere, start_elsewhere
 
 from buildarena_cli.local import free_port
 
@@ -181,15 +181,17 @@ def test_the_whole_service_runs_from_a_read_only_checkout_without_pybullet() -> 
                 line = process.stdout.readline()
                 assert line, process.stderr.read()
                 printed += line
-            assert "PyBullet is not installed: machines are simulated with MuJoCo alone" in printed
+            assert "the default engine 'pybullet' is not installed" in printed
+            assert "submissions must name one" in printed
             with httpx.Client(base_url=f"http://127.0.0.1:{port}/v1") as api:
                 assert api.get("/health").json()["status"] == "ok"
                 sweep = {"tasks": ["support-1"], "models": ["builtin/idle"], "seeds": [0]}
-                made = api.post("/sweeps", json=sweep).json()
-                assert api.get(f"/sweeps/{made['id']}").json()["spec"]["simulator"] == "mujoco"
-                refused = api.post("/sweeps", json={**sweep, "simulator": "pybullet"})
-                assert refused.status_code == 422
-                assert refused.json()["errors"][0]["choices"] == ["mujoco"]
+                made = api.post("/sweeps", json={**sweep, "simulator": "mujoco"})
+                assert made.status_code == 202, made.text
+                for refused in (sweep, {**sweep, "simulator": "pybullet"}):
+                    answer = api.post("/sweeps", json=refused)
+                    assert answer.status_code == 422
+                    assert answer.json()["errors"][0]["choices"] == ["mujoco"]
         finally:
             process.send_signal(signal.SIGTERM)
             process.communicate(timeout=60)

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import psutil
 import pytest
-from running import wait_until
-from terminals import BUILDARENA, piped
+from support.clients.terminals import BUILDARENA, piped
+from support.servers.stacks import wait_until
 
 from buildarena_cli.commands.running import _print_new
 from buildarena_cli.local import free_port

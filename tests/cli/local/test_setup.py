@@ -73,7 +73,7 @@ NO_COMPILING = '*"sync"*"requirements.lock") echo cc1plus is missing >&2; exit 1
 def test_without_wheel_and_compiler_all_but_pybullet_is_installed(folder: Path) -> None:
     done = set_up(folder, NO_WHEEL, NO_COMPILING)
     assert (done.returncode, done.stderr) == (0, "")
-    assert "there is no C++ compiler: without it, machines are simulated with MuJoCo" in done.stdout
+    assert "there is no C++ compiler: without it, name MuJoCo" in done.stdout
     assert (folder / ".venv/without-pybullet.lock").read_text() == REST
 
 

@@ -87,9 +87,9 @@ def test_sub_machines_are_built_before_the_assembly(tmp_path, replay):
     [
         (b"{", "input: not JSON"),
         (b"3", "input: expected a list"),
-        (b"[3]", r"input[0]: expected an object with op and params"),
-        (b'[{"params": {}}]', r"input[0]: expected an object with op and params"),
-        (b'{"seed": 1}', "input: steps are missing"),
+        (b"[3]", "input[0]: expected an object"),
+        (b'[{"params": {}}]', "input[0]: op is missing"),
+        (b'{"seed": 1}', "input: steps is missing"),
         (b'{"steps": 1}', "input.steps: expected a list"),
         (b'{"steps": [], "sub_machines": [1]}', "input.sub_machines: expected an object"),
         (b"\xff\xfe", "input: not JSON"),

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 import pytest
-from provider_standin import ProviderStandIn
+from support.providers.stand_in import ProviderStandIn
 
 from buildarena_pipeline.catalog.models import ModelEntry, Price, ProviderEntry
 from buildarena_worker.providers.provider import ProviderClient
 from buildarena_worker.providers.retries import RetryPolicy
 
-QUICK = RetryPolicy(tries=5, first_wait_s=0.01, longest_wait_s=0.05, timeout_s=2.0)
+QUICK = RetryPolicy(attempts=5, first_wait_s=0.01, longest_wait_s=0.05, timeout_s=2.0)
 PRICE = Price(input=2.0, output=8.0, cached=0.5)
 
 
@@ -22,11 +22,12 @@ def client(monkeypatch) -> Iterator[Callable[..., ProviderClient]]:
     made: list[ProviderClient] = []
 
     def make(
-        standin: ProviderStandIn, wire: str = "openai", policy: RetryPolicy = QUICK
+        standin: ProviderStandIn, protocol: str = "openai", policy: RetryPolicy = QUICK
     ) -> ProviderClient:
-        base = f"{standin.url}/v1" if wire == "openai" else standin.url
-        entry = ModelEntry(name=f"{wire}/standin", provider=wire, model="standin", price=PRICE)
-        provider = ProviderEntry(wire=wire, base_url=base, key="STANDIN_KEY")
+        base = f"{standin.url}/v1" if protocol == "openai" else standin.url
+        name = f"{protocol}/standin"
+        entry = ModelEntry(name=name, provider=protocol, model="standin", price=PRICE)
+        provider = ProviderEntry(protocol=protocol, base_url=base, key="STANDIN_KEY")
         made.append(ProviderClient(entry, provider, policy))
         return made[-1]
 

@@ -5,7 +5,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import pytest
-from provider_standin import ProviderStandIn
+from support.providers.stand_in import ProviderStandIn
 
 from buildarena_pipeline.catalog.models import ModelEntry, ProviderEntry
 from buildarena_pipeline.errors import PermanentError, TransientError
@@ -15,7 +15,7 @@ from buildarena_worker.providers.retries import RetryPolicy
 from buildarena_worker.session.messages import Message, Reply, Request, Tool, ToolCall
 from buildarena_worker.session.results import Failed
 
-WIRES = ["openai", "anthropic", "google"]
+PROTOCOLS = ["openai", "anthropic", "google"]
 
 
 def ask(text: str = "hello") -> Request:
@@ -26,10 +26,10 @@ def ask(text: str = "hello") -> Request:
     )
 
 
-@pytest.mark.parametrize("wire", WIRES)
-def test_a_whole_session_over_http_equals_the_one_played_inside(play, wire, client) -> None:
+@pytest.mark.parametrize("protocol", PROTOCOLS)
+def test_a_whole_session_over_http_equals_the_one_played_inside(play, protocol, client) -> None:
     with ProviderStandIn() as standin:
-        over_http = play(client=client(standin, wire), workflow="five-role")
+        over_http = play(client=client(standin, protocol), workflow="five-role")
     inside = play(workflow="five-role")
     assert over_http.suspended is not None, over_http.failure
     assert over_http.suspended.machine.to_document() == inside.suspended.machine.to_document()
@@ -47,22 +47,26 @@ def test_a_whole_session_over_http_equals_the_one_played_inside(play, wire, clie
     assert float(used.cost_usd) == pytest.approx(wanted, abs=1e-6 * counts.requests)
 
 
-FAULTS = [(wire, fault) for wire in WIRES for fault in ("429", "429 gzip", "500", "503", "drop")]
+FAULTS = [
+    (protocol, fault)
+    for protocol in PROTOCOLS
+    for fault in ("429", "429 gzip", "500", "503", "drop")
+]
 
 
-@pytest.mark.parametrize(("wire", "fault"), FAULTS)
-def test_passing_faults_are_retried(wire, fault, client) -> None:
+@pytest.mark.parametrize(("protocol", "fault"), FAULTS)
+def test_passing_faults_are_retried(protocol, fault, client) -> None:
     with ProviderStandIn("idle", fault=lambda n: fault if n < 2 else None) as standin:
-        answer = client(standin, wire).complete(ask())
+        answer = client(standin, protocol).complete(ask())
     assert answer.reply.text == "TERMINATE"
-    assert answer.tries == 3
+    assert answer.attempts == 3
     assert answer.usage.requests == 1
 
 
 def test_retries_are_bounded(client) -> None:
     with (
         ProviderStandIn("idle", fault=lambda _: "500") as standin,
-        pytest.raises(TransientError, match="5 tries failed") as caught,
+        pytest.raises(TransientError, match="5 attempts failed") as caught,
     ):
         client(standin).complete(ask())
     assert standin.counts.requests == 5
@@ -70,10 +74,10 @@ def test_retries_are_bounded(client) -> None:
 
 
 def test_a_silent_provider_times_out(client) -> None:
-    policy = RetryPolicy(tries=2, first_wait_s=0.01, timeout_s=0.3)
+    policy = RetryPolicy(attempts=2, first_wait_s=0.01, timeout_s=0.3)
     with ProviderStandIn("idle", fault=lambda n: "slow" if n == 0 else None) as standin:
         answer = client(standin, policy=policy).complete(ask())
-    assert answer.tries == 2
+    assert answer.attempts == 2
 
 
 @pytest.mark.parametrize(
@@ -92,7 +96,7 @@ def test_refusals_that_stay_are_not_retried(fault, reason, client) -> None:
 
 def test_a_missing_key_is_named() -> None:
     entry = ModelEntry(name="x/y", provider="x", model="y")
-    provider = ProviderEntry(wire="openai", base_url="http://127.0.0.1:9", key="NO_SUCH_KEY")
+    provider = ProviderEntry(protocol="openai", base_url="http://127.0.0.1:9", key="NO_SUCH_KEY")
     with pytest.raises(PermanentError, match="NO_SUCH_KEY"):
         ProviderClient(entry, provider)
 
@@ -166,7 +170,7 @@ def test_sessions_get_through_a_provider_that_fails_one_request_in_five(play, cl
     kinds = ("429", "500", "503", "drop", "slow", "garbage")
     rng = random.Random(5)
     faults = [rng.choice(kinds) if rng.random() < 0.2 else None for _ in range(5000)]
-    policy = RetryPolicy(tries=8, first_wait_s=0.01, longest_wait_s=0.05, timeout_s=0.5)
+    policy = RetryPolicy(attempts=8, first_wait_s=0.01, longest_wait_s=0.05, timeout_s=0.5)
     with (
         ProviderStandIn(fault=lambda n: faults[n % len(faults)]) as standin,
         ThreadPoolExecutor(4) as threads,
@@ -177,6 +181,6 @@ def test_sessions_get_through_a_provider_that_fails_one_request_in_five(play, cl
         )
     assert all(p.suspended is not None for p in played), [p.failure for p in played]
     tries = [entry.tries for p in played for entry in p.entries]
-    assert max(tries) <= policy.tries
+    assert max(tries) <= policy.attempts
     assert sum(tries) == standin.counts.requests
     assert sum(tries) > 1.1 * len(tries)

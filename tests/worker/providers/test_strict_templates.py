@@ -1,4 +1,4 @@
-"""Whole sessions over every wire, held to the alternation that strict chat templates demand."""
+"""Whole sessions over every protocol, held to the alternation that strict chat templates demand."""
 
 from __future__ import annotations
 
@@ -6,18 +6,18 @@ import itertools
 from typing import Any
 
 import pytest
-from provider_standin import ProviderStandIn
+from support.providers.stand_in import ProviderStandIn
 
 from buildarena_worker.builtin.expert import reply as expert
 from buildarena_worker.session.messages import Reply, Request
 from buildarena_worker.workflow.rounds import Loop
 
-WIRES = ["openai", "anthropic", "google"]
+PROTOCOLS = ["openai", "anthropic", "google"]
 
 
-def speakers(wire: str, body: dict[str, Any]) -> list[str]:
-    """Who speaks, message by message, as the wire carries it."""
-    if wire == "google":
+def speakers(protocol: str, body: dict[str, Any]) -> list[str]:
+    """Who speaks, message by message, as the protocol carries it."""
+    if protocol == "google":
         kinds = {"model": "assistant", "user": "user"}
         return [
             "tool" if "functionResponse" in content["parts"][0] else kinds[content["role"]]
@@ -45,25 +45,27 @@ def awkward(request: Request) -> Reply:
     return expert(request)
 
 
-@pytest.mark.parametrize("wire", WIRES)
-def test_a_driven_session_alternates_through_three_attempts(play, rollout, wire, client) -> None:
+@pytest.mark.parametrize("protocol", PROTOCOLS)
+def test_a_driven_session_alternates_through_three_attempts(
+    play, rollout, protocol, client
+) -> None:
     records = [rollout(n, success=False, indicator=float(n)) for n in range(2)]
     with ProviderStandIn(respond=awkward) as standin:
-        played = play(task="transport-1", client=client(standin, wire), rollouts=records)
+        played = play(task="transport-1", client=client(standin, protocol), rollouts=records)
     assert played.suspended is not None, played.failure
     assert played.suspended.number == 2
     controls = [turn for turn in played.session.transcript.turns if turn.stage == "control"]
     assert len(controls) == 4
     for body in standin.counts.bodies:
-        assert is_strict(speakers(wire, body)), speakers(wire, body)
+        assert is_strict(speakers(protocol, body)), speakers(protocol, body)
 
 
-@pytest.mark.parametrize("wire", WIRES)
-def test_a_closed_loop_with_an_analyst_alternates(play, rollout, wire, client) -> None:
+@pytest.mark.parametrize("protocol", PROTOCOLS)
+def test_a_closed_loop_with_an_analyst_alternates(play, rollout, protocol, client) -> None:
     with ProviderStandIn(respond=awkward) as standin:
         played = play(
             task="lift-3",
-            client=client(standin, wire),
+            client=client(standin, protocol),
             loop=Loop(rounds=2, analyst=True),
             rollouts=[rollout(0, success=False, indicator=3.0)],
         )
@@ -71,4 +73,4 @@ def test_a_closed_loop_with_an_analyst_alternates(play, rollout, wire, client) -
     assert (played.suspended.number, played.suspended.final) == (1, True)
     assert {turn.stage for turn in played.session.transcript.turns} >= {"analyse", "assemble"}
     for body in standin.counts.bodies:
-        assert is_strict(speakers(wire, body)), speakers(wire, body)
+        assert is_strict(speakers(protocol, body)), speakers(protocol, body)

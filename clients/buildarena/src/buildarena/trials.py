@@ -15,7 +15,7 @@ from buildarena_benchmark.flags import is_censored, meaning
 from buildarena_environment import Evaluator, try_machine
 from buildarena_environment import Trial as TriedMachine
 from buildarena_geometry import Machine as GeometryMachine
-from buildarena_simulation import ENGINES, SimulationError, Trajectory
+from buildarena_simulation import DEFAULT_ENGINE, SimulationError, Trajectory, require_engine
 
 PLAYER_HEIGHT: Final = FRAME_HEIGHT + 84
 
@@ -81,7 +81,7 @@ class Trial:
 def simulate(
     machine: GeometryMachine,
     task: str | Path | Task,
-    engine: str = "mujoco",
+    engine: str = DEFAULT_ENGINE,
     *,
     seed: int | None = None,
 ) -> Trial:
@@ -90,7 +90,7 @@ def simulate(
     Args:
         machine: The machine.
         task: A built-in task's name, a task file, or a task.
-        engine: ``mujoco`` or ``pybullet``.
+        engine: ``pybullet`` or ``mujoco``; by default the one that scores jobs which name none.
         seed: Varies the start a little, as a fair repetition would; None for the exact one.
 
     Returns:
@@ -102,7 +102,7 @@ def simulate(
         SimulationError: The engine failed, which says nothing of the machine.
     """
     chosen = chosen_task(task)
-    _check_engine(engine)
+    require_engine(engine)
     copy = machine.copy()
     return _shown_trial(chosen, copy, try_machine(chosen, copy, engine, seed=seed))
 
@@ -110,7 +110,7 @@ def simulate(
 def simulate_all(
     machines: Iterable[GeometryMachine],
     task: str | Path | Task,
-    engine: str = "mujoco",
+    engine: str = DEFAULT_ENGINE,
     *,
     seed: int | None = None,
     processes: int = 2,
@@ -120,7 +120,7 @@ def simulate_all(
     Args:
         machines: The machines.
         task: A built-in task's name, a task file, or a task.
-        engine: ``mujoco`` or ``pybullet``.
+        engine: ``pybullet`` or ``mujoco``; by default the one that scores jobs which name none.
         seed: As in `simulate`, the same for all.
         processes: Trials at once.
 
@@ -133,7 +133,7 @@ def simulate_all(
             others is kept by `buildarena_environment.Evaluator`, which this is made of.
     """
     chosen, copies = chosen_task(task), [machine.copy() for machine in machines]
-    _check_engine(engine)
+    require_engine(engine)
     trials = []
     with Evaluator(chosen, engine, seed=seed, processes=processes, trajectories=True) as evaluator:
         for number, (machine, found) in enumerate(zip(copies, evaluator.map(copies), strict=True)):
@@ -152,8 +152,3 @@ def _shown_trial(task: Task, machine: GeometryMachine, tried: TriedMachine) -> T
         trajectory=tried.trajectory,
         refusal=refusal,
     )
-
-
-def _check_engine(engine: str) -> None:
-    if engine not in ENGINES:
-        raise ValueError(f"no engine {engine!r}; there are {', '.join(ENGINES)}")

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Generator, Iterator
-from typing import Any
+from collections.abc import Coroutine, Iterator
+from typing import Any, TypeVar
 
 from buildarena_cli.errors import CommandError
-from buildarena_cli.near import near_field
+from buildarena_cli.suggestions import suggested_field
 from buildarena_client import errors, paths
+from buildarena_client.client import Client as ApiClient
+from buildarena_client.config import KEY_VARIABLE
 from buildarena_client.paths import HEALTH
-from buildarena_client.patience import Patience
-from buildarena_client.places import KEY_VARIABLE
-from buildarena_client.requests import Request, Response
-from buildarena_client.synchronous.client import Client as ApiClient
+from buildarena_client.retries import RetryPolicy
 
-PATIENCE_S = Patience().restart_s
+T = TypeVar("T")
+PATIENCE_S = RetryPolicy().restart_s
 """How long a watching command waits for a service that is being restarted."""
 STATE_POLL_S = 0.3
 
@@ -49,17 +49,9 @@ class Client(ApiClient):
             time.sleep(STATE_POLL_S)
         return answer
 
-    def _document(self, request: Request) -> Any:
+    def _run(self, coroutine: Coroutine[Any, Any, T]) -> T:
         with _in_words():
-            return super()._document(request)
-
-    def _answer(self, request: Request) -> Response:
-        with _in_words():
-            return super()._answer(request)
-
-    def _chunks(self, request: Request) -> Generator[bytes, None, None]:
-        with _in_words():
-            yield from super()._chunks(request)
+            return super()._run(coroutine)
 
 
 class RefusedError(CommandError):
@@ -108,7 +100,7 @@ def _worded(error: errors.ClientError) -> CommandError:
 
 
 def _line(error: dict[str, Any]) -> str:
-    near = near_field(error["field"], error["message"], error["choices"])
+    near = suggested_field(error["field"], error["message"], error["choices"])
     return errors.described(error) + (near if error["choices"] else "")
 
 

@@ -10,7 +10,7 @@ import os
 from pathlib import Path
 from typing import Final
 
-from buildarena_client.places import DEFAULT_URL, KEY_VARIABLE
+from buildarena_client.config import DEFAULT_URL, KEY_VARIABLE
 
 DEFAULT_PORT: Final = 8321
 DEFAULT_DATA: Final = ".buildarena"

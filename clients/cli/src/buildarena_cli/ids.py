@@ -6,7 +6,7 @@ import re
 from typing import TYPE_CHECKING, Any, Final
 
 from buildarena_cli.errors import CommandError
-from buildarena_cli.near import did_you_mean
+from buildarena_cli.suggestions import did_you_mean
 
 if TYPE_CHECKING:
     from buildarena_cli.client import Client

@@ -1,7 +1,7 @@
 """Groups of commands that are loaded when they are named.
 
 Loading every command takes half a second and more; help and completion need their names and first
-sentences only, which stand in `buildarena_cli.commands.COMMANDS`.
+sentences only, which stand in `buildarena_cli.command_table`.
 """
 
 from __future__ import annotations
@@ -14,15 +14,15 @@ import typer
 from typer.core import TyperGroup
 from typer.main import get_command, get_group
 
-from buildarena_cli.commands import COMMANDS, Entry
-from buildarena_cli.near import near_words
+from buildarena_cli.command_table import COMMANDS, Entry
+from buildarena_cli.suggestions import suggested_words
 
 MAX_WIDTH = 100
 """Columns of help texts on wide terminals."""
 CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": MAX_WIDTH}
 
 
-class NearGroup(TyperGroup):
+class SuggestingGroup(TyperGroup):
     """A group whose refusal of an unknown command names the near ones."""
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
@@ -31,7 +31,7 @@ class NearGroup(TyperGroup):
         try:
             return super().resolve_command(ctx, args)
         except Exception as error:
-            near = near_words(args[0], self.commands)
+            near = suggested_words(args[0], self.commands)
             if near and getattr(error, "message", "").startswith("No such command"):
                 error.message = (  # type: ignore[attr-defined]
                     f"No such command {args[0]!r}; did you mean {' or '.join(near)}?"
@@ -39,7 +39,7 @@ class NearGroup(TyperGroup):
             raise
 
 
-class LazyGroup(NearGroup):
+class LazyGroup(SuggestingGroup):
     """The group of all commands."""
 
     def __init__(self, **attributes: Any) -> None:
@@ -98,7 +98,7 @@ def new_group(text: str) -> typer.Typer:
     return typer.Typer(
         help=text,
         no_args_is_help=True,
-        cls=NearGroup,
+        cls=SuggestingGroup,
         rich_markup_mode=None,
         add_completion=False,
         pretty_exceptions_enable=False,

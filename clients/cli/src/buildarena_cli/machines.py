@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from buildarena_cli.errors import FAILED, CommandError
-from buildarena_cli.near import did_you_mean
+from buildarena_cli.suggestions import did_you_mean
 from buildarena_cli.terminal.output import warn
 
 if TYPE_CHECKING:
@@ -29,25 +29,35 @@ MachineFile = Annotated[
     ),
 ]
 
+DialectOption = Annotated[
+    str | None,
+    typer.Option(
+        "--dialect",
+        help="The version of the interface that an action log is from; found if left out.",
+    ),
+]
 
-def read_machine(file: Path) -> Machine:
+
+def read_machine(file: Path, dialect: str | None = None) -> Machine:
     """The machine of a file; what of it was not understood is told on standard error.
 
     Args:
         file: A machine file of the game's, a machine document or an action log.
+        dialect: The version of the interface that an action log is from; found if left out.
 
     Raises:
         CommandError: The file cannot be read.
         BesiegeError: It is a machine file, and wrong.
-        DocumentError: It is none of these, or the document is wrong.
+        DocumentError: It is none of these, the document is wrong, or an action is refused.
+        ValueError: There is no such dialect.
     """
-    found = read_imported(file)
+    found = read_imported(file, dialect)
     for remark in found.not_understood:
         warn(f"{file}: {remark}")
     return found.machine
 
 
-def read_imported(file: Path) -> ImportedMachine:
+def read_imported(file: Path, dialect: str | None = None) -> ImportedMachine:
     """The machine of a file with what was not understood; see `read_machine`."""
     from buildarena_besiege import read_any_machine
 
@@ -55,7 +65,7 @@ def read_imported(file: Path) -> ImportedMachine:
         data = sys.stdin.buffer.read() if str(file) == "-" else file.read_bytes()
     except OSError as error:
         raise CommandError(f"{file}: {error.strerror or error}") from error
-    return read_any_machine(data, where=str(file))
+    return read_any_machine(data, where=str(file), dialect=dialect)
 
 
 def chosen_task(name: str) -> Task:

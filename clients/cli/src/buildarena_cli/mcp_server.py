@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 import json
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from typing import Any
 
@@ -23,7 +23,6 @@ from buildarena_cli.ids import checked_id
 from buildarena_environment import MAIN
 from buildarena_environment.workbench import MACHINE, building_tools
 from buildarena_geometry.modules.names import CaselessNames
-from buildarena_pipeline.catalog.simulators import SIMULATORS
 
 INSTRUCTIONS = """Build a machine for a BuildArena task. Call list_tasks, then open_session for one
 task; read its answer: the task, the rules and the modules; call start and the other tools with the
@@ -43,15 +42,15 @@ def make_server(client: Client) -> Server[Any]:
     Args:
         client: The API.
     """
-    tools = _tools()
-    machine_tools = CaselessNames(tool.name for tool in building_tools(looked_up=True))
+    machine_tools = CaselessNames(tool.name for tool in building_tools(on_demand=True))
     # Threads would carry out calls that were sent side by side in any order.
     turns: defaultdict[object, asyncio.Lock] = defaultdict(asyncio.Lock)
 
     async def list_tools(
         _: ServerRequestContext[Any], __: types.PaginatedRequestParams | None
     ) -> types.ListToolsResult:
-        return types.ListToolsResult(tools=tools)
+        simulators = await asyncio.to_thread(client.get, "/v1/simulators")
+        return types.ListToolsResult(tools=_tools(simulators))
 
     async def call_tool(
         _: ServerRequestContext[Any], params: types.CallToolRequestParams
@@ -85,7 +84,13 @@ async def serve_stdio(client: Client) -> None:
         await server.run(read, write, server.create_initialization_options())
 
 
-def _tools() -> list[types.Tool]:
+def _tools(simulators: Sequence[Mapping[str, Any]]) -> list[types.Tool]:
+    simulator: dict[str, Any] = {
+        "type": "string",
+        "enum": [known["name"] for known in simulators],
+        "description": "What simulates the machine.",
+    }
+    simulator.update(("default", known["name"]) for known in simulators if known["default"])
     managing = [
         types.Tool(
             name="list_tasks",
@@ -112,12 +117,7 @@ def _tools() -> list[types.Tool]:
                         "default": 0,
                         "description": "Each seed is one try at the task.",
                     },
-                    "simulator": {
-                        "type": "string",
-                        "enum": list(SIMULATORS),
-                        "default": SIMULATORS[0],
-                        "description": "What simulates the machine.",
-                    },
+                    "simulator": simulator,
                 },
                 "required": ["task", "agent"],
             },
@@ -143,7 +143,7 @@ def _tools() -> list[types.Tool]:
             ),
         )
         # Sessions of tasks that tell their modules refuse to have them looked up.
-        for tool in building_tools(looked_up=True)
+        for tool in building_tools(on_demand=True)
     ]
     return managing + building
 

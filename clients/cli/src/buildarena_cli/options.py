@@ -57,17 +57,18 @@ ModelsOption = Annotated[
 ]
 
 
-class ReadingName(StrEnum):
-    """How flags are read; see `buildarena_benchmark.flags.Reading`, which is slow to load."""
+class PolicyName(StrEnum):
+    """Scoring policies; see `buildarena_benchmark.flags.ScoringPolicy`, which is slow to load."""
 
     OURS = "ours"
     PUBLISHED = "published"
 
 
-ReadingOption = Annotated[
-    ReadingName,
+PolicyOption = Annotated[
+    PolicyName,
     typer.Option(
-        "--reading",
+        "--policy",
+        "--reading",  # its former name
         help="How flags are read: disqualified trials fail, or what the published evaluation "
         "calls hacked is left out.",
     ),

@@ -13,7 +13,7 @@ from buildarena_benchmark import SourceError, ValidationIssue
 from buildarena_benchmark.tasks.sources import Source, path_of, read_source
 from buildarena_cli.client import RefusedError
 from buildarena_cli.errors import CommandError
-from buildarena_cli.near import near_field
+from buildarena_cli.suggestions import suggested_field
 from buildarena_pipeline.catalog.specs import SweepSpec
 
 MAX_BYTES: Final = 2 * 1024 * 1024
@@ -71,7 +71,7 @@ class SpecFile:
 
     def _line(self, issue: ValidationIssue) -> str:
         top = next(iter(path_of(issue.path)), "")
-        near = near_field(issue.path, issue.message, issue.choices)
+        near = suggested_field(issue.path, issue.message, issue.choices)
         if top not in self.overridden:
             return issue.describe(self.source.origin) + near
         given = ValidationIssue(path=issue.path, message=issue.message, choices=issue.choices)

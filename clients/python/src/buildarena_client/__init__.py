@@ -5,11 +5,13 @@ Importing it loads nothing: each name is loaded when it is first used.
 
 from __future__ import annotations
 
+import warnings
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from buildarena_client.asynchronous.client import AsyncClient as AsyncClient
+    from buildarena_client.async_client import AsyncClient as AsyncClient
+    from buildarena_client.client import Client as Client
     from buildarena_client.errors import BadArgumentError as BadArgumentError
     from buildarena_client.errors import ClientError as ClientError
     from buildarena_client.errors import ConflictError as ConflictError
@@ -32,12 +34,11 @@ if TYPE_CHECKING:
     from buildarena_client.frames import leaderboard_frame as leaderboard_frame
     from buildarena_client.frames import results_frame as results_frame
     from buildarena_client.frames import sweeps_frame as sweeps_frame
-    from buildarena_client.patience import Patience as Patience
-    from buildarena_client.synchronous.client import Client as Client
+    from buildarena_client.retries import RetryPolicy as RetryPolicy
 
 _HOMES = {
-    "asynchronous.client": ("AsyncClient",),
-    "synchronous.client": ("Client",),
+    "async_client": ("AsyncClient",),
+    "client": ("Client",),
     "errors": (
         "BadArgumentError",
         "ClientError",
@@ -59,13 +60,16 @@ _HOMES = {
     ),
     "event_streams": ("Event",),
     "frames": ("jobs_frame", "leaderboard_frame", "results_frame", "sweeps_frame"),
-    "patience": ("Patience",),
+    "retries": ("RetryPolicy",),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 __all__ = sorted(_HOME_OF)  # noqa: PLE0605 - as the table above says
 
 
 def __getattr__(name: str) -> Any:
+    if name == "Patience":
+        warnings.warn("Patience is now RetryPolicy", DeprecationWarning, stacklevel=2)
+        name = "RetryPolicy"
     if name not in _HOME_OF:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(f"{__name__}.{_HOME_OF[name]}"), name)

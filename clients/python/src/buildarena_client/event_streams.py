@@ -1,22 +1,22 @@
-"""Server-sent events: pieces of a stream become events, wherever it is cut."""
+"""Server-sent events of the service."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
-from typing import Any, Final, TypedDict
+from typing import Any, Final, NamedTuple, TypedDict
 
 from buildarena_client.errors import NotAnApiError
 
+MEDIA_TYPE: Final = "text/event-stream"
 MAX_EVENT_BYTES: Final = 16 << 20
-"""More than any event has: a stream without an end of line is none of ours."""
+"""More than any event has: a stream without an end of line is not BuildArena's."""
 
 
 class Event(TypedDict):
     """Something that happened to a job or a sweep.
 
     Attributes:
-        id: Grows; a stream that begins after it goes on behind it.
+        id: Grows; a stream that begins after it continues behind it.
         kind: What happened.
         job: The job it happened to, if it is about one.
         sweep: The sweep it is about, if it is about one.
@@ -32,48 +32,30 @@ class Event(TypedDict):
     data: dict[str, Any]
 
 
-class EventReader:
-    """Reads events from a stream's pieces."""
+class Message(NamedTuple):
+    """A server-sent event before its data are read."""
 
-    def __init__(self) -> None:
-        self._rest = b""
-
-    def feed(self, piece: bytes) -> Iterator[Event]:
-        """Events that are whole with this piece.
-
-        Raises:
-            NotAnApiError: These are no events of the service.
-        """
-        # A line may end with either or both; a pair may be cut in two.
-        text = (self._rest + piece).replace(b"\r\n", b"\n")
-        *blocks, self._rest = text.split(b"\n\n")
-        if len(self._rest) > MAX_EVENT_BYTES:
-            raise NotAnApiError("the stream holds no events: it is not BuildArena's")
-        for block in blocks:
-            event = _event(block)
-            if event is not None:
-                yield event
+    id: str
+    kind: str
+    data: str
 
 
-def _event(block: bytes) -> Event | None:
-    """The event of a block; None for one that keeps the connection open."""
-    fields: dict[str, list[str]] = {}
-    for line in block.decode("utf-8", "replace").split("\n"):
-        name, _, value = line.partition(":")
-        if name:
-            fields.setdefault(name, []).append(value.removeprefix(" "))
-    if "data" not in fields or "id" not in fields:
-        return None
+def event_of(message: Message) -> Event:
+    """The event that a message carries.
+
+    Raises:
+        NotAnApiError: It carries none of the service's.
+    """
     try:
-        content = json.loads("\n".join(fields["data"]))
-        known = {name: content.pop(name, None) for name in ("job", "sweep", "at")}
+        data = json.loads(message.data)
+        job, sweep, at = (data.pop(name, None) for name in ("job", "sweep", "at"))
         return Event(
-            id=int(fields["id"][-1]),
-            kind=fields.get("event", ["message"])[-1],
-            job=known["job"],
-            sweep=known["sweep"],
-            at=str(known["at"]),
-            data=content,
+            id=int(message.id), kind=message.kind, job=job, sweep=sweep, at=str(at), data=data
         )
     except (ValueError, AttributeError, TypeError) as error:
-        raise NotAnApiError("the stream holds no events: it is not BuildArena's") from error
+        raise no_events() from error
+
+
+def no_events() -> NotAnApiError:
+    """The error for a stream that is not one of the service's."""
+    return NotAnApiError("the stream holds no events: it is not BuildArena's")

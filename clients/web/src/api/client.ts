@@ -25,9 +25,7 @@ export const client = createClient<paths>({
 client.use(withKey);
 
 /** The data of an answer, or its problem as an error. */
-export async function taken<Data>(
-  asked: Promise<{ data?: Data; error?: unknown; response: Response }>,
-): Promise<Data> {
+export async function taken<Data>(asked: Promise<{ data?: Data; error?: unknown; response: Response }>): Promise<Data> {
   let answer;
   try {
     answer = await asked;

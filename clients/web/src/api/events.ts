@@ -65,11 +65,7 @@ async function readStream(
  * Listens to a stream of events as long as the component is there; connects again by itself.
  * `after` is the event up to which everything is known when it begins.
  */
-export function useEvents(
-  path: string | null,
-  onEvents: (events: ServiceEvent[]) => void,
-  after = 0,
-): StreamState {
+export function useEvents(path: string | null, onEvents: (events: ServiceEvent[]) => void, after = 0): StreamState {
   const [state, setState] = useState<StreamState>("connecting");
   const handler = useRef(onEvents);
   const begin = useRef(after);
@@ -85,13 +81,19 @@ export function useEvents(
     const listen = async (): Promise<void> => {
       while (!ending.signal.aborted) {
         try {
-          await readStream(path, lastId, ending.signal, () => {
-            setState("live");
-            wait = FIRST_WAIT_MS;
-          }, (events) => {
-            lastId = Math.max(lastId, ...events.map((event) => event.id));
-            handler.current(events);
-          });
+          await readStream(
+            path,
+            lastId,
+            ending.signal,
+            () => {
+              setState("live");
+              wait = FIRST_WAIT_MS;
+            },
+            (events) => {
+              lastId = Math.max(lastId, ...events.map((event) => event.id));
+              handler.current(events);
+            },
+          );
         } catch {
           // Whatever broke it: the loop looks whether anybody still listens.
         }

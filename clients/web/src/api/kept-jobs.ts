@@ -53,7 +53,9 @@ function compare(a: Value, b: Value, by: string): number {
 function ended(job: JobView, since: string | null, until: string | null): boolean {
   if (since === null && until === null) return true;
   const at = job.finished_at;
-  return at !== null && (since === null || compareTimes(at, since) >= 0) && (until === null || compareTimes(at, until) < 0);
+  return (
+    at !== null && (since === null || compareTimes(at, since) >= 0) && (until === null || compareTimes(at, until) < 0)
+  );
 }
 
 function holds(job: JobView, words: URLSearchParams): boolean {
@@ -61,12 +63,24 @@ function holds(job: JobView, words: URLSearchParams): boolean {
     const wanted = words.get(name);
     if (wanted !== null && read(job) !== wanted) return false;
   }
-  const [flag, least, most, text, prefix] = [words.get("flag"), words.get("indicator_min"), words.get("indicator_max"), words.get("text"), words.get("id_prefix")];
+  const [flag, least, most, text, prefix] = [
+    words.get("flag"),
+    words.get("indicator_min"),
+    words.get("indicator_max"),
+    words.get("text"),
+    words.get("id_prefix"),
+  ];
   if (flag !== null && !(job.flags ?? []).includes(flag)) return false;
   if (least !== null && (job.indicator === null || job.indicator < Number(least))) return false;
   if (most !== null && (job.indicator === null || job.indicator > Number(most))) return false;
   if (prefix !== null && !job.id.startsWith(prefix)) return false;
-  if (text !== null && ![job.id, job.task, job.model, job.reason, job.detail].some((one) => one?.toLowerCase().includes(text.toLowerCase()))) return false;
+  if (
+    text !== null &&
+    ![job.id, job.task, job.model, job.reason, job.detail].some((one) =>
+      one?.toLowerCase().includes(text.toLowerCase()),
+    )
+  )
+    return false;
   return ended(job, words.get("since"), words.get("until"));
 }
 
@@ -82,7 +96,8 @@ export function listed(rows: Rows, words: URLSearchParams): JobPage {
     .sort((a, b) => {
       const [one, other] = [value(a), value(b)];
       // Jobs without such a figure come last, in both directions.
-      if (one === null || other === null) return Number(one === null) - Number(other === null) || sign * (a.id < b.id ? -1 : 1);
+      if (one === null || other === null)
+        return Number(one === null) - Number(other === null) || sign * (a.id < b.id ? -1 : 1);
       return sign * (compare(one, other, by) || (a.id < b.id ? -1 : 1));
     });
   const begin = Number(words.get("cursor") ?? 0);

@@ -7,7 +7,7 @@ describe("keyOf", () => {
 
   it("is the spelling of a site's index: decoded, the parameters in order", () => {
     expect(key("/v1/leaderboard")).toBe("/v1/leaderboard");
-    expect(key("/v1/leaderboard?track=a%2Fb&reading=published")).toBe("/v1/leaderboard?reading=published&track=a/b");
+    expect(key("/v1/leaderboard?track=a%2Fb&policy=published")).toBe("/v1/leaderboard?policy=published&track=a/b");
     expect(key("/v1/leaderboard?task=b&task=a")).toBe("/v1/leaderboard?task=a&task=b");
     expect(key("/v1/leaderboard/compare?first=x+y%26z")).toBe("/v1/leaderboard/compare?first=x y&z");
     expect(key("/v1/jobs/j/artifacts/a%20b")).toBe("/v1/jobs/j/artifacts/a b");
@@ -15,7 +15,19 @@ describe("keyOf", () => {
 });
 
 describe("listed", () => {
-  const job = (id: string, change: object): object => ({ id, task: "t", model: "m", created_at: "2026-01-01T00:00:00Z", finished_at: null, indicator: null, flags: null, reason: null, detail: null, usage: { cost_usd: null }, ...change });
+  const job = (id: string, change: object): object => ({
+    id,
+    task: "t",
+    model: "m",
+    created_at: "2026-01-01T00:00:00Z",
+    finished_at: null,
+    indicator: null,
+    flags: null,
+    reason: null,
+    detail: null,
+    usage: { cost_usd: null },
+    ...change,
+  });
   const rows = {
     jobs: [
       job("a", { indicator: 1, finished_at: "2026-01-01T00:00:00.100000Z" }),
@@ -26,7 +38,10 @@ describe("listed", () => {
     kept: [],
     sweeps: { s: [2, 0] },
   } as unknown as Rows;
-  const ids = (words: string): string => listed(rows, new URLSearchParams(words)).jobs.map((one) => one.id).join("");
+  const ids = (words: string): string =>
+    listed(rows, new URLSearchParams(words))
+      .jobs.map((one) => one.id)
+      .join("");
 
   it("has jobs without a figure last, in both directions, and equal ones by their ids in the direction asked for", () => {
     expect(ids("sort=indicator")).toBe("cdab");

@@ -26,7 +26,11 @@ async function file(name: string, cache: RequestCache = "default"): Promise<Resp
   } catch {
     // Told below, as an answer that is no file.
   }
-  throw new ApiError(0, null, "a file of this site can’t be read: perhaps it was written again meanwhile, and reloading the page helps");
+  throw new ApiError(
+    0,
+    null,
+    "a file of this site can’t be read: perhaps it was written again meanwhile, and reloading the page helps",
+  );
 }
 
 const read = new Map<string, Promise<unknown>>();
@@ -66,7 +70,12 @@ async function ofJob(id: string, key: string): Promise<Response> {
 
 /** Answers a request from a site's files, as the service would. */
 export async function keptAnswer(request: Request): Promise<Response> {
-  if (request.method !== "GET") return problem(405, "Not on this site", "This is a published copy: nothing can be changed here. A running service can.");
+  if (request.method !== "GET")
+    return problem(
+      405,
+      "Not on this site",
+      "This is a published copy: nothing can be changed here. A running service can.",
+    );
   const url = new URL(request.url);
   if (url.pathname === "/v1/caller") return Response.json(READER);
   const site = await readSite();

@@ -1,5 +1,5 @@
 import { keepPreviousData, queryOptions } from "@tanstack/react-query";
-import type { BoardSearch } from "../pages/board/search";
+import type { BoardSearch } from "./board-search";
 import { client, jsonOf, taken, type Schema } from "./client";
 import type { paths } from "./contract";
 import { readSite } from "./kept";
@@ -26,7 +26,7 @@ export function boardQuery(search: BoardSearch): Record<string, string | string[
   const query: Record<string, string | string[]> = {};
   if (search.track !== undefined) query.track = search.track;
   if (search.task !== undefined && search.task.length > 0) query.task = search.task;
-  if (search.reading !== undefined) query.reading = search.reading;
+  if (search.policy !== undefined) query.policy = search.policy;
   if (search.since !== undefined) query.since = `${search.since}T00:00:00Z`;
   if (search.until !== undefined) query.until = `${search.until}T00:00:00Z`;
   return query;
@@ -78,8 +78,7 @@ export const sweepTroubles = (id: string) =>
   queryOptions({
     queryKey: ["sweep-troubles", id],
     refetchInterval: every(2 * LIVE_MS),
-    queryFn: () =>
-      taken(client.GET("/v1/sweeps/{sweep_id}/troubles", { params: { path: { sweep_id: id } } })),
+    queryFn: () => taken(client.GET("/v1/sweeps/{sweep_id}/troubles", { params: { path: { sweep_id: id } } })),
   });
 
 export const sweepComparison = (first: string, second: string) =>
@@ -95,7 +94,9 @@ export const deadLetters = (id: string) =>
     queryKey: ["sweep-jobs", id, "errored"],
     refetchInterval: every(3 * LIVE_MS),
     queryFn: () =>
-      taken(client.GET("/v1/jobs", { params: { query: { sweep: id, outcome: "errored", sort: "finished", limit: 100 } } })),
+      taken(
+        client.GET("/v1/jobs", { params: { query: { sweep: id, outcome: "errored", sort: "finished", limit: 100 } } }),
+      ),
   });
 
 export const jobPage = (filters: JobFilters) => client.GET("/v1/jobs", { params: { query: filters } });
@@ -109,8 +110,7 @@ export const job = (id: string) =>
 export const jobFiles = (id: string) =>
   queryOptions({
     queryKey: ["job-files", id],
-    queryFn: () =>
-      taken(client.GET("/v1/jobs/{job_id}/artifacts", { params: { path: { job_id: id } } })),
+    queryFn: () => taken(client.GET("/v1/jobs/{job_id}/artifacts", { params: { path: { job_id: id } } })),
   });
 
 /** An artifact's content never changes under its hash, so it is read once. */
@@ -133,8 +133,7 @@ export const task = (name: string, version?: string) =>
   queryOptions({
     queryKey: ["task", name, version ?? ""],
     staleTime: 60_000,
-    queryFn: () =>
-      taken(client.GET("/v1/tasks/{name}", { params: { path: { name }, query: { version } } })),
+    queryFn: () => taken(client.GET("/v1/tasks/{name}", { params: { path: { name }, query: { version } } })),
   });
 
 export const models = () =>
@@ -142,4 +141,11 @@ export const models = () =>
     queryKey: ["models"],
     staleTime: 60_000,
     queryFn: () => taken(client.GET("/v1/models", {})),
+  });
+
+export const simulators = () =>
+  queryOptions({
+    queryKey: ["simulators"],
+    staleTime: 60_000,
+    queryFn: () => taken(client.GET("/v1/simulators", {})),
   });

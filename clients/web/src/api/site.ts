@@ -16,7 +16,10 @@ export interface Site {
 }
 
 /** Where these pages find the site they show; null where a service answers them. */
-export const SITE: string | null = typeof document === "undefined" ? null : (document.querySelector('meta[name="buildarena-site"]')?.getAttribute("content") ?? null);
+export const SITE: string | null =
+  typeof document === "undefined"
+    ? null
+    : (document.querySelector('meta[name="buildarena-site"]')?.getAttribute("content") ?? null);
 
 export const isSite = SITE !== null;
 

@@ -6,10 +6,29 @@ export interface Choice {
   note?: string;
 }
 
-const STEPS: Readonly<Record<string, number>> = { ArrowDown: 1, ArrowRight: 1, ArrowUp: -1, ArrowLeft: -1, Home: -Infinity, End: Infinity };
+const STEPS: Readonly<Record<string, number>> = {
+  ArrowDown: 1,
+  ArrowRight: 1,
+  ArrowUp: -1,
+  ArrowLeft: -1,
+  Home: -Infinity,
+  End: Infinity,
+};
 
 /** One of several things, chosen by a click or the arrow keys. */
-export function Choices({ label, choices, value, onChange, wide = false }: { label: string; choices: readonly Choice[]; value: string | undefined; onChange: (id: string) => void; wide?: boolean }) {
+export function Choices({
+  label,
+  choices,
+  value,
+  onChange,
+  wide = false,
+}: {
+  label: string;
+  choices: readonly Choice[];
+  value: string | undefined;
+  onChange: (id: string) => void;
+  wide?: boolean;
+}) {
   const own = useId();
   const list = useRef<HTMLDivElement>(null);
   const at = choices.findIndex((choice) => choice.id === value);
@@ -18,7 +37,8 @@ export function Choices({ label, choices, value, onChange, wide = false }: { lab
     if (list.current !== null && chosen instanceof HTMLElement) {
       const { offsetTop, offsetHeight } = chosen;
       const { scrollTop, clientHeight } = list.current;
-      if (offsetTop < scrollTop || offsetTop + offsetHeight > scrollTop + clientHeight) list.current.scrollTop = offsetTop - clientHeight / 2;
+      if (offsetTop < scrollTop || offsetTop + offsetHeight > scrollTop + clientHeight)
+        list.current.scrollTop = offsetTop - clientHeight / 2;
     }
   }, [at]);
   const onKeys = (event: KeyboardEvent): void => {
@@ -29,9 +49,26 @@ export function Choices({ label, choices, value, onChange, wide = false }: { lab
     if (next !== undefined) onChange(next.id);
   };
   return (
-    <div ref={list} className={wide ? "choices choices-wide" : "choices"} role="listbox" aria-label={label} tabIndex={0} aria-activedescendant={at < 0 ? undefined : `${own}-${at}`} onKeyDown={onKeys}>
+    <div
+      ref={list}
+      className={wide ? "choices choices-wide" : "choices"}
+      role="listbox"
+      aria-label={label}
+      tabIndex={0}
+      aria-activedescendant={at < 0 ? undefined : `${own}-${at}`}
+      onKeyDown={onKeys}
+    >
       {choices.map((choice, index) => (
-        <div key={choice.id} id={`${own}-${index}`} role="option" aria-selected={index === at} className="choice" onClick={() => { onChange(choice.id); }}>
+        <div
+          key={choice.id}
+          id={`${own}-${index}`}
+          role="option"
+          aria-selected={index === at}
+          className="choice"
+          onClick={() => {
+            onChange(choice.id);
+          }}
+        >
           <span>{choice.text}</span>
           {choice.note !== undefined && <small>{choice.note}</small>}
         </div>

@@ -1,11 +1,27 @@
 import { Table } from "@mantine/core";
 
 /** The figures of a drawing, for those who want to read them. */
-export function DataTable({ name, title = "As a table", columns, rows }: { name: string; title?: string; columns: readonly string[]; rows: readonly (readonly string[])[] }) {
+export function DataTable({
+  name,
+  title = "As a table",
+  columns,
+  rows,
+}: {
+  name: string;
+  title?: string;
+  columns: readonly string[];
+  rows: readonly (readonly string[])[];
+}) {
   return (
     <details>
       <summary style={{ cursor: "pointer", fontSize: 13 }}>{title}</summary>
-      <Table.ScrollContainer minWidth={260} type="native" tabIndex={0} role="region" aria-label={`${name}, scrolls sideways`}>
+      <Table.ScrollContainer
+        minWidth={260}
+        type="native"
+        tabIndex={0}
+        role="region"
+        aria-label={`${name}, scrolls sideways`}
+      >
         <Table fz="sm" aria-label={name} verticalSpacing={4}>
           <Table.Thead>
             <Table.Tr>

@@ -28,7 +28,14 @@ export function Gallery({ jobs, unit, by }: { jobs: readonly JobView[]; unit?: s
           <Group gap={6} mt={4}>
             <OutcomeBadge value={job.outcome ?? job.state} size="sm" />
             {(job.flags ?? []).map((flag) => (
-              <Badge key={flag} size="sm" color="yellow" variant="outline" tt="none" styles={{ root: { color: "inherit" } }}>
+              <Badge
+                key={flag}
+                size="sm"
+                color="yellow"
+                variant="outline"
+                tt="none"
+                styles={{ root: { color: "inherit" } }}
+              >
                 {words(flag)}
               </Badge>
             ))}
@@ -50,7 +57,8 @@ export function Thumbnail({ id, label }: { id: string; label: string }) {
     queryKey: ["thumbnail", id],
     staleTime: Infinity,
     retry: false,
-    queryFn: async () => new Blob([await bytesOf(`/v1/jobs/${encodeURIComponent(id)}/thumbnail.png`, "image/png")], { type: "image/png" }),
+    queryFn: async () =>
+      new Blob([await bytesOf(`/v1/jobs/${encodeURIComponent(id)}/thumbnail.png`, "image/png")], { type: "image/png" }),
   });
   const { data } = query;
   const show = useCallback(
@@ -72,5 +80,11 @@ export function Thumbnail({ id, label }: { id: string; label: string }) {
     );
   }
   if (data === undefined) return <Skeleton height={150} radius={0} />;
-  return <img ref={show} alt={label} style={{ width: "100%", height: 150, objectFit: "cover", display: "block", background: "#eef1f4" }} />;
+  return (
+    <img
+      ref={show}
+      alt={label}
+      style={{ width: "100%", height: 150, objectFit: "cover", display: "block", background: "#eef1f4" }}
+    />
+  );
 }

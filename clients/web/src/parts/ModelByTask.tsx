@@ -9,7 +9,15 @@ interface Row {
 }
 
 /** A table of models by tasks that scrolls sideways; `children` are further rows. */
-export function ModelByTask({ heads, rows, children }: { heads: readonly { task: string; head: ReactNode }[]; rows: readonly Row[]; children?: ReactNode }) {
+export function ModelByTask({
+  heads,
+  rows,
+  children,
+}: {
+  heads: readonly { task: string; head: ReactNode }[];
+  rows: readonly Row[];
+  children?: ReactNode;
+}) {
   return (
     <div style={{ overflowX: "auto" }} tabIndex={0} role="region" aria-label="Model by task, scrolls sideways">
       <table className="heat figures sticky-first">

@@ -46,7 +46,10 @@ export function Shell() {
   const places = usePlaces();
   const path = useRouterState({ select: (state) => state.location.pathname });
   useEffect(() => {
-    const name = path.split("/").filter((part) => part !== "").join(" · ");
+    const name = path
+      .split("/")
+      .filter((part) => part !== "")
+      .join(" · ");
     document.title = name === "" ? "BuildArena" : `${name} – BuildArena`;
   }, [path]);
   return (
@@ -62,9 +65,18 @@ export function Shell() {
       >
         Skip to the content
       </a>
-      <Box component="header" style={{ borderBottom: "1px solid var(--mantine-color-default-border)" }} bg="var(--mantine-color-body)">
+      <Box
+        component="header"
+        style={{ borderBottom: "1px solid var(--mantine-color-default-border)" }}
+        bg="var(--mantine-color-body)"
+      >
         <Container size="var(--page-width)" py={10}>
-          <Group justify="space-between" align={isSite ? "start" : undefined} gap="xs" wrap={isSite ? "nowrap" : "wrap"}>
+          <Group
+            justify="space-between"
+            align={isSite ? "start" : undefined}
+            gap="xs"
+            wrap={isSite ? "nowrap" : "wrap"}
+          >
             <Group gap="md">
               <Link className="quiet" to="/" aria-label="BuildArena, start">
                 <Group gap={8} wrap="nowrap">
@@ -115,7 +127,12 @@ function KeyButton() {
   return (
     <Popover position="bottom-end" withArrow trapFocus>
       <Popover.Target>
-        <ActionIcon variant={known === null ? "subtle" : "light"} color="gray" c="inherit" aria-label={known === null ? "Give an API key" : "API key is set"}>
+        <ActionIcon
+          variant={known === null ? "subtle" : "light"}
+          color="gray"
+          c="inherit"
+          aria-label={known === null ? "Give an API key" : "API key is set"}
+        >
           <IconKey size={18} aria-hidden />
         </ActionIcon>
       </Popover.Target>

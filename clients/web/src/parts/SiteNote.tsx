@@ -9,7 +9,9 @@ export function SiteNote() {
   return (
     <Container component="footer" size="var(--page-width)" py="lg" aria-label="About this site">
       <Text size="sm" className="dimmed">
-        A published copy, written on <time dateTime={data.written_at}>{new Date(data.written_at).toLocaleString()}</time>. {data.holds} {data.left_out.join(" ")}
+        A published copy, written on{" "}
+        <time dateTime={data.written_at}>{new Date(data.written_at).toLocaleString()}</time>. {data.holds}{" "}
+        {data.left_out.join(" ")}
       </Text>
     </Container>
   );

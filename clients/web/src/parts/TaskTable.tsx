@@ -1,8 +1,9 @@
 import { Badge, Group, Table, Text } from "@mantine/core";
 import { Link } from "@tanstack/react-router";
 import type { Row, TaskBoard } from "../api/queries";
-import { sharedRanks } from "../pages/board/ranks";
-import { jobsBehind, type BoardSearch } from "../pages/board/search";
+import { sharedRanks } from "./ranks";
+import type { BoardSearch } from "../api/board-search";
+import { jobsBehind } from "./jobs-behind";
 import { count, dollars, measured, number, percent, places } from "../format";
 import { Interval } from "./Interval";
 
@@ -19,9 +20,7 @@ export function TaskTable({ task, search = {} }: { task: TaskBoard; search?: Boa
             <Table.Th className="figures">Rank</Table.Th>
             <Table.Th className="figures">Place</Table.Th>
             <Table.Th>Success, 95 % interval</Table.Th>
-            <Table.Th className="figures">
-              {measured(task.indicator, task.unit)}
-            </Table.Th>
+            <Table.Th className="figures">{measured(task.indicator, task.unit)}</Table.Th>
             <Table.Th className="figures">Best</Table.Th>
             <Table.Th className="figures">Parts</Table.Th>
             <Table.Th className="figures">$ a success</Table.Th>
@@ -30,7 +29,13 @@ export function TaskTable({ task, search = {} }: { task: TaskBoard; search?: Boa
         </Table.Thead>
         <Table.Tbody>
           {task.rows.map((row) => (
-            <TaskRow key={`${row.model} ${row.configuration}`} row={row} search={search} tied={row.rank !== null && ties.has(row.rank)} several={several} />
+            <TaskRow
+              key={`${row.model} ${row.configuration}`}
+              row={row}
+              search={search}
+              tied={row.rank !== null && ties.has(row.rank)}
+              several={several}
+            />
           ))}
         </Table.Tbody>
       </Table>
@@ -62,7 +67,14 @@ function TaskRow({ row, search, tied, several }: { row: Row; search: BoardSearch
       <Table.Td className="figures">{places(row.rank_low, row.rank_high)}</Table.Td>
       <Table.Td>
         <Group gap={8} wrap="nowrap">
-          <Interval low={row.success_low} high={row.success_high} value={row.success_rate} from={0} to={1} label={`success ${success}`} />
+          <Interval
+            low={row.success_low}
+            high={row.success_high}
+            value={row.success_rate}
+            from={0}
+            to={1}
+            label={`success ${success}`}
+          />
           <Text size="sm" className="figures" style={{ whiteSpace: "nowrap" }}>
             {percent(row.success_rate)} ({success})
             <Text span size="xs" className="dimmed" display="block">
@@ -75,7 +87,11 @@ function TaskRow({ row, search, tied, several }: { row: Row; search: BoardSearch
         {row.censored > 0 && row.indicator_mean !== null ? "≥ " : ""}
         {number(row.indicator_mean)}
         <Text size="xs" className="dimmed">
-          {row.indicator_low === null ? (row.too_few_data ? "too few data" : "") : `${number(row.indicator_low)} to ${number(row.indicator_high)}`}
+          {row.indicator_low === null
+            ? row.too_few_data
+              ? "too few data"
+              : ""
+            : `${number(row.indicator_low)} to ${number(row.indicator_high)}`}
         </Text>
       </Table.Td>
       <Table.Td className="figures">

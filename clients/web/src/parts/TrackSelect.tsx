@@ -2,7 +2,15 @@ import { Select } from "@mantine/core";
 import { trackLabel } from "../format";
 
 /** Which track's results are shown; nothing where there is no choice. */
-export function TrackSelect({ known, chosen, onTrack }: { known: readonly string[]; chosen: string | null; onTrack: (track: string) => void }) {
+export function TrackSelect({
+  known,
+  chosen,
+  onTrack,
+}: {
+  known: readonly string[];
+  chosen: string | null;
+  onTrack: (track: string) => void;
+}) {
   if (known.length < 2) return null;
   return (
     <Select

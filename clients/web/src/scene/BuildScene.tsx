@@ -23,11 +23,23 @@ interface BuildSceneProps {
 const NONE: readonly PlacedView[] = [];
 
 /** A machine as it stands after a step. */
-export default function BuildScene({ parts, ghosts = NONE, whole, chosen, onChoose, subject, label, height = 420, lock }: BuildSceneProps) {
+export default function BuildScene({
+  parts,
+  ghosts = NONE,
+  whole,
+  chosen,
+  onChoose,
+  subject,
+  label,
+  height = 420,
+  lock,
+}: BuildSceneProps) {
   const machine = useMemo(() => machineOf(parts.values()), [parts]);
   const bounds = useMemo(() => {
     const ends = boundsOf(machineOf(whole.values()));
-    const tried = boundsOf(machineOf(ghosts.map((block) => ({ ...block, start: null, end: null, flipped: false, bindings: {} }))));
+    const tried = boundsOf(
+      machineOf(ghosts.map((block) => ({ ...block, start: null, end: null, flipped: false, bindings: {} }))),
+    );
     return new Box3().copy(ends).union(boundsOf(machine)).union(tried);
   }, [machine, whole, ghosts]);
   return (

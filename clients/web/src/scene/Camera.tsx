@@ -37,7 +37,9 @@ export function Camera({ bounds, subject, lock }: { bounds: Box3; subject: strin
   useEffect(() => {
     if (controls === null) return;
     const before = aimed.current;
-    const grown = before !== null && (aim.distance > GROWTH * before.distance || aim.center.distanceTo(before.center) > before.distance / 3);
+    const grown =
+      before !== null &&
+      (aim.distance > GROWTH * before.distance || aim.center.distanceTo(before.center) > before.distance / 3);
     if (before !== null && before.subject === subject && !grown) return;
     aimed.current = { ...aim, subject };
     camera.position.copy(aim.center).addScaledVector(VIEW, aim.distance);

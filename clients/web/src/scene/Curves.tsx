@@ -57,10 +57,31 @@ export function Curves({
             >
               <rect width={WIDTH} height={HEIGHT} fill="currentColor" fillOpacity={0.04} />
               {breaks.map((time, item) => (
-                <line key={item} x1={(WIDTH * time) / end} x2={(WIDTH * time) / end} y1={0} y2={HEIGHT} stroke="var(--mantine-color-red-6)" strokeDasharray="3 3" />
+                <line
+                  key={item}
+                  x1={(WIDTH * time) / end}
+                  x2={(WIDTH * time) / end}
+                  y1={0}
+                  y2={HEIGHT}
+                  stroke="var(--mantine-color-red-6)"
+                  strokeDasharray="3 3"
+                />
               ))}
-              <path d={path} fill="none" stroke="var(--mantine-primary-color-filled)" strokeWidth={2} vectorEffect="non-scaling-stroke" />
-              <line x1={(WIDTH * now) / end} x2={(WIDTH * now) / end} y1={0} y2={HEIGHT} stroke="currentColor" vectorEffect="non-scaling-stroke" />
+              <path
+                d={path}
+                fill="none"
+                stroke="var(--mantine-primary-color-filled)"
+                strokeWidth={2}
+                vectorEffect="non-scaling-stroke"
+              />
+              <line
+                x1={(WIDTH * now) / end}
+                x2={(WIDTH * now) / end}
+                y1={0}
+                y2={HEIGHT}
+                stroke="currentColor"
+                vectorEffect="non-scaling-stroke"
+              />
             </svg>
           </figure>
         );

@@ -19,7 +19,9 @@ export default function FileScene({ scene, label }: { scene: MachineScene; label
         <Parts machine={machine} pose={asPlaced} chosen={marked} onChoose={setChosen} />
       </Stage>
       <Text size="xs" className="dimmed" role="status">
-        {part === undefined ? "Drag to turn, scroll to come closer, click a part to read what it is." : `${part.id}: ${part.module}`}
+        {part === undefined
+          ? "Drag to turn, scroll to come closer, click a part to read what it is."
+          : `${part.id}: ${part.module}`}
       </Text>
     </>
   );

@@ -68,7 +68,10 @@ export function Film({
   const blocks = useMemo(() => (loads === null ? null : loadsOfBlocks(trial, loads)), [trial, loads]);
   const joints = useMemo(() => new Map(trial.peaks.map((peak, index) => [peak.joint, index])), [trial]);
   const colour = useCallback((part: Part) => (blocks === null ? null : loadColour(blocks.get(part.id) ?? 0)), [blocks]);
-  const rodColour = useCallback((rod: Rod) => (loads === null ? null : loadColour(loads[joints.get(rod.joint) ?? -1] ?? 0)), [loads, joints]);
+  const rodColour = useCallback(
+    (rod: Rod) => (loads === null ? null : loadColour(loads[joints.get(rod.joint) ?? -1] ?? 0)),
+    [loads, joints],
+  );
   const pose = useMemo<PoseNow>(() => (part, into) => into.copy(poses.current.get(part.id) ?? part.pose), []);
   return (
     <>

@@ -16,9 +16,25 @@ export function Ghosts({ blocks }: { blocks: readonly PlacedView[] }) {
     const { module, pose } = partOf(block);
     const geometry = moduleGeometry(module);
     return (
-      <group key={`${block.id}-${index}`} matrixAutoUpdate={false} matrix={pose} userData={{ ghost: block.id }} onUpdate={(self) => { self.matrixWorldNeedsUpdate = true; }}>
+      <group
+        key={`${block.id}-${index}`}
+        matrixAutoUpdate={false}
+        matrix={pose}
+        userData={{ ghost: block.id }}
+        onUpdate={(self) => {
+          self.matrixWorldNeedsUpdate = true;
+        }}
+      >
         <mesh geometry={geometry}>
-          <meshLambertMaterial color={REFUSED} transparent opacity={0.35} depthWrite={false} polygonOffset polygonOffsetFactor={-2} polygonOffsetUnits={-2} />
+          <meshLambertMaterial
+            color={REFUSED}
+            transparent
+            opacity={0.35}
+            depthWrite={false}
+            polygonOffset
+            polygonOffsetFactor={-2}
+            polygonOffsetUnits={-2}
+          />
         </mesh>
         <lineSegments geometry={new EdgesGeometry(geometry)}>
           <lineBasicMaterial color={REFUSED} />

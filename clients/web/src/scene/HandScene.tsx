@@ -67,11 +67,21 @@ function Marks({ part, face, from }: Pick<HandSceneProps, "part" | "face" | "fro
     <>
       {face !== undefined && <Mark face={face} colour={face.taken_by === null ? FREE : TAKEN} />}
       {from !== undefined && <Mark face={from} colour={FROM} />}
-      {part?.faces.filter((one) => one.taken_by === null).map((one) => (
-        <Html key={`${part.id} ${one.label}`} center occlude position={lifted(one, 0.12)} zIndexRange={[10, 0]} wrapperClass="face-letter" aria-hidden>
-          {one.label}
-        </Html>
-      ))}
+      {part?.faces
+        .filter((one) => one.taken_by === null)
+        .map((one) => (
+          <Html
+            key={`${part.id} ${one.label}`}
+            center
+            occlude
+            position={lifted(one, 0.12)}
+            zIndexRange={[10, 0]}
+            wrapperClass="face-letter"
+            aria-hidden
+          >
+            {one.label}
+          </Html>
+        ))}
     </>
   );
 }

@@ -12,7 +12,17 @@ const BROKEN = 0.3;
 const UPRIGHT = new Quaternion();
 
 /** A ball at each joint, the larger and redder the nearer to breaking. */
-export function LoadedJoints({ machine, trial, pose, loads }: { machine: Machine; trial: Trial; pose: PoseNow; loads: Float32Array }) {
+export function LoadedJoints({
+  machine,
+  trial,
+  pose,
+  loads,
+}: {
+  machine: Machine;
+  trial: Trial;
+  pose: PoseNow;
+  loads: Float32Array;
+}) {
   const mesh = useRef<InstancedMesh>(null);
   const invalidate = useThree((state) => state.invalidate);
   const joints = useMemo(() => placed(machine, trial), [machine, trial]);
@@ -63,7 +73,13 @@ export function Breaks({ machine, trial, pose, now }: { machine: Machine; trial:
   });
   if (joints.length === 0) return null;
   return (
-    <instancedMesh ref={mesh} args={[undefined, undefined, joints.length]} frustumCulled={false} renderOrder={3} userData={{ breaks: joints.map((joint) => joint.name) }}>
+    <instancedMesh
+      ref={mesh}
+      args={[undefined, undefined, joints.length]}
+      frustumCulled={false}
+      renderOrder={3}
+      userData={{ breaks: joints.map((joint) => joint.name) }}
+    >
       <octahedronGeometry args={[1]} />
       <meshBasicMaterial color="#b00020" wireframe depthTest={false} transparent />
     </instancedMesh>

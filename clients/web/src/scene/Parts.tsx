@@ -48,7 +48,15 @@ export function Parts(props: PartsProps) {
   );
 }
 
-function Blocks({ module, parts, pose, moving, colour, chosen, onChoose }: PartsProps & { module: string; parts: Part[] }) {
+function Blocks({
+  module,
+  parts,
+  pose,
+  moving,
+  colour,
+  chosen,
+  onChoose,
+}: PartsProps & { module: string; parts: Part[] }) {
   const mesh = useRef<InstancedMesh>(null);
   const invalidate = useThree((state) => state.invalidate);
   const geometry = moduleGeometry(module);
@@ -117,7 +125,10 @@ function Rods({ machine, pose, moving, rodColour, chosen, onChoose }: PartsProps
   });
   useEffect(() => {
     machine.rods.forEach((rod, index) => {
-      mesh.current?.setColorAt(index, chosen?.has(rod.id) ? CHOSEN : new Color(rodColour?.(rod) ?? KIND_COLOURS.connector));
+      mesh.current?.setColorAt(
+        index,
+        chosen?.has(rod.id) ? CHOSEN : new Color(rodColour?.(rod) ?? KIND_COLOURS.connector),
+      );
     });
     if (mesh.current?.instanceColor) mesh.current.instanceColor.needsUpdate = true;
     invalidate();

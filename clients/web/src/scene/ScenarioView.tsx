@@ -16,7 +16,8 @@ export default function ScenarioView({ scenario }: { scenario: Scenario }) {
       const center = new Vector3(...box.center).clampLength(0, SEEN);
       whole.union(new Box3().setFromCenterAndSize(center, new Vector3(...box.size).multiplyScalar(0.5)));
     }
-    for (const gate of scenario.gates ?? []) for (const post of posts(gate)) whole.expandByPoint(new Vector3(...post).clampLength(0, SEEN));
+    for (const gate of scenario.gates ?? [])
+      for (const post of posts(gate)) whole.expandByPoint(new Vector3(...post).clampLength(0, SEEN));
     for (const mark of scenario.marks ?? []) whole.expandByPoint(new Vector3(...mark.center).clampLength(0, SEEN));
     return whole;
   }, [scenario]);
@@ -57,7 +58,10 @@ function released({ height = 0, velocity = [0, 0, 0] }: Scenario["placement"]): 
 }
 
 function signs({ gates = [], marks = [] }: Scenario): string {
-  const shown = [...(gates.length > 0 ? [counted(gates.length, "gate")] : []), ...(marks.length > 0 ? [counted(marks.length, "mark")] : [])];
+  const shown = [
+    ...(gates.length > 0 ? [counted(gates.length, "gate")] : []),
+    ...(marks.length > 0 ? [counted(marks.length, "mark")] : []),
+  ];
   return shown.length === 0 ? "" : `There are ${shown.join(" and ")}, which nothing can touch. `;
 }
 

@@ -34,8 +34,22 @@ export default function TrialView(props: TrialProps) {
       <TrialScene {...props} clock={clock} loads={loads} follow={follow} />
       <TimeLine clock={clock} end={end} breaks={props.trial.breaks} />
       <Group gap="md">
-        <Switch size="sm" label="Loads on joints" checked={loads} onChange={(event) => { setLoads(event.currentTarget.checked); }} />
-        <Switch size="sm" label="Follow the machine" checked={follow} onChange={(event) => { setFollow(event.currentTarget.checked); }} />
+        <Switch
+          size="sm"
+          label="Loads on joints"
+          checked={loads}
+          onChange={(event) => {
+            setLoads(event.currentTarget.checked);
+          }}
+        />
+        <Switch
+          size="sm"
+          label="Follow the machine"
+          checked={follow}
+          onChange={(event) => {
+            setFollow(event.currentTarget.checked);
+          }}
+        />
         <Text size="xs" className="dimmed">
           {props.trial.engine} {props.trial.engineVersion}
         </Text>
@@ -49,11 +63,28 @@ export default function TrialView(props: TrialProps) {
 
 export function TrialCurves({ trial, clock }: { trial: Trial; clock: Clock }) {
   const curves = useMemo(() => curvesOf(trial), [trial]);
-  return <Curves curves={curves} times={trial.times} now={clock.shown} breaks={trial.breaks.map((found) => found.time_s)} seek={clock.seek} />;
+  return (
+    <Curves
+      curves={curves}
+      times={trial.times}
+      now={clock.shown}
+      breaks={trial.breaks.map((found) => found.time_s)}
+      seek={clock.seek}
+    />
+  );
 }
 
 /** The drawing of a trial at the clock's time. */
-export function TrialScene({ scene, trial, scenario, clock, loads, follow, height = 420, lock }: TrialProps & { clock: Clock; loads: boolean; follow: boolean; height?: number; lock?: CameraLock }) {
+export function TrialScene({
+  scene,
+  trial,
+  scenario,
+  clock,
+  loads,
+  follow,
+  height = 420,
+  lock,
+}: TrialProps & { clock: Clock; loads: boolean; follow: boolean; height?: number; lock?: CameraLock }) {
   const machine = useMemo(() => readScene(scene), [scene]);
   const bounds = useMemo(() => startBounds(machine, trial), [machine, trial]);
   const borne = loadsAt(trial, clock.shown);
@@ -66,7 +97,9 @@ export function TrialScene({ scene, trial, scenario, clock, loads, follow, heigh
       </Stage>
       {loads && (
         <Text size="xs" className="figures">
-          {most === null ? "No joint bears anything." : `Most loaded: ${most.kind} ${most.joint}, ${(100 * most.ratio).toFixed(0)} % of its strength.`}
+          {most === null
+            ? "No joint bears anything."
+            : `Most loaded: ${most.kind} ${most.joint}, ${(100 * most.ratio).toFixed(0)} % of its strength.`}
         </Text>
       )}
     </>
@@ -81,7 +114,14 @@ function Broken({ breaks, seek }: { breaks: readonly Break[]; seek: (time: numbe
     <Alert color="red" py="xs" title={`${breaks.length} joint${breaks.length > 1 ? "s" : ""} broke`}>
       <Group gap={6}>
         {breaks.slice(0, NAMED).map((found, index) => (
-          <Button key={index} size="compact-xs" variant="default" onClick={() => { seek(Math.max(0, found.time_s - 0.2)); }}>
+          <Button
+            key={index}
+            size="compact-xs"
+            variant="default"
+            onClick={() => {
+              seek(Math.max(0, found.time_s - 0.2));
+            }}
+          >
             ✕ {found.kind} {found.joint} at {duration(found.time_s)}, {(100 * found.ratio).toFixed(0)} %
           </Button>
         ))}

@@ -38,11 +38,19 @@ export function curvesOf(trial: Trial): Curve[] {
   const count = trial.times.length;
   const curves: Curve[] = [];
   if (trial.loads !== null) {
-    curves.push({ name: "Largest load on a joint", unit: "% of its strength, shown up to 120", values: largestLoads(trial.loads, trial.peaks.length, count) });
+    curves.push({
+      name: "Largest load on a joint",
+      unit: "% of its strength, shown up to 120",
+      values: largestLoads(trial.loads, trial.peaks.length, count),
+    });
   }
   curves.push(
     { name: "Mean height of the machine", unit: "units", values: heights(trial) },
-    { name: "Distance of the starting block", unit: "units", values: distances(trial.positions, trial.blockIds.length * 3, count) },
+    {
+      name: "Distance of the starting block",
+      unit: "units",
+      values: distances(trial.positions, trial.blockIds.length * 3, count),
+    },
   );
   if (trial.cargo !== null) {
     curves.push({ name: "Distance of the cargo", unit: "units", values: distances(trial.cargo.positions, 3, count) });

@@ -7,7 +7,10 @@ const cube = [
   { label: "B", center: [-0.5, 0, 0], normal: [-1, 0, 0] },
   { label: "C", center: [0, 0, 0.5], normal: [0, 0, 1] },
 ] as const;
-const hit = (point: readonly [number, number, number], normal: readonly [number, number, number]) => ({ point: new Vector3(...point), normal: new Vector3(...normal) });
+const hit = (point: readonly [number, number, number], normal: readonly [number, number, number]) => ({
+  point: new Vector3(...point),
+  normal: new Vector3(...normal),
+});
 
 describe("the face that was clicked", () => {
   it("looks the way its surface does", () => {

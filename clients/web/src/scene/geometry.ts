@@ -12,7 +12,11 @@ function solidGeometry(solid: Solid): BufferGeometry {
   const middle = from.clone().add(to).multiplyScalar(0.5);
   if (solid.shape === "box") {
     const size = to.clone().sub(from);
-    return new BoxGeometry(Math.abs(size.x), Math.abs(size.y), Math.abs(size.z)).translate(middle.x, middle.y, middle.z);
+    return new BoxGeometry(Math.abs(size.x), Math.abs(size.y), Math.abs(size.z)).translate(
+      middle.x,
+      middle.y,
+      middle.z,
+    );
   }
   const axis = to.clone().sub(from);
   return new CylinderGeometry(solid.radius, solid.radius, axis.length(), SIDES)

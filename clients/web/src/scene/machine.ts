@@ -72,14 +72,23 @@ export function machineOf(parts: Iterable<PartView>): Machine {
     if (part.start === null || part.end === null) machine.parts.push(partOf(part));
     else {
       const { id, module, start, end } = part;
-      machine.rods.push({ id, module, joint: `${module} ${id}`, startBlock: null, endBlock: null, startLocal: vector(start), endLocal: vector(end) });
+      machine.rods.push({
+        id,
+        module,
+        joint: `${module} ${id}`,
+        startBlock: null,
+        endBlock: null,
+        startLocal: vector(start),
+        endLocal: vector(end),
+      });
     }
   }
   return machine;
 }
 
 function solidBox(solid: Solid): Box3 {
-  if (solid.shape === "sphere") return new Box3(vector(solid.center), vector(solid.center)).expandByScalar(solid.radius);
+  if (solid.shape === "sphere")
+    return new Box3(vector(solid.center), vector(solid.center)).expandByScalar(solid.radius);
   const box = new Box3().setFromPoints([vector(solid.from), vector(solid.to)]);
   // A cylinder's corners lie within its radius around its axis, whichever way that points.
   return solid.shape === "box" ? box : box.expandByScalar(solid.radius);

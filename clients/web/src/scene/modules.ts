@@ -34,21 +34,33 @@ interface BodyView {
 }
 
 /** Learns what somebody's own modules look like, from a scene that has blocks of them. */
-export function learnShapes(modules: Readonly<Record<string, { kind: string; center: readonly number[]; bodies: readonly BodyView[] }>>): void {
+export function learnShapes(
+  modules: Readonly<Record<string, { kind: string; center: readonly number[]; bodies: readonly BodyView[] }>>,
+): void {
   for (const [name, { kind, center, bodies }] of Object.entries(modules)) {
-    if (!BY_NAME.has(name)) BY_NAME.set(name, { name, kind, center: [center[0] ?? 0, center[1] ?? 0, center[2] ?? 0], body: bodies.map(solidOf) });
+    if (!BY_NAME.has(name))
+      BY_NAME.set(name, {
+        name,
+        kind,
+        center: [center[0] ?? 0, center[1] ?? 0, center[2] ?? 0],
+        body: bodies.map(solidOf),
+      });
   }
 }
 
 function solidOf({ shape, center, quaternion, size }: BodyView): Solid {
-  if (shape === "sphere") return { shape, radius: (size[0] ?? 0) / 2, center: [center[0] ?? 0, center[1] ?? 0, center[2] ?? 0] };
+  if (shape === "sphere")
+    return { shape, radius: (size[0] ?? 0) / 2, center: [center[0] ?? 0, center[1] ?? 0, center[2] ?? 0] };
   const [w, x, y, z] = [quaternion[0] ?? 1, quaternion[1] ?? 0, quaternion[2] ?? 0, quaternion[3] ?? 0];
   const half = (size[2] ?? 0) / 2;
   // A cylinder's axis is its own z, turned.
   const axis = [2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)].map((value) => value * half);
   const reach = shape === "cylinder" ? axis : size.map((value) => value / 2);
-  const corner = (sign: number): Vector => [0, 1, 2].map((k) => (center[k] ?? 0) + sign * (reach[k] ?? 0)) as unknown as Vector;
-  return shape === "box" ? { shape, from: corner(-1), to: corner(1) } : { shape, radius: (size[0] ?? 0) / 2, from: corner(-1), to: corner(1) };
+  const corner = (sign: number): Vector =>
+    [0, 1, 2].map((k) => (center[k] ?? 0) + sign * (reach[k] ?? 0)) as unknown as Vector;
+  return shape === "box"
+    ? { shape, from: corner(-1), to: corner(1) }
+    : { shape, radius: (size[0] ?? 0) / 2, from: corner(-1), to: corner(1) };
 }
 
 /** How a module looks; a module of somebody's own is shown as a small cube. */

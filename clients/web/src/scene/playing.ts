@@ -14,7 +14,14 @@ function turn(values: Float32Array, at: number): Quaternion {
   return new Quaternion(values[at + 1], values[at + 2], values[at + 3], values[at]);
 }
 
-function blended(positions: Float32Array, quaternions: Float32Array, item: number, count: number, index: number, share: number): [Vector3, Quaternion] {
+function blended(
+  positions: Float32Array,
+  quaternions: Float32Array,
+  item: number,
+  count: number,
+  index: number,
+  share: number,
+): [Vector3, Quaternion] {
   const [from, to] = [index * count + item, Math.min(index + 1, positions.length / 3 / count - 1) * count + item];
   const place = point(positions, 3 * from);
   const facing = turn(quaternions, 4 * from);
@@ -59,10 +66,15 @@ export function cargoAt(trial: Trial, time: number, into: Matrix4): Matrix4 {
 /** The box around everything that moves, as the trial begins. */
 export function startBounds(machine: Machine, trial: Trial): Box3 {
   const start = poseAt(trial, 0);
-  const whole = boundsOf({ ...machine, parts: machine.parts.map((part) => ({ ...part, pose: start(part, part.pose.clone()) })) });
+  const whole = boundsOf({
+    ...machine,
+    parts: machine.parts.map((part) => ({ ...part, pose: start(part, part.pose.clone()) })),
+  });
   if (trial.cargo !== null) {
     const size = new Vector3(...trial.cargo.size);
-    whole.union(new Box3().setFromCenterAndSize(new Vector3().setFromMatrixPosition(cargoAt(trial, 0, new Matrix4())), size));
+    whole.union(
+      new Box3().setFromCenterAndSize(new Vector3().setFromMatrixPosition(cargoAt(trial, 0, new Matrix4())), size),
+    );
   }
   return whole;
 }

@@ -9,13 +9,28 @@ import { instantAt, type Trial } from "./trial";
 
 const CYCLE: [number, number, number, number] = [0.5, 0.5, 0.5, 0.5];
 const SCENE: MachineScene = {
-  modules: { "Own Wheel": { kind: "wheel", center: [0, 0, 1], pointing: null, bodies: [{ shape: "cylinder", center: [0, 0, 1], quaternion: [0.5 ** 0.5, 0, 0.5 ** 0.5, 0], size: [3, 3, 2] }], flames: [] } },
+  modules: {
+    "Own Wheel": {
+      kind: "wheel",
+      center: [0, 0, 1],
+      pointing: null,
+      bodies: [{ shape: "cylinder", center: [0, 0, 1], quaternion: [0.5 ** 0.5, 0, 0.5 ** 0.5, 0], size: [3, 3, 2] }],
+      flames: [],
+    },
+  },
   blocks: [
     { id: "1", module: "Starting Block", position: [0, 0, 2], quaternion: [1, 0, 0, 0] },
     { id: "2", module: "Small Wooden Block", position: [0.5, 0, 2], quaternion: CYCLE },
   ],
   connectors: [
-    { id: "7", module: "Brace", joint: "Brace 7", rope: false, start: { block: "1", point: [0, 0, 0.5] }, end: { block: "2", point: [0, 0, 0.5] } },
+    {
+      id: "7",
+      module: "Brace",
+      joint: "Brace 7",
+      rope: false,
+      start: { block: "1", point: [0, 0, 0.5] },
+      end: { block: "2", point: [0, 0, 0.5] },
+    },
   ],
 };
 
@@ -41,10 +56,33 @@ describe("readScene", () => {
 
   it("puts a connector of a replay where it says, in the world", () => {
     const { parts, rods } = machineOf([
-      { id: "1", module: "Starting Block", position: [0, 0, 2], quaternion: [1, 0, 0, 0], start: null, end: null, flipped: false, bindings: {} },
-      { id: "7", module: "Brace", position: [0, 0, 2], quaternion: CYCLE, start: [0, 0, 2], end: [1, 0, 3], flipped: false, bindings: {} },
+      {
+        id: "1",
+        module: "Starting Block",
+        position: [0, 0, 2],
+        quaternion: [1, 0, 0, 0],
+        start: null,
+        end: null,
+        flipped: false,
+        bindings: {},
+      },
+      {
+        id: "7",
+        module: "Brace",
+        position: [0, 0, 2],
+        quaternion: CYCLE,
+        start: [0, 0, 2],
+        end: [1, 0, 3],
+        flipped: false,
+        bindings: {},
+      },
     ]);
-    expect([parts.length, rods[0]?.startBlock, rods[0]?.joint, rods[0]?.endLocal.toArray()]).toEqual([1, null, "Brace 7", [1, 0, 3]]);
+    expect([parts.length, rods[0]?.startBlock, rods[0]?.joint, rods[0]?.endLocal.toArray()]).toEqual([
+      1,
+      null,
+      "Brace 7",
+      [1, 0, 3],
+    ]);
   });
 
   it("finds the box around it", () => {
@@ -104,7 +142,10 @@ describe("loads", () => {
 
   it("belong to joints at blocks, and to connectors", () => {
     expect(jointsOf(TRIAL).map((joint) => joint.block)).toEqual(["2", null]);
-    expect([...loadsOfBlocks(TRIAL, loadsAt(TRIAL, 1))]).toEqual([["1", 1.25], ["2", 1.25]]);
+    expect([...loadsOfBlocks(TRIAL, loadsAt(TRIAL, 1))]).toEqual([
+      ["1", 1.25],
+      ["2", 1.25],
+    ]);
     expect(mostLoaded(TRIAL, loadsAt(TRIAL, 2))).toMatchObject({ joint: "Brace 7", ratio: 0.5 });
     expect(mostLoaded(TRIAL, loadsAt(TRIAL, 0))).toBeNull();
   });
@@ -113,8 +154,16 @@ describe("loads", () => {
 describe("posts", () => {
   it("stand across the way a gate is crossed, from north towards east", () => {
     const rounded = (heading_deg: number) =>
-      posts({ name: "g", center: [4, 10], half_width: 1.5, heading_deg }).map((post) => post.map((value) => Math.round(value * 1e6) / 1e6));
-    expect(rounded(0)).toEqual([[2.5, 10, 0], [5.5, 10, 0]]);
-    expect(rounded(90)).toEqual([[4, 11.5, 0], [4, 8.5, 0]]);
+      posts({ name: "g", center: [4, 10], half_width: 1.5, heading_deg }).map((post) =>
+        post.map((value) => Math.round(value * 1e6) / 1e6),
+      );
+    expect(rounded(0)).toEqual([
+      [2.5, 10, 0],
+      [5.5, 10, 0],
+    ]);
+    expect(rounded(90)).toEqual([
+      [4, 11.5, 0],
+      [4, 8.5, 0],
+    ]);
   });
 });

@@ -11,6 +11,10 @@ export interface Gate {
 /** Where a gate's two posts stand: the line between them lies across the way it is crossed. */
 export function posts({ center, half_width, heading_deg = 0 }: Gate): [Vector, Vector] {
   const heading = (heading_deg * Math.PI) / 180;
-  const at = (sign: number): Vector => [center[0] + sign * half_width * Math.cos(heading), center[1] - sign * half_width * Math.sin(heading), 0];
+  const at = (sign: number): Vector => [
+    center[0] + sign * half_width * Math.cos(heading),
+    center[1] - sign * half_width * Math.sin(heading),
+    0,
+  ];
   return [at(-1), at(1)];
 }

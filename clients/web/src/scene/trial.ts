@@ -23,7 +23,12 @@ export interface Trial {
   positions: Float32Array;
   /** T x N x 4 as (w, x, y, z). */
   quaternions: Float32Array;
-  cargo: { size: readonly [number, number, number]; positions: Float32Array; quaternions: Float32Array; mass: Float64Array } | null;
+  cargo: {
+    size: readonly [number, number, number];
+    positions: Float32Array;
+    quaternions: Float32Array;
+    mass: Float64Array;
+  } | null;
   peaks: readonly JointPeak[];
   /** T x J shares of strength, in the order of the peaks; null in older trajectories. */
   loads: Float32Array | null;

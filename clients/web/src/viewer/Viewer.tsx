@@ -17,7 +17,9 @@ export function Viewer({ given, height }: { given: Given; height: number }) {
   const machine = useMemo(() => readScene(given.machine), [given]);
   const trial = useMemo(() => (given.trial === null ? null : trialOf(given.trial)), [given]);
   if (trial === null) return <Standing machine={machine} title={given.title} height={height} />;
-  return <Played machine={machine} trial={trial} scenario={given.scenario} title={given.title} height={height - CONTROLS} />;
+  return (
+    <Played machine={machine} trial={trial} scenario={given.scenario} title={given.title} height={height - CONTROLS} />
+  );
 }
 
 function Standing({ machine, title, height }: { machine: Machine; title: string; height: number }) {
@@ -62,7 +64,9 @@ function Played({ machine, trial, scenario, title, height }: PlayedProps) {
           max={end}
           step={0.04}
           value={clock.shown}
-          onChange={(event) => { clock.seek(Number(event.currentTarget.value)); }}
+          onChange={(event) => {
+            clock.seek(Number(event.currentTarget.value));
+          }}
         />
         <output>
           {clock.shown.toFixed(1)} / {end.toFixed(0)} s
@@ -71,7 +75,12 @@ function Played({ machine, trial, scenario, title, height }: PlayedProps) {
       <div className="controls">
         <label>
           Speed{" "}
-          <select value={clock.speed} onChange={(event) => { clock.setSpeed(event.currentTarget.value); }}>
+          <select
+            value={clock.speed}
+            onChange={(event) => {
+              clock.setSpeed(event.currentTarget.value);
+            }}
+          >
             {SPEEDS.map((speed) => (
               <option key={speed} value={speed}>
                 {speed}×
@@ -80,9 +89,20 @@ function Played({ machine, trial, scenario, title, height }: PlayedProps) {
           </select>
         </label>
         <label>
-          <input type="checkbox" checked={coloured} onChange={(event) => { setColoured(event.currentTarget.checked); }} /> Loads on joints
+          <input
+            type="checkbox"
+            checked={coloured}
+            onChange={(event) => {
+              setColoured(event.currentTarget.checked);
+            }}
+          />{" "}
+          Loads on joints
         </label>
-        <span>{most === null ? "No joint bears anything." : `Most loaded: ${most.kind} ${most.joint}, ${(100 * most.ratio).toFixed(0)} % of its strength.`}</span>
+        <span>
+          {most === null
+            ? "No joint bears anything."
+            : `Most loaded: ${most.kind} ${most.joint}, ${(100 * most.ratio).toFixed(0)} % of its strength.`}
+        </span>
       </div>
     </>
   );

@@ -21,6 +21,7 @@ from buildarena_environment import (
 )
 from buildarena_gymnasium.pictures import Picture, picture_of
 from buildarena_gymnasium.spaces import ACTION_SPACE, MAX_ACTION, OBSERVATION_SPACE, observed
+from buildarena_simulation import DEFAULT_ENGINE
 
 OPTIONS: Final = ("state", "start_seed")
 MAX_START_SEED: Final = 2**31
@@ -59,7 +60,7 @@ class BuildEnv(gymnasium.Env[str, str]):
         self,
         task: Task | str,
         *,
-        simulator: str = "mujoco",
+        simulator: str = DEFAULT_ENGINE,
         steps: int = 2000,
         rounds: int = 1,
         rewards: Mapping[str, float] | None = None,

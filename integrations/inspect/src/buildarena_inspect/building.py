@@ -23,6 +23,7 @@ from buildarena_environment import (
 from buildarena_geometry import Machine
 from buildarena_inspect.errors import LogError
 from buildarena_inspect.trial_processes import try_machine
+from buildarena_simulation import DEFAULT_ENGINE
 
 STATE: Final = "buildarena:state"
 """Where a sample's store keeps how its episode stood when it was scored."""
@@ -44,7 +45,7 @@ class Conditions:
     """
 
     task: str
-    simulator: str = "mujoco"
+    simulator: str = DEFAULT_ENGINE
     seed: int | None = None
     rounds: int = 1
     steps: int = 2000

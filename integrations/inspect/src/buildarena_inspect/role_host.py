@@ -29,7 +29,7 @@ from buildarena_inspect.building import Building
 from buildarena_inspect.scorers import machine_hash
 from buildarena_inspect.tools import parameters_of
 from buildarena_inspect.trial_processes import try_machine
-from buildarena_pipeline.runtime.trial_books import tracked_at_1_hz
+from buildarena_pipeline.runtime.trial_repository import tracked_at_1_hz
 from buildarena_store import JournalEntry, RolloutRecord, Usage
 from buildarena_worker.session.messages import Message, Reply, Request, ToolCall
 

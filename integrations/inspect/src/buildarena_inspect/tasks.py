@@ -16,10 +16,11 @@ from inspect_ai.solver import Solver
 from buildarena_benchmark import builtin_tasks
 from buildarena_inspect.building import Conditions
 from buildarena_inspect.errors import ChoiceError, UnguardedProgramError
-from buildarena_inspect.keeping import keep
+from buildarena_inspect.log_artifacts import keep
 from buildarena_inspect.roles import five_roles
 from buildarena_inspect.scorers import indicator, reward, success
 from buildarena_inspect.solvers import react_builder, workbench
+from buildarena_simulation import DEFAULT_ENGINE
 
 NAMESPACE: Final = "buildarena"
 """What comes before a task's name on Inspect's command line."""
@@ -89,7 +90,7 @@ def _named(name: str, tasks: Sequence[str]) -> Callable[..., Task]:
     """Registers a task under our name; Inspect's own way would put the module's before it."""
 
     def make(  # noqa: PLR0917 - Inspect gives them by name
-        simulator: str = "mujoco",
+        simulator: str = DEFAULT_ENGINE,
         rounds: int = 1,
         rewards: dict[str, float] | str | None = None,
         solver: str = "react",
@@ -119,7 +120,7 @@ def _documentation(tasks: Sequence[str]) -> str:
     return f"""{title}.
 
     Args:
-        simulator: Name of the engine, `mujoco` or `pybullet`.
+        simulator: Name of the engine, `pybullet` or `mujoco`.
         rounds: How often a model may submit; a successful trial ends the building.
         rewards: Weights of rewards by name, for the scorer `reward`.
         solver: `react`, Inspect's agent, or `roles`, our workflow of five roles.

@@ -9,14 +9,14 @@ from typing import Final
 from buildarena_benchmark import Task
 from buildarena_environment import Trial, TrialPool
 from buildarena_geometry import Machine
-from buildarena_simulation import SimulationError
+from buildarena_simulation import DEFAULT_ENGINE, SimulationError
 
 TRIES: Final = 2
 """What ended a process may have been chance; what ends it twice is taken to be the machine."""
 
 
 def try_machine(
-    task: Task, machine: Machine, simulator: str = "mujoco", *, seed: int | None = None
+    task: Task, machine: Machine, simulator: str = DEFAULT_ENGINE, *, seed: int | None = None
 ) -> Trial:
     """As `buildarena_environment.try_machine`, in a warm process; waits where all are busy.
 

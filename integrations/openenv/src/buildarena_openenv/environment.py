@@ -11,6 +11,7 @@ from openenv.core.env_server.types import EnvironmentMetadata
 
 from buildarena_environment import Answer, Environment, Limits, TrialPool, call
 from buildarena_openenv.models import BuildAction, BuildObservation, BuildState
+from buildarena_simulation import DEFAULT_ENGINE
 
 SETTINGS: Final = ("task", "rounds", "steps")
 MAX_EPISODE_ID: Final = 255
@@ -19,7 +20,6 @@ MAX_PARTS: Final = 5_000
 """Parts that all machines of a session may have together; the largest task allows 500."""
 MAX_SEED: Final = 2**31
 DEFAULT_TASK: Final = "support-1"
-DEFAULT_SIMULATOR: Final = "mujoco"
 DEFAULT_STEPS: Final = 2000
 
 
@@ -35,7 +35,7 @@ class Terms:
     """
 
     task: str = DEFAULT_TASK
-    simulator: str = DEFAULT_SIMULATOR
+    simulator: str = DEFAULT_ENGINE
     max_steps: int = DEFAULT_STEPS
     rewards: Mapping[str, float] | None = None
 

@@ -15,13 +15,13 @@ from openenv.core.env_server.types import ConcurrencyConfig
 from buildarena_environment import TrialPool
 from buildarena_openenv.body_limit import BodyLimitMiddleware
 from buildarena_openenv.environment import (
-    DEFAULT_SIMULATOR,
     DEFAULT_STEPS,
     DEFAULT_TASK,
     BuildEnvironment,
     Terms,
 )
 from buildarena_openenv.models import BuildAction, BuildObservation, BuildState
+from buildarena_simulation import DEFAULT_ENGINE
 
 MAX_SESSIONS: Final = 64
 SESSION_IDLE_S: Final = 1800.0
@@ -79,7 +79,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--host", default="127.0.0.1")
     parser.add_argument("--port", type=int, default=8000)
     parser.add_argument("--task", default=DEFAULT_TASK, help="of episodes whose client names none")
-    parser.add_argument("--simulator", default=DEFAULT_SIMULATOR)
+    parser.add_argument("--simulator", default=DEFAULT_ENGINE)
     parser.add_argument("--max-steps", type=int, default=DEFAULT_STEPS)
     parser.add_argument("--max-sessions", type=int, default=MAX_SESSIONS)
     parser.add_argument("--processes", type=int, default=None, help="that try machines")

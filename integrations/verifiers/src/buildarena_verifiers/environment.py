@@ -10,6 +10,7 @@ import verifiers.v1 as vf
 
 from buildarena_benchmark import builtin_tasks
 from buildarena_environment import REWARDS, UnknownChoiceError
+from buildarena_simulation import DEFAULT_ENGINE
 from buildarena_verifiers.taskset import BuildTaskConfig, BuildTasksetConfig
 from buildarena_verifiers.trial_runners import RUNNERS
 
@@ -47,7 +48,7 @@ class BuildEnv(vf.Env[BuildEnvConfig]):
 
 def load_environment(
     tasks: Sequence[str] | str | None = None,
-    simulator: str = "mujoco",
+    simulator: str = DEFAULT_ENGINE,
     *,
     rounds: int = 1,
     steps: int = 2000,

@@ -8,7 +8,7 @@ import verifiers.v1 as vf
 from openai import AsyncOpenAI
 
 from buildarena_verifiers.harness_config import BuildHarnessConfig
-from buildarena_verifiers.seat import Seat
+from buildarena_verifiers.rollout import Seat
 from buildarena_verifiers.taskset import seat_of
 
 MAX_REMINDERS = 3

@@ -10,8 +10,9 @@ from pydantic import Field, PrivateAttr
 
 from buildarena_benchmark import builtin_tasks
 from buildarena_environment import Environment, Limits
+from buildarena_simulation import DEFAULT_ENGINE
 from buildarena_verifiers.harness_config import BuildHarnessConfig
-from buildarena_verifiers.seat import Seat
+from buildarena_verifiers.rollout import Seat
 from buildarena_verifiers.trial_runners import RUNNERS
 
 RECORD = "buildarena"
@@ -63,7 +64,7 @@ class BuildTasksetConfig(vf.TasksetConfig):
     """
 
     tasks: list[str] = Field(default_factory=lambda: list(builtin_tasks()))
-    simulator: str = "mujoco"
+    simulator: str = DEFAULT_ENGINE
     rounds: int = Field(1, ge=1)
     steps: int = Field(2000, ge=1)
     start_seeds: list[int] = Field(default_factory=list)

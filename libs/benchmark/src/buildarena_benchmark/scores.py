@@ -1,46 +1,20 @@
 """Scores: one trial's verdict, and a trial that never was."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
-from buildarena_benchmark.scorers import (
-    glide,
-    height,
-    hover,
-    placing,
-    road,
-    slalom,
-    support,
-    thrust,
-    transport,
-    winch,
-)
-from buildarena_benchmark.scorers.stability import is_unstable
-from buildarena_benchmark.scorers.verdict import Metric, Verdict
+from buildarena_benchmark.scorers.measures.stability import is_unstable
+from buildarena_benchmark.scorers.registry import known_scorers
+from buildarena_benchmark.scorers.scorer import UNSTABLE, Metric
 
 if TYPE_CHECKING:
     from buildarena_benchmark.tasks.task import Task
     from buildarena_geometry import Machine
     from buildarena_simulation import Trajectory
     from buildarena_simulation.rollout import Decision
-
-_SCORERS: Final[Mapping[str, Callable[..., Verdict]]] = MappingProxyType(
-    {
-        "transport": transport.judge,
-        "support": support.judge,
-        "thrust": thrust.judge,
-        "height": height.judge,
-        "road": road.judge,
-        "slalom": slalom.judge,
-        "winch": winch.judge,
-        "place": placing.judge,
-        "hover": hover.judge,
-        "glide": glide.judge,
-    }
-)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,20 +45,22 @@ def score(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Score:
     Returns:
         The score; a rollout that blew up is flagged `unstable` and is never a success.
     """
-    verdict = _SCORERS[task.scorer](task, machine, trajectory)
+    scorer = known_scorers()[task.scorer]
+    verdict = scorer.judge(task.scoring, task.scenario, machine, trajectory)
+    flags = tuple(flag.name for flag in verdict.flags)
     metrics = {**_machine_metrics(machine), **_finite(verdict.metrics)}
     if is_unstable(task.scenario, machine, trajectory, verdict.deciding):
         return Score(
             success=False,
             indicator=0.0,
             metrics=MappingProxyType(metrics),
-            flags=(*verdict.flags, "unstable"),
+            flags=(*flags, UNSTABLE.name),
         )
     return Score(
         success=verdict.success,
         indicator=verdict.indicator,
         metrics=MappingProxyType(metrics),
-        flags=verdict.flags,
+        flags=flags,
     )
 
 
@@ -100,7 +76,8 @@ def decision(task: "Task") -> "Decision | None":
     Returns:
         What `simulate` takes as `until`; None where the whole trial decides.
     """
-    return support.decision(task) if task.scorer == "support" else None
+    decide = known_scorers()[task.scorer].decision
+    return decide(task.scoring, task.scenario) if decide else None
 
 
 def failed_score(task: "Task", machine: "Machine | None" = None) -> Score:

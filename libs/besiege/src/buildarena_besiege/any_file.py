@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Any, Final
 
 from buildarena_besiege.importing.machine import ImportedMachine, read_machine_file
 from buildarena_geometry import KeyPress
@@ -10,26 +10,29 @@ from buildarena_geometry.errors import DocumentError
 from buildarena_geometry.json_texts import read_json
 from buildarena_geometry.keys import KEYS
 from buildarena_geometry.machine_files import machine_of
-from buildarena_geometry.reading import Reader
+from buildarena_geometry.reading import read, shown
 
 _LEADING: Final = b" \t\r\n\x00"
+_PUBLISHED_FIELDS: Final = {"time": "time_s", "hold_for": "hold_for_s"}
 _XML_BEGINNINGS: Final = (b"<", b"\xef\xbb\xbf<", b"\xff\xfe<", b"\xfe\xff\x00<", b"\x00<")
 
 
-def read_any_machine(data: bytes, *, where: str) -> ImportedMachine:
+def read_any_machine(data: bytes, *, where: str, dialect: str | None = None) -> ImportedMachine:
     """The machine of a file, told apart by content.
 
     Args:
         data: A machine file of the game's (.bsg), a machine document or an action log (JSON).
         where: What messages call the file.
+        dialect: The version of the interface that an action log is from; found if left out.
 
     Raises:
         MachineFileError: It is XML, and not a machine file.
-        DocumentError: It is neither, or the document is wrong.
+        DocumentError: It is neither, the document is wrong, or an action of the log is refused.
+        ValueError: There is no such dialect.
     """
     if data.lstrip(_LEADING).startswith(_XML_BEGINNINGS):
         return read_machine_file(data)
-    machine = machine_of(_json(data, where), where=where)
+    machine = machine_of(_json(data, where), where=where, version=dialect)
     return ImportedMachine(machine=machine, name="", not_understood=())
 
 
@@ -44,19 +47,20 @@ def read_presses(data: bytes, *, where: str) -> tuple[KeyPress, ...]:
     Raises:
         DocumentError: It is none; the message names the entry.
     """
-    found = []
-    for entry in Reader(value=_json(data, where), where=where, error=DocumentError).items():
-        published = isinstance(entry.value, dict) and "time" in entry.value
-        time, hold = ("time", "hold_for") if published else ("time_s", "hold_for_s")
-        fields = entry.fields(required=(time, "key", hold))
-        found.append(
-            KeyPress(
-                time_s=fields[time].number(least=0),
-                key=fields["key"].choice(KEYS),
-                hold_for_s=fields[hold].number(above=0),
-            )
-        )
-    return tuple(found)
+    presses = []
+    entries = read(_json(data, where), list[Any], where=where, error=DocumentError)
+    for index, entry in enumerate(entries):
+        place = f"{where}[{index}]"
+        if isinstance(entry, dict) and "time" in entry:
+            renamed = {_PUBLISHED_FIELDS.get(name, name): value for name, value in entry.items()}
+            press = read(renamed, KeyPress, where=place, error=DocumentError)
+        else:
+            press = read(entry, KeyPress, where=place, error=DocumentError)
+        if press.key not in KEYS:
+            expected = f"one of {', '.join(KEYS)}, found {shown(press.key)}"
+            raise DocumentError(f"{place}.key: expected {expected}")
+        presses.append(press)
+    return tuple(presses)
 
 
 def _json(data: bytes, where: str) -> object:

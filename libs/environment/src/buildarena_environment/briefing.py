@@ -41,22 +41,22 @@ _CHECKS: Final = {
     "wheels": "At least {count} powered wheels.",
 }
 
-_LOOKED_UP: Final = "Only the modules that can be looked up."
+_ON_DEMAND: Final = "Only the modules that can be looked up."
 
 
-def briefing(task: Task, *, trials: str, conduct: str, values: Mapping[str, str]) -> str:
+def briefing(task: Task, *, trials: str, guidelines: str, values: Mapping[str, str]) -> str:
     """All that a builder must know to play a task, but for its tools.
 
     Args:
         task: The task.
         trials: How often it may submit, in a sentence or two.
-        conduct: What holds for its calls and for the end, as paragraphs; a template.
-        values: What stands in for the names in `conduct`, beside those of every task.
+        guidelines: What holds for its calls and for the end, as paragraphs; a template.
+        values: What stands in for the names in `guidelines`, beside those of every task.
 
     Returns:
         Markdown: how it plays, the statement, the frame, the rules, the modules.
     """
-    return Template(_text(trials, conduct)).substitute(
+    return Template(_text(trials, guidelines)).substitute(
         task=task.name,
         control=_CONTROL[task.control].format(from_s=task.scenario.control.from_s),
         statement=task.statement.strip(),
@@ -71,30 +71,32 @@ def briefing(task: Task, *, trials: str, conduct: str, values: Mapping[str, str]
 
 def modules_told(constraints: Constraints) -> str:
     """What a builder reads about its modules: all of them, or how to look them up."""
-    if constraints.looked_up:
+    if constraints.on_demand:
         return lookup_text(constraints.catalogue)
     return modules_text(constraints.catalogue, modules_named(constraints.modules))
 
 
 @cache
-def briefing_digest(trials: str, conduct: str, *, looked_up: bool = False) -> str:
+def briefing_digest(trials: str, guidelines: str, *, on_demand: bool = False) -> str:
     """Hash of the words around a statement: results of different ones don't compare.
 
     Args:
         trials: How often it may submit.
-        conduct: What holds for its calls and for the end.
-        looked_up: Whether modules are looked up: who does that does not compare with who is told.
+        guidelines: What holds for its calls and for the end.
+        on_demand: Whether modules are looked up: who does that does not compare with who is told.
     """
-    words = [_text(trials, conduct), *_CONTROL.values(), *_CHECKS.values()]
-    if looked_up:
-        words.append(_LOOKED_UP)
+    words = [_text(trials, guidelines), *_CONTROL.values(), *_CHECKS.values()]
+    if on_demand:
+        words.append(_ON_DEMAND)
     return sha256("\0".join(words).encode()).hexdigest()
 
 
 @cache
-def _text(trials: str, conduct: str) -> str:
+def _text(trials: str, guidelines: str) -> str:
     frame = resources.files(__package__).joinpath("briefing.md").read_text(encoding="utf-8")
-    return frame.strip().replace("$trials", trials).replace("$conduct", conduct.strip()) + "\n"
+    return (
+        frame.strip().replace("$trials", trials).replace("$guidelines", guidelines.strip()) + "\n"
+    )
 
 
 def _sub_structures(task: Task) -> str:
@@ -108,7 +110,7 @@ def _checks(task: Task) -> str:
     limits = task.constraints
     checks = [_CHECKS["always"].format(own=limits.max_blocks, all=limits.most_blocks)]
     if limits.modules is not None:
-        checks.append(_LOOKED_UP if limits.looked_up else _CHECKS["modules"])
+        checks.append(_ON_DEMAND if limits.on_demand else _CHECKS["modules"])
     checks += [
         _CHECKS["least"].format(count=count, name=name)
         for name, count in limits.min_modules.items()

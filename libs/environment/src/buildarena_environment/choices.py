@@ -10,7 +10,7 @@ from typing import Final
 
 from buildarena_benchmark import Task, builtin_tasks
 from buildarena_environment.errors import UnknownChoiceError
-from buildarena_simulation import ENGINES
+from buildarena_simulation import DEFAULT_ENGINE, ENGINES, require_engine
 
 WITHOUT: Final = 1.0
 """The reference of a task that has none, where no reward asks for it."""
@@ -35,10 +35,11 @@ def checked_simulator(name: str) -> str:
 
     Raises:
         UnknownChoiceError: None has.
+        UnknownEngineError: It is the default one, and not installed.
     """
-    if name not in ENGINES:
+    if name not in ENGINES and name != DEFAULT_ENGINE:
         raise UnknownChoiceError("simulator", name, ENGINES)
-    return name
+    return require_engine(name)
 
 
 def reference_of(task: Task, given: float | None = None, *, needed: bool = False) -> float:

@@ -27,6 +27,7 @@ from buildarena_environment.snapshots import Snapshot
 from buildarena_environment.trials import Trial, Tries, best_trial, told, try_machine
 from buildarena_environment.workbench import MAIN, Workbench, tools_of_models
 from buildarena_geometry import Accepted, Cause, Machine, Refused, ToolDefinition
+from buildarena_simulation import DEFAULT_ENGINE
 
 if TYPE_CHECKING:
     from buildarena_geometry import Outcome
@@ -140,7 +141,7 @@ class Environment:
     def __init__(
         self,
         task: Task | str,
-        simulator: str = "mujoco",
+        simulator: str = DEFAULT_ENGINE,
         *,
         seed: int | None = None,
         rounds: int = 1,
@@ -161,7 +162,7 @@ class Environment:
         self._tries = tries
         self._shaped = bool(self.weights.keys() - TERMINAL)
         limits_of = self.task.constraints
-        self._bench = Workbench(limits_of.catalogue, looked_up=limits_of.looked_up)
+        self._bench = Workbench(limits_of.catalogue, on_demand=limits_of.on_demand)
         self._steps = self._changes = self._refused = 0
         self._trials: tuple[Trial, ...] = ()
         self._done = False
@@ -181,18 +182,20 @@ class Environment:
     @property
     def observation(self) -> Observation:
         """What a builder has before its first step."""
-        conduct = resources.files(__package__).joinpath("conduct.md").read_text(encoding="utf-8")
+        guidelines = (
+            resources.files(__package__).joinpath("guidelines.md").read_text(encoding="utf-8")
+        )
         text = briefing(
             self.task,
             trials=ONCE if self.rounds == 1 else OFTEN,
-            conduct=conduct,
+            guidelines=guidelines,
             values={
                 "calls": f"{self.limits.steps:,}",
                 "rounds": str(self.rounds),
                 "after": LAST if self.rounds == 1 else AGAIN,
             },
         )
-        tools = tools_of_models(looked_up=self.task.constraints.looked_up)
+        tools = tools_of_models(on_demand=self.task.constraints.on_demand)
         return Observation(task=self.task.name, briefing=text, tools=tools)
 
     @property

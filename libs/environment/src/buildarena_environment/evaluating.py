@@ -18,6 +18,7 @@ from buildarena_environment.trial_pool import (
     text_of,
 )
 from buildarena_geometry import Machine
+from buildarena_simulation import DEFAULT_ENGINE
 
 AHEAD: Final = 4
 """Machines of an iterable that are taken before their turn, for each process."""
@@ -47,7 +48,7 @@ class Evaluator:
     def __init__(
         self,
         task: Task | str,
-        simulator: str = "mujoco",
+        simulator: str = DEFAULT_ENGINE,
         *,
         seed: int | None = None,
         processes: int | None = None,

@@ -16,7 +16,7 @@ from buildarena_benchmark import Task, builtin_tasks, parse_task
 from buildarena_environment.trials import Trial, try_machine
 from buildarena_environment.warm_process import ProcessEndedError, WarmProcess
 from buildarena_geometry import DocumentError, Machine
-from buildarena_simulation import SimulationError, read_trajectory, write_trajectory
+from buildarena_simulation import DEFAULT_ENGINE, SimulationError, read_trajectory, write_trajectory
 
 LONGEST_TRIAL_S: Final = 600.0
 
@@ -114,7 +114,12 @@ class TrialPool:
         return self._threads.submit(self._evaluate, question)
 
     def try_machine(
-        self, task: Task, machine: Machine, simulator: str = "mujoco", *, seed: int | None = None
+        self,
+        task: Task,
+        machine: Machine,
+        simulator: str = DEFAULT_ENGINE,
+        *,
+        seed: int | None = None,
     ) -> Trial:
         """As `buildarena_environment.try_machine`, in one of the processes; waits for it.
 

@@ -12,7 +12,7 @@ from buildarena_benchmark import Score, Task, broken_constraint, failed_score, s
 from buildarena_benchmark.flags import is_disqualified
 from buildarena_benchmark.scores import decision
 from buildarena_geometry import Machine
-from buildarena_simulation import MachineNotSimulable, Trajectory, simulate
+from buildarena_simulation import DEFAULT_ENGINE, MachineNotSimulable, Trajectory, simulate
 
 NOT_SIMULABLE = "not_simulable"
 
@@ -86,7 +86,7 @@ class Tries(Protocol):
 def try_machine(
     task: Task,
     machine: Machine,
-    simulator: str = "mujoco",
+    simulator: str = DEFAULT_ENGINE,
     *,
     seed: int | None = None,
     whole: bool = True,

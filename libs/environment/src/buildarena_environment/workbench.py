@@ -51,20 +51,20 @@ MACHINE: Final = {
 _LOOKUPS: Final = CaselessNames(tool.name for tool in tool_definitions([LOOKUP]))
 
 
-def building_tools(*, looked_up: bool = False) -> tuple[ToolDefinition, ...]:
+def building_tools(*, on_demand: bool = False) -> tuple[ToolDefinition, ...]:
     """All actions of the geometry library, as they are.
 
     Args:
-        looked_up: Whether the task has its modules looked up, and there are tools for that.
+        on_demand: Whether the task has its modules looked up, and there are tools for that.
     """
-    return tool_definitions((*GROUPS, LOOKUP) if looked_up else GROUPS)
+    return tool_definitions((*GROUPS, LOOKUP) if on_demand else GROUPS)
 
 
-def tools_of_models(*, looked_up: bool = False) -> tuple[ToolDefinition, ...]:
+def tools_of_models(*, on_demand: bool = False) -> tuple[ToolDefinition, ...]:
     """The actions with one more argument, `machine`, and the tool that submits.
 
     Args:
-        looked_up: As for `building_tools`.
+        on_demand: As for `building_tools`.
     """
     building = [
         ToolDefinition(
@@ -76,7 +76,7 @@ def tools_of_models(*, looked_up: bool = False) -> tuple[ToolDefinition, ...]:
             },
             group=tool.group,
         )
-        for tool in building_tools(looked_up=looked_up)
+        for tool in building_tools(on_demand=on_demand)
     ]
     return (*building, SUBMIT)
 
@@ -89,12 +89,12 @@ class Workbench:
 
     Args:
         catalogue: The modules they may be made of; the basic ones if left out.
-        looked_up: Whether modules may be looked up here; the calls are refused where they are told.
+        on_demand: Whether modules may be looked up here; the calls are refused where they are told.
     """
 
-    def __init__(self, catalogue: Catalogue | None = None, *, looked_up: bool = False) -> None:
+    def __init__(self, catalogue: Catalogue | None = None, *, on_demand: bool = False) -> None:
         self._catalogue = catalogue
-        self._looked_up = looked_up
+        self._looked_up = on_demand
         self._machines: dict[str, Machine] = {}
 
     @property

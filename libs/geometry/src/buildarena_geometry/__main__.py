@@ -8,8 +8,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from buildarena_geometry.dialects import dialect, dialects
 from buildarena_geometry.errors import GeometryError
-from buildarena_geometry.vectors.dialects import dialect, dialects
 from buildarena_geometry.vectors.sequences import parse, run_sequences
 
 if TYPE_CHECKING:

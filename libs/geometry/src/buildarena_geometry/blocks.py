@@ -9,6 +9,7 @@ import numpy as np
 
 from buildarena_geometry.modules.module import Module
 from buildarena_geometry.poses import Pose
+from buildarena_geometry.reading import Amount, Form, Positive
 from buildarena_geometry.rotations import Vector, add, scaled
 
 if TYPE_CHECKING:
@@ -192,13 +193,12 @@ class Joint:
         return self.offset <= JOINT_REACH + 1e-9
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class KeyPress:
+class KeyPress(Form, frozen=True, kw_only=True):
     """One entry of a control sequence: from `time_s` on, `key` is held for `hold_for_s` seconds."""
 
-    time_s: float
+    time_s: Amount
     key: str
-    hold_for_s: float
+    hold_for_s: Positive
 
 
 def seated(world_from_face: Pose, module: Module) -> Pose:

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import Any
 
+from buildarena_geometry.dialects import Dialect, dialect, dialects
 from buildarena_geometry.errors import DocumentError
 from buildarena_geometry.machine import Machine
-
-if TYPE_CHECKING:
-    from buildarena_geometry.modules.module import Catalogue
+from buildarena_geometry.modules.sets import module_set
 
 
-def machine_of(content: object, *, where: str, catalogue: Catalogue | None = None) -> Machine:
+def machine_of(content: object, *, where: str, version: str | None = None) -> Machine:
     """The machine of a file's JSON values.
 
     Args:
@@ -20,13 +20,16 @@ def machine_of(content: object, *, where: str, catalogue: Catalogue | None = Non
             or an object with such a list under "actions" or "steps" and, for an assembly, the
             lists of its sub-structures by name under "sub_structures" or "sub_machines".
         where: What messages call the file.
-        catalogue: The modules it is made of; the basic ones if left out.
+        version: The dialect of an action log, see `dialects`; if left out, the one in which every
+            action is accepted.
 
     Raises:
-        DocumentError: It is none of these, or the document is wrong.
+        DocumentError: It is none of these, the document is wrong, or an action of the log is
+            refused.
+        ValueError: There is no such dialect.
     """
     if isinstance(content, dict) and "blocks" in content:
-        return Machine.from_document(content, catalogue=catalogue)
+        return Machine.from_document(content)
     if isinstance(content, list):
         content = {"actions": content}
     actions = content.get("actions", content.get("steps")) if isinstance(content, dict) else None
@@ -35,8 +38,16 @@ def machine_of(content: object, *, where: str, catalogue: Catalogue | None = Non
     parts = content.get("sub_structures", content.get("sub_machines")) or {}
     if not isinstance(parts, dict):
         raise DocumentError(f"{where}: sub_structures is an object of action logs by name")
-    built = {name: _built(log, {}, f"{where}, {name}", catalogue) for name, log in parts.items()}
-    return _built(actions, built, where, catalogue)
+    refusals = []
+    for name in dialects() if version is None else (version,):
+        try:
+            return _assembled(actions, parts, where, dialect(name))
+        except _ActionRefusedError as refused:
+            refusals.append((refused.accepted, name, refused))
+    _, name, furthest = max(refusals, key=lambda refusal: refusal[0])
+    raise DocumentError(
+        f"{furthest}; read as dialect {name}, of {', '.join(dialects())}"
+    ) from furthest
 
 
 def machine_bytes(machine: Machine) -> bytes:
@@ -46,14 +57,41 @@ def machine_bytes(machine: Machine) -> bytes:
     ).encode()
 
 
-def _built(
-    actions: object, available: dict[str, Machine], where: str, catalogue: Catalogue | None
+class _ActionRefusedError(DocumentError):
+    """An action of a log is refused; `accepted` ones of all its lists came before."""
+
+    def __init__(self, message: str, accepted: int) -> None:
+        super().__init__(message)
+        self.accepted = accepted
+
+
+def _assembled(
+    actions: list[Any], parts: Mapping[str, object], where: str, speaking: Dialect
 ) -> Machine:
-    """The machine a log builds; refused actions change nothing, as when they were made."""
+    built: dict[str, Machine] = {}
+    accepted = 0
+    for name, log in parts.items():
+        built[name] = _built(log, {}, f"{where}, {name}", speaking, accepted)
+        accepted += len(built[name].log)
+    return _built(actions, built, where, speaking, accepted)
+
+
+def _built(
+    actions: object, available: dict[str, Machine], where: str, speaking: Dialect, accepted: int
+) -> Machine:
+    """The machine a log builds."""
     if not isinstance(actions, list) or not all(isinstance(action, dict) for action in actions):
         raise DocumentError(f"{where}: an action log is a list of objects")
-    machine = Machine(catalogue=catalogue, available=available)
-    for action in actions:
+    machine = Machine(catalogue=module_set("all"), available=available)
+    for number, action in enumerate(actions, start=1):
         name = action.get("op", action.get("name"))
-        machine.act(name, action.get("params", action.get("arguments")))
+        arguments = action.get("params", action.get("arguments"))
+        if isinstance(arguments, dict):
+            arguments = speaking.ours(arguments, machine)
+        outcome = machine.act(name, arguments)
+        if not outcome.ok:
+            raise _ActionRefusedError(
+                f"{where}: action {number}, {name}, is refused: {outcome.text}",
+                accepted + number - 1,
+            )
     return machine

@@ -1,152 +1,157 @@
-"""Reads JSON values that people wrote, and says where they went wrong."""
+"""Reads JSON values that people wrote into typed structs, and says where they went wrong."""
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, NoReturn
+import re
+import sys
+from typing import TYPE_CHECKING, Annotated, NoReturn, TypeVar
+
+import msgspec
+from msgspec import Meta, inspect
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator
-
     from buildarena_geometry.errors import GeometryError
-    from buildarena_geometry.rotations import Vector
+
+_LARGEST = sys.float_info.max
+_LONGEST_QUOTE = 60  # characters; one line of a terminal
+Finite = Annotated[float, Meta(ge=-_LARGEST, le=_LARGEST)]
+Amount = Annotated[float, Meta(ge=0.0, le=_LARGEST)]
+Positive = Annotated[float, Meta(gt=0.0, le=_LARGEST)]
+Point = tuple[Finite, Finite, Finite]
+Name = Annotated[str, Meta(max_length=60)]
+
+_KINDS = {
+    "float": "a number",
+    "int": "a whole number",
+    "str": "a text",
+    "bool": "true or false",
+    "array": "a list",
+    "object": "an object",
+}
+_BOUNDS = {
+    r" > ([\d.e+]+)": r" above \1",
+    r" of length <= (\d+)": r" of at most \1 characters",
+    r" >= ([\d.e+]+)": r" of at least \1",
+    r" <= ([\d.e+]+)": r" of at most \1",
+    r"(\d)\.0$": r"\1",
+}
+_STEP = re.compile(r"\.(\w+)|\[(\d+|\.\.\.)\]")
+_Read = TypeVar("_Read")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Reader:
-    """One JSON value, the place it has in its file, and the error to raise about it."""
-
-    value: object
-    where: str
-    error: type[GeometryError]
-
-    def fail(self, expected: str) -> NoReturn:
-        """Raises the reader's error: this place should hold what is expected."""
-        shown = repr(self.value)
-        shown = shown if len(shown) <= 60 else shown[:57] + "..."  # noqa: PLR2004  one line of a terminal
-        raise self.error(f"{self.where}: expected {expected}, found {shown}")
-
-    def fields(self, *, required: Collection[str], optional: Collection[str] = ()) -> Fields:
-        """The value as an object with these fields and no others."""
-        if not isinstance(self.value, dict):
-            self.fail(f"an object with {', '.join(required)}")
-        for name in required:
-            if name not in self.value:
-                raise self.error(f"{self.where}: {name} is missing")
-        for name in self.value:
-            if name not in required and name not in optional:
-                known = ", ".join([*required, *optional])
-                raise self.error(
-                    f"{self.where}: there is no field {name!r}; the fields are {known}"
-                )
-        return Fields(reader=self, values=self.value)
-
-    def items(self) -> Iterator[Reader]:
-        """The entries of the value, which is a list."""
-        if not isinstance(self.value, list | tuple):
-            self.fail("a list")
-        for index, entry in enumerate(self.value):
-            yield Reader(value=entry, where=f"{self.where}[{index}]", error=self.error)
-
-    def entries(self) -> Iterator[tuple[str, Reader]]:
-        """The entries of the value, which is an object whose keys are names."""
-        if not isinstance(self.value, dict):
-            self.fail("an object")
-        for key, entry in self.value.items():
-            if not isinstance(key, str):
-                self.fail("an object whose keys are texts")
-            yield key, Reader(value=entry, where=f"{self.where}.{key}", error=self.error)
-
-    def text(self, *, longest: int | None = None) -> str:
-        """The value as a text."""
-        if not isinstance(self.value, str):
-            self.fail("a text")
-        if longest is not None and len(self.value) > longest:
-            self.fail(f"a text of at most {longest} characters")
-        return self.value
-
-    def choice(self, choices: Collection[str]) -> str:
-        """The value as one of the given texts."""
-        if not isinstance(self.value, str) or self.value not in choices:
-            self.fail(f"one of {', '.join(choices)}")
-        return self.value
-
-    def truth(self) -> bool:
-        """The value as true or false."""
-        if not isinstance(self.value, bool):
-            self.fail("true or false")
-        return self.value
-
-    def integer(self, *, least: int | None = None) -> int:
-        """The value as a whole number."""
-        value = self.value
-        # JSON has one kind of number: 2.0 is as whole as 2.
-        if isinstance(value, float) and value.is_integer():
-            value = int(value)
-        if not isinstance(value, int) or isinstance(value, bool):
-            self.fail("a whole number")
-        if least is not None and value < least:
-            self.fail(f"a whole number of at least {least}")
-        return value
-
-    def number(self, *, least: float | None = None, above: float | None = None) -> float:
-        """The value as a finite number."""
-        if not isinstance(self.value, int | float) or isinstance(self.value, bool):
-            self.fail("a number")
-        try:
-            number = float(self.value)
-        except OverflowError:
-            self.fail("a finite number")
-        if not math.isfinite(number):
-            self.fail("a finite number")
-        if least is not None and number < least:
-            self.fail(f"a number of at least {least:g}")
-        if above is not None and number <= above:
-            self.fail(f"a number above {above:g}")
-        return number
-
-    def numbers(self, count: int) -> tuple[float, ...]:
-        """The value as a list of so many finite numbers."""
-        if not isinstance(self.value, list | tuple) or len(self.value) != count:
-            self.fail(f"{count} numbers")
-        return tuple(entry.number() for entry in self.items())
-
-    def vector(self) -> Vector:
-        """The value as three finite numbers."""
-        x, y, z = self.numbers(3)
-        return (x, y, z)
-
-    def direction(self) -> Vector:
-        """The value as three finite numbers, a vector of length 1."""
-        vector = self.vector()
-        if abs(math.hypot(*vector) - 1) > 1e-6:  # noqa: PLR2004  what six written digits may miss
-            self.fail("a direction, three numbers with length 1")
-        return vector
+class Whole(int):
+    """A whole number that is not negative, as JSON spells it: 2.0 is as whole as 2."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Fields:
-    """The fields of a JSON object whose names have been checked."""
+class Form(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """An object of a file: its fields are those of the struct, and there are no others."""
 
-    reader: Reader
-    values: dict[str, object]
 
-    def __getitem__(self, name: str) -> Reader:
-        where = f"{self.reader.where}.{name}"
-        return Reader(value=self.values.get(name), where=where, error=self.reader.error)
+class MisfitError(ValueError):
+    """A field that is good by itself does not fit the others; the text begins with its place."""
 
-    def __contains__(self, name: str) -> bool:
-        return name in self.values
 
-    def items(self, name: str) -> list[Reader]:
-        """The entries of a list that may be left out."""
-        return list(self[name].items()) if name in self else []
+def read(value: object, kind: type[_Read], *, where: str, error: type[GeometryError]) -> _Read:
+    """A JSON value as a struct.
 
-    def text(self, name: str) -> str:
-        """The text of a field that may be left out."""
-        return self[name].text() if name in self else ""
+    Args:
+        value: JSON as Python has it, or anything else, which is refused.
+        kind: the struct, whose annotations say what its fields hold.
+        where: what messages call the value.
+        error: what is raised where it has another form.
+    """
+    try:
+        return msgspec.convert(value, kind, dec_hook=_whole)
+    except UnicodeError as problem:
+        raise error(f"{where}: expected texts without lone surrogates") from problem
+    except (msgspec.ValidationError, ValueError, OverflowError) as problem:
+        text, _, place = str(problem).partition(" - at `")
+        if place.startswith("key`"):
+            text = "Expected `object` whose keys are texts"
+        place = place.rstrip("`").rpartition("`")[2]
+        raise error(_explained(text, place, value, kind, where)) from problem
 
-    def has(self, name: str) -> bool:
-        """Whether the field is there and not null."""
-        return self.values.get(name) is not None
+
+def refuse(place: str, expected: str, value: object) -> NoReturn:
+    """Raises that a place, such as `joint.axis`, should hold what is expected."""
+    raise MisfitError(f".{place}: expected {expected}, found {shown(value)}")
+
+
+def shown(value: object) -> str:
+    """A value as messages quote it."""
+    text = repr(value)
+    return text if len(text) <= _LONGEST_QUOTE else text[: _LONGEST_QUOTE - 3] + "..."
+
+
+def _whole(kind: type, value: object) -> object:
+    if kind is not Whole:
+        raise NotImplementedError(kind)
+    if isinstance(value, float) and value.is_integer():
+        value = int(value)
+    if not isinstance(value, int) or isinstance(value, bool):
+        raise TypeError("Expected `int`")
+    if value < 0:
+        raise ValueError("Expected `int` >= 0")
+    return Whole(value)
+
+
+def _explained(text: str, place: str, value: object, kind: type, where: str) -> str:
+    """What msgspec complains about, with the place, the valid choices and what was found."""
+    held, form = value, inspect.type_info(kind)
+    for field, index in _STEP.findall(place):
+        held, form = _inside(held, field or index), _form_inside(form, field, index)
+    where += place.removeprefix("$")
+    if text.startswith("."):
+        return where + text
+    name = text.split("`")[1] if "`" in text else ""
+    if text.startswith("Object contains unknown field"):
+        return f"{where}: there is no field {name!r}; the fields are {', '.join(_choices(form))}"
+    if text.startswith("Object missing required field"):
+        return f"{where}: {name} is missing"
+    if text.startswith("Invalid"):
+        expected = f"one of {', '.join(_choices(form))}"
+    elif "out of range" in text or "+308" in text:
+        expected = "a finite number"
+    else:
+        expected = text.removeprefix("Expected ").partition(", got")[0]
+        expected = re.sub(r"`(.*?)`", lambda kinds: _named(kinds[1]), expected)
+        for bound, words in _BOUNDS.items():
+            expected = re.sub(bound, words, expected)
+    return f"{where}: expected {expected}, found {shown(held)}"
+
+
+def _named(kinds: str) -> str:
+    return " or ".join(_KINDS.get(kind, kind) for kind in kinds.split(" | "))
+
+
+def _inside(value: object, step: str) -> object:
+    if isinstance(value, dict):
+        return value.get(step, value)
+    return value[int(step)] if isinstance(value, list | tuple) else value
+
+
+def _form_inside(form: inspect.Type, field: str, index: str) -> inspect.Type:
+    """The type of a struct's field or of a list's entry."""
+    for kind in form.types if isinstance(form, inspect.UnionType) else (form,):
+        if isinstance(kind, inspect.StructType):
+            forms = {known.encode_name: known.type for known in kind.fields}
+            # A tag is no field: its choices are those of the union.
+            return forms.get(field, form)
+        if isinstance(kind, inspect.TupleType):
+            return kind.item_types[int(index)]
+        if isinstance(kind, inspect.VarTupleType | inspect.ListType):
+            return kind.item_type
+    return form
+
+
+def _choices(form: inspect.Type) -> list[str]:
+    """What may be written at a place: literals, tags, or the fields of an object."""
+    if isinstance(form, inspect.UnionType):
+        tags = [str(kind.tag) for kind in form.types if isinstance(kind, inspect.StructType)]
+        return tags if len(tags) > 1 else [text for kind in form.types for text in _choices(kind)]
+    if isinstance(form, inspect.StructType):
+        tag = [form.tag_field] if form.tag_field else []
+        return [*tag, *(field.encode_name for field in form.fields)]
+    if isinstance(form, inspect.EnumType):
+        return [str(choice.value) for choice in form.cls]
+    return list(map(str, form.values)) if isinstance(form, inspect.LiteralType) else []

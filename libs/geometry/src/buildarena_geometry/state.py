@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from buildarena_geometry.blocks import Block, Connector, FaceRef, Joint, KeyPress
+from buildarena_geometry.reading import Form
 from buildarena_geometry.rotations import distance, subtract
 
 if TYPE_CHECKING:
@@ -22,8 +23,7 @@ if TYPE_CHECKING:
     from buildarena_geometry.rotations import Vector
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SubStructure:
+class SubStructure(Form, frozen=True, kw_only=True):
     """One machine inside an assembly.
 
     Attributes:

@@ -3,7 +3,8 @@
 Importing this package loads no engine, no pyarrow and no scipy; `simulate` does, when called.
 """
 
-from buildarena_simulation.engines import ENGINES, engine_version
+from buildarena_simulation.constants import DEFAULT_ENGINE
+from buildarena_simulation.engines.registry import ENGINES, engine_version
 from buildarena_simulation.errors import (
     BuildarenaSimulationError,
     MachineNotSimulable,
@@ -12,11 +13,12 @@ from buildarena_simulation.errors import (
     UnknownEngineError,
 )
 from buildarena_simulation.parquet import read_trajectory, schema_of, write_trajectory
-from buildarena_simulation.rollout import SIMULATION_VERSION, simulate
+from buildarena_simulation.rollout import SIMULATION_VERSION, require_engine, simulate
 from buildarena_simulation.scenario import Scenario
 from buildarena_simulation.trajectory import Bearing, Break, Event, JointPeak, Trajectory
 
 __all__ = [
+    "DEFAULT_ENGINE",
     "ENGINES",
     "SIMULATION_VERSION",
     "Bearing",
@@ -32,6 +34,7 @@ __all__ = [
     "UnknownEngineError",
     "engine_version",
     "read_trajectory",
+    "require_engine",
     "schema_of",
     "simulate",
     "write_trajectory",

@@ -128,3 +128,9 @@ CARGO_SHIFT: Final = 0.1
 
 KEY_DELAY_S: Final = 0.04
 """A seed delays every pressing and letting go of a key by up to this, seconds. Ours."""
+
+DEFAULT_ENGINE: Final = "pybullet"
+"""The engine of every door that is asked for none.
+
+Where it is not installed a trial is refused, never run by another engine: that gives another score.
+"""

@@ -76,7 +76,7 @@ def plan_forces(
     if control.mode == "held":
         pushing[times >= control.from_s - 1e-9] = True
     for k, block in enumerate(forces.pushes):
-        push = structure.parts[block].module.forces.push
+        push = structure.parts[block].module.push
         if push is not None:
             pushing[:, k] |= held_during(pressed, bindings[block].get(push.action, ()), times)
     heights = np.zeros((len(times), len(forces.altitudes)))
@@ -87,7 +87,7 @@ def plan_forces(
         heights[:, k] = np.cumsum(rises - sinks) * of.rate * time_step_s
     let_go = np.zeros((len(times), len(forces.decouplers)), dtype=bool)
     for k, block in enumerate(forces.decouplers):
-        decoupling = structure.parts[block].module.forces.decouple
+        decoupling = structure.parts[block].module.decouple
         if decoupling is not None:
             held = held_during(pressed, bindings[block].get(decoupling.action, ()), times)
             let_go[:, k] = np.logical_or.accumulate(held)
@@ -109,7 +109,7 @@ def _grip_keys(
     grips = grips_of(structure)
     grab, release = (np.zeros((len(times), len(grips)), dtype=bool) for _ in range(2))
     for g, block in enumerate(grips.blocks):
-        grip = structure.parts[block].module.forces.grip
+        grip = structure.parts[block].module.grip
         if grip is not None:
             grab[:, g] = held_during(pressed, bindings[block].get(grip.grab, ()), times)
             release[:, g] = held_during(pressed, bindings[block].get(grip.release, ()), times)

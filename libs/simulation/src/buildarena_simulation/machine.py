@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, TypedDict
 
 import numpy as np
 
-from buildarena_geometry.modules.joints import MOVING_SEATS, UP, SeatJoint
+from buildarena_geometry.modules.joints import MOVING_JOINTS, UP, MovingJoint
 from buildarena_geometry.modules.solids import Ball, Cylinder
 from buildarena_simulation.constants import MAX_PARTS, JointKind
 from buildarena_simulation.control import Bindings
@@ -47,11 +47,11 @@ def structure_of(machine: "Machine") -> Structure:
     links, ropes = [], []
     for joint in machine.joints:
         if joint.holds:
-            tether = parts[index[joint.part]].module.forces.tether
-            if tether is None:
+            rope_mount = parts[index[joint.part]].module.rope_mount
+            if rope_mount is None:
                 links.append(_link(joint, index, parts))
             else:
-                ropes.append(_tether(joint, index, tether.length))
+                ropes.append(_rope_mount(joint, index, rope_mount.length))
     connectors = list(machine.connectors.values())
     braces = [c for c in connectors if c.module.link == "rigid"]
     winches = [c for c in connectors if c.module.link == "rope"]
@@ -85,7 +85,7 @@ def structure_of(machine: "Machine") -> Structure:
                 **_span(connector, index),
                 mass=connector.module.mass,
                 share=share,
-                spring=connector.module.forces.spring,
+                spring=connector.module.spring,
             )
         )
     return build_structure(parts, links, ropes)
@@ -151,15 +151,15 @@ def _part(block: "Block") -> Part:
     shown = np.array(block.center)
     center = shapes[0].center if physics.mass_at == "body" else shown
     axis, pivot = np.zeros(3), center
-    if physics.seat in MOVING_SEATS:
-        joint = module.joint or SeatJoint()
+    if physics.joint_type in MOVING_JOINTS:
+        joint = module.joint or MovingJoint()
         axis = rotation[:, 2] if joint.axis == UP else rotation @ np.array(joint.axis)
         if joint.point is not None:
             pivot = np.array(pose.position) + rotation @ np.array(joint.point)
         elif module.motor is None:
             pivot = shapes[0].center
     direction = None
-    if physics.seat == "axle":
+    if physics.joint_type == "axle":
         direction = axis
     elif block.pointing is not None:
         direction = np.array(block.pointing)
@@ -203,13 +203,13 @@ def _link(joint: "Joint", index: dict[str, int], parts: list[Part]) -> Link:
         name=f"{joint.base}-{joint.part}",
         first=base,
         second=part,
-        kind=JointKind(parts[part].physics.seat),
+        kind=JointKind(parts[part].physics.joint_type),
         start=point,
         end=point,
     )
 
 
-def _tether(joint: "Joint", index: dict[str, int], length: float) -> Rope:
+def _rope_mount(joint: "Joint", index: dict[str, int], length: float) -> Rope:
     point = np.array(joint.point)
     return Rope(
         name=f"{joint.base}-{joint.part}",

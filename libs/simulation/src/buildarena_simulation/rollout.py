@@ -9,7 +9,7 @@ import numpy as np
 
 from buildarena_simulation.breaking import BreakingModel
 from buildarena_simulation.clearance import require_clear_start
-from buildarena_simulation.constants import GRAVITY, SAMPLE_RATE_HZ
+from buildarena_simulation.constants import DEFAULT_ENGINE, GRAVITY, SAMPLE_RATE_HZ
 from buildarena_simulation.control import (
     Bindings,
     KeyHold,
@@ -19,9 +19,13 @@ from buildarena_simulation.control import (
     recoil,
     varied_presses,
 )
-from buildarena_simulation.engines import ENGINES, create_engine, engine_version
 from buildarena_simulation.engines.base import Engine, World
-from buildarena_simulation.errors import BuildarenaSimulationError, SimulationError
+from buildarena_simulation.engines.registry import ENGINES, create_engine, engine_version
+from buildarena_simulation.errors import (
+    BuildarenaSimulationError,
+    SimulationError,
+    UnknownEngineError,
+)
 from buildarena_simulation.force_control import ForceSchedule, plan_forces
 from buildarena_simulation.holding import Holding
 from buildarena_simulation.machine import bindings_of, structure_of
@@ -47,15 +51,32 @@ Decision = Callable[[np.ndarray | None], bool]
 """Whether a trial is decided, from the cargo's position (3,) as it is recorded; None without."""
 
 
+def require_engine(name: str) -> str:
+    """The name of an engine, if that is installed.
+
+    Raises:
+        UnknownEngineError: It is not; the message says which are, and how the default comes here.
+    """
+    if name in ENGINES:
+        return name
+    installed = ", ".join(ENGINES)
+    if name == DEFAULT_ENGINE:
+        raise UnknownEngineError(
+            f"the default engine {name!r} is not installed: `pip install {name}`, or name another; "
+            f"there are {installed}"
+        )
+    raise UnknownEngineError(f"no engine {name!r}; there are {installed}")
+
+
 def simulate(
     machine: "Machine",
     scenario: Scenario,
-    engine: str = ENGINES[0],
+    engine: str = DEFAULT_ENGINE,
     *,
     controls: Sequence[KeyHold] | None = None,
     start: Start | None = None,
     seed: int | None = None,
-    finer: int = 1,
+    substeps: int = 1,
     until: Decision | None = None,
     on_progress: Callable[[float], None] | None = None,
 ) -> Trajectory:
@@ -68,8 +89,8 @@ def simulate(
         controls: A control sequence to use in place of the machine's own.
         start: Where machine and cargo start, in place of where the scenario puts them.
         seed: Varies the start as a fair repetition would, see `start_of`; None for the exact one.
-        finer: By how much the engine's steps are shorter than usual, to tell a result of the model
-            from one of the steps.
+        substeps: Into how many each of the engine's usual steps is divided, to tell a result of
+            the model from one of the steps.
         until: Ends the trial after the first sample for which it says so; by default it lasts as
             long as the scenario says.
         on_progress: Called now and then with the share of the trial that is done, 0 to 1.
@@ -79,10 +100,11 @@ def simulate(
 
     Raises:
         MachineNotSimulable: The machine is empty, unplaceable or too large; a failed trial.
-        UnknownEngineError: No engine has this name.
+        UnknownEngineError: No engine of this name is installed.
         ValueError: A start and a seed are given, or only one of start and scenario has a cargo.
         SimulationError: The simulator failed; never scored.
     """
+    require_engine(engine)
     structure = structure_of(machine)
     return simulate_structure(
         structure,
@@ -92,7 +114,7 @@ def simulate(
         controls=machine.control_sequence if controls is None else controls,
         start=start,
         seed=seed,
-        finer=finer,
+        substeps=substeps,
         until=until,
         on_progress=on_progress,
     )
@@ -107,7 +129,7 @@ def simulate_structure(
     controls: Sequence[KeyHold] = (),
     start: Start | None = None,
     seed: int | None = None,
-    finer: int = 1,
+    substeps: int = 1,
     until: Decision | None = None,
     on_progress: Callable[[float], None] | None = None,
 ) -> Trajectory:
@@ -121,7 +143,7 @@ def simulate_structure(
         controls: The control sequence.
         start: See `simulate`.
         seed: See `simulate`.
-        finer: See `simulate`.
+        substeps: See `simulate`.
         until: See `simulate`.
         on_progress: Called now and then with the share of the trial that is done.
     """
@@ -137,7 +159,7 @@ def simulate_structure(
         terrain=scenario.terrain,
         cargo=start.cargo,
         gravity=GRAVITY,
-        finer=finer,
+        substeps=substeps,
         field=field_of(structure),
     )
     if seed is not None:
@@ -201,7 +223,7 @@ class _Trial:
         engine.enter(clusters, motion)
         self._interval_s = engine.time_step_s * engine.steps_per_evaluation
         self.breaking = BreakingModel(world, clusters, motion, interval_s=self._interval_s)
-        if any(part.module.forces.grip for part in structure.parts):
+        if any(part.module.grip for part in structure.parts):
             self.breaking.holding = Holding(world)
         self.recorder = Recorder(structure, scenario)
         self._blown_up = False

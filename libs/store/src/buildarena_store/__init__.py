@@ -33,7 +33,6 @@ from buildarena_store.errors import (
     UploadError,
 )
 from buildarena_store.events import Event, Events
-from buildarena_store.figures import STAGE_SECONDS, Figures, ServiceFigures
 from buildarena_store.jobs.external_calls import ExternalCall, ExternalCalls
 from buildarena_store.jobs.job import Job, JobKey, NewJob
 from buildarena_store.jobs.jobs import Jobs
@@ -44,6 +43,7 @@ from buildarena_store.jobs.rollouts import RolloutRecord, RolloutRequest, Rollou
 from buildarena_store.jobs.runner_leases import RunnerLeases
 from buildarena_store.jobs.turns import TurnRecord, TurnResult, Turns
 from buildarena_store.jobs.verifications import Verification, Verifications
+from buildarena_store.metrics import STAGE_SECONDS, Metrics, MetricValues
 from buildarena_store.states import (
     JobState,
     Outcome,
@@ -80,7 +80,6 @@ __all__ = [
     "Events",
     "ExternalCall",
     "ExternalCalls",
-    "Figures",
     "Job",
     "JobKey",
     "JobScore",
@@ -92,6 +91,8 @@ __all__ = [
     "Lease",
     "Leases",
     "Mark",
+    "MetricValues",
+    "Metrics",
     "NameTakenError",
     "Need",
     "NewJob",
@@ -105,7 +106,6 @@ __all__ = [
     "Round",
     "RunnerLeases",
     "SchemaVersionError",
-    "ServiceFigures",
     "Shortage",
     "Stage",
     "StaleLeaseError",

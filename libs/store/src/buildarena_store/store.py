@@ -8,7 +8,6 @@ from buildarena_store.accounts.budgets import Budgets
 from buildarena_store.accounts.keys import ApiKeys
 from buildarena_store.database import Database
 from buildarena_store.events import Events
-from buildarena_store.figures import Figures
 from buildarena_store.jobs.external_calls import ExternalCalls
 from buildarena_store.jobs.jobs import Jobs
 from buildarena_store.jobs.journal import Journal
@@ -18,6 +17,7 @@ from buildarena_store.jobs.rollouts import Rollouts
 from buildarena_store.jobs.runner_leases import RunnerLeases
 from buildarena_store.jobs.turns import Turns
 from buildarena_store.jobs.verifications import Verifications
+from buildarena_store.metrics import Metrics
 from buildarena_store.sweeps.lifecycle import SweepLifecycle
 from buildarena_store.sweeps.sweeps import Sweeps
 from buildarena_store.tasks import Tasks
@@ -45,7 +45,7 @@ class Store:
     tasks: Tasks
     events: Events
     workers: Workers
-    figures: Figures
+    metrics: Metrics
 
 
 def open_store(database: Database, *, lease_s: float, max_faults: int) -> Store:
@@ -75,5 +75,5 @@ def open_store(database: Database, *, lease_s: float, max_faults: int) -> Store:
         tasks=Tasks(database),
         events=Events(database),
         workers=Workers(database),
-        figures=Figures(database),
+        metrics=Metrics(database),
     )

@@ -184,7 +184,7 @@ sweep_jobs = Table(
 )
 
 # Who wants a job beside the sweeps that do; the operator's name is empty.
-job_wants = Table(
+job_claims = Table(
     "job_wants",
     metadata,
     Column("job_id", Text, ForeignKey("jobs.id"), primary_key=True),

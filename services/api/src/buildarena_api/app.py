@@ -14,8 +14,9 @@ from buildarena_api.dashboard.files import read_pages
 from buildarena_api.dashboard.serving import Dashboard, is_page
 from buildarena_api.events.hub import EventHub
 from buildarena_api.http.access import caller_of
-from buildarena_api.http.answers import KeptAnswers
 from buildarena_api.http.concurrency import limited, usual_limits
+from buildarena_api.http.former_names import FormerNamesMiddleware
+from buildarena_api.http.infrastructure import InfrastructureMetrics
 from buildarena_api.http.key_checks import KeyChecks
 from buildarena_api.http.limits import BodyLimitMiddleware
 from buildarena_api.http.locality import LocalOnlyMiddleware
@@ -31,7 +32,7 @@ from buildarena_api.http.overload import OverloadMiddleware
 from buildarena_api.http.own_pool import OwnPool
 from buildarena_api.http.problems import add_problem_handlers, problem_responses
 from buildarena_api.http.rate_limits import RateLimits
-from buildarena_api.http.surroundings import SurroundingsMetrics
+from buildarena_api.http.response_cache import ResponseCache
 from buildarena_api.leaderboard.cache import BoardCache
 from buildarena_api.replays.making import Replays
 from buildarena_api.routes import (
@@ -51,6 +52,7 @@ from buildarena_api.routes import (
     replays,
     runner,
     sessions,
+    simulators,
     sweeps,
     tasks,
     trials,
@@ -85,6 +87,7 @@ ORDINARY = (
     callers,
     keys,
     metrics,
+    simulators,
     workers,
 )
 LIMITED_THEMSELVES = (events, exports, archives, comparisons)
@@ -137,7 +140,7 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
     app.state.context = context
     app.state.artifact_probe = health.ArtifactProbe(context.artifacts)
     app.state.metrics.registry.register(
-        SurroundingsMetrics(
+        InfrastructureMetrics(
             context,
             lambda: app.state.artifact_probe.check().ok,
             {
@@ -154,8 +157,8 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
     app.state.concurrency = usual_limits()
     app.state.registry = registry
     app.state.boards = BoardCache(context.store.results.boards, context.tasks)
-    app.state.scenes = KeptAnswers(trials.KEPT_SCENES)
-    app.state.pictures = KeptAnswers(pictures.KEPT_PICTURES)
+    app.state.scenes = ResponseCache(trials.MAX_CACHED_SCENES)
+    app.state.pictures = ResponseCache(pictures.MAX_CACHED_PICTURES)
     app.state.replays = Replays(context)
     app.state.submissions = Submissions(context, registry)
     app.state.external = ExternalSessions(context)
@@ -199,6 +202,7 @@ def _add_middleware(app: FastAPI) -> None:
         if isinstance(found, Route)
     ]
     app.add_middleware(MethodMiddleware, routes=routes)
+    app.add_middleware(FormerNamesMiddleware)
     if not settings.require_keys:
         app.add_middleware(LocalOnlyMiddleware, is_page=is_page)
     app.add_middleware(RequestLog, metrics=app.state.metrics)

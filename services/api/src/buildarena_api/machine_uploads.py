@@ -50,7 +50,7 @@ def read_upload(data: bytes) -> ImportedMachine:
     return ImportedMachine(machine=machine, name="", not_understood=())
 
 
-def not_kept(machine: Machine) -> str | None:
+def not_storable(machine: Machine) -> str | None:
     """Why a machine's document would not be read back; None for one that can be tried."""
     try:
         Machine.from_document(machine.to_document())

@@ -4,27 +4,17 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from buildarena_geometry import __version__ as geometry_version
-from buildarena_pipeline.catalog.simulators import BESIEGE, SIMULATORS
 from buildarena_pipeline.errors import StartupError
 from buildarena_pipeline.runtime.settings import Settings, load_settings
-from buildarena_simworker.simulators.engines import EngineSimulator
-from buildarena_simworker.simulators.simulator import Simulator
+from buildarena_pipeline.runtime.simulators.installed import announced, installed_simulators
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Served:
-    """How one simulator is served; a game has one window and so does one job at a time."""
-
-    make: Callable[[], Simulator]
-    versions: Mapping[str, Any]
-    pool: str
-    concurrency: int
+if TYPE_CHECKING:
+    from buildarena_pipeline.runtime.context import Context
 
 
 def main() -> None:
@@ -33,7 +23,7 @@ def main() -> None:
     With ``--api`` it reaches nothing but the API, as a runner; otherwise database and broker.
     """
     parser = argparse.ArgumentParser(prog="buildarena_simworker", description=main.__doc__)
-    parser.add_argument("--simulator", required=True, choices=sorted(SIMULATORS))
+    parser.add_argument("--simulator", required=True, choices=list(installed_simulators()))
     parser.add_argument("--api", metavar="URL", help="reach only this API")
     parser.add_argument("--key-file", type=Path, help="the runner key; default: BUILDARENA_KEY")
     parser.add_argument("--ca-file", type=Path, help="certificates to trust besides the system's")
@@ -57,18 +47,25 @@ def main() -> None:
 def _serve_database(simulator: str, settings: Settings) -> None:
     # A runner has no such connections, and is not to load what makes them.
     from buildarena_pipeline.runtime.worker_process import WorkerSpec, run_worker
-    from buildarena_simworker.simulate import simulate_handler
+    from buildarena_simworker.simulate import SimulateHandler, simulate_handler
     from buildarena_store.states import simulate_queue
 
-    served = _besiege(settings) if simulator == BESIEGE else _engine(simulator, settings)
+    described = installed_simulators()[simulator]
+    first = described.make(settings)
+
+    def handler(context: Context) -> SimulateHandler:
+        # A process that others are forked from does no jobs itself.
+        own = first if described.single else described.make(settings)
+        return simulate_handler(context, own)
+
     run_worker(
         WorkerSpec(
             kind="simulate",
             queues=[simulate_queue(simulator)],
-            pool=served.pool,
-            concurrency=served.concurrency,
-            make_handler=lambda context: simulate_handler(context, served.make()),
-            versions={"geometry": geometry_version, **served.versions},
+            pool="solo" if described.single else "prefork",
+            concurrency=1 if described.single else settings.simulations_per_worker,
+            make_handler=handler,
+            versions={"geometry": geometry_version, **first.versions, **announced(described)},
         ),
         settings,
     )
@@ -91,49 +88,30 @@ def _check(given: argparse.Namespace) -> None:
 
 
 def _serve_api(given: argparse.Namespace, settings: Settings) -> None:
-    from buildarena_simworker.remote.engine_process import EngineProcess
     from buildarena_simworker.remote.process import RunnerOptions, read_key, serve
 
     name: str = given.simulator
-    served = _besiege(settings) if name == BESIEGE else _engine(name, settings)
-
-    def warm_engine() -> Simulator:
-        engine = EngineProcess(name)
-        engine.start()
-        return engine
-
-    at_once = given.at_once or served.concurrency
-    if at_once > 1 and name == BESIEGE:
-        raise StartupError("a game has one window, so --at-once is 1: start a runner per machine")
+    described = installed_simulators()[name]
+    if described.single and (given.at_once or 1) > 1:
+        raise StartupError(
+            f"{name} runs one trial at a time, so --at-once is 1: start a runner per machine"
+        )
+    first = described.make(settings)
+    make = partial(described.make_isolated or described.make, settings)
     serve(
         RunnerOptions(
             url=given.api,
             key=read_key(given.key_file),
             simulator=name,
-            version=str(served.versions["simulation"]),
-            make=served.make if name == BESIEGE else warm_engine,
-            at_once=at_once,
+            version=str(first.versions["simulation"]),
+            make=(lambda: first) if described.single else make,
+            at_once=given.at_once or (1 if described.single else settings.simulations_per_worker),
+            announced=announced(described),
             ca_file=given.ca_file,
             allow_http=given.allow_http,
             log_level=settings.log_level,
         )
     )
-
-
-def _engine(name: str, settings: Settings) -> _Served:
-    return _Served(
-        make=lambda: EngineSimulator(name),
-        versions=EngineSimulator(name).versions,
-        pool="prefork",
-        concurrency=settings.simulations_per_worker,
-    )
-
-
-def _besiege(settings: Settings) -> _Served:
-    from buildarena_simworker.simulators.besiege.simulator import besiege_simulator
-
-    game = besiege_simulator(settings)
-    return _Served(make=lambda: game, versions=game.versions, pool="solo", concurrency=1)
 
 
 main()

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from buildarena_pipeline.runtime.active_lease import ActiveLease
 from buildarena_pipeline.runtime.context import Context
-from buildarena_pipeline.runtime.trial_books import DueTrial, TrialBooks
+from buildarena_pipeline.runtime.simulators.simulator import Simulator, Trial
 from buildarena_pipeline.runtime.trial_outcomes import File, TrialOutcome
-from buildarena_simworker.simulators.simulator import Simulator, Trial
+from buildarena_pipeline.runtime.trial_repository import DueTrial, TrialRepository
 from buildarena_simworker.trials import do_trial
 from buildarena_store import StaleLeaseError
 
@@ -15,33 +15,33 @@ class SimulateHandler:
     """Simulates the waiting rollouts of jobs; each job then ends, or goes back to its session.
 
     Args:
-        books: Where trials come from and outcomes go.
+        trials: Where trials come from and outcomes go.
         simulator: What runs them.
     """
 
-    def __init__(self, books: TrialBooks, simulator: Simulator) -> None:
-        self._books = books
+    def __init__(self, trials: TrialRepository, simulator: Simulator) -> None:
+        self._trials = trials
         self._simulator = simulator
 
     def __call__(self, active: ActiveLease) -> None:
         """Simulates the leased job's waiting rollout; see `StageHandler`."""
-        leased = _LeasedInDatabase(self._books, active, repeatable=self._simulator.repeatable)
+        leased = _LeasedInDatabase(self._trials, active, repeatable=self._simulator.repeatable)
         do_trial(self._simulator, leased)
 
 
 class _LeasedInDatabase:
     """A `LeasedTrial` of this process' own lease."""
 
-    def __init__(self, books: TrialBooks, active: ActiveLease, *, repeatable: bool) -> None:
-        self._books = books
+    def __init__(self, trials: TrialRepository, active: ActiveLease, *, repeatable: bool) -> None:
+        self._trials = trials
         self._active = active
         self._repeatable = repeatable
         self._due: DueTrial | None = None
 
     def take(self) -> Trial | None:
         lease = self._active.lease
-        due = self._due = self._books.due(lease.job)
-        if self._repeatable and self._books.repeat(lease, due):
+        due = self._due = self._trials.due(lease.job)
+        if self._repeatable and self._trials.repeat(lease, due):
             return None
         return Trial(
             job_id=lease.job.id,
@@ -56,10 +56,10 @@ class _LeasedInDatabase:
 
     def complete(self, outcome: TrialOutcome) -> None:
         assert self._due is not None, "a trial is taken before it is completed"  # noqa: S101
-        self._books.complete(self._active.lease, self._due, outcome)
+        self._trials.complete(self._active.lease, self._due, outcome)
 
     def keep_evidence(self, files: dict[str, File]) -> None:
-        self._books.keep_evidence(self._active.lease.job.id, files)
+        self._trials.keep_evidence(self._active.lease.job.id, files)
 
     def _require(self) -> None:
         if self._active.lost:
@@ -68,4 +68,4 @@ class _LeasedInDatabase:
 
 def simulate_handler(context: Context, simulator: Simulator) -> SimulateHandler:
     """What does the simulate stage, from a process' connections."""
-    return SimulateHandler(TrialBooks.of(context), simulator)
+    return SimulateHandler(TrialRepository.of(context), simulator)

@@ -6,13 +6,13 @@ import time
 from typing import Protocol
 
 from buildarena_pipeline.errors import TransientError
-from buildarena_pipeline.runtime.trial_outcomes import File, TrialOutcome
-from buildarena_simworker.simulators.simulator import (
+from buildarena_pipeline.runtime.simulators.simulator import (
     MachineRefusedError,
     Simulator,
     SimulatorFaultError,
     Trial,
 )
+from buildarena_pipeline.runtime.trial_outcomes import File, TrialOutcome
 
 
 class LeasedTrial(Protocol):

@@ -14,6 +14,7 @@ from buildarena_pipeline.runtime.job_runner import StageHandler
 from buildarena_pipeline.runtime.settings import load_settings
 from buildarena_pipeline.runtime.worker_process import SideWork, WorkerSpec, run_worker
 from buildarena_store.states import CONSTRUCT_QUEUE, VERIFY_QUEUE
+from buildarena_worker.providers.registry import require_known_protocols
 from buildarena_worker.wiring import construct_handler, verification_runner
 
 
@@ -22,6 +23,7 @@ def main() -> None:
     try:
         settings = load_settings()
         registry = load_registry(settings.models_file)
+        require_known_protocols(registry)
 
         def make_handler(context: Context) -> StageHandler:
             return construct_handler(context, registry)

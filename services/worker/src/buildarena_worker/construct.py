@@ -29,7 +29,7 @@ from buildarena_store import (
 )
 from buildarena_store.states import AttemptResult, JobState, simulate_queue
 from buildarena_worker.jobs import loop_of, pack_of
-from buildarena_worker.providers import ModelClients
+from buildarena_worker.providers.clients import ModelClients
 from buildarena_worker.session.budget_guard import BudgetGuard, Price
 from buildarena_worker.session.concurrency_gate import ConcurrencyGate
 from buildarena_worker.session.host import LiveHost, ReplayHost

@@ -25,16 +25,17 @@ from buildarena_geometry import KeyPress, Machine
 from buildarena_geometry.machine_files import machine_bytes
 from buildarena_pipeline.agents.workbench import bench_of
 from buildarena_pipeline.catalog.prompt_packs import PromptPacks
-from buildarena_pipeline.catalog.simulators import BESIEGE
 from buildarena_pipeline.catalog.tasks import TaskCatalog
 from buildarena_pipeline.catalog.tracks import EXTERNAL_WORKFLOW, FILE_WORKFLOW
 from buildarena_pipeline.errors import PermanentError
 from buildarena_pipeline.runtime.scoring import best_rollout, task_of
+from buildarena_pipeline.runtime.simulators.simulator import BESIEGE
 from buildarena_simulation import (
     SIMULATION_VERSION,
     MachineNotSimulable,
     Trajectory,
     TrajectoryFormatError,
+    UnknownEngineError,
     read_trajectory,
     schema_of,
     simulate,
@@ -256,6 +257,9 @@ class Verifier:
             again, digest = failed_score(task, machine), None
         except LogIncompleteError as error:
             return [*checks, Check(name=f"{name}: log", ok=False, kept="", found=str(error))]
+        except UnknownEngineError as error:
+            kept = record.engine
+            return [*checks, Check(name=f"{name}: engine", ok=False, kept=kept, found=str(error))]
         else:
             again = score(task, machine, trajectory)
             digest = _hash(self._written_as(record.trajectory_hash, trajectory))

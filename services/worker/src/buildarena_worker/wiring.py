@@ -6,7 +6,7 @@ from buildarena_pipeline.catalog.models import ModelRegistry
 from buildarena_pipeline.catalog.prompt_packs import PromptPacks
 from buildarena_pipeline.runtime.context import Context
 from buildarena_worker.construct import ConstructHandler
-from buildarena_worker.providers import ModelClients
+from buildarena_worker.providers.clients import ModelClients
 from buildarena_worker.session.concurrency_gate import ConcurrencyGate
 from buildarena_worker.verify import VerificationRunner, Verifier
 from buildarena_worker.workflow import Workflows

@@ -9,7 +9,7 @@ import typer
 
 from buildarena_cli.client import Client
 from buildarena_cli.errors import CommandError
-from buildarena_cli.instead import run_instead
+from buildarena_cli.exec import exec_module
 from buildarena_cli.lazy import new_group
 from buildarena_cli.machines import chosen_task, read_machine, shown_errors
 from buildarena_cli.options import DEFAULT_URL, JsonOption, UrlOption
@@ -114,13 +114,13 @@ def calibrate(
 ) -> None:
     """Find out where to click in this machine's game, and try it."""
     given = [*(["--defaults"] if defaults else []), *(["--try"] if only_try else [])]
-    run_instead([*RUNNER, "calibrate", *given])
+    exec_module([*RUNNER, "calibrate", *given])
 
 
 @app.command("doctor")
 def doctor(*, as_json: JsonOption = False) -> None:
     """Show what this machine lacks to play the game; the exit code is 1 when anything does."""
-    run_instead([*RUNNER, "doctor", *(["--json"] if as_json else [])])
+    exec_module([*RUNNER, "doctor", *(["--json"] if as_json else [])])
 
 
 @app.command("agreement")
@@ -158,5 +158,5 @@ def show_agreement(
     print_table(columns(*heads), rows, title=emphasised(str(found["track"])))
 
 
-RUNNER = ("buildarena_simworker.simulators.besiege",)
+RUNNER = ("buildarena_simworker_besiege",)
 """The program that knows this machine's game."""

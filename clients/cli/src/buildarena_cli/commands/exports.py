@@ -11,16 +11,16 @@ from buildarena_cli.client import Client
 from buildarena_cli.commands.leaderboard import LevelOption
 from buildarena_cli.errors import USAGE, CommandError
 from buildarena_cli.ids import whole_id
-from buildarena_cli.near import did_you_mean
 from buildarena_cli.options import (
     DEFAULT_URL,
     ModelsOption,
-    ReadingName,
-    ReadingOption,
+    PolicyName,
+    PolicyOption,
     TasksOption,
     TrackOption,
     UrlOption,
 )
+from buildarena_cli.suggestions import did_you_mean
 from buildarena_cli.terminal.completion import complete_sweep
 from buildarena_cli.terminal.output import say
 
@@ -49,7 +49,7 @@ def export(
     task: TasksOption = None,
     level: LevelOption = None,
     model: ModelsOption = None,
-    reading: ReadingOption = ReadingName.OURS,
+    policy: PolicyOption = PolicyName.OURS,
     track: TrackOption = None,
     sweep: SweepsOption = None,
     success_only: Annotated[
@@ -77,9 +77,9 @@ def export(
             "--license": licence,
         }
         _require_none(of_datasets, "goes with --dataset only")
-        _board(out, url, task=task, level=level, model=model, reading=reading.value, track=track)
+        _board(out, url, task=task, level=level, model=model, policy=policy.value, track=track)
         return
-    of_boards = {"--level": level, "--reading": reading is not ReadingName.OURS}
+    of_boards = {"--level": level, "--policy": policy is not PolicyName.OURS}
     _require_none(of_boards, "is for leaderboards, not for datasets")
     _dataset(
         Client(url),

@@ -11,8 +11,8 @@ import typer
 from buildarena_cli.client import Client, at
 from buildarena_cli.errors import CommandError
 from buildarena_cli.ids import whole_id
-from buildarena_cli.near import did_you_mean
 from buildarena_cli.options import DEFAULT_URL, JobId, JsonOption, UrlOption
+from buildarena_cli.suggestions import did_you_mean
 from buildarena_cli.terminal.output import columns, print_json, print_table, say
 from buildarena_client.errors import DamagedError
 from buildarena_client.files import require_hash

@@ -15,8 +15,8 @@ from buildarena_cli.options import (
     JsonOption,
     ModelName,
     ModelsOption,
-    ReadingName,
-    ReadingOption,
+    PolicyName,
+    PolicyOption,
     TasksOption,
     TrackOption,
     UrlOption,
@@ -41,7 +41,7 @@ def leaderboard(
     level: LevelOption = None,
     model: ModelsOption = None,
     since: SinceOption = None,
-    reading: ReadingOption = ReadingName.OURS,
+    policy: PolicyOption = PolicyName.OURS,
     track: Annotated[
         str | None, typer.Option("--track", help="Only this track; as JSON the first without.")
     ] = None,
@@ -58,7 +58,7 @@ def leaderboard(
         "level": level,
         "model": model,
         "since": None if since is None else f"{since.isoformat()}Z",
-        "reading": reading.value,
+        "policy": policy.value,
     }
     client = Client(url)
     board = client.get("/v1/leaderboard", track=track, **asked)
@@ -98,7 +98,7 @@ def compare(
     second: ModelName,
     *,
     task: TasksOption = None,
-    reading: ReadingOption = ReadingName.OURS,
+    policy: PolicyOption = PolicyName.OURS,
     track: TrackOption = None,
     url: UrlOption = DEFAULT_URL,
     as_json: JsonOption = False,
@@ -113,7 +113,7 @@ def compare(
         first=first,
         second=second,
         task=task,
-        reading=reading.value,
+        policy=policy.value,
         track=track,
     )
     if as_json:

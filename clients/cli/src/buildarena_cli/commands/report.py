@@ -11,12 +11,12 @@ import typer
 from buildarena_cli.client import Client, at
 from buildarena_cli.errors import CommandError
 from buildarena_cli.ids import whole_id
-from buildarena_cli.options import DEFAULT_URL, ReadingName, ReadingOption, UrlOption
+from buildarena_cli.options import DEFAULT_URL, PolicyName, PolicyOption, UrlOption
 from buildarena_cli.terminal.completion import complete_sweep
 from buildarena_cli.terminal.output import say
 
 if TYPE_CHECKING:
-    from buildarena_benchmark.flags import Reading
+    from buildarena_benchmark.flags import ScoringPolicy
     from buildarena_benchmark.leaderboard import EndedJob
 
 ENDINGS = (".html", ".md", ".pdf")
@@ -39,7 +39,7 @@ def report(
         ),
     ],
     out: Annotated[Path, typer.Option("--out", help="File: .html, .md or .pdf.")],
-    reading: ReadingOption = ReadingName.OURS,
+    policy: PolicyOption = PolicyName.OURS,
     url: UrlOption = DEFAULT_URL,
 ) -> None:
     """Write a report of sweeps: tables and plots.
@@ -52,7 +52,7 @@ def report(
     from buildarena_cli.report.writing import write_report
 
     client = Client(url)
-    material = collect(client, [whole_id(client, "sweep", id_) for id_ in sweeps], reading)
+    material = collect(client, [whole_id(client, "sweep", id_) for id_ in sweeps], policy)
     try:
         write_report(sections(material), out)
     except OSError as error:
@@ -60,13 +60,13 @@ def report(
     say(f"{out}: {len(material.trials):,} jobs")
 
 
-def collect(client: Client, ids: Sequence[str], reading: str = "ours") -> Any:
+def collect(client: Client, ids: Sequence[str], policy: str = "ours") -> Any:
     """Reads what a report of these sweeps is made of, with flags read as asked.
 
     Sweeps of different workflows, prompts or decodings are set side by side: each becomes a row
     of its own, named by what differs from the paper's main experiment.
     """
-    from buildarena_benchmark.flags import Reading
+    from buildarena_benchmark.flags import ScoringPolicy
     from buildarena_cli.report.custom_tasks import read_tasks
     from buildarena_cli.report.material import Material
 
@@ -85,14 +85,16 @@ def collect(client: Client, ids: Sequence[str], reading: str = "ours") -> Any:
             # The paper's main table is of the main experiment alone.
             if not variants[sweep["id"]]:
                 snapshots[row] = registry.get(result["model"], "")
-            rounds[result["job_id"]] = [_verdict(r, Reading(reading)) for r in result["rounds"]]
+            rounds[result["job_id"]] = [
+                _verdict(r, ScoringPolicy(policy)) for r in result["rounds"]
+            ]
             for made in result["rounds"]:
                 tried = verdicts.setdefault((result["task"], made["machine"]), {})
-                tried[sweep["spec"]["simulator"]] = _verdict(made, Reading(reading))
+                tried[sweep["spec"]["simulator"]] = _verdict(made, ScoringPolicy(policy))
             trials[result["job_id"]] = _trial(result, row)
     progress = [sweep["progress"] for sweep in found]
     return Material(
-        reading=Reading(reading),
+        policy=ScoringPolicy(policy),
         title=", ".join(dict.fromkeys(sweep["name"] for sweep in found)),
         tasks=read_tasks(client, list(trials.values())),
         trials=list(trials.values()),
@@ -105,9 +107,9 @@ def collect(client: Client, ids: Sequence[str], reading: str = "ours") -> Any:
 
 def variant(spec: Mapping[str, Any]) -> str:
     """What of a sweep differs from the paper's main experiment; "" for nothing."""
-    from buildarena_simulation import ENGINES
+    from buildarena_simulation import DEFAULT_ENGINE
 
-    main = {"simulator": ENGINES[0], **PLAIN}
+    main = {"simulator": DEFAULT_ENGINE, **PLAIN}
     given = {name: spec.get(name, plain) for name, plain in main.items()}
     loop = given["closed_loop"]
     parts = [
@@ -130,11 +132,11 @@ def variant(spec: Mapping[str, Any]) -> str:
     return ", ".join(parts)
 
 
-def _verdict(made: Mapping[str, Any], reading: Reading) -> tuple[bool, float]:
-    """Success and indicator of a simulated machine, as a reading of flags has them."""
-    from buildarena_benchmark.flags import Reading, is_disqualified
+def _verdict(made: Mapping[str, Any], policy: ScoringPolicy) -> tuple[bool, float]:
+    """Success and indicator of a simulated machine, under a scoring policy."""
+    from buildarena_benchmark.flags import ScoringPolicy, is_disqualified
 
-    if reading == Reading.OURS and is_disqualified(made["flags"]):
+    if policy == ScoringPolicy.OURS and is_disqualified(made["flags"]):
         return False, 0.0
     return made["success"], made["indicator"]
 

@@ -13,8 +13,8 @@ import typer
 
 from buildarena_cli.defaults import data_folder
 from buildarena_cli.errors import FAILED, CommandError
-from buildarena_cli.near import did_you_mean
 from buildarena_cli.options import DEFAULT_URL, DataOption, JsonOption, UrlOption
+from buildarena_cli.suggestions import did_you_mean
 from buildarena_cli.terminal.output import columns, number, print_json, print_table, say
 
 if TYPE_CHECKING:

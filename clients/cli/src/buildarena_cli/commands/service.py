@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from buildarena_cli.errors import CommandError
-from buildarena_cli.near import did_you_mean
 from buildarena_cli.options import DataOption, PortOption
+from buildarena_cli.suggestions import did_you_mean
 from buildarena_cli.terminal.output import say
 
 if TYPE_CHECKING:
@@ -78,8 +78,12 @@ def demo(
     from buildarena_cli.local.stack import Stack
     from buildarena_cli.terminal.boards import overview
     from buildarena_cli.terminal.progress import exit_code, watch_sweep
+    from buildarena_simulation import ENGINES
 
-    sweep_file = DEMO_SWEEP if not task else {**DEMO_SWEEP, "tasks": _demo_tasks(task)}
+    # The demo names its engine: where the default one is missing it shows what another makes of it.
+    sweep_file = {**DEMO_SWEEP, "simulator": ENGINES[0]}
+    if task:
+        sweep_file["tasks"] = _demo_tasks(task)
     settings = _settings(data, port)
     settings = settings.model_copy(update={"data": settings.data / "demo"})
     _interrupt_on_terminate()
@@ -154,10 +158,13 @@ def _interrupt_on_terminate() -> None:
 
 
 def _tell_simulators() -> None:
-    from buildarena_pipeline.catalog.simulators import ENGINE_SIMULATORS
+    from buildarena_simulation import UnknownEngineError, require_engine
+    from buildarena_simulation.constants import DEFAULT_ENGINE
 
-    if "pybullet" not in ENGINE_SIMULATORS:
-        _tell("PyBullet is not installed: machines are simulated with MuJoCo alone")
+    try:
+        require_engine(DEFAULT_ENGINE)
+    except UnknownEngineError as error:
+        _tell(f"{error}; submissions must name one")
 
 
 def _tell(line: str) -> None:

@@ -11,8 +11,8 @@ import typer
 from buildarena_cli.client import Client, RefusedError, at
 from buildarena_cli.errors import FAILED, CommandError
 from buildarena_cli.lazy import new_group
-from buildarena_cli.near import did_you_mean, near_field
 from buildarena_cli.options import DEFAULT_URL, JsonOption, TaskName, UrlOption
+from buildarena_cli.suggestions import did_you_mean, suggested_field
 from buildarena_cli.terminal.output import columns, in_words, print_json, print_table, say, warn
 
 if TYPE_CHECKING:
@@ -152,7 +152,7 @@ def _issues(errors: Sequence[dict[str, Any]]) -> list[ValidationIssue]:
 def _refusal(issues: Sequence[ValidationIssue], file: Path) -> CommandError:
     return CommandError(
         "\n".join(
-            issue.describe(str(file)) + near_field(issue.path, issue.message, issue.choices)
+            issue.describe(str(file)) + suggested_field(issue.path, issue.message, issue.choices)
             for issue in issues
         )
     )

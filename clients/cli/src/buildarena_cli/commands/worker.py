@@ -10,10 +10,10 @@ import typer
 
 from buildarena_cli.defaults import KEY_VARIABLE
 from buildarena_cli.errors import CommandError
-from buildarena_cli.instead import run_instead
+from buildarena_cli.exec import exec_module
 from buildarena_cli.lazy import new_group
-from buildarena_cli.near import did_you_mean
 from buildarena_cli.options import DEFAULT_URL, JsonOption, UrlOption
+from buildarena_cli.suggestions import did_you_mean
 from buildarena_cli.terminal.output import columns, minute_of, number, print_json, print_table, say
 
 app = new_group("Run workers by themselves.")
@@ -64,10 +64,10 @@ def start_worker(
     given = _options({"--key-file": key_file, "--ca-file": ca_file, "--at-once": at_once})
     given += ["--allow-http"] * allow_http
     if api is not None:
-        run_instead([*_remote(queue), "--api", api, *given])
+        exec_module([*_remote(queue), "--api", api, *given])
     if given:
         raise CommandError(f"{given[0]}: only with --api URL")
-    run_instead(_known(queue))
+    exec_module(_known(queue))
 
 
 @app.command("list")
@@ -98,7 +98,7 @@ def check_runner(
     """
     words = [*_remote(queue), "--api", api, "--check"]
     words += _options({"--key-file": key_file, "--ca-file": ca_file})
-    run_instead([*words, *(["--allow-http"] * allow_http), *(["--json"] * as_json)])
+    exec_module([*words, *(["--allow-http"] * allow_http), *(["--json"] * as_json)])
 
 
 def migrate() -> None:
@@ -122,9 +122,13 @@ def migrate() -> None:
 def _known(queue: str) -> list[str]:
     """The words of the program that serves a queue."""
     from buildarena_cli.local.programs import programs
-    from buildarena_pipeline.catalog.simulators import SIMULATORS
+    from buildarena_pipeline.errors import StartupError
+    from buildarena_pipeline.runtime.simulators.installed import installed_simulators
 
-    known = programs(SIMULATORS)
+    try:
+        known = programs(installed_simulators())
+    except StartupError as error:
+        raise CommandError(str(error)) from error
     workers = {program.queue: program.words for program in known if program.queue}
     if queue not in workers:
         raise CommandError(

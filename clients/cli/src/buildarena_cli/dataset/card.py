@@ -9,7 +9,7 @@ import yaml
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from buildarena_benchmark.flags import DISQUALIFYING, INFORMATIVE
+from buildarena_benchmark.scorers.registry import known_flags
 from buildarena_cli.dataset.columns import ACTIONS, JOBS, Column
 from buildarena_cli.dataset.counts import Counts
 from buildarena_cli.report.escaping import markdown_cell
@@ -40,8 +40,7 @@ def card(counts: Counts) -> str:
         licences=sorted(counts.licences.items()),
         jobs=_told(JOBS),
         actions=_told(ACTIONS),
-        flags=[*DISQUALIFYING.items(), *INFORMATIVE.items()],
-        disqualifying=set(DISQUALIFYING),
+        flags=known_flags().values(),
         code=Markup,
     )
     return f"---\n{_front_matter(counts)}---\n\n{text}"

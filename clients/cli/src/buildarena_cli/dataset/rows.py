@@ -123,8 +123,8 @@ def _first_words(task: Mapping[str, Any] | None, track: Mapping[str, Any]) -> st
     if task is None:
         return None
     as_read = track.get("workflow") == EXTERNAL_WORKFLOW
-    looked_up = bool(track.get("looked_up"))
-    if as_read and track.get("prompts_digest") == briefing_digest(looked_up=looked_up):
+    on_demand = bool(track.get("looked_up"))
+    if as_read and track.get("prompts_digest") == briefing_digest(on_demand=on_demand):
         return _briefing(compact(task["document"])) or str(task["statement"])
     return str(task["statement"])
 

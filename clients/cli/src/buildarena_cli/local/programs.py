@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from buildarena_pipeline.catalog.simulators import ENGINE_SIMULATORS
 from buildarena_store.states import CONSTRUCT_QUEUE, simulate_queue
 
 
@@ -24,7 +23,7 @@ class Program:
     queue: str | None = None
 
 
-def programs(simulators: Sequence[str] = ENGINE_SIMULATORS) -> list[Program]:
+def programs(simulators: Iterable[str]) -> list[Program]:
     """All programs in the order in which they are started.
 
     Args:

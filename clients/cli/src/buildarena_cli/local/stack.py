@@ -25,14 +25,15 @@ from buildarena_cli.local import (
 )
 from buildarena_cli.local.programs import programs
 from buildarena_cli.local.service import LOCK, READY, RUN, log_name, unwritable
-from buildarena_client.faults import WireError
+from buildarena_client.client import run
 from buildarena_client.paths import HEALTH
 from buildarena_client.requests import Request
-from buildarena_client.synchronous.wire import Wire
+from buildarena_client.transport_errors import TransportError
+from buildarena_client.transports.blocking import BlockingTransport
 from buildarena_environment.processes import PARENT, dying_with_me, tree_memory_bytes
-from buildarena_pipeline.catalog.simulators import ENGINE_SIMULATORS
 from buildarena_pipeline.errors import StartupError
 from buildarena_pipeline.runtime.settings import PREFIX, SECRETS, Settings
+from buildarena_pipeline.runtime.simulators.installed import installed_engines
 from buildarena_pipeline.secret_files import SUFFIX
 from buildarena_store import Database
 from buildarena_store.accounts.keys import new_secret
@@ -51,7 +52,7 @@ class Stack:
     Args:
         settings: Where data lies and which port the API takes.
         tell: Gets one line for each thing that was started.
-        simulators: Engines to start workers for.
+        simulators: Simulators to start workers for; by default all engines that are installed.
 
     Attributes:
         environment: The variables that its programs were started with; further workers need them.
@@ -62,7 +63,7 @@ class Stack:
         settings: Settings,
         *,
         tell: Callable[[str], None] = lambda _: None,
-        simulators: tuple[str, ...] = ENGINE_SIMULATORS,
+        simulators: Sequence[str] | None = None,
     ) -> None:
         self.settings = settings
         self.admin_key: str | None = None
@@ -71,7 +72,7 @@ class Stack:
         self.supervisor = Supervisor()
         self.peak_memory_bytes = 0
         self._tell = tell
-        self._simulators = simulators
+        self._simulators = installed_engines() if simulators is None else simulators
         self._lock: IO[str] | None = None
         self._ready = False
         self._memory_thread = threading.Thread(
@@ -229,12 +230,12 @@ class Stack:
         self._tell("waiting until everything answers")
         deadline = time.monotonic() + READY_WITHIN_S
         missing = "the API"
-        wire = Wire(self.url, {})
+        transport = BlockingTransport(self.url, {})
         request = Request(method="GET", path=HEALTH, timeout_s=5)
         while time.monotonic() < deadline:
             self.require_running()
-            with contextlib.suppress(WireError, ValueError):
-                health = wire.send(request).json()
+            with contextlib.suppress(TransportError, ValueError):
+                health = run(transport.send(request)).json()
                 served = {f"simulate.{engine}" for engine in self._simulators}
                 bad = [
                     check["name"]

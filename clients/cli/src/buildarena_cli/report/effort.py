@@ -6,6 +6,13 @@ from collections.abc import Mapping, Sequence
 from itertools import combinations
 
 from buildarena_benchmark.leaderboard import Cell, cost_bins, counted_trials
+from buildarena_benchmark.leaderboard.columns import (
+    COST,
+    COST_PER_SUCCESS,
+    INPUT_TOKENS,
+    OUTPUT_TOKENS,
+    REQUESTS,
+)
 from buildarena_benchmark.statistics import agreement, detectable_difference
 from buildarena_cli.report.document import Block, Grid, Heading, Paragraph, Plot
 from buildarena_cli.report.material import Material, paper_rows, percent
@@ -19,34 +26,31 @@ SAMPLES = 64
 def cost(material: Material, cells: Mapping[str, Sequence[Cell]]) -> list[Block]:
     """Tokens, requests and dollars, and whether more of them brought more."""
     paper = paper_rows(cells, material.snapshots)
-    rows = []
-    for task, row in cells.items():
-        for cell in row:
-            reference = paper[task].get(cell.model)
-            rows.append(
-                (
-                    task,
-                    cell.model,
-                    number(cell.input_tokens_mean, 0),
-                    number(reference.input_tokens_mean, 0) if reference else "-",
-                    number(cell.output_tokens_mean, 0),
-                    number(reference.output_tokens_mean, 0) if reference else "-",
-                    number(cell.requests_mean),
-                    number(reference.requests_mean) if reference else "-",
-                    number(cell.cost_usd_mean, 4),
-                    number(cell.cost_per_success_usd, 4),
-                )
-            )
+    compared, own = (INPUT_TOKENS, OUTPUT_TOKENS, REQUESTS), (COST, COST_PER_SUCCESS)
+    rows = [
+        (
+            *(task, cell.model),
+            *(
+                column.text(shown)
+                for column in compared
+                for shown in (cell, paper[task].get(cell.model))
+            ),
+            *(column.text(cell) for column in own),
+        )
+        for task, row in cells.items()
+        for cell in row
+    ]
     columns = (
-        *("task", "model", "input tokens", "paper", "output tokens", "paper", "requests"),
-        *("paper", "USD", "USD a success"),
+        *("task", "model"),
+        *(heading for column in compared for heading in (column.heading, "paper")),
+        *(column.heading for column in own),
     )
     blocks: list[Block] = [
         Heading(text="Cost"),
         Grid(caption="Means of scored jobs", columns=columns, rows=rows, text_columns=2),
     ]
     categories = {name: task.category for name, task in material.tasks.items()}
-    by_category = cost_bins(material.trials, reading=material.reading, categories=categories)
+    by_category = cost_bins(material.trials, policy=material.policy, categories=categories)
     if by_category:
         blocks.append(
             Plot(
@@ -61,7 +65,7 @@ def cost(material: Material, cells: Mapping[str, Sequence[Cell]]) -> list[Block]
 def rounds(material: Material) -> list[Block]:
     """Closed loops: curves of every model and task that had a second round."""
     runs: dict[str, dict[str, list[Sequence[tuple[bool, float]]]]] = {}
-    for trial in counted_trials(material.trials, reading=material.reading):
+    for trial in counted_trials(material.trials, policy=material.policy):
         models = runs.setdefault(trial.task, {})
         models.setdefault(trial.model, []).append(material.rounds[trial.job_id])
     blocks: list[Block] = []

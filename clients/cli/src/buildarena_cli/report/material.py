@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from buildarena_benchmark.flags import Reading
+from buildarena_benchmark.flags import ScoringPolicy
 from buildarena_benchmark.leaderboard import Cell, EndedJob, PublishedRow, published_rows
 
 
@@ -39,7 +39,7 @@ class Material:
 
     Attributes:
         title: What was run.
-        reading: How flags are read.
+        policy: The scoring policy: how flags are read.
         tasks: The tasks by name, the built-in ones first; also such as were not run.
         trials: Ended jobs; their models are named as rows of the report.
         rounds: Of each job by id, for each round: success and indicator.
@@ -49,7 +49,7 @@ class Material:
     """
 
     title: str
-    reading: Reading
+    policy: ScoringPolicy
     tasks: Mapping[str, ReportTask]
     trials: Sequence[EndedJob]
     rounds: Mapping[str, Sequence[tuple[bool, float]]]

@@ -7,8 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
-from buildarena_benchmark.flags import Reading, is_disqualified, is_left_out, meaning
+from buildarena_benchmark.flags import ScoringPolicy, is_disqualified, is_left_out, meaning
 from buildarena_benchmark.leaderboard import Board, BoardQuery, Cell, TrackBoard, failure_rows
+from buildarena_benchmark.leaderboard.columns import BEST, INDICATOR, PARTS, SUCCESS
 from buildarena_benchmark.statistics import MIN_SUCCESSES
 from buildarena_cli.report.custom_tasks import custom_tasks
 from buildarena_cli.report.document import Block, Grid, Heading, Paragraph, Plot
@@ -23,12 +24,12 @@ from buildarena_cli.report.material import (
 from buildarena_cli.report.plots import indicator_plot, radar_plot, shares_plot, success_plot
 from buildarena_cli.terminal.output import in_words, number
 
-READ: Final[Mapping[Reading, str]] = {
-    Reading.OURS: "Disqualified jobs count as failures with an indicator of 0.",
-    Reading.PUBLISHED: "Jobs that the published evaluation calls hacked are left out of them, as "
-    "it leaves them out itself.",
+READ: Final[Mapping[ScoringPolicy, str]] = {
+    ScoringPolicy.OURS: "Disqualified jobs count as failures with an indicator of 0.",
+    ScoringPolicy.PUBLISHED: "Jobs that the published evaluation calls hacked are left out, "
+    "as it leaves them out itself.",
 }
-"""What each reading does with flags."""
+"""What each policy does with flags."""
 
 
 def sections(material: Material) -> list[Block]:
@@ -43,14 +44,14 @@ def sections(material: Material) -> list[Block]:
     )
     for trial in material.trials:
         kept.put(trial)
-    board = kept.board(BoardQuery(reading=material.reading))
+    board = kept.board(BoardQuery(policy=material.policy))
     cells = {task.task: [row.cell for row in task.rows] for task in board.tasks}
     return [
         *blocks,
         *custom_tasks(material, board),
         *_overall(board),
         *_performance(board, cells, material),
-        *_flags(cells, material.reading),
+        *_flags(cells, material.policy),
         *_dimensions(board),
         *_failures(material, cells),
         *cost(material, cells),
@@ -69,7 +70,7 @@ def _opening(material: Material) -> Paragraph:
         text += f". {material.unfinished:,} have not ended yet, and are not in this report"
     return Paragraph(
         text=f"{text}. Averages are over scored jobs; errored and cancelled jobs are left out and "
-        f"counted beside. {READ[material.reading]} The paper's figures were measured in the "
+        f"counted beside. {READ[material.policy]} The paper's figures were measured in the "
         "game itself: they are a reference and are never ranked with ours."
     )
 
@@ -116,21 +117,21 @@ def _performance(
                     "-" if ranked.rank is None else str(ranked.rank),
                     f"{cell.successes}/{cell.trials}",
                     f"{cell.successes}/{cell.ended}",
-                    percent(cell.success_rate),
+                    SUCCESS.text(cell),
                     between(cell.success_low, cell.success_high, 100),
-                    percent(reference.success_rate) if reference else "-",
-                    number(cell.indicator_mean, at_least=cell.censored > 0),
+                    SUCCESS.text(reference),
+                    INDICATOR.text(cell),
                     indicator_between(cell),
-                    number(cell.indicator_best, at_least=cell.censored > 0),
-                    number(reference.indicator_mean) if reference else "-",
-                    number(cell.parts_mean),
-                    number(reference.parts_mean) if reference else "-",
+                    BEST.text(cell),
+                    INDICATOR.text(reference),
+                    PARTS.text(cell),
+                    PARTS.text(reference),
                     str(cell.flagged),
                 )
             )
     columns = (
-        *("task", "model", "rank", "of scored", "of ended", "success", "95 %", "paper"),
-        *("indicator", "95 %", "best", "paper", "parts", "paper", "flagged"),
+        *("task", "model", "rank", "of scored", "of ended", SUCCESS.heading, "95 %", "paper"),
+        *(INDICATOR.heading, "95 %", BEST.heading, "paper", PARTS.heading, "paper", "flagged"),
     )
     labels = {
         name: in_words(material.tasks[name].indicator, material.tasks[name].unit)
@@ -159,10 +160,10 @@ def _performance(
     ]
 
 
-def _flags(cells: Mapping[str, Sequence[Cell]], reading: Reading) -> list[Block]:
+def _flags(cells: Mapping[str, Sequence[Cell]], policy: ScoringPolicy) -> list[Block]:
     """Which flags trials have, what they say, and what they do to a rank."""
     rows = [
-        (task, cell.model, flag, str(count), _effect(flag, reading), meaning(flag))
+        (task, cell.model, flag, str(count), _effect(flag, policy), meaning(flag))
         for task, row in cells.items()
         for cell in row
         for flag, count in cell.flags.items()
@@ -177,10 +178,10 @@ def _flags(cells: Mapping[str, Sequence[Cell]], reading: Reading) -> list[Block]
     ]
 
 
-def _effect(flag: str, reading: Reading) -> str:
-    if is_left_out([flag], reading):
+def _effect(flag: str, policy: ScoringPolicy) -> str:
+    if is_left_out([flag], policy):
         return "are left out"
-    if reading == Reading.OURS and is_disqualified([flag]):
+    if policy == ScoringPolicy.OURS and is_disqualified([flag]):
         return "are failures"
     return "count as scored"
 

@@ -11,8 +11,8 @@ from buildarena_cli.client import Client, at
 from buildarena_cli.site.asking import Answer, Answers, ask, document, question
 from buildarena_cli.site.scope import Job, Scope
 
-READINGS: Final = (None, "published")
-"""How pages ask for our reading, and for the other."""
+SCORING_POLICIES: Final = (None, "published")
+"""How pages ask for our scoring policy, and for the other."""
 EXPORTS: Final = {"csv": "csv", "parquet": "parquet", "latex": "tex"}
 MAX_COMPARED: Final = 20
 """Models of a track whose comparisons are kept: each with each other is asked for."""
@@ -52,10 +52,10 @@ class Collected:
     def _boards(self) -> None:
         tasks = sorted({job["task"] for job in self._scope.ended})
         # Pages ask without a track first, and get that of the scope or the first.
-        for track, reading, task in itertools.product(
-            (None, *self._scope.tracks), READINGS, (None, *tasks)
+        for track, policy, task in itertools.product(
+            (None, *self._scope.tracks), SCORING_POLICIES, (None, *tasks)
         ):
-            asked = {"track": track, "reading": reading, "task": task}
+            asked = {"track": track, "policy": policy, "task": task}
             self._put(question(BOARD, asked), self._board(asked))
             self._put(question(f"{BOARD}/figures", asked), self._held(f"{BOARD}/figures", asked))
             for form, ending in EXPORTS.items():
@@ -146,7 +146,7 @@ def questions(scope: Scope) -> Iterator[int]:
     tasks = len({job["task"] for job in scope.ended}) + 1
     models = min(MAX_COMPARED, len({job["model"] for job in scope.ended}))
     tracks = len(scope.tracks)
-    yield len(READINGS) * tasks * (2 * (tracks + 1) + len(EXPORTS) * tracks)
+    yield len(SCORING_POLICIES) * tasks * (2 * (tracks + 1) + len(EXPORTS) * tracks)
     yield models * (models - 1) * (tracks + 1)
     yield 2 * tasks + 2
     yield len(scope.sweeps) * (len(scope.sweeps) + 2)

@@ -9,7 +9,7 @@ not even one column fits beside the names, the intervals give way.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from buildarena_cli.terminal.output import (
@@ -29,20 +29,25 @@ from buildarena_cli.terminal.output import (
 )
 
 GAP = "   "
+ROW: dict[str, Callable[[Mapping[str, Any]], str]] = {
+    "#": lambda row: _rank(row["rank"]),
+    "model": lambda row: _marked([row]),
+    "success": lambda row: f"{row['successes']}/{row['trials']}",
+    "95 %": lambda row: _interval(row["success_low"], row["success_high"]),
+    "indicator": lambda row: number(row["indicator_mean"], at_least=_is_censored(row)),
+    "of it 95 %": lambda row: _spread(
+        row["indicator_low"], row["indicator_high"], too_few=row["too_few_data"]
+    ),
+    "best": lambda row: number(row["indicator_best"], at_least=_is_censored(row)),
+    "parts": lambda row: number(row.get("parts_mean")),
+    "requests": lambda row: number(row["requests_mean"], 0),
+    "tokens": lambda row: number(row["output_tokens_mean"], 0),
+    "USD": lambda row: number(row["cost_usd_mean"], 2),
+}
+"""The columns of a row on a task: what each shows of the API's answer."""
 RESULTS = ("success", "95 %", "indicator")
-SPREAD = ("of it 95 %", "best")
-EFFORT = ("parts", "requests", "tokens")
-LEAVING = ("requests", "parts", "tokens", "USD", *reversed(SPREAD), "95 %", "indicator")
-DETAILS = columns(
-    *("#", "model", *RESULTS, *SPREAD, *EFFORT, "USD"),
-    figures=("#", *RESULTS, *SPREAD, *EFFORT, "USD"),
-    leaving=LEAVING,
-)
-PUBLISHED = columns(
-    *("model", *RESULTS, *EFFORT),
-    figures=(*RESULTS, *EFFORT),
-    leaving=[name for name in LEAVING if name in {*RESULTS, *EFFORT}],
-)
+PUBLISHED = ("model", *RESULTS, "parts", "requests", "tokens")
+LEAVING = ("requests", "parts", "tokens", "USD", "best", "of it 95 %", "95 %", "indicator")
 OVERALL = columns(
     *("#", "model", "place", "mean rank", "success", "USD", "front"),
     figures=("#", "place", "mean rank", "success", "USD"),
@@ -91,20 +96,9 @@ def overview(board: Mapping[str, Any], *, published: bool = False) -> None:
 
 def task_table(task: Mapping[str, Any]) -> None:
     """Prints all models on one task."""
-    print_table(
-        DETAILS,
-        [
-            (
-                _rank(row["rank"]),
-                _marked([row]),
-                *_results(row),
-                _spread(row),
-                number(row["indicator_best"], at_least=_is_censored(row)),
-                *_effort(row),
-                number(row["cost_usd_mean"], 2),
-            )
-            for row in task["rows"]
-        ],
+    _print_rows(
+        tuple(ROW),
+        task["rows"],
         title=emphasised(f"{task['task']}: {in_words(task['indicator'], task['unit'])}"),
         notes=[
             "* baseline; # is shared by statistically tied models",
@@ -118,11 +112,21 @@ def task_table(task: Mapping[str, Any]) -> None:
 
 def published_table(task: Mapping[str, Any]) -> None:
     """Prints the paper's figures of one task."""
-    print_table(
-        PUBLISHED,
-        [(row["model"], *_results(row), *_effort(row)) for row in task["published"]],
-        title=f"{task['task']}, as published: measured in the game, never ranked with ours",
-    )
+    title = f"{task['task']}, as published: measured in the game, never ranked with ours"
+    _print_rows(PUBLISHED, task["published"], title=title)
+
+
+def _print_rows(
+    names: Sequence[str],
+    rows: Sequence[Mapping[str, Any]],
+    *,
+    title: str,
+    notes: Sequence[str] = (),
+) -> None:
+    figures = [name for name in names if name != "model"]
+    cells = [[ROW[name](row) for name in names] for row in rows]
+    shown = columns(*names, figures=figures, leaving=LEAVING)
+    print_table(shown, cells, title=title, notes=notes)
 
 
 def overall_table(board: Mapping[str, Any]) -> None:
@@ -153,26 +157,9 @@ def overall_table(board: Mapping[str, Any]) -> None:
     )
 
 
-def _results(row: Mapping[str, Any]) -> tuple[str, ...]:
-    return (
-        f"{row['successes']}/{row['trials']}",
-        _interval(row),
-        number(row["indicator_mean"], at_least=_is_censored(row)),
-    )
-
-
-def _effort(row: Mapping[str, Any]) -> tuple[str, ...]:
-    return (
-        number(row.get("parts_mean")),
-        number(row["requests_mean"], 0),
-        number(row["output_tokens_mean"], 0),
-    )
-
-
-def _spread(row: Mapping[str, Any]) -> str:
-    if row["too_few_data"]:
+def _spread(low: float | None, high: float | None, *, too_few: bool) -> str:
+    if too_few:
         return "too few"
-    low, high = row["indicator_low"], row["indicator_high"]
     return NOTHING if low is None else f"{number(low)}-{number(high)}"
 
 
@@ -185,9 +172,8 @@ def _rank(rank: int | None) -> str:
     return NOTHING if rank is None else str(rank)
 
 
-def _interval(row: Mapping[str, Any]) -> str:
-    low, high = row["success_low"], row["success_high"]
-    return NOTHING if low is None else f"{100 * low:.0f}-{100 * high:.0f} %"
+def _interval(low: float | None, high: float | None) -> str:
+    return NOTHING if low is None or high is None else f"{100 * low:.0f}-{100 * high:.0f} %"
 
 
 def _published_rows(board: Mapping[str, Any]) -> list[_Row]:
@@ -259,15 +245,9 @@ def _column(headings: Sequence[str], cells: Sequence[str]) -> list[str]:
 
 def _cells(rows: Sequence[Mapping[str, Any] | None], intervals: bool) -> list[str]:
     """Success, interval and indicator of rows, aligned among themselves."""
-    cells = []
-    for row in rows:
-        if row is None:
-            cells.append((NOTHING,) * (2 + intervals))
-            continue
-        middle = (_interval(row),) if intervals else ()
-        rate = f"{row['successes']}/{row['trials']}"
-        cells.append((rate, *middle, number(row["indicator_mean"], at_least=_is_censored(row))))
-    return _aligned(cells, right=range(2 + intervals))
+    names = [name for name in RESULTS if intervals or name != "95 %"]
+    cells = [[NOTHING if row is None else ROW[name](row) for name in names] for row in rows]
+    return _aligned(cells, right=range(len(names)))
 
 
 def _aligned(rows: Sequence[Sequence[str]], right: Sequence[int]) -> list[str]:
@@ -293,7 +273,7 @@ def _legend(board: Mapping[str, Any]) -> list[str]:
         *(f"  {', '.join(tasks)}: {name}" for name, tasks in indicators.items()),
         "* baseline; # is the overall rank, shared by statistically tied models",
         *_remarks(rows),
-        *_reading(board, rows),
+        *_policy(board, rows),
         *_imports(rows),
     ]
 
@@ -305,9 +285,10 @@ def _marked(rows: Sequence[Mapping[str, Any]]) -> str:
         rows: One model configuration, on one task or several.
     """
     first = rows[0]
-    limits = first["decoding"].get("limits", {})
+    limits = first.get("decoding", {}).get("limits", {})
     spelled = ", ".join(f"{name} {value}" for name, value in limits.items())
-    marks = ("*" if first["baseline"] else "") + ("†" if any(r["imported"] for r in rows) else "")
+    marks = "*" if first.get("baseline") else ""
+    marks += "†" if any(row.get("imported") for row in rows) else ""
     return f"{first['model']}{marks}" + (f" ({spelled})" if spelled else "")
 
 
@@ -329,13 +310,13 @@ def _flags(rows: Sequence[Mapping[str, Any]]) -> Counter[str]:
     return counts
 
 
-def _reading(board: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> list[str]:
+def _policy(board: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> list[str]:
     """What the board's flags say, and what was done about them."""
     counts = _flags(rows)
     found = [
         f"  {flag['name']}: {flag['meaning']}" for flag in board["flags"] if counts[flag["name"]]
     ]
-    if board["reading"] != "ours":
+    if board["policy"] != "ours":
         found.append("what the published evaluation calls hacked is left out, as it does itself")
     return found
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import typer
 
-from buildarena_client.places import DEFAULT_URL, kept_key
+from buildarena_client.config import DEFAULT_URL, stored_key
 
 if TYPE_CHECKING:
     from socket import socket
@@ -94,6 +94,6 @@ def _connected(host: str, port: int | None, *, tls: bool) -> socket:
 
 def _request(host: str, path: str) -> bytes:
     """A GET of HTTP 1.0, whose answer is one piece that ends with the connection."""
-    key = kept_key()
+    key = stored_key()
     authorization = f"Authorization: Bearer {key}\r\n" if key else ""
     return f"GET {path} HTTP/1.0\r\nHost: {host}\r\n{authorization}\r\n".encode()

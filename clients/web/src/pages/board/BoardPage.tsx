@@ -10,7 +10,7 @@ import { Controls } from "./Controls";
 import { Exports } from "./Exports";
 import { HeatMap } from "./HeatMap";
 import { Overall } from "./Overall";
-import type { BoardSearch } from "./search";
+import type { BoardSearch } from "../../api/board-search";
 
 const BoardPlots = lazy(() => import("./BoardPlots"));
 const route = getRouteApi("/");

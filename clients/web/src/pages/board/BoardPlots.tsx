@@ -7,7 +7,7 @@ import { Costs } from "./Costs";
 import { entriesOf } from "./entries";
 import { Failures } from "./Failures";
 import { Radar } from "./Radar";
-import type { BoardSearch } from "./search";
+import type { BoardSearch } from "../../api/board-search";
 
 /** What the board means: cost against performance, dimensions, how jobs end. */
 export default function BoardPlots({ board, search }: { board: Board; search: BoardSearch }) {

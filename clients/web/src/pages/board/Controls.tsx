@@ -4,7 +4,7 @@ import { useNavigate } from "@tanstack/react-router";
 import { tasks, type Board } from "../../api/queries";
 import { isSite } from "../../api/site";
 import { trackLabel } from "../../format";
-import type { BoardSearch } from "./search";
+import type { BoardSearch } from "../../api/board-search";
 
 /** The switches of the board. Each is a word of the address, so that a view can be sent. */
 export function Controls({ board, search }: { board: Board; search: BoardSearch }) {
@@ -52,9 +52,9 @@ export function Controls({ board, search }: { board: Board; search: BoardSearch 
             { value: "ours", label: "count as failures" },
             { value: "published", label: "as the paper" },
           ]}
-          value={search.reading ?? "ours"}
-          onChange={(reading) => {
-            set({ reading: reading === "published" ? "published" : undefined });
+          value={search.policy ?? "ours"}
+          onChange={(policy) => {
+            set({ policy: policy === "published" ? "published" : undefined });
           }}
         />
       </Stack>

@@ -16,18 +16,29 @@ export function Costs({ figures, entries }: { figures: Figures; entries: readonl
   const price = priced ? "cost_usd_mean" : "output_tokens_mean";
   const drawn = rows.filter((row) => row.mean_rank !== null && row[price] !== null);
   const options = (): Plot.PlotOptions => ({
-      height: 300,
-      marginRight: 120,
-      marginTop: 26,
-      marginBottom: 42,
-      style: { fontSize: "12px" },
-      x: { label: priced ? "dollars a job →" : "output tokens a job →", grid: true, zero: true },
-      y: { label: "↑ mean rank over tasks, 1 is best", reverse: true, grid: true, nice: true, zero: false },
-      marks: [
-        Plot.line(drawn.filter((row) => row.pareto), { x: price, y: "mean_rank", sort: price, strokeDasharray: "5 3", strokeOpacity: 0.7 }),
-        Plot.dot(drawn, { x: price, y: "mean_rank", r: 5.5, symbol: (row: { pareto: boolean }) => (row.pareto ? "diamond" : "circle"), fill: (row: { pareto: boolean }) => (row.pareto ? "#009e73" : "#999999"), stroke: "currentColor", strokeWidth: 1 }),
-        Plot.text(drawn, { x: price, y: "mean_rank", text: "label", dx: 10, textAnchor: "start" }),
-      ],
+    height: 300,
+    marginRight: 120,
+    marginTop: 26,
+    marginBottom: 42,
+    style: { fontSize: "12px" },
+    x: { label: priced ? "dollars a job →" : "output tokens a job →", grid: true, zero: true },
+    y: { label: "↑ mean rank over tasks, 1 is best", reverse: true, grid: true, nice: true, zero: false },
+    marks: [
+      Plot.line(
+        drawn.filter((row) => row.pareto),
+        { x: price, y: "mean_rank", sort: price, strokeDasharray: "5 3", strokeOpacity: 0.7 },
+      ),
+      Plot.dot(drawn, {
+        x: price,
+        y: "mean_rank",
+        r: 5.5,
+        symbol: (row: { pareto: boolean }) => (row.pareto ? "diamond" : "circle"),
+        fill: (row: { pareto: boolean }) => (row.pareto ? "#009e73" : "#999999"),
+        stroke: "currentColor",
+        strokeWidth: 1,
+      }),
+      Plot.text(drawn, { x: price, y: "mean_rank", text: "label", dx: 10, textAnchor: "start" }),
+    ],
   });
   if (rows.length === 0) return <Text size="sm">Nothing was scored yet.</Text>;
   const figure = (row: (typeof rows)[number]): string[] => [
@@ -42,9 +53,14 @@ export function Costs({ figures, entries }: { figures: Figures; entries: readonl
     <>
       {drawn.length > 0 && <Drawing options={options} label={rows.map((row) => figure(row).join(", ")).join("; ")} />}
       <Text size="xs" className="dimmed" mb={4}>
-        Diamonds and their line: the Pareto front, models that no other beats at a lower price. {!priced && "No job has cost anything: output tokens stand in on the axis."}
+        Diamonds and their line: the Pareto front, models that no other beats at a lower price.{" "}
+        {!priced && "No job has cost anything: output tokens stand in on the axis."}
       </Text>
-      <DataTable name="Cost and performance" columns={["Model", "Mean rank", "Success, mean of tasks", "$ a job", "Output tokens", "Pareto"]} rows={rows.map(figure)} />
+      <DataTable
+        name="Cost and performance"
+        columns={["Model", "Mean rank", "Success, mean of tasks", "$ a job", "Output tokens", "Pareto"]}
+        rows={rows.map(figure)}
+      />
     </>
   );
 }

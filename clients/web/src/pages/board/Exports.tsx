@@ -4,7 +4,7 @@ import { useState } from "react";
 import { download } from "../../api/client";
 import { boardQuery } from "../../api/queries";
 import { ProblemNote } from "../../parts/Problem";
-import type { BoardSearch } from "./search";
+import type { BoardSearch } from "../../api/board-search";
 
 const FORMATS: Readonly<Record<string, { label: string; ending: string }>> = {
   csv: { label: "CSV", ending: "csv" },

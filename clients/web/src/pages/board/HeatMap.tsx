@@ -4,7 +4,8 @@ import type { Board, Row, TaskBoard } from "../../api/queries";
 import { dollars, measured, number, percent } from "../../format";
 import { ModelByTask } from "../../parts/ModelByTask";
 import { cellOf, entriesOf, type Entry } from "./entries";
-import { jobsBehind, type BoardSearch, type Figure } from "./search";
+import type { BoardSearch, Figure } from "../../api/board-search";
+import { jobsBehind } from "../../parts/jobs-behind";
 import { shade, shareOf } from "./shades";
 
 const FIGURES: readonly { value: Figure; label: string }[] = [
@@ -39,7 +40,11 @@ export function HeatMap({ board, search }: { board: Board; search: BoardSearch }
           value={figure}
           onChange={(value) => {
             const chosen = FIGURES.find((one) => one.value === value)?.value;
-            void navigate({ search: (before) => ({ ...before, figure: chosen === "success" ? undefined : chosen }), replace: true, resetScroll: false });
+            void navigate({
+              search: (before) => ({ ...before, figure: chosen === "success" ? undefined : chosen }),
+              replace: true,
+              resetScroll: false,
+            });
           }}
         />
       </Group>
@@ -64,7 +69,9 @@ export function HeatMap({ board, search }: { board: Board; search: BoardSearch }
         rows={entries.map((entry) => ({
           key: entry.key,
           label: entry.label,
-          cells: board.tasks.map((task) => <Cell key={task.task} task={task} entry={entry} figure={figure} entries={entries} search={search} />),
+          cells: board.tasks.map((task) => (
+            <Cell key={task.task} task={task} entry={entry} figure={figure} entries={entries} search={search} />
+          )),
         }))}
       >
         {search.paper === "yes" && <Ghosts board={board} figure={figure} />}
@@ -123,7 +130,8 @@ function Ghosts({ board, figure }: { board: Board; figure: Figure }) {
       </th>
       {board.tasks.map((task) => {
         const row = task.published.find((one) => one.model === name);
-        const value = row === undefined || figure === "cost" ? null : figure === "success" ? row.success_rate : row.indicator_mean;
+        const value =
+          row === undefined || figure === "cost" ? null : figure === "success" ? row.success_rate : row.indicator_mean;
         return (
           <td key={task.task}>
             <span className="heat-cell heat-empty">

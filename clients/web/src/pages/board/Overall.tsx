@@ -4,8 +4,8 @@ import type { Board, OverallView } from "../../api/queries";
 import { count, dollars, number, percent, places } from "../../format";
 import { Interval } from "../../parts/Interval";
 import { entriesOf, keyOf } from "./entries";
-import { sharedRanks } from "./ranks";
-import type { BoardSearch } from "./search";
+import { sharedRanks } from "../../parts/ranks";
+import type { BoardSearch } from "../../api/board-search";
 
 type Entry = Pick<OverallView, "rank" | "rank_low" | "rank_high" | "mean_rank" | "model">;
 
@@ -34,7 +34,13 @@ export function Overall({ board, search }: { board: Board; search: BoardSearch }
         </Table.Thead>
         <Table.Tbody>
           {overall.map((row) => (
-            <OverallRow key={keyOf(row)} row={row} label={labels.get(keyOf(row)) ?? row.model} most={most} tied={row.rank !== null && ties.has(row.rank)} />
+            <OverallRow
+              key={keyOf(row)}
+              row={row}
+              label={labels.get(keyOf(row)) ?? row.model}
+              most={most}
+              tied={row.rank !== null && ties.has(row.rank)}
+            />
           ))}
           {published.map((row) => (
             <Table.Tr key={`paper ${row.model}`} className="ghost">
@@ -81,7 +87,14 @@ function Place({ row, most, tied }: { row: Entry; most: number; tied: boolean })
       </Table.Td>
       <Table.Td>
         <Group gap={8} wrap="nowrap">
-          <Interval low={row.rank_low} high={row.rank_high} value={row.rank} from={1} to={most} label={`place ${interval}`} />
+          <Interval
+            low={row.rank_low}
+            high={row.rank_high}
+            value={row.rank}
+            from={1}
+            to={most}
+            label={`place ${interval}`}
+          />
           <Text size="sm" className="figures" style={{ whiteSpace: "nowrap" }}>
             {interval}
           </Text>

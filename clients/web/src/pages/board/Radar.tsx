@@ -46,20 +46,47 @@ export function Radar({ figures, entries }: { figures: Figures; entries: readonl
       x: { axis: null, domain: [-wide, wide] },
       y: { axis: null, domain: [-edge, edge] },
       marks: [
-        ...RINGS.map((ring) => Plot.line(corners(() => ring), { x: "x", y: "y", strokeOpacity: 0.25, strokeWidth: 1 })),
-        Plot.link(names.map((_, index) => spotOf(index, names.length, 1)), { x1: 0, y1: 0, x2: "x", y2: "y", strokeOpacity: 0.2 }),
-        ...(["start", "middle", "end"] as const).map((textAnchor) =>
-          Plot.text(labels.filter((label) => label.textAnchor === textAnchor), { x: "x", y: "y", text: "name", fontSize: 12, textAnchor }),
+        ...RINGS.map((ring) =>
+          Plot.line(
+            corners(() => ring),
+            { x: "x", y: "y", strokeOpacity: 0.25, strokeWidth: 1 },
+          ),
         ),
-        Plot.text(RINGS.map((ring) => ({ ring: String(ring), ...spotOf(0.5, names.length, 0.86 * ring) })), { x: "x", y: "y", text: "ring", fontSize: 9, fillOpacity: 0.7 }),
-        ...rows.map(({ dimensions }, index) => Plot.line(corners((name) => dimensions[name] ?? 0), { x: "x", y: "y", strokeWidth: 2.2, ...strokeOf(index) })),
+        Plot.link(
+          names.map((_, index) => spotOf(index, names.length, 1)),
+          { x1: 0, y1: 0, x2: "x", y2: "y", strokeOpacity: 0.2 },
+        ),
+        ...(["start", "middle", "end"] as const).map((textAnchor) =>
+          Plot.text(
+            labels.filter((label) => label.textAnchor === textAnchor),
+            { x: "x", y: "y", text: "name", fontSize: 12, textAnchor },
+          ),
+        ),
+        Plot.text(
+          RINGS.map((ring) => ({ ring: String(ring), ...spotOf(0.5, names.length, 0.86 * ring) })),
+          { x: "x", y: "y", text: "ring", fontSize: 9, fillOpacity: 0.7 },
+        ),
+        ...rows.map(({ dimensions }, index) =>
+          Plot.line(
+            corners((name) => dimensions[name] ?? 0),
+            { x: "x", y: "y", strokeWidth: 2.2, ...strokeOf(index) },
+          ),
+        ),
       ],
     };
   };
   if (rows.length === 0) return <Text size="sm">No ranked model has scores along difficulty dimensions.</Text>;
   return (
     <>
-      <Drawing options={options} label={rows.map(({ entry, dimensions }) => `${entry.label}: ${names.map((name) => `${words(name)} ${number(dimensions[name], 2)}`).join(", ")}`).join("; ")} />
+      <Drawing
+        options={options}
+        label={rows
+          .map(
+            ({ entry, dimensions }) =>
+              `${entry.label}: ${names.map((name) => `${words(name)} ${number(dimensions[name], 2)}`).join(", ")}`,
+          )
+          .join("; ")}
+      />
       <Group gap="md" my={6}>
         {rows.map(({ entry }, index) => (
           <Group key={entry.key} gap={6} wrap="nowrap">
@@ -73,7 +100,11 @@ export function Radar({ figures, entries }: { figures: Figures; entries: readonl
       <Text size="xs" className="dimmed" mb={4}>
         From 0 (last on every task) to 1 (first), weighted by what the tasks ask for.
       </Text>
-      <DataTable name="Difficulty dimensions" columns={["Model", ...names.map(words)]} rows={rows.map(({ entry, dimensions }) => [entry.label, ...names.map((name) => number(dimensions[name], 2))])} />
+      <DataTable
+        name="Difficulty dimensions"
+        columns={["Model", ...names.map(words)]}
+        rows={rows.map(({ entry, dimensions }) => [entry.label, ...names.map((name) => number(dimensions[name], 2))])}
+      />
     </>
   );
 }

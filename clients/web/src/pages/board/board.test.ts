@@ -1,33 +1,38 @@
 import { describe, expect, it } from "vitest";
 import { boardQuery } from "../../api/queries";
 import { exportPath } from "./Exports";
-import { sharedRanks } from "./ranks";
+import { sharedRanks } from "../../parts/ranks";
 import { partsOf } from "./Failures";
 import { spotOf } from "./Radar";
-import { jobsBehind, readSearch } from "./search";
+import { readSearch } from "../../api/board-search";
+import { jobsBehind } from "../../parts/jobs-behind";
 import { shade, shareOf } from "./shades";
 
 describe("readSearch", () => {
   it("reads every switch, and one task as a list", () => {
-    const raw = { track: "t", task: "lift-1", reading: "published", since: "2026-01-02", figure: "cost", paper: "yes" };
+    const raw = { track: "t", task: "lift-1", policy: "published", since: "2026-01-02", figure: "cost", paper: "yes" };
     expect(readSearch(raw)).toMatchObject({ ...raw, task: ["lift-1"] });
   });
 
-  it.each([{ reading: "mine" }, { since: "yesterday" }, { task: [1, null, ""] }, { figure: {} }, { track: 7 }])(
-    "drops what makes no sense: %j",
-    (raw) => {
-      expect(Object.values(readSearch(raw)).filter((value) => value !== undefined)).toEqual([]);
-    },
-  );
+  it.each([
+    { policy: "mine" },
+    { reading: "mine" },
+    { since: "yesterday" },
+    { task: [1, null, ""] },
+    { figure: {} },
+    { track: 7 },
+  ])("drops what makes no sense: %j", (raw) => {
+    expect(Object.values(readSearch(raw)).filter((value) => value !== undefined)).toEqual([]);
+  });
 });
 
 describe("exports", () => {
   it("ask for exactly what is shown", () => {
-    const path = exportPath("a/b&c", { task: ["x", "y"], reading: "published", figure: "cost" }, "csv");
+    const path = exportPath("a/b&c", { task: ["x", "y"], policy: "published", figure: "cost" }, "csv");
     const words = new URL(path, "http://here").searchParams;
     expect(words.getAll("task")).toEqual(["x", "y"]);
     expect(words.get("track")).toBe("a/b&c");
-    expect(words.get("reading")).toBe("published");
+    expect(words.get("policy")).toBe("published");
     expect(words.has("figure")).toBe(false);
   });
 
@@ -57,8 +62,16 @@ describe("drawings", () => {
     expect(spotOf(2, 4, 1).y).toBeCloseTo(-1);
   });
   it("share a model's jobs out completely, the most frequent first", () => {
-    const parts = partsOf([{ label: "a", counts: { one: 1, two_x: 3 } }, { label: "b", counts: {} }, { label: "c", counts: { one: 1 } }]);
-    expect(parts.map((part) => [part.label, part.name, part.share])).toEqual([["a", "two x", 0.75], ["a", "one", 0.25], ["c", "one", 1]]);
+    const parts = partsOf([
+      { label: "a", counts: { one: 1, two_x: 3 } },
+      { label: "b", counts: {} },
+      { label: "c", counts: { one: 1 } },
+    ]);
+    expect(parts.map((part) => [part.label, part.name, part.share])).toEqual([
+      ["a", "two x", 0.75],
+      ["a", "one", 0.25],
+      ["c", "one", 1],
+    ]);
   });
 });
 describe("a cell", () => {

@@ -12,7 +12,8 @@ import { builtAt, ghostsOf, rangeOf, stepsOf, touchedBy, type Replay } from "../
 /** Two machines that grow in step, seen by cameras that turn together. */
 export default function Builds({ jobs }: { jobs: readonly [JobDetail, JobDetail] }) {
   const [first, second] = useQueries({ queries: [replayQuery(jobs[0].id), replayQuery(jobs[1].id)] });
-  if (first.data === undefined || second.data === undefined) return first.isError || second.isError ? <Empty title="The builds could not be read" /> : <Loading rows={10} />;
+  if (first.data === undefined || second.data === undefined)
+    return first.isError || second.isError ? <Empty title="The builds could not be read" /> : <Loading rows={10} />;
   return <InStep replays={[first.data, second.data]} />;
 }
 
@@ -29,17 +30,47 @@ function InStep({ replays }: { replays: readonly [Replay | null, Replay | null] 
     <Stack gap="xs">
       <SimpleGrid cols={{ base: 1, sm: 2 }}>
         {steps.map((own, side) => (
-          <OneBuild key={side} name={side === 0 ? "A" : "B"} steps={own} at={Math.min(at, own.length - 1)} lock={lock} />
+          <OneBuild
+            key={side}
+            name={side === 0 ? "A" : "B"}
+            steps={own}
+            at={Math.min(at, own.length - 1)}
+            lock={lock}
+          />
         ))}
       </SimpleGrid>
       <Group wrap="nowrap" gap="xs">
-        <ActionIcon variant="default" size="lg" aria-label="One step back" disabled={at === 0} onClick={() => { go(at - 1); }}>
+        <ActionIcon
+          variant="default"
+          size="lg"
+          aria-label="One step back"
+          disabled={at === 0}
+          onClick={() => {
+            go(at - 1);
+          }}
+        >
           <IconChevronLeft size={18} aria-hidden />
         </ActionIcon>
-        <ActionIcon variant="default" size="lg" aria-label="One step on" disabled={at === last} onClick={() => { go(at + 1); }}>
+        <ActionIcon
+          variant="default"
+          size="lg"
+          aria-label="One step on"
+          disabled={at === last}
+          onClick={() => {
+            go(at + 1);
+          }}
+        >
           <IconChevronRight size={18} aria-hidden />
         </ActionIcon>
-        <Slider style={{ flex: 1 }} min={0} max={last} value={at} onChange={go} label={(value) => `step ${value + 1}`} thumbLabel="Step of both builds" />
+        <Slider
+          style={{ flex: 1 }}
+          min={0}
+          max={last}
+          value={at}
+          onChange={go}
+          label={(value) => `step ${value + 1}`}
+          thumbLabel="Step of both builds"
+        />
         <Text size="sm" className="figures">
           {at + 1} / {last + 1}
         </Text>
@@ -48,7 +79,17 @@ function InStep({ replays }: { replays: readonly [Replay | null, Replay | null] 
   );
 }
 
-function OneBuild({ name, steps, at, lock }: { name: string; steps: ReturnType<typeof stepsOf>; at: number; lock: CameraLock }) {
+function OneBuild({
+  name,
+  steps,
+  at,
+  lock,
+}: {
+  name: string;
+  steps: ReturnType<typeof stepsOf>;
+  at: number;
+  lock: CameraLock;
+}) {
   const step = steps[at];
   const parts = useMemo(() => builtAt(steps, at).parts, [steps, at]);
   const whole = useMemo(() => builtAt(steps, rangeOf(steps, step?.chapter ?? -1)?.[1] ?? -1).parts, [steps, step]);
@@ -56,10 +97,21 @@ function OneBuild({ name, steps, at, lock }: { name: string; steps: ReturnType<t
   const marked = useMemo(() => (at === steps.length - 1 ? new Set<string>() : touchedBy(step)), [at, steps, step]);
   return (
     <div>
-      <BuildScene parts={parts} whole={whole} ghosts={ghosts} chosen={marked} subject={String(step?.chapter)} label={`${name} after step ${at + 1}: ${parts.size} parts`} height={340} lock={lock} />
+      <BuildScene
+        parts={parts}
+        whole={whole}
+        ghosts={ghosts}
+        chosen={marked}
+        subject={String(step?.chapter)}
+        label={`${name} after step ${at + 1}: ${parts.size} parts`}
+        height={340}
+        lock={lock}
+      />
       <Text size="xs" mt={4}>
         <b>{name}</b>{" "}
-        {step === undefined ? "built nothing" : `step ${at + 1} of ${steps.length}: ${step.action}, ${step.accepted ? "accepted" : `refused (${step.reason?.replaceAll("_", " ") ?? ""})`}; ${parts.size} parts`}
+        {step === undefined
+          ? "built nothing"
+          : `step ${at + 1} of ${steps.length}: ${step.action}, ${step.accepted ? "accepted" : `refused (${step.reason?.replaceAll("_", " ") ?? ""})`}; ${parts.size} parts`}
       </Text>
     </div>
   );

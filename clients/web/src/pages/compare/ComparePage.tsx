@@ -15,8 +15,12 @@ export default function ComparePage() {
   return (
     <Stack gap="lg">
       <Title order={1}>Compare</Title>
-      {search.a !== undefined && search.b !== undefined && <ComparedJobs key={`${search.a} ${search.b}`} ids={[search.a, search.b]} />}
-      {first !== undefined && first !== "" && second !== undefined && second !== "" && <ComparedModels first={first} second={second} track={search.track} />}
+      {search.a !== undefined && search.b !== undefined && (
+        <ComparedJobs key={`${search.a} ${search.b}`} ids={[search.a, search.b]} />
+      )}
+      {first !== undefined && first !== "" && second !== undefined && second !== "" && (
+        <ComparedModels first={first} second={second} track={search.track} />
+      )}
       <Chooser key={JSON.stringify(search)} search={search} />
     </Stack>
   );
@@ -61,7 +65,16 @@ function Chooser({ search }: { search: CompareSearch }) {
         }}
       >
         <Group align="end">
-          <TextInput label="Two models" placeholder="maker/one, maker/other" value={models} onChange={(event) => { setModels(event.currentTarget.value); }} w={400} maw="100%" />
+          <TextInput
+            label="Two models"
+            placeholder="maker/one, maker/other"
+            value={models}
+            onChange={(event) => {
+              setModels(event.currentTarget.value);
+            }}
+            w={400}
+            maw="100%"
+          />
           <Button type="submit" variant="default" disabled={named.length !== 2}>
             Compare models
           </Button>

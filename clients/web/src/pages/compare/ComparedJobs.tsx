@@ -18,7 +18,16 @@ const Trials = lazy(() => import("./Trials"));
 export function ComparedJobs({ ids }: { ids: readonly [string, string] }) {
   const [first, second] = useQueries({ queries: [jobQuery(ids[0]), jobQuery(ids[1])] });
   const error = first.error ?? second.error;
-  if (error !== null) return <ProblemNote error={error} retry={() => { void first.refetch(); void second.refetch(); }} />;
+  if (error !== null)
+    return (
+      <ProblemNote
+        error={error}
+        retry={() => {
+          void first.refetch();
+          void second.refetch();
+        }}
+      />
+    );
   if (first.data === undefined || second.data === undefined) return <Loading rows={10} />;
   return <Both jobs={[first.data, second.data]} />;
 }
@@ -32,7 +41,18 @@ function Both({ jobs }: { jobs: readonly [JobDetail, JobDetail] }) {
     <Stack gap="lg">
       <Section
         title="Facts"
-        aside={<SegmentedControl size="xs" aria-label="Which facts" value={differing} onChange={setDiffering} data={[{ value: "all", label: "All" }, { value: "differing", label: "Only what differs" }]} />}
+        aside={
+          <SegmentedControl
+            size="xs"
+            aria-label="Which facts"
+            value={differing}
+            onChange={setDiffering}
+            data={[
+              { value: "all", label: "All" },
+              { value: "differing", label: "Only what differs" },
+            ]}
+          />
+        }
       >
         <div style={{ overflowX: "auto" }} tabIndex={0} role="region" aria-label="Facts of both jobs, scrolls">
           <Table miw={300} style={{ overflowWrap: "anywhere" }}>
@@ -62,7 +82,9 @@ function Both({ jobs }: { jobs: readonly [JobDetail, JobDetail] }) {
             </Table.Tbody>
           </Table>
         </div>
-        {jobs[0].task !== jobs[1].task && <Text size="sm">They are of different tasks, so their indicators say nothing about each other.</Text>}
+        {jobs[0].task !== jobs[1].task && (
+          <Text size="sm">They are of different tasks, so their indicators say nothing about each other.</Text>
+        )}
       </Section>
       <Section title="Machines">
         <Tabs defaultValue="builds" keepMounted={false}>

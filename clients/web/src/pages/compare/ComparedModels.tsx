@@ -14,7 +14,10 @@ const comparison = (first: string, second: string, track: string | undefined) =>
   queryOptions({
     queryKey: ["compare", first, second, track ?? ""],
     // The generated client takes pairs for lists of any length.
-    queryFn: async () => (await taken(client.GET("/v1/leaderboard/compare", { params: { query: { first, second, track } } }))) as Comparison,
+    queryFn: async () =>
+      (await taken(
+        client.GET("/v1/leaderboard/compare", { params: { query: { first, second, track } } }),
+      )) as Comparison,
   });
 
 async function endedJobs(model: string, task: string): Promise<JobView[]> {
@@ -43,7 +46,8 @@ export function differing(a: readonly JobView[], b: readonly JobView[], track: s
   const others = new Map(b.filter((job) => job.track === track).map((job) => [key(job), job]));
   return a.flatMap((job): [JobView, JobView][] => {
     const other = others.get(key(job));
-    const apart = other !== undefined && job.track === track && (job.outcome === "success") !== (other.outcome === "success");
+    const apart =
+      other !== undefined && job.track === track && (job.outcome === "success") !== (other.outcome === "success");
     return apart ? [[job, other]] : [];
   });
 }
@@ -138,7 +142,12 @@ function Cases({ found }: { found: Comparison }) {
         pairs.length === 0 ? (
           <Text size="sm">On every shared seed both succeeded or both failed.</Text>
         ) : (
-          <div style={{ overflow: "auto", maxHeight: 480 }} tabIndex={0} role="region" aria-label="Cases where they differ, scrolls">
+          <div
+            style={{ overflow: "auto", maxHeight: 480 }}
+            tabIndex={0}
+            role="region"
+            aria-label="Cases where they differ, scrolls"
+          >
             <Table miw={620}>
               <Table.Thead>
                 <Table.Tr>
@@ -157,7 +166,8 @@ function Cases({ found }: { found: Comparison }) {
                     </Table.Td>
                     {[a, b].map((job) => (
                       <Table.Td key={job.id}>
-                        <OutcomeBadge value={job.outcome ?? job.state} size="sm" /> {number(job.indicator)} <span className="dimmed">{job.reason === null ? "" : words(job.reason)}</span>
+                        <OutcomeBadge value={job.outcome ?? job.state} size="sm" /> {number(job.indicator)}{" "}
+                        <span className="dimmed">{job.reason === null ? "" : words(job.reason)}</span>
                       </Table.Td>
                     ))}
                   </Table.Tr>

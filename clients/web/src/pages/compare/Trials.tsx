@@ -16,10 +16,20 @@ export default function Trials({ jobs }: { jobs: readonly [JobDetail, JobDetail]
   const [a, b] = jobs.map((job) => rolloutsOf(job.artifacts).at(-1) ?? 0) as [number, number];
   const [firstScene, secondScene] = useQueries({ queries: [sceneQuery(jobs[0].id, a), sceneQuery(jobs[1].id, b)] });
   const [first, second] = useQueries({
-    queries: [trialQuery(jobs[0].id, a, jobs[0].artifacts[`trajectory-${a}`]), trialQuery(jobs[1].id, b, jobs[1].artifacts[`trajectory-${b}`])],
+    queries: [
+      trialQuery(jobs[0].id, a, jobs[0].artifacts[`trajectory-${a}`]),
+      trialQuery(jobs[1].id, b, jobs[1].artifacts[`trajectory-${b}`]),
+    ],
   });
-  if ([firstScene, secondScene, first, second].some((query) => query.isError)) return <Empty title="A trial could not be read" />;
-  if (firstScene.data === undefined || secondScene.data === undefined || first.data === undefined || second.data === undefined) return <Loading rows={10} />;
+  if ([firstScene, secondScene, first, second].some((query) => query.isError))
+    return <Empty title="A trial could not be read" />;
+  if (
+    firstScene.data === undefined ||
+    secondScene.data === undefined ||
+    first.data === undefined ||
+    second.data === undefined
+  )
+    return <Loading rows={10} />;
   return <InStep scenes={[firstScene.data, secondScene.data]} trials={[first.data, second.data]} />;
 }
 
@@ -38,14 +48,34 @@ function InStep({ scenes, trials }: { scenes: readonly [Scene, Scene]; trials: r
               <Text size="sm" fw={650}>
                 {side === 0 ? "A" : "B"}
               </Text>
-              {machine === null ? <Empty title="It had no machine" /> : <TrialScene scene={machine} scenario={scenario} trial={trial} clock={clock} loads={loads} follow={false} height={320} lock={lock} />}
+              {machine === null ? (
+                <Empty title="It had no machine" />
+              ) : (
+                <TrialScene
+                  scene={machine}
+                  scenario={scenario}
+                  trial={trial}
+                  clock={clock}
+                  loads={loads}
+                  follow={false}
+                  height={320}
+                  lock={lock}
+                />
+              )}
             </div>
           );
         })}
       </SimpleGrid>
       <TimeLine clock={clock} end={end} breaks={[...trials[0].breaks, ...trials[1].breaks]} />
       <Group>
-        <Switch size="sm" label="Loads on joints" checked={loads} onChange={(event) => { setLoads(event.currentTarget.checked); }} />
+        <Switch
+          size="sm"
+          label="Loads on joints"
+          checked={loads}
+          onChange={(event) => {
+            setLoads(event.currentTarget.checked);
+          }}
+        />
         {loads && <Legend whole={trials.some((trial) => trial.loads === null)} />}
       </Group>
       <SimpleGrid cols={{ base: 1, sm: 2 }}>

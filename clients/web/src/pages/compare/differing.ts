@@ -22,7 +22,8 @@ export function aligned(first: readonly string[], second: readonly string[]): Pa
   let [i, j] = [0, 0];
   while (i < n && j < m) {
     if (first[i] === second[j]) pairs.push({ a: i++, b: j++, same: true });
-    else if ((longest[(i + 1) * width + j] ?? 0) >= (longest[i * width + j + 1] ?? 0)) pairs.push({ a: i++, b: null, same: false });
+    else if ((longest[(i + 1) * width + j] ?? 0) >= (longest[i * width + j + 1] ?? 0))
+      pairs.push({ a: i++, b: null, same: false });
     else pairs.push({ a: null, b: j++, same: false });
   }
   while (i < n) pairs.push({ a: i++, b: null, same: false });
@@ -35,7 +36,8 @@ function beside(pairs: readonly Pair[]): Pair[] {
   const rows: Pair[] = [];
   let [a, b]: [number[], number[]] = [[], []];
   const close = (): void => {
-    for (let k = 0; k < Math.max(a.length, b.length); k += 1) rows.push({ a: a[k] ?? null, b: b[k] ?? null, same: false });
+    for (let k = 0; k < Math.max(a.length, b.length); k += 1)
+      rows.push({ a: a[k] ?? null, b: b[k] ?? null, same: false });
     [a, b] = [[], []];
   };
   for (const pair of pairs) {

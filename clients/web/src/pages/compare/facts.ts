@@ -22,7 +22,11 @@ function told(job: JobDetail): [string, string][] {
     ["Took", duration(secondsBetween(job.started_at, job.finished_at))],
     ["Track", job.track],
     ...Object.entries(job.metrics ?? {}).flatMap(([name, value]): [string, string][] =>
-      typeof value === "number" ? [[words(name), number(value, Number.isInteger(value) ? 0 : 2)]] : typeof value === "boolean" ? [[words(name), value ? "yes" : "no"]] : [],
+      typeof value === "number"
+        ? [[words(name), number(value, Number.isInteger(value) ? 0 : 2)]]
+        : typeof value === "boolean"
+          ? [[words(name), value ? "yes" : "no"]]
+          : [],
     ),
   ];
 }
@@ -30,5 +34,9 @@ function told(job: JobDetail): [string, string][] {
 /** What is told of two jobs, fact by fact; "–" where one has no such fact. */
 export function factsOf(first: JobDetail, second: JobDetail): Fact[] {
   const [a, b] = [new Map(told(first)), new Map(told(second))];
-  return [...new Set([...a.keys(), ...b.keys()])].map((name) => ({ name, a: a.get(name) ?? "–", b: b.get(name) ?? "–" }));
+  return [...new Set([...a.keys(), ...b.keys()])].map((name) => ({
+    name,
+    a: a.get(name) ?? "–",
+    b: b.get(name) ?? "–",
+  }));
 }

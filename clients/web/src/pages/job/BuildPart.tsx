@@ -1,5 +1,12 @@
 import { ActionIcon, Alert, Anchor, Code, Group, Select, Slider, Stack, Text } from "@mantine/core";
-import { IconChevronLeft, IconChevronRight, IconPlayerPause, IconPlayerPlay, IconPlayerSkipBack, IconPlayerSkipForward } from "@tabler/icons-react";
+import {
+  IconChevronLeft,
+  IconChevronRight,
+  IconPlayerPause,
+  IconPlayerPlay,
+  IconPlayerSkipBack,
+  IconPlayerSkipForward,
+} from "@tabler/icons-react";
 import { lazy, Suspense, useEffect, useState, type KeyboardEvent } from "react";
 import { words } from "../../format";
 import { Loading } from "../../parts/States";
@@ -43,8 +50,14 @@ export function BuildPart({ build, onBuilt }: { build: Build; onBuilt?: () => vo
       <Chapters build={build} />
       <Told build={build} />
       <ChosenPart build={build} />
-      {build.replay?.complete === false && <Text size="xs">The session has too many steps to show: the last are left out.</Text>}
-      {build.replay?.exact === false && <Text size="xs">Done again by this version of the geometry library, the steps do not end in exactly the kept machine.</Text>}
+      {build.replay?.complete === false && (
+        <Text size="xs">The session has too many steps to show: the last are left out.</Text>
+      )}
+      {build.replay?.exact === false && (
+        <Text size="xs">
+          Done again by this version of the geometry library, the steps do not end in exactly the kept machine.
+        </Text>
+      )}
     </Stack>
   );
 }
@@ -68,7 +81,16 @@ function Buttons({ build, onBuilt }: { build: Build; onBuilt?: () => void }) {
     };
   }, [playing, at, last, go, onBuilt]);
   const button = (label: string, icon: React.ReactNode, to: number) => (
-    <ActionIcon variant="default" size="lg" aria-label={label} disabled={to < 0 || to > last || to === at} onClick={() => { setPlaying(false); go(to); }}>
+    <ActionIcon
+      variant="default"
+      size="lg"
+      aria-label={label}
+      disabled={to < 0 || to > last || to === at}
+      onClick={() => {
+        setPlaying(false);
+        go(to);
+      }}
+    >
       {icon}
     </ActionIcon>
   );
@@ -93,7 +115,10 @@ function Buttons({ build, onBuilt }: { build: Build; onBuilt?: () => void }) {
         min={0}
         max={Math.max(0, last)}
         value={at}
-        onChange={(to) => { setPlaying(false); go(to); }}
+        onChange={(to) => {
+          setPlaying(false);
+          go(to);
+        }}
         label={(value) => `step ${value + 1}`}
         thumbLabel="Step of the build"
       />
@@ -109,7 +134,9 @@ function Chapters({ build }: { build: Build }) {
   if (chapters.length < 2) return null;
   const data = chapters.flatMap((chapter, index) => {
     const range = rangeOf(build.steps, index);
-    return range === null ? [] : [{ value: String(index), label: `${chapterTitle(chapter)} (steps ${range[0] + 1} to ${range[1] + 1})` }];
+    return range === null
+      ? []
+      : [{ value: String(index), label: `${chapterTitle(chapter)} (steps ${range[0] + 1} to ${range[1] + 1})` }];
   });
   return (
     <Select
@@ -154,23 +181,49 @@ function Told({ build }: { build: Build }) {
       <Text size="sm" style={{ whiteSpace: "pre-wrap", overflowWrap: "anywhere" }}>
         {step.text}
       </Text>
-      <Text size="xs">{step.attempted.length > 0 ? "The see-through block with drawn edges is where it would have been." : "Where it would have been is not known."}</Text>
+      <Text size="xs">
+        {step.attempted.length > 0
+          ? "The see-through block with drawn edges is where it would have been."
+          : "Where it would have been is not known."}
+      </Text>
     </Alert>
   );
 }
 
 function ChosenPart({ build }: { build: Build }) {
   const part = build.part === undefined ? undefined : build.parts.get(build.part);
-  if (part === undefined) return <Text size="xs" className="dimmed">Drag to turn, scroll to come closer, click a part to see what made it. Arrow keys step.</Text>;
+  if (part === undefined)
+    return (
+      <Text size="xs" className="dimmed">
+        Drag to turn, scroll to come closer, click a part to see what made it. Arrow keys step.
+      </Text>
+    );
   const bindings = Object.entries(part.bindings).filter(([, keys]) => keys.length > 0);
   const { madeBy } = build;
   return (
-    <Alert color="pink" py="xs" title={`${part.id}: ${part.module}`} withCloseButton closeButtonLabel="Choose no part" onClose={() => { build.choose(undefined); }}>
+    <Alert
+      color="pink"
+      py="xs"
+      title={`${part.id}: ${part.module}`}
+      withCloseButton
+      closeButtonLabel="Choose no part"
+      onClose={() => {
+        build.choose(undefined);
+      }}
+    >
       <Text size="sm">
-        Its root is at ({part.position.map((value) => value.toFixed(2)).join(", ")}).{part.flipped ? " Its spin is flipped." : ""}
+        Its root is at ({part.position.map((value) => value.toFixed(2)).join(", ")}).
+        {part.flipped ? " Its spin is flipped." : ""}
         {bindings.map(([action, keys]) => ` ${action}: ${keys.join(", ")}.`).join("")}{" "}
         {madeBy !== undefined && (
-          <Anchor component="button" type="button" inherit onClick={() => { build.go(madeBy); }}>
+          <Anchor
+            component="button"
+            type="button"
+            inherit
+            onClick={() => {
+              build.go(madeBy);
+            }}
+          >
             Step {madeBy + 1} made it.
           </Anchor>
         )}

@@ -25,8 +25,17 @@ export function JobHead({ job }: { job: JobDetail }) {
           <OutcomeBadge value={job.outcome ?? job.state} size="lg" />
         </Group>
         <Text size="sm" className="dimmed">
-          <span style={{ fontFamily: "monospace", overflowWrap: "anywhere" }}>{job.id}</span> · seed {job.seed} · {trackLabel(job.track)} ·{" "}
-          {job.finished_at === null ? <>submitted <Ago time={job.created_at} /></> : <>ended <Ago time={job.finished_at} /></>}
+          <span style={{ fontFamily: "monospace", overflowWrap: "anywhere" }}>{job.id}</span> · seed {job.seed} ·{" "}
+          {trackLabel(job.track)} ·{" "}
+          {job.finished_at === null ? (
+            <>
+              submitted <Ago time={job.created_at} />
+            </>
+          ) : (
+            <>
+              ended <Ago time={job.finished_at} />
+            </>
+          )}
         </Text>
         {job.reason !== null && (
           <Text size="sm" mt={4}>
@@ -44,22 +53,40 @@ export function JobHead({ job }: { job: JobDetail }) {
 export function JobFacts({ job }: { job: JobDetail }) {
   const task = useQuery(taskQuery(job.task, job.task_version));
   const unit = task.data?.unit === "1" ? "" : (task.data?.unit ?? "");
-  const metrics = Object.entries(job.metrics ?? {}).filter(([, value]) => typeof value === "number" || typeof value === "boolean");
+  const metrics = Object.entries(job.metrics ?? {}).filter(
+    ([, value]) => typeof value === "number" || typeof value === "boolean",
+  );
   return (
     <Paper withBorder p="md" component="section" aria-label="Score and usage">
       <SimpleGrid cols={{ base: 2, sm: 3, md: 6 }} spacing="sm">
-        <Fact name={words(task.data?.indicator ?? "indicator")} value={`${job.censored ? "≥ " : ""}${number(job.indicator)}`} note={unit} strong />
+        <Fact
+          name={words(task.data?.indicator ?? "indicator")}
+          value={`${job.censored ? "≥ " : ""}${number(job.indicator)}`}
+          note={unit}
+          strong
+        />
         <Fact name="Actions" value={count(job.actions)} note={`${count(job.refused_actions)} refused`} />
         <Fact name="Model requests" value={count(job.usage.requests)} note="" />
-        <Fact name="Tokens" value={job.usage.input_tokens === null ? "–" : `${compact(job.usage.input_tokens)} in`} note={job.usage.output_tokens === null ? "" : `${compact(job.usage.output_tokens)} out`} />
+        <Fact
+          name="Tokens"
+          value={job.usage.input_tokens === null ? "–" : `${compact(job.usage.input_tokens)} in`}
+          note={job.usage.output_tokens === null ? "" : `${compact(job.usage.output_tokens)} out`}
+        />
         <Fact name="Cost" value={dollars(job.usage.cost_usd)} note="" />
-        <Fact name="Took" value={duration(secondsBetween(job.started_at, job.finished_at))} note={`${job.attempts.length} attempts`} />
+        <Fact
+          name="Took"
+          value={duration(secondsBetween(job.started_at, job.finished_at))}
+          note={`${job.attempts.length} attempts`}
+        />
       </SimpleGrid>
       {metrics.length > 0 && (
         <Group gap="md" mt="sm">
           {metrics.map(([name, value]) => (
             <Text key={name} size="sm">
-              <span className="dimmed">{words(name)}</span> <span className="figures">{typeof value === "number" ? number(value, Number.isInteger(value) ? 0 : 2) : String(value)}</span>
+              <span className="dimmed">{words(name)}</span>{" "}
+              <span className="figures">
+                {typeof value === "number" ? number(value, Number.isInteger(value) ? 0 : 2) : String(value)}
+              </span>
             </Text>
           ))}
         </Group>
@@ -84,7 +111,7 @@ function Flags({ job }: { job: JobDetail }) {
             </Badge>
             <Text size="sm">
               {meanings.get(name)?.meaning ?? ""}
-              {meanings.get(name)?.disqualifying ? " It counts as a failure in our reading." : ""}
+              {meanings.get(name)?.disqualifying ? " It counts as a failure under our scoring policy." : ""}
             </Text>
           </Group>
         </Alert>

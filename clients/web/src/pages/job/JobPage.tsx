@@ -50,7 +50,14 @@ function Live({ state }: { state: StreamState | "ended" }) {
   if (state === "ended") return null;
   const [colour, text] = LIVE[state];
   return (
-    <Badge color={colour} variant="outline" tt="none" role="status" data-live={state} styles={{ root: { color: "inherit" } }}>
+    <Badge
+      color={colour}
+      variant="outline"
+      tt="none"
+      role="status"
+      data-live={state}
+      styles={{ root: { color: "inherit" } }}
+    >
       {text}
     </Badge>
   );
@@ -92,9 +99,21 @@ function Room({ job }: { job: JobDetail }) {
             <Answered query={replay} rows={10}>
               {(found) =>
                 found === null || build.steps.length === 0 ? (
-                  <Empty title={ended ? "Nothing was built" : "Nothing is built yet"}>{job.detail ?? (ended ? "No action reached a machine." : "The first action shows here as soon as it is taken.")}</Empty>
+                  <Empty title={ended ? "Nothing was built" : "Nothing is built yet"}>
+                    {job.detail ??
+                      (ended ? "No action reached a machine." : "The first action shows here as soon as it is taken.")}
+                  </Empty>
                 ) : (
-                  <BuildPart build={build} onBuilt={ended && trials.length > 0 ? () => { show("trial", true); } : undefined} />
+                  <BuildPart
+                    build={build}
+                    onBuilt={
+                      ended && trials.length > 0
+                        ? () => {
+                            show("trial", true);
+                          }
+                        : undefined
+                    }
+                  />
                 )
               }
             </Answered>
@@ -106,7 +125,13 @@ function Room({ job }: { job: JobDetail }) {
       </Section>
       <Section title="Transcript">
         <Answered query={transcript}>
-          {(found) => (found === null || found.turns.length === 0 ? <Empty title={ended ? "This job has no transcript" : "No turn was taken yet"} /> : <TranscriptView turns={found.turns} build={build} />)}
+          {(found) =>
+            found === null || found.turns.length === 0 ? (
+              <Empty title={ended ? "This job has no transcript" : "No turn was taken yet"} />
+            ) : (
+              <TranscriptView turns={found.turns} build={build} />
+            )
+          }
         </Answered>
       </Section>
     </div>

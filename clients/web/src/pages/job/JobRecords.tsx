@@ -23,18 +23,20 @@ export function JobRecords({ job }: { job: JobDetail }) {
         <Section title="Manifest">
           <details>
             <summary style={{ cursor: "pointer" }}>Versions of everything that can change this result</summary>
-          <Table fz="sm">
-            <Table.Tbody>
-              {flattened(job.manifest).map(([name, value]) => (
-                <Table.Tr key={name}>
-                  <Table.Th fw={500} scope="row">
-                    {name}
-                  </Table.Th>
-                  <Table.Td style={{ overflowWrap: "anywhere", fontFamily: "monospace", fontSize: 12 }}>{value}</Table.Td>
-                </Table.Tr>
-              ))}
-            </Table.Tbody>
-          </Table>
+            <Table fz="sm">
+              <Table.Tbody>
+                {flattened(job.manifest).map(([name, value]) => (
+                  <Table.Tr key={name}>
+                    <Table.Th fw={500} scope="row">
+                      {name}
+                    </Table.Th>
+                    <Table.Td style={{ overflowWrap: "anywhere", fontFamily: "monospace", fontSize: 12 }}>
+                      {value}
+                    </Table.Td>
+                  </Table.Tr>
+                ))}
+              </Table.Tbody>
+            </Table>
           </details>
         </Section>
       )}
@@ -75,8 +77,15 @@ function Files({ job }: { job: JobDetail }) {
                       leftSection={<IconDownload size={14} aria-hidden />}
                       aria-label={`Save ${file.name}`}
                       onClick={() => {
-                        const ending = file.media_type.includes("json") ? "json" : file.media_type.includes("parquet") ? "parquet" : "bin";
-                        download(`/v1/jobs/${job.id}/artifacts/${encodeURIComponent(file.name)}`, `${job.id}-${file.name}.${ending}`).catch(setError);
+                        const ending = file.media_type.includes("json")
+                          ? "json"
+                          : file.media_type.includes("parquet")
+                            ? "parquet"
+                            : "bin";
+                        download(
+                          `/v1/jobs/${job.id}/artifacts/${encodeURIComponent(file.name)}`,
+                          `${job.id}-${file.name}.${ending}`,
+                        ).catch(setError);
                       }}
                     >
                       Save

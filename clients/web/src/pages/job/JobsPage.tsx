@@ -8,7 +8,7 @@ import { words } from "../../format";
 import { JobsTable } from "../../parts/JobsTable";
 import { ProblemNote } from "../../parts/Problem";
 import { Empty, Loading, Stale } from "../../parts/States";
-import type { JobsSearch } from "./search";
+import type { JobsSearch } from "../../api/jobs-search";
 
 const route = getRouteApi("/jobs");
 const PAGE = 200;
@@ -25,7 +25,7 @@ export default function JobsPage() {
     queryFn: ({ pageParam }) => taken(jobPage({ ...search, limit: PAGE, cursor: pageParam })),
     initialPageParam: undefined as string | undefined,
     getNextPageParam: (page) => page.next_cursor ?? undefined,
-    refetchInterval: (running) => ((running.state.data?.pages.length ?? 1) === 1 && every(REFRESH_MS)),
+    refetchInterval: (running) => (running.state.data?.pages.length ?? 1) === 1 && every(REFRESH_MS),
   });
   const jobs = (query.data?.pages ?? []).flatMap((page) => page.jobs);
   const more = (): void => {
@@ -35,10 +35,14 @@ export default function JobsPage() {
     <Stack gap="md">
       <Title order={1}>Jobs</Title>
       <Filters search={search} />
-      {query.isError && query.data === undefined && <ProblemNote error={query.error} retry={() => void query.refetch()} />}
+      {query.isError && query.data === undefined && (
+        <ProblemNote error={query.error} retry={() => void query.refetch()} />
+      )}
       {query.isError && query.data !== undefined && <Stale since={query.dataUpdatedAt} />}
       {query.isPending && <Loading rows={10} />}
-      {query.data !== undefined && jobs.length === 0 && <Empty title="No job is like that">Take a filter away to see more.</Empty>}
+      {query.data !== undefined && jobs.length === 0 && (
+        <Empty title="No job is like that">Take a filter away to see more.</Empty>
+      )}
       {jobs.length > 0 && (
         <>
           <JobsTable jobs={jobs} onEnd={more} />
@@ -67,7 +71,9 @@ function Filters({ search }: { search: JobsSearch }) {
     ["state", "State", STATES],
     ["outcome", "Outcome", OUTCOMES],
   ];
-  const others = (["sweep", "reason", "flag", "track", "task_version", "configuration", "since", "until"] as const).filter((name) => search[name] !== undefined && search[name] !== null);
+  const others = (
+    ["sweep", "reason", "flag", "track", "task_version", "configuration", "since", "until"] as const
+  ).filter((name) => search[name] !== undefined && search[name] !== null);
   const set = (name: keyof JobsSearch, value: string | null): void => {
     void navigate({ search: (before) => ({ ...before, [name]: value ?? undefined }), replace: true });
   };
@@ -77,7 +83,10 @@ function Filters({ search }: { search: JobsSearch }) {
         <Select
           key={name}
           label={label}
-          data={[...new Set([...data, ...(search[name] ? [search[name]] : [])])].map((value) => ({ value, label: words(value) }))}
+          data={[...new Set([...data, ...(search[name] ? [search[name]] : [])])].map((value) => ({
+            value,
+            label: words(value),
+          }))}
           value={search[name] ?? null}
           placeholder="all"
           clearable

@@ -23,13 +23,20 @@ export function TranscriptView({ turns, build }: { turns: readonly Turn[]; build
     overscan: 4,
     gap: 10,
   });
-  useInStep(build, shown, frame, (place) => { list.scrollToIndex(place, { align: "center" }); });
+  useInStep(build, shown, frame, (place) => {
+    list.scrollToIndex(place, { align: "center" });
+  });
   const roles = [...new Set(turns.map((turn) => turn.role))];
   const latest = useRef(build.go);
   useEffect(() => {
     latest.current = build.go;
   });
-  const go = useMemo(() => (step: number) => { latest.current(step); }, []);
+  const go = useMemo(
+    () => (step: number) => {
+      latest.current(step);
+    },
+    [],
+  );
   return (
     <Stack gap="xs">
       <Group gap="sm" align="end">
@@ -42,7 +49,16 @@ export function TranscriptView({ turns, build }: { turns: readonly Turn[]; build
             setText(event.currentTarget.value);
           }}
         />
-        <Select label="Role" data={roles} value={role} onChange={setRole} placeholder="all" clearable clearButtonProps={{ "aria-label": "Every role" }} w={140} />
+        <Select
+          label="Role"
+          data={roles}
+          value={role}
+          onChange={setRole}
+          placeholder="all"
+          clearable
+          clearButtonProps={{ "aria-label": "Every role" }}
+          w={140}
+        />
         <Switch
           mb={8}
           label="Refused actions only"
@@ -55,7 +71,13 @@ export function TranscriptView({ turns, build }: { turns: readonly Turn[]; build
       <Text size="xs" className="dimmed" role="status">
         {shown.length === turns.length ? `${turns.length} turns` : `${shown.length} of ${turns.length} turns`}
       </Text>
-      <div ref={frame} style={{ height: Math.min(HEIGHT_PX, Math.max(160, list.getTotalSize())), overflow: "auto" }} tabIndex={0} role="region" aria-label="Transcript, scrolls">
+      <div
+        ref={frame}
+        style={{ height: Math.min(HEIGHT_PX, Math.max(160, list.getTotalSize())), overflow: "auto" }}
+        tabIndex={0}
+        role="region"
+        aria-label="Transcript, scrolls"
+      >
         <div style={{ height: list.getTotalSize(), position: "relative" }}>
           {list.getVirtualItems().map((item) => {
             const turn = shown[item.index];
@@ -66,7 +88,14 @@ export function TranscriptView({ turns, build }: { turns: readonly Turn[]; build
                 data-index={item.index}
                 style={{ position: "absolute", top: 0, left: 0, right: 0, transform: `translateY(${item.start}px)` }}
               >
-                {turn !== undefined && <TurnCard turn={turn} marked={markedIn(build.markedAction, turn.index)} stepOf={build.stepOf} go={go} />}
+                {turn !== undefined && (
+                  <TurnCard
+                    turn={turn}
+                    marked={markedIn(build.markedAction, turn.index)}
+                    stepOf={build.stepOf}
+                    go={go}
+                  />
+                )}
               </div>
             );
           })}
@@ -86,7 +115,12 @@ function markedIn(marked: string | null, turn: number): number | null {
 const NEAR_PX = 200;
 
 /** Brings the turn of the step into sight; one that comes in live only to who reads the end. */
-function useInStep(build: Build, shown: readonly Turn[], frame: React.RefObject<HTMLDivElement | null>, show: (place: number) => void): void {
+function useInStep(
+  build: Build,
+  shown: readonly Turn[],
+  frame: React.RefObject<HTMLDivElement | null>,
+  show: (place: number) => void,
+): void {
   const { markedAction, following } = build;
   const begun = useRef(false);
   useEffect(() => {
@@ -114,7 +148,13 @@ interface TurnProps {
 const TurnCard = memo(function TurnCard({ turn, marked, stepOf, go }: TurnProps) {
   const colour = ROLE_COLOURS[turn.role] ?? "gray";
   return (
-    <article className="turn" style={{ "--turn-colour": `var(--mantine-color-${colour}-6)` } as React.CSSProperties} aria-label={`Turn ${turn.index}, ${turn.role}`} data-turn={turn.index} data-chosen={marked === null ? undefined : true}>
+    <article
+      className="turn"
+      style={{ "--turn-colour": `var(--mantine-color-${colour}-6)` } as React.CSSProperties}
+      aria-label={`Turn ${turn.index}, ${turn.role}`}
+      data-turn={turn.index}
+      data-chosen={marked === null ? undefined : true}
+    >
       <header className="turn-head">
         <span className="figures dimmed">{turn.index}</span>
         <b>{turn.role}</b>
@@ -122,27 +162,53 @@ const TurnCard = memo(function TurnCard({ turn, marked, stepOf, go }: TurnProps)
           {turn.stage}
           {turn.sub_structure === null ? "" : ` · ${turn.sub_structure}`}
         </span>
-        {turn.finish !== undefined && turn.finish !== "stop" && turn.finish !== "tool_calls" && <span className="tag">{turn.finish}</span>}
+        {turn.finish !== undefined && turn.finish !== "stop" && turn.finish !== "tool_calls" && (
+          <span className="tag">{turn.finish}</span>
+        )}
         {turn.input_tokens !== undefined && (
           <span className="figures dimmed turn-usage">
-            {count(turn.input_tokens)} in · {count(turn.output_tokens)} out · {dollars(Number(turn.cost_usd ?? 0))} · {duration(turn.latency_s)}
+            {count(turn.input_tokens)} in · {count(turn.output_tokens)} out · {dollars(Number(turn.cost_usd ?? 0))} ·{" "}
+            {duration(turn.latency_s)}
           </span>
         )}
       </header>
       {turn.text !== "" && <div className="turn-text">{turn.text}</div>}
       {turn.actions.map((action, index) => (
-        <ActionFold key={index} action={action} chosen={marked === index} step={stepOf.get(`${turn.index}:${index}`)} go={go} />
+        <ActionFold
+          key={index}
+          action={action}
+          chosen={marked === index}
+          step={stepOf.get(`${turn.index}:${index}`)}
+          go={go}
+        />
       ))}
     </article>
   );
 });
 
-function ActionFold({ action, chosen, step, go }: { action: TurnAction; chosen: boolean; step: number | undefined; go: (step: number) => void }) {
+function ActionFold({
+  action,
+  chosen,
+  step,
+  go,
+}: {
+  action: TurnAction;
+  chosen: boolean;
+  step: number | undefined;
+  go: (step: number) => void;
+}) {
   return (
-    <div className="action-line" data-chosen={chosen ? true : undefined} aria-current={chosen ? "step" : undefined} style={{ marginTop: 6, display: "flex", gap: 8, alignItems: "start" }}>
+    <div
+      className="action-line"
+      data-chosen={chosen ? true : undefined}
+      aria-current={chosen ? "step" : undefined}
+      style={{ marginTop: 6, display: "flex", gap: 8, alignItems: "start" }}
+    >
       <details style={{ flex: 1, minWidth: 0 }} open={!action.ok}>
         <summary style={{ cursor: "pointer" }}>
-          <span className={action.ok ? "tag tag-good" : "tag tag-bad"}>{action.ok ? "✓ accepted" : `✗ ${words(action.reason ?? "refused")}`}</span>
+          <span className={action.ok ? "tag tag-good" : "tag tag-bad"}>
+            {action.ok ? "✓ accepted" : `✗ ${words(action.reason ?? "refused")}`}
+          </span>
           <code className="call">{callLine(action)}</code>
         </summary>
         <pre className="feedback" style={{ padding: "6px 10px" }}>
@@ -150,7 +216,13 @@ function ActionFold({ action, chosen, step, go }: { action: TurnAction; chosen: 
         </pre>
       </details>
       {step !== undefined && (
-        <button type="button" className="step-link" onClick={() => { go(step); }}>
+        <button
+          type="button"
+          className="step-link"
+          onClick={() => {
+            go(step);
+          }}
+        >
           step {step + 1}
         </button>
       )}

@@ -23,7 +23,8 @@ export function Verify({ job }: { job: JobDetail }) {
   const found = useQuery({
     queryKey: ["verification", id],
     enabled: id !== undefined,
-    queryFn: () => taken(client.GET("/v1/verifications/{verification_id}", { params: { path: { verification_id: id ?? "" } } })),
+    queryFn: () =>
+      taken(client.GET("/v1/verifications/{verification_id}", { params: { path: { verification_id: id ?? "" } } })),
     refetchInterval: (query) => (query.state.data?.state === "done" ? false : ASK_EVERY_MS),
   });
   if (job.success === null || isSite) return null;
@@ -87,5 +88,9 @@ const LONGEST = 40;
 
 function shown(value: unknown) {
   const text = typeof value === "string" ? value : JSON.stringify(value);
-  return <Text span size="xs" title={text}>{text.length > LONGEST ? `${text.slice(0, LONGEST)}…` : text}</Text>;
+  return (
+    <Text span size="xs" title={text}>
+      {text.length > LONGEST ? `${text.slice(0, LONGEST)}…` : text}
+    </Text>
+  );
 }

@@ -1,7 +1,7 @@
 import { useMemo } from "react";
 import type { PartView, PlacedView } from "../../scene/machine";
 import { builtAt, ghostsOf, placesOf, rangeOf, stepsOf, touchedBy, type Replay, type Step } from "./replay";
-import type { JobSearch } from "./search";
+import type { JobSearch } from "../../api/jobs-search";
 import type { Turn } from "./transcript";
 
 const NO_TURNS: readonly Turn[] = [];
@@ -33,7 +33,12 @@ export interface Build {
   choose: (part: string | undefined) => void;
 }
 
-export function useBuild(replay: Replay | null, turns: readonly Turn[] | undefined, search: JobSearch, change: (search: JobSearch) => void): Build {
+export function useBuild(
+  replay: Replay | null,
+  turns: readonly Turn[] | undefined,
+  search: JobSearch,
+  change: (search: JobSearch) => void,
+): Build {
   const steps = useMemo(() => (replay === null ? [] : stepsOf(replay)), [replay]);
   const last = steps.length - 1;
   const following = search.step === undefined || search.step > last;
@@ -44,7 +49,10 @@ export function useBuild(replay: Replay | null, turns: readonly Turn[] | undefin
   const whole = useMemo(() => builtAt(steps, end ?? -1).parts, [steps, end]);
   const ghosts = useMemo(() => ghostsOf(step), [step]);
   const places = useMemo(() => placesOf(steps, turns ?? NO_TURNS), [steps, turns]);
-  const stepOf = useMemo(() => new Map(places.flatMap((place, index) => (place === null ? [] : [[place, index] as const]))), [places]);
+  const stepOf = useMemo(
+    () => new Map(places.flatMap((place, index) => (place === null ? [] : [[place, index] as const]))),
+    [places],
+  );
   const part = search.part !== undefined && built.parts.has(search.part) ? search.part : undefined;
   const madeBy = part === undefined ? undefined : built.madeBy.get(part);
   const marked = useMemo<ReadonlySet<string>>(() => {

@@ -12,7 +12,9 @@ interface ToldTurn extends Turn {
 
 /** The turns that events tell, and whether all of them are told in full. */
 export function toldIn(events: readonly ServiceEvent[]): { turns: Turn[]; whole: boolean } {
-  const told = events.filter((event) => event.kind === "turn").flatMap((event) => (event.data.turn as ToldTurn | undefined) ?? []);
+  const told = events
+    .filter((event) => event.kind === "turn")
+    .flatMap((event) => (event.data.turn as ToldTurn | undefined) ?? []);
   return { turns: told, whole: told.every((turn) => turn.shortened !== true) };
 }
 
@@ -20,7 +22,9 @@ export function toldIn(events: readonly ServiceEvent[]): { turns: Turn[]; whole:
 export function useLive(job: JobDetail | undefined, id: string): StreamState | "ended" {
   const queries = useQueryClient();
   const open = job !== undefined && job.state !== "done";
-  const readAgain = useAgain(useCallback(() => queries.refetchQueries({ queryKey: replayQuery(id).queryKey }), [queries, id]));
+  const readAgain = useAgain(
+    useCallback(() => queries.refetchQueries({ queryKey: replayQuery(id).queryKey }), [queries, id]),
+  );
   const onEvents = useCallback(
     (events: ServiceEvent[]) => {
       const { turns, whole } = toldIn(events);
@@ -35,14 +39,16 @@ export function useLive(job: JobDetail | undefined, id: string): StreamState | "
         } else void queries.invalidateQueries({ queryKey: key });
         readAgain();
       }
-      if (events.some((event) => event.kind !== "turn")) void queries.invalidateQueries({ queryKey: jobQuery(id).queryKey });
+      if (events.some((event) => event.kind !== "turn"))
+        void queries.invalidateQueries({ queryKey: jobQuery(id).queryKey });
     },
     [queries, id, readAgain],
   );
   const state = useEvents(open ? `/v1/jobs/${encodeURIComponent(id)}/events` : null, onEvents);
   const before = useRef(state);
   useEffect(() => {
-    if (before.current === "broken" && state === "live") void queries.invalidateQueries({ queryKey: jobQuery(id).queryKey });
+    if (before.current === "broken" && state === "live")
+      void queries.invalidateQueries({ queryKey: jobQuery(id).queryKey });
     before.current = state;
   }, [state, queries, id]);
   return open ? state : "ended";

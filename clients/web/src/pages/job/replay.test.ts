@@ -6,13 +6,36 @@ import type { JobView } from "../../api/queries";
 import { toldIn } from "./live";
 import { rolloutsOf } from "./queries";
 import { builtAt, ghostsOf, isWhole, placesOf, rangeOf, stepsOf, touchedBy, withTurns, type Replay } from "./replay";
-import { readJobSearch } from "./search";
+import { readJobSearch } from "../../api/jobs-search";
 import type { Turn } from "./transcript";
 
 type StepView = Replay["chapters"][number]["steps"][number];
 
-const part = (id: string, x = 0): PartView => ({ id, module: "Small Wooden Block", position: [x, 0, 0], quaternion: [1, 0, 0, 0], start: null, end: null, flipped: false, bindings: {} });
-const step = (change: Partial<StepView>): StepView => ({ turn: 0, action: "attach_block_to", arguments: {}, accepted: true, reason: null, text: null, added: [], moved: [], removed: [], rebound: [], control_sequence: null, attempted: [], ...change });
+const part = (id: string, x = 0): PartView => ({
+  id,
+  module: "Small Wooden Block",
+  position: [x, 0, 0],
+  quaternion: [1, 0, 0, 0],
+  start: null,
+  end: null,
+  flipped: false,
+  bindings: {},
+});
+const step = (change: Partial<StepView>): StepView => ({
+  turn: 0,
+  action: "attach_block_to",
+  arguments: {},
+  accepted: true,
+  reason: null,
+  text: null,
+  added: [],
+  moved: [],
+  removed: [],
+  rebound: [],
+  control_sequence: null,
+  attempted: [],
+  ...change,
+});
 const REPLAY: Replay = {
   complete: true,
   exact: true,
@@ -23,16 +46,32 @@ const REPLAY: Replay = {
       steps: [
         step({ action: "start", added: [part("1")] }),
         step({ turn: 1, added: [part("2", 1)] }),
-        step({ turn: 1, accepted: false, reason: "overlap", attempted: [{ id: "3", module: "Torch", position: [9, 0, 0], quaternion: [1, 0, 0, 0] }] }),
+        step({
+          turn: 1,
+          accepted: false,
+          reason: "overlap",
+          attempted: [{ id: "3", module: "Torch", position: [9, 0, 0], quaternion: [1, 0, 0, 0] }],
+        }),
         step({ turn: 2, action: "shift_block", moved: [part("2", 5)] }),
         step({ turn: 3, action: "remove_block", removed: ["2"] }),
       ],
     },
-    { name: "assembly", kind: "assembly", steps: [step({ turn: 4, action: "add_machine", added: [part("A1"), part("A2")] }), step({ turn: null, action: "review", added: [] })] },
+    {
+      name: "assembly",
+      kind: "assembly",
+      steps: [
+        step({ turn: 4, action: "add_machine", added: [part("A1"), part("A2")] }),
+        step({ turn: null, action: "review", added: [] }),
+      ],
+    },
   ],
 };
 const turn = (index: number, actions: [string, boolean][] = []): Turn => ({
-  index, stage: "build", sub_structure: null, role: "builder", text: "",
+  index,
+  stage: "build",
+  sub_structure: null,
+  role: "builder",
+  text: "",
   actions: actions.map(([name, ok]) => ({ name, ok, arguments: {}, reason: null, feedback: "" })),
 });
 
@@ -41,7 +80,15 @@ describe("a replay", () => {
 
   it("builds step by step, each chapter from nothing", () => {
     const ids = (at: number) => [...builtAt(steps, at).parts.keys()];
-    expect([-1, 0, 1, 2, 3, 4, 5].map(ids)).toEqual([[], ["1"], ["1", "2"], ["1", "2"], ["1", "2"], ["1"], ["A1", "A2"]]);
+    expect([-1, 0, 1, 2, 3, 4, 5].map(ids)).toEqual([
+      [],
+      ["1"],
+      ["1", "2"],
+      ["1", "2"],
+      ["1", "2"],
+      ["1"],
+      ["A1", "A2"],
+    ]);
     expect(builtAt(steps, 3).parts.get("2")?.position).toEqual([5, 0, 0]);
     expect(builtAt(steps, 3).madeBy.get("2")).toBe(1);
     expect([rangeOf(steps, 0), rangeOf(steps, 1), rangeOf(steps, 2)]).toEqual([[0, 4], [5, 6], null]);
@@ -54,7 +101,16 @@ describe("a replay", () => {
   });
 
   it("finds each step's action in the transcript, also where actions are no steps", () => {
-    const turns = [turn(0, [["start", true]]), turn(1, [["get_machine_summary", true], ["attach_block_to", true], ["attach_block_to", false]]), turn(2, [["shift_block", true]]), turn(4, [])];
+    const turns = [
+      turn(0, [["start", true]]),
+      turn(1, [
+        ["get_machine_summary", true],
+        ["attach_block_to", true],
+        ["attach_block_to", false],
+      ]),
+      turn(2, [["shift_block", true]]),
+      turn(4, []),
+    ];
     expect(placesOf(steps, turns)).toEqual(["0:0", "1:1", "1:2", "2:0", "3:", "4:", null]);
   });
 });
@@ -69,7 +125,13 @@ describe("live turns", () => {
   });
 
   it("that were too long to be sent are read", () => {
-    const event = (shortened: boolean) => ({ id: 1, kind: "turn", job: "j", at: "", data: { turn: { ...turn(0), shortened } } });
+    const event = (shortened: boolean) => ({
+      id: 1,
+      kind: "turn",
+      job: "j",
+      at: "",
+      data: { turn: { ...turn(0), shortened } },
+    });
     expect(toldIn([event(false)]).whole).toBe(true);
     expect(toldIn([event(false), event(true)]).whole).toBe(false);
     expect(toldIn([{ id: 1, kind: "done", job: "j", at: "", data: {} }])).toEqual({ turns: [], whole: true });
@@ -78,7 +140,10 @@ describe("live turns", () => {
 
 describe("addresses", () => {
   it.each([
-    [{ step: 3, part: 7, view: "trial" }, { step: 3, part: "7", view: "trial" }],
+    [
+      { step: 3, part: 7, view: "trial" },
+      { step: 3, part: "7", view: "trial" },
+    ],
     [{ step: -1, part: "x".repeat(200), view: "x" }, {}],
     [{ step: "3", part: null }, {}],
     [{ step: 1e300 }, {}],
@@ -105,9 +170,15 @@ describe("what differs", () => {
   });
 
   it("is told of jobs with one seed, task version and track alone", () => {
-    const job = (id: string, seed: number, outcome: string, track = "t", version = "v") => ({ id, seed, outcome, track, task: "x", task_version: version }) as JobView;
+    const job = (id: string, seed: number, outcome: string, track = "t", version = "v") =>
+      ({ id, seed, outcome, track, task: "x", task_version: version }) as JobView;
     const first = [job("a", 0, "success"), job("b", 1, "success"), job("c", 2, "limit"), job("d", 3, "success")];
-    const second = [job("e", 0, "limit"), job("f", 1, "success"), job("g", 2, "success", "other"), job("h", 3, "limit", "t", "w")];
+    const second = [
+      job("e", 0, "limit"),
+      job("f", 1, "success"),
+      job("g", 2, "success", "other"),
+      job("h", 3, "limit", "t", "w"),
+    ];
     expect(differing(first, second, "t").map(([a, b]) => a.id + b.id)).toEqual(["ae"]);
   });
 });

@@ -57,7 +57,9 @@ export function placesOf(steps: readonly Step[], turns: readonly Turn[]): (strin
     if (step.turn === null) return null;
     const actions = byIndex.get(step.turn)?.actions ?? [];
     const from = taken.get(step.turn) ?? 0;
-    const found = actions.findIndex((action, index) => index >= from && action.name === step.action && action.ok === step.accepted);
+    const found = actions.findIndex(
+      (action, index) => index >= from && action.name === step.action && action.ok === step.accepted,
+    );
     if (found < 0) return `${step.turn}:`;
     taken.set(step.turn, found + 1);
     return `${step.turn}:${found}`;

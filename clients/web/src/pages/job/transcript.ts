@@ -61,7 +61,8 @@ function searchable(turn: Turn): string {
 
 /** An action's call as one line. */
 export function callLine(action: Pick<TurnAction, "name" | "arguments">): string {
-  if (typeof action.arguments !== "object" || action.arguments === null) return `${action.name}(${JSON.stringify(action.arguments)})`;
+  if (typeof action.arguments !== "object" || action.arguments === null)
+    return `${action.name}(${JSON.stringify(action.arguments)})`;
   const words = Object.entries(action.arguments).map(([name, value]) => `${name}=${JSON.stringify(value)}`);
   return `${action.name}(${words.join(", ")})`;
 }

@@ -1,6 +1,7 @@
 import { Alert, Button, FileButton, Group, List, Select, Stack, Text, Title } from "@mantine/core";
 import { IconFileUpload, IconPlayerPlay } from "@tabler/icons-react";
 import { useQuery } from "@tanstack/react-query";
+import { SimulatorSelect, useSimulator } from "../../parts/SimulatorSelect";
 import { Link } from "@tanstack/react-router";
 import { lazy, Suspense, useState, type DragEvent } from "react";
 import { job as jobQuery, tasks as tasksQuery } from "../../api/queries";
@@ -9,12 +10,11 @@ import { OutcomeBadge } from "../../parts/Outcome";
 import { ProblemNote } from "../../parts/Problem";
 import { Section } from "../../parts/Section";
 import { Answered, Loading } from "../../parts/States";
-import { Result } from "../build/Result";
+import { Result } from "../workbench/Result";
 import { useLook, useTrial, type Check, type Dropped } from "./files";
 
 const FileScene = lazy(() => import("../../scene/FileScene"));
 const GlbScene = lazy(() => import("../../scene/GlbScene"));
-const SIMULATORS = ["pybullet", "mujoco"];
 const FIRST = "support-1";
 const ASK_EVERY_MS = 1_000;
 
@@ -39,27 +39,54 @@ export default function MachinePage() {
     <Stack gap="md">
       <div>
         <Title order={1}>A machine from a file</Title>
-        <Text maw={720}>Look at a machine, read what is wrong with it, and put it through a task&apos;s trial. Nothing in a file is run; what you try stands on no leaderboard.</Text>
+        <Text maw={720}>
+          Look at a machine, read what is wrong with it, and put it through a task&apos;s trial. Nothing in a file is
+          run; what you try stands on no leaderboard.
+        </Text>
       </div>
       <div
         className="drop"
         data-over={over ? "" : undefined}
-        onDragOver={(event) => { event.preventDefault(); setOver(true); }}
-        onDragLeave={() => { setOver(false); }}
+        onDragOver={(event) => {
+          event.preventDefault();
+          setOver(true);
+        }}
+        onDragLeave={() => {
+          setOver(false);
+        }}
         onDrop={onDrop}
       >
         <Stack align="center" gap="xs">
           <IconFileUpload size={32} aria-hidden />
           <Text fw={600}>Drop a machine document (JSON), a machine file of the game (.bsg) or a GLB here</Text>
-          <FileButton onChange={(file) => { open(file); }} accept=".json,.bsg,.glb,application/json,model/gltf-binary" inputProps={{ "aria-label": "Machine file" }}>
-            {(props) => <Button variant="default" loading={look.isPending} {...props}>Choose a file</Button>}
+          <FileButton
+            onChange={(file) => {
+              open(file);
+            }}
+            accept=".json,.bsg,.glb,application/json,model/gltf-binary"
+            inputProps={{ "aria-label": "Machine file" }}
+          >
+            {(props) => (
+              <Button variant="default" loading={look.isPending} {...props}>
+                Choose a file
+              </Button>
+            )}
           </FileButton>
-          <Text size="xs" className="dimmed">Machines up to 2 MiB and 2,000 parts, GLB up to 16 MiB.</Text>
+          <Text size="xs" className="dimmed">
+            Machines up to 2 MiB and 2,000 parts, GLB up to 16 MiB.
+          </Text>
         </Stack>
       </div>
       {look.isError && <ProblemNote error={look.error} />}
       {look.data !== undefined && (
-        <Section title={look.data.file.name} aside={<Text size="sm" className="dimmed">{bytes(look.data.file.size)}</Text>}>
+        <Section
+          title={look.data.file.name}
+          aside={
+            <Text size="sm" className="dimmed">
+              {bytes(look.data.file.size)}
+            </Text>
+          }
+        >
           <Suspense fallback={<Loading rows={8} />}>
             <Shown dropped={look.data} />
           </Suspense>
@@ -71,8 +98,13 @@ export default function MachinePage() {
             <Try
               check={dropped.check}
               task={task}
-              setTask={(value) => { setTask(value); open(dropped.file, value); }}
-              start={(simulator) => { trial.mutate({ file: dropped.file, task, simulator }); }}
+              setTask={(value) => {
+                setTask(value);
+                open(dropped.file, value);
+              }}
+              start={(simulator) => {
+                trial.mutate({ file: dropped.file, task, simulator });
+              }}
               busy={trial.isPending}
             />
             {trial.isError && <ProblemNote error={trial.error} />}
@@ -90,7 +122,10 @@ function Shown({ dropped }: { dropped: Dropped }) {
     return (
       <Stack gap="xs">
         <GlbScene root={glb.root} bounds={glb.bounds} label={`The shapes of ${file.name}`} />
-        <Text size="sm">{glb.nodes} nodes. A GLB holds shapes only, drawn here without pictures: to check or try a machine, drop its document or .bsg file.</Text>
+        <Text size="sm">
+          {glb.nodes} nodes. A GLB holds shapes only, drawn here without pictures: to check or try a machine, drop its
+          document or .bsg file.
+        </Text>
       </Stack>
     );
   }
@@ -105,53 +140,108 @@ function Shown({ dropped }: { dropped: Dropped }) {
 
 function Findings({ check }: { check: Check }) {
   const sound = check.faults.length === 0;
-  const size = check.bounds === null ? null : check.bounds[1].map((high, axis) => high - (check.bounds?.[0][axis] ?? 0));
-  const remarks = [...check.remarks, ...(check.detached.length > 0 ? [`not joined to the starting block: ${check.detached.join(", ")}`] : [])];
+  const size =
+    check.bounds === null ? null : check.bounds[1].map((high, axis) => high - (check.bounds?.[0][axis] ?? 0));
+  const remarks = [
+    ...check.remarks,
+    ...(check.detached.length > 0 ? [`not joined to the starting block: ${check.detached.join(", ")}`] : []),
+  ];
   return (
     <Stack gap="xs">
       <Text size="sm" className="figures">
         {check.name !== "" && <b>{check.name}: </b>}
         {check.parts} parts, mass {number(check.mass, 2)}
-        {size !== null && `, ${size.map((value) => number(value, 2)).join(" × ")} units (east × north × up)`}, {check.control_sequence.length} key press{check.control_sequence.length === 1 ? "" : "es"}
+        {size !== null && `, ${size.map((value) => number(value, 2)).join(" × ")} units (east × north × up)`},{" "}
+        {check.control_sequence.length} key press{check.control_sequence.length === 1 ? "" : "es"}
       </Text>
       <Alert color={sound ? "teal" : "red"} py="xs" title={sound ? "✓ it is a sound machine" : "✗ it cannot be tried"}>
-        {sound ? "No two blocks overlap, and every part sits where the document says." : <List size="sm">{check.faults.map((one) => <List.Item key={one}>{one}</List.Item>)}</List>}
+        {sound ? (
+          "No two blocks overlap, and every part sits where the document says."
+        ) : (
+          <List size="sm">
+            {check.faults.map((one) => (
+              <List.Item key={one}>{one}</List.Item>
+            ))}
+          </List>
+        )}
       </Alert>
       {remarks.length > 0 && (
         <Alert color="yellow" py="xs" title={`${remarks.length} remark${remarks.length > 1 ? "s" : ""}`}>
-          <List size="sm" style={{ maxHeight: 200, overflow: "auto" }}>{remarks.map((one) => <List.Item key={one}>{one}</List.Item>)}</List>
+          <List size="sm" style={{ maxHeight: 200, overflow: "auto" }}>
+            {remarks.map((one) => (
+              <List.Item key={one}>{one}</List.Item>
+            ))}
+          </List>
         </Alert>
       )}
     </Stack>
   );
 }
 
-function Try({ check, task, setTask, start, busy }: { check: Check; task: string; setTask: (task: string) => void; start: (simulator: string) => void; busy: boolean }) {
+function Try({
+  check,
+  task,
+  setTask,
+  start,
+  busy,
+}: {
+  check: Check;
+  task: string;
+  setTask: (task: string) => void;
+  start: (simulator: string) => void;
+  busy: boolean;
+}) {
   const tasks = useQuery(tasksQuery());
-  const [simulator, setSimulator] = useState(SIMULATORS[0] ?? "");
+  const simulator = useSimulator();
   return (
     <>
       <Group align="end" gap="sm">
-        <Select label="Task" searchable data={(tasks.data ?? []).map((one) => ({ value: one.name, label: `${one.name}: ${one.title}` }))} value={task} allowDeselect={false} onChange={(value) => { if (value !== null) setTask(value); }} w={{ base: "100%", xs: 320 }} />
-        <Select label="Simulator" data={SIMULATORS} value={simulator} allowDeselect={false} onChange={(value) => { setSimulator(value ?? simulator); }} w={130} />
-        <Button leftSection={<IconPlayerPlay size={16} aria-hidden />} loading={busy} disabled={check.faults.length > 0} onClick={() => { start(simulator); }}>
+        <Select
+          label="Task"
+          searchable
+          data={(tasks.data ?? []).map((one) => ({ value: one.name, label: `${one.name}: ${one.title}` }))}
+          value={task}
+          allowDeselect={false}
+          onChange={(value) => {
+            if (value !== null) setTask(value);
+          }}
+          w={{ base: "100%", xs: 320 }}
+        />
+        <SimulatorSelect choice={simulator} />
+        <Button
+          leftSection={<IconPlayerPlay size={16} aria-hidden />}
+          loading={busy}
+          disabled={check.faults.length > 0}
+          onClick={() => {
+            start(simulator.value);
+          }}
+        >
           Start the trial
         </Button>
       </Group>
-      {check.broken_rule !== null && <Text size="sm">It breaks a rule of {task}: {check.broken_rule}. Its trial would end there.</Text>}
+      {check.broken_rule !== null && (
+        <Text size="sm">
+          It breaks a rule of {task}: {check.broken_rule}. Its trial would end there.
+        </Text>
+      )}
     </>
   );
 }
 
 function Tried({ id }: { id: string }) {
-  const query = useQuery({ ...jobQuery(id), refetchInterval: (asked) => (asked.state.data?.state === "done" ? false : ASK_EVERY_MS) });
+  const query = useQuery({
+    ...jobQuery(id),
+    refetchInterval: (asked) => (asked.state.data?.state === "done" ? false : ASK_EVERY_MS),
+  });
   return (
     <Answered query={query} rows={6}>
       {(job) => (
         <Stack gap="sm">
           <Group gap="sm" role="status">
             <OutcomeBadge value={job.outcome ?? job.state} />
-            <Link to="/jobs/$id" params={{ id }}>The whole job</Link>
+            <Link to="/jobs/$id" params={{ id }}>
+              The whole job
+            </Link>
           </Group>
           {job.state === "done" && <Result job={job} />}
         </Stack>

@@ -20,7 +20,11 @@ export interface Dropped {
 async function sent<Data>(path: string, query: Record<string, string>, file: File): Promise<Data> {
   let response: Response;
   try {
-    response = await fetch(`${BASE}${path}?${new URLSearchParams(query).toString()}`, { method: "POST", body: file, headers: { ...authorization(), "Content-Type": "application/octet-stream" } });
+    response = await fetch(`${BASE}${path}?${new URLSearchParams(query).toString()}`, {
+      method: "POST",
+      body: file,
+      headers: { ...authorization(), "Content-Type": "application/octet-stream" },
+    });
   } catch {
     throw new ApiError(0, null, "no answer came: is it running, and is the network there?");
   }
@@ -34,10 +38,14 @@ async function looked(file: File, task: string | null): Promise<Dropped> {
   const beginning = await file.slice(0, GLB.length).text();
   if (beginning === GLB) {
     const { MAX_GLB_BYTES, readGlb } = await import("./glb");
-    if (file.size > MAX_GLB_BYTES) throw new Error(`a GLB file may have at most ${MAX_GLB_BYTES / 1024 / 1024} MiB here`);
+    if (file.size > MAX_GLB_BYTES)
+      throw new Error(`a GLB file may have at most ${MAX_GLB_BYTES / 1024 / 1024} MiB here`);
     return { file, glb: await readGlb(await file.arrayBuffer()), check: null };
   }
-  if (file.size > MAX_BYTES) throw new Error(`a machine's file may have at most ${MAX_BYTES / 1024 / 1024} MiB; this one has ${(file.size / 1024 / 1024).toFixed(1)} MiB`);
+  if (file.size > MAX_BYTES)
+    throw new Error(
+      `a machine's file may have at most ${MAX_BYTES / 1024 / 1024} MiB; this one has ${(file.size / 1024 / 1024).toFixed(1)} MiB`,
+    );
   return { file, glb: null, check: await sent<Check>("/v1/machines/check", task === null ? {} : { task }, file) };
 }
 
@@ -52,8 +60,11 @@ async function lookedAt(file: File, task: string | null): Promise<Dropped> {
   }
 }
 
-export const useLook = () => useMutation({ mutationFn: ({ file, task }: { file: File; task: string | null }) => lookedAt(file, task) });
+export const useLook = () =>
+  useMutation({ mutationFn: ({ file, task }: { file: File; task: string | null }) => lookedAt(file, task) });
 
 export const useTrial = () =>
-  useMutation({ mutationFn: ({ file, ...query }: { file: File; task: string; simulator: string }) => sent<JobView>("/v1/machines/trials", query, file) });
-
+  useMutation({
+    mutationFn: ({ file, ...query }: { file: File; task: string; simulator: string }) =>
+      sent<JobView>("/v1/machines/trials", query, file),
+  });

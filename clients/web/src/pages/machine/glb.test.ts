@@ -2,13 +2,19 @@ import { describe, expect, it } from "vitest";
 import { describedBy, readGlb, withoutPictures } from "./glb";
 
 /** A GLB with this description and some bytes of data. */
-function glb(description: unknown, data = new Uint8Array(0), change: { version?: number; length?: number } = {}): ArrayBuffer {
+function glb(
+  description: unknown,
+  data = new Uint8Array(0),
+  change: { version?: number; length?: number } = {},
+): ArrayBuffer {
   const text = new TextEncoder().encode(typeof description === "string" ? description : JSON.stringify(description));
   const padded = Math.ceil(text.length / 4) * 4;
   const tail = data.length === 0 ? 0 : 8 + data.length;
   const whole = new Uint8Array(20 + padded + tail).fill(0x20);
   const view = new DataView(whole.buffer);
-  [0x46546c67, change.version ?? 2, whole.length, change.length ?? padded, 0x4e4f534a].forEach((value, index) => { view.setUint32(4 * index, value, true); });
+  [0x46546c67, change.version ?? 2, whole.length, change.length ?? padded, 0x4e4f534a].forEach((value, index) => {
+    view.setUint32(4 * index, value, true);
+  });
   whole.set(text, 20);
   if (tail > 0) {
     view.setUint32(20 + padded, data.length, true);
@@ -60,6 +66,8 @@ describe("a GLB file", () => {
   });
 
   it("without shapes is refused", async () => {
-    await expect(readGlb(glb({ asset: { version: "2.0" }, scenes: [{ nodes: [] }], scene: 0 }))).rejects.toThrow("no shapes");
+    await expect(readGlb(glb({ asset: { version: "2.0" }, scenes: [{ nodes: [] }], scene: 0 }))).rejects.toThrow(
+      "no shapes",
+    );
   });
 });

@@ -28,7 +28,13 @@ export default function ModelPage() {
     <Stack gap="lg">
       <Group justify="space-between">
         <Title order={1}>{name}</Title>
-        {query.data !== undefined && <TrackSelect known={query.data.tracks} chosen={query.data.track} onTrack={(to) => void navigate({ search: { track: to }, replace: true })} />}
+        {query.data !== undefined && (
+          <TrackSelect
+            known={query.data.tracks}
+            chosen={query.data.track}
+            onTrack={(to) => void navigate({ search: { track: to }, replace: true })}
+          />
+        )}
       </Group>
       <Answered query={query}>{(found) => <Profile board={found} name={name} />}</Answered>
     </Stack>
@@ -121,9 +127,23 @@ function Standing({ entry, row }: { entry: Entry; row: OverallView | undefined }
 /** What a job of the model takes, task by task. */
 function Effort({ tasks }: { tasks: Board["tasks"] }) {
   const rows = tasks.flatMap((task) =>
-    task.rows.map((row) => [task.task, count(row.requests_mean), count(row.input_tokens_mean), count(row.output_tokens_mean), dollars(row.cost_usd_mean), percent(row.invalid_action_rate, 1)]),
+    task.rows.map((row) => [
+      task.task,
+      count(row.requests_mean),
+      count(row.input_tokens_mean),
+      count(row.output_tokens_mean),
+      dollars(row.cost_usd_mean),
+      percent(row.invalid_action_rate, 1),
+    ]),
   );
-  return <DataTable name="Effort a job" title="What a job takes: requests, tokens, dollars" columns={["Task", "Requests", "Tokens in", "Tokens out", "$ a job", "Refused"]} rows={rows} />;
+  return (
+    <DataTable
+      name="Effort a job"
+      title="What a job takes: requests, tokens, dollars"
+      columns={["Task", "Requests", "Tokens in", "Tokens out", "$ a job", "Refused"]}
+      rows={rows}
+    />
+  );
 }
 
 const LOOKED_AT = 60;
@@ -133,21 +153,44 @@ const SHOWN = 8;
 function Best({ name, track }: { name: string; track: string | undefined }) {
   const query = useQuery({
     queryKey: ["best", name, track],
-    queryFn: async () => (await taken(client.GET("/v1/jobs", { params: { query: { model: name, track, outcome: "success", sort: "indicator", limit: LOOKED_AT } } }))).jobs,
+    queryFn: async () =>
+      (
+        await taken(
+          client.GET("/v1/jobs", {
+            params: { query: { model: name, track, outcome: "success", sort: "indicator", limit: LOOKED_AT } },
+          }),
+        )
+      ).jobs,
   });
   const last = useQuery({
     queryKey: ["latency", name, track],
-    queryFn: async () => (await taken(client.GET("/v1/jobs", { params: { query: { model: name, track, state: "done", sort: "finished", limit: LOOKED_AT } } }))).jobs,
+    queryFn: async () =>
+      (
+        await taken(
+          client.GET("/v1/jobs", {
+            params: { query: { model: name, track, state: "done", sort: "finished", limit: LOOKED_AT } },
+          }),
+        )
+      ).jobs,
   });
-  const took = (last.data ?? []).flatMap((job) => secondsBetween(job.started_at, job.finished_at) ?? []).sort((a, b) => a - b);
+  const took = (last.data ?? [])
+    .flatMap((job) => secondsBetween(job.started_at, job.finished_at) ?? [])
+    .sort((a, b) => a - b);
   return (
     <Section title="Its best machines">
       <Answered query={query} rows={4}>
-        {(jobs) => (jobs.length === 0 ? <Text size="sm">None has succeeded.</Text> : <Gallery jobs={oneOfEach(jobs, (job) => job.task, SHOWN)} by="task" />)}
+        {(jobs) =>
+          jobs.length === 0 ? (
+            <Text size="sm">None has succeeded.</Text>
+          ) : (
+            <Gallery jobs={oneOfEach(jobs, (job) => job.task, SHOWN)} by="task" />
+          )
+        }
       </Answered>
       {took.length > 0 && (
         <Text size="sm" mt="sm">
-          Latency: its last {count(took.length)} jobs took {duration(took[Math.floor(took.length / 2)])} in the middle, {duration(took.at(-1))} at most, from start to end, simulation included.
+          Latency: its last {count(took.length)} jobs took {duration(took[Math.floor(took.length / 2)])} in the middle,{" "}
+          {duration(took.at(-1))} at most, from start to end, simulation included.
         </Text>
       )}
     </Section>

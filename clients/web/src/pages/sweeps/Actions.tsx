@@ -37,19 +37,45 @@ export function Actions({ sweep }: { sweep: SweepView }) {
   if (!mayChange(who, sweep.owner)) return null;
   const can = possible(sweep.state);
   const button = (what: Act, label: string, icon: React.ReactNode, onClick: () => void) => (
-    <Button key={what} size="xs" variant="default" leftSection={icon} loading={doing.isPending && doing.variables === what} onClick={onClick}>
+    <Button
+      key={what}
+      size="xs"
+      variant="default"
+      leftSection={icon}
+      loading={doing.isPending && doing.variables === what}
+      onClick={onClick}
+    >
       {label}
     </Button>
   );
   const left = sweep.progress.total - sweep.progress.done;
   return (
     <Group gap="xs">
-      {can.includes("pause") && button("pause", "Pause", <IconPlayerPause size={15} aria-hidden />, () => { doing.mutate("pause"); })}
-      {can.includes("resume") && button("resume", "Resume", <IconPlayerPlay size={15} aria-hidden />, () => { doing.mutate("resume"); })}
-      {(sweep.progress.outcomes.errored ?? 0) > 0 && sweep.state !== "cancelled" &&
-        button("retry", `Retry ${sweep.progress.outcomes.errored ?? 0} errored`, <IconRefresh size={15} aria-hidden />, () => { doing.mutate("retry"); })}
+      {can.includes("pause") &&
+        button("pause", "Pause", <IconPlayerPause size={15} aria-hidden />, () => {
+          doing.mutate("pause");
+        })}
+      {can.includes("resume") &&
+        button("resume", "Resume", <IconPlayerPlay size={15} aria-hidden />, () => {
+          doing.mutate("resume");
+        })}
+      {(sweep.progress.outcomes.errored ?? 0) > 0 &&
+        sweep.state !== "cancelled" &&
+        button(
+          "retry",
+          `Retry ${sweep.progress.outcomes.errored ?? 0} errored`,
+          <IconRefresh size={15} aria-hidden />,
+          () => {
+            doing.mutate("retry");
+          },
+        )}
       {can.includes("cancel") && button("cancel", "Cancel…", <IconBan size={15} aria-hidden />, question.open)}
-      <Modal opened={asking} onClose={question.close} title={`Cancel ${sweep.name}?`} closeButtonProps={{ "aria-label": "Close" }}>
+      <Modal
+        opened={asking}
+        onClose={question.close}
+        title={`Cancel ${sweep.name}?`}
+        closeButtonProps={{ "aria-label": "Close" }}
+      >
         <Text size="sm">
           {left} jobs have not ended; those that nobody else wants end now. This cannot be taken back.
         </Text>

@@ -6,7 +6,17 @@ import { OUTCOME_COLOURS } from "../../theme";
 import type { CellCounts, Moment } from "./live";
 
 /** The order of a cell's parts, from good to open. */
-const ORDER = ["success", "unsuccessful", "construction_failed", "limit", "errored", "cancelled", "running", "on_hold", "queued"];
+const ORDER = [
+  "success",
+  "unsuccessful",
+  "construction_failed",
+  "limit",
+  "errored",
+  "cancelled",
+  "running",
+  "on_hold",
+  "queued",
+];
 
 function colour(name: string): string {
   if (name === "queued") return "var(--mantine-color-default-border)";
@@ -41,20 +51,33 @@ export function Grid({ moment, sweep }: { moment: Moment; sweep: string }) {
         rows={[...models].map(([model, cells]) => ({
           key: model,
           label: model,
-          cells: tasks.map((task) => <Cell key={task} cell={cells.get(task)} task={task} model={model} sweep={sweep} />),
+          cells: tasks.map((task) => (
+            <Cell key={task} cell={cells.get(task)} task={task} model={model} sweep={sweep} />
+          )),
         }))}
       />
     </>
   );
 }
 
-function Cell({ cell, task, model, sweep }: { cell: CellCounts | undefined; task: string; model: string; sweep: string }) {
+function Cell({
+  cell,
+  task,
+  model,
+  sweep,
+}: {
+  cell: CellCounts | undefined;
+  task: string;
+  model: string;
+  sweep: string;
+}) {
   if (cell === undefined) return <span className="heat-cell heat-empty">–</span>;
   const parts = ORDER.flatMap((name) => {
     const n = cell.counts.get(name);
     return n === undefined ? [] : [{ name, n }];
   });
-  const ended = cell.total - ["queued", "running", "on_hold"].reduce((sum, name) => sum + (cell.counts.get(name) ?? 0), 0);
+  const ended =
+    cell.total - ["queued", "running", "on_hold"].reduce((sum, name) => sum + (cell.counts.get(name) ?? 0), 0);
   return (
     <Link
       className="heat-cell"
@@ -69,7 +92,13 @@ function Cell({ cell, task, model, sweep }: { cell: CellCounts | undefined; task
       </span>
       <svg width={64} height={8} viewBox={`0 0 ${cell.total} 1`} preserveAspectRatio="none" aria-hidden>
         {parts.map(({ name, n }, index) => (
-          <rect key={name} x={parts.slice(0, index).reduce((sum, part) => sum + part.n, 0)} width={n} height={1} fill={colour(name)} />
+          <rect
+            key={name}
+            x={parts.slice(0, index).reduce((sum, part) => sum + part.n, 0)}
+            width={n}
+            height={1}
+            fill={colour(name)}
+          />
         ))}
       </svg>
     </Link>

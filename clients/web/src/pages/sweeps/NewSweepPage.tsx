@@ -5,7 +5,7 @@ import { useNavigate } from "@tanstack/react-router";
 import { lazy, Suspense, useMemo, useRef, useState } from "react";
 import { client, taken, type Schema } from "../../api/client";
 import { ApiError } from "../../api/problem";
-import { models, tasks } from "../../api/queries";
+import { models, simulators, tasks } from "../../api/queries";
 import { isSite } from "../../api/site";
 import { compact, count, dollars } from "../../format";
 import { has, useCaller } from "../../parts/may";
@@ -43,20 +43,30 @@ function estimate(spec: Record<string, unknown> | null) {
 
 function useKnown(): Known {
   const knownTasks = useQuery(tasks()).data;
+  const knownSimulators = useQuery(simulators()).data;
   const knownModels = useQuery(models()).data;
   return useMemo(
     () => ({
       tasks: (knownTasks ?? []).map((one) => one.name),
       models: (knownModels ?? []).map((one) => one.name),
-      ...{ "workflow default": ["five-role"], "simulator default": ["pybullet"], "prompts default": ["default"] },
+      simulator: (knownSimulators ?? []).map((one) => one.name),
+      ...{
+        "workflow default": ["five-role"],
+        "simulator default": (knownSimulators ?? []).filter((one) => one.default).map((one) => one.name),
+        "prompts default": ["default"],
+      },
     }),
-    [knownTasks, knownModels],
+    [knownTasks, knownModels, knownSimulators],
   );
 }
 
 /** A sweep from a form or as YAML; what it would take is told before it is submitted. */
 export default function NewSweepPage() {
-  return isSite ? <Empty title="Sweeps are submitted to a running service">This is a published copy of its results.</Empty> : <Writing />;
+  return isSite ? (
+    <Empty title="Sweeps are submitted to a running service">This is a published copy of its results.</Empty>
+  ) : (
+    <Writing />
+  );
 }
 
 function Writing() {
@@ -69,7 +79,10 @@ function Writing() {
   const query = useQuery(estimate(asked.value));
   const refusal = asked.value !== null && query.error instanceof ApiError ? query.error.problem : null;
   // Places are those of the text that was asked about.
-  const refused = useMemo(() => (refusal === null || settled !== text ? [] : faultsOf(refusal, asked)), [refusal, asked, settled, text]);
+  const refused = useMemo(
+    () => (refusal === null || settled !== text ? [] : faultsOf(refusal, asked)),
+    [refusal, asked, settled, text],
+  );
   const faults: readonly Fault[] = read.value === null ? read.faults : refused;
   const ready = settled === text && query.data !== undefined && faults.length === 0;
   const editing = { text, onText: setText, faults, known };
@@ -77,7 +90,15 @@ function Writing() {
     <Stack gap="lg">
       <Group justify="space-between">
         <Title order={1}>New sweep</Title>
-        <SegmentedControl aria-label="How to write it" data={[{ value: "form", label: "Form" }, { value: "yaml", label: "YAML" }]} value={way} onChange={setWay} />
+        <SegmentedControl
+          aria-label="How to write it"
+          data={[
+            { value: "form", label: "Form" },
+            { value: "yaml", label: "YAML" },
+          ]}
+          value={way}
+          onChange={setWay}
+        />
       </Group>
       <Group align="start" gap="lg">
         <Stack style={{ flex: "2 1 420px", minWidth: 0 }}>
@@ -86,17 +107,29 @@ function Writing() {
               <Editor {...editing} />
             </Suspense>
           )}
-          {way === "form" && (read.value === null ? <Text size="sm">The YAML can’t be read; its faults are listed beside.</Text> : <Form {...editing} value={read.value} />)}
+          {way === "form" &&
+            (read.value === null ? (
+              <Text size="sm">The YAML can’t be read; its faults are listed beside.</Text>
+            ) : (
+              <Form {...editing} value={read.value} />
+            ))}
           <Text size="xs" className="dimmed">
-            {way === "yaml" ? "Ctrl-Space completes. Escape, then Tab, leaves the field. " : "Seeds, decoding, limits and closed loops are written as YAML. "}
+            {way === "yaml"
+              ? "Ctrl-Space completes. Escape, then Tab, leaves the field. "
+              : "Seeds, decoding, limits and closed loops are written as YAML. "}
             The command line takes the same file: <code>buildarena sweep run FILE</code>
           </Text>
         </Stack>
         <Stack style={{ flex: "1 1 300px", minWidth: 0 }} gap="lg">
           {faults.length > 0 && <Faults faults={faults} />}
-          {query.isError && refusal === null && settled === text && <ProblemNote error={query.error} retry={() => void query.refetch()} />}
+          {query.isError && refusal === null && settled === text && (
+            <ProblemNote error={query.error} retry={() => void query.refetch()} />
+          )}
           {query.isError && refusal !== null && refusal.errors.length === 0 && <ProblemNote error={query.error} />}
-          <Estimate found={faults.length === 0 ? query.data : undefined} waiting={faults.length === 0 && !query.isError && !ready} />
+          <Estimate
+            found={faults.length === 0 ? query.data : undefined}
+            waiting={faults.length === 0 && !query.isError && !ready}
+          />
           <Submit spec={asked.value} ready={ready} />
         </Stack>
       </Group>
@@ -127,7 +160,13 @@ function Estimate({ found, waiting }: { found: Schema<"SweepEstimate"> | undefin
           <Text size="lg" fw={650} className="figures">
             {count(found.jobs)} jobs, {dollars(found.cost_usd)}
           </Text>
-          <Table.ScrollContainer minWidth={300} type="native" tabIndex={0} role="region" aria-label="Estimate, scrolls sideways">
+          <Table.ScrollContainer
+            minWidth={300}
+            type="native"
+            tabIndex={0}
+            role="region"
+            aria-label="Estimate, scrolls sideways"
+          >
             <Table fz="sm" aria-label="Estimate by model">
               <Table.Thead>
                 <Table.Tr>
@@ -145,7 +184,9 @@ function Estimate({ found, waiting }: { found: Schema<"SweepEstimate"> | undefin
                     <Table.Td className="figures">
                       {compact(model.input_tokens)}, {compact(model.output_tokens)}
                     </Table.Td>
-                    <Table.Td className="figures">{model.cost_usd === null ? "no price known" : dollars(model.cost_usd)}</Table.Td>
+                    <Table.Td className="figures">
+                      {model.cost_usd === null ? "no price known" : dollars(model.cost_usd)}
+                    </Table.Td>
                   </Table.Tr>
                 ))}
               </Table.Tbody>
@@ -168,7 +209,8 @@ function Submit({ spec, ready }: { spec: Record<string, unknown> | null; ready: 
   // One sweep has one key, however often it is sent: a second click, or one after an answer was lost, adds none.
   const keys = useRef(new Map<string, string>());
   const going = useRef(false);
-  if (who !== undefined && !has(who, "submit")) return <Text size="sm">This key may only read: submitting needs the scope submit.</Text>;
+  if (who !== undefined && !has(who, "submit"))
+    return <Text size="sm">This key may only read: submitting needs the scope submit.</Text>;
   const send = async (): Promise<void> => {
     if (going.current || spec === null) return;
     going.current = true;
@@ -178,7 +220,12 @@ function Submit({ spec, ready }: { spec: Record<string, unknown> | null; ready: 
     const key = keys.current.get(content) ?? freshKey();
     keys.current.set(content, key);
     try {
-      const done = await taken(client.POST("/v1/sweeps", { body: spec as unknown as SweepSpec, params: { header: { "Idempotency-Key": key } } }));
+      const done = await taken(
+        client.POST("/v1/sweeps", {
+          body: spec as unknown as SweepSpec,
+          params: { header: { "Idempotency-Key": key } },
+        }),
+      );
       await navigate({ to: "/sweeps/$id", params: { id: done.id } });
     } catch (refusal) {
       setError(refusal);

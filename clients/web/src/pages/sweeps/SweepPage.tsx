@@ -38,7 +38,16 @@ export default function SweepPage() {
           {moment === null && (error === null ? <Loading rows={8} /> : <ProblemNote error={error} />)}
           {moment !== null && (
             <>
-              <Section title="Model by task" aside={!complete && <Text size="sm" role="status">reading: {count(moment.jobs.length)} of {count(sweep.progress.total)} jobs</Text>}>
+              <Section
+                title="Model by task"
+                aside={
+                  !complete && (
+                    <Text size="sm" role="status">
+                      reading: {count(moment.jobs.length)} of {count(sweep.progress.total)} jobs
+                    </Text>
+                  )
+                }
+              >
                 <Grid moment={moment} sweep={id} />
               </Section>
               <Section title="Jobs">
@@ -67,7 +76,11 @@ function Head({ sweep, stream }: { sweep: SweepView; stream: StreamState }) {
           </Text>
         </div>
         <Group gap="xs">
-          <Button size="xs" variant="default" renderRoot={(props) => <Link to="/sweeps/compare" search={{ a: sweep.id }} {...props} />}>
+          <Button
+            size="xs"
+            variant="default"
+            renderRoot={(props) => <Link to="/sweeps/compare" search={{ a: sweep.id }} {...props} />}
+          >
             Compare…
           </Button>
           <Actions sweep={sweep} />
@@ -101,10 +114,30 @@ function Facts({ sweep, rate }: { sweep: SweepView; rate: Rate | null }) {
   const speed = rate ?? { perMinute: null, leftSeconds: null };
   const running = sweep.state === "active";
   const facts: readonly [string, string, string, number?][] = [
-    ["Jobs ended", `${count(progress.done)} of ${count(progress.total)}`, Object.entries(progress.stages).map(([name, n]) => `${n} ${name}`).join(", ")],
-    ["Rate", speed.perMinute === null ? "–" : `${number(speed.perMinute)} a minute`, running && (speed.leftSeconds ?? 0) >= 1 ? `about ${duration(speed.leftSeconds)} left` : ""],
-    ["Spent", dollars(progress.cost_usd), budget?.max_cost_usd == null ? "no budget in dollars" : `of ${dollars(budget.max_cost_usd)}`, shareOf(budget?.spent_cost_usd, budget?.max_cost_usd)],
-    ["Model requests", count(progress.requests), budget?.max_requests == null ? "" : `of ${count(budget.max_requests)}`, shareOf(budget?.spent_requests, budget?.max_requests)],
+    [
+      "Jobs ended",
+      `${count(progress.done)} of ${count(progress.total)}`,
+      Object.entries(progress.stages)
+        .map(([name, n]) => `${n} ${name}`)
+        .join(", "),
+    ],
+    [
+      "Rate",
+      speed.perMinute === null ? "–" : `${number(speed.perMinute)} a minute`,
+      running && (speed.leftSeconds ?? 0) >= 1 ? `about ${duration(speed.leftSeconds)} left` : "",
+    ],
+    [
+      "Spent",
+      dollars(progress.cost_usd),
+      budget?.max_cost_usd == null ? "no budget in dollars" : `of ${dollars(budget.max_cost_usd)}`,
+      shareOf(budget?.spent_cost_usd, budget?.max_cost_usd),
+    ],
+    [
+      "Model requests",
+      count(progress.requests),
+      budget?.max_requests == null ? "" : `of ${count(budget.max_requests)}`,
+      shareOf(budget?.spent_requests, budget?.max_requests),
+    ],
     ["Tokens", `${compact(progress.input_tokens)} in`, `${compact(progress.output_tokens)} out`],
   ];
   return (
@@ -114,7 +147,15 @@ function Facts({ sweep, rate }: { sweep: SweepView; rate: Rate | null }) {
           <Text size="xs" className="dimmed">
             {note}
           </Text>
-          {share !== undefined && <Progress value={Math.min(100, 100 * share)} size="sm" mt={4} color={share > 0.9 ? "orange" : "blue"} aria-label={`${name}: ${percent(share)} of the budget`} />}
+          {share !== undefined && (
+            <Progress
+              value={Math.min(100, 100 * share)}
+              size="sm"
+              mt={4}
+              color={share > 0.9 ? "orange" : "blue"}
+              aria-label={`${name}: ${percent(share)} of the budget`}
+            />
+          )}
         </Fact>
       ))}
     </SimpleGrid>

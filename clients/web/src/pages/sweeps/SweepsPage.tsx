@@ -67,12 +67,24 @@ export default function SweepsPage() {
               </Table>
               <Group mt="sm" gap="xs">
                 {cursors.length > 0 && (
-                  <Button size="xs" variant="default" onClick={() => { setCursors(cursors.slice(0, -1)); }}>
+                  <Button
+                    size="xs"
+                    variant="default"
+                    onClick={() => {
+                      setCursors(cursors.slice(0, -1));
+                    }}
+                  >
                     Newer
                   </Button>
                 )}
                 {page.next_cursor !== null && (
-                  <Button size="xs" variant="default" onClick={() => { setCursors([...cursors, page.next_cursor ?? ""]); }}>
+                  <Button
+                    size="xs"
+                    variant="default"
+                    onClick={() => {
+                      setCursors([...cursors, page.next_cursor ?? ""]);
+                    }}
+                  >
                     Older
                   </Button>
                 )}
@@ -87,7 +99,12 @@ export default function SweepsPage() {
 
 export function SweepState({ state }: { state: string }) {
   return (
-    <Badge variant="outline" color={SWEEP_COLOURS[state] ?? "gray"} tt="none" styles={{ root: { color: "var(--mantine-color-text)", minWidth: "max-content" } }}>
+    <Badge
+      variant="outline"
+      color={SWEEP_COLOURS[state] ?? "gray"}
+      tt="none"
+      styles={{ root: { color: "var(--mantine-color-text)", minWidth: "max-content" } }}
+    >
       {words(state)}
     </Badge>
   );
@@ -102,7 +119,12 @@ export function OutcomeBar({ sweep, size = 12 }: { sweep: SweepView; size?: numb
   return (
     <Progress.Root size={size} role="img" aria-label={label} title={label}>
       {parts.map(([name, n]) => (
-        <Progress.Section key={name} value={(100 * n) / Math.max(1, total)} color={OUTCOME_COLOURS[name] ?? "gray"} withAria={false} />
+        <Progress.Section
+          key={name}
+          value={(100 * n) / Math.max(1, total)}
+          color={OUTCOME_COLOURS[name] ?? "gray"}
+          withAria={false}
+        />
       ))}
     </Progress.Root>
   );

@@ -34,7 +34,10 @@ export function DeadLetters({ sweep }: { sweep: SweepView }) {
   for (const job of jobs) reasons.set(job.reason ?? "unknown", (reasons.get(job.reason ?? "unknown") ?? 0) + 1);
   const retriable = (job: JobView): boolean => mayChange(who, job.owner) && sweep.state !== "cancelled";
   return (
-    <Alert color="pink" title={`${count(errored)} ${errored === 1 ? "job" : "jobs"} ended by faults, and in no average`}>
+    <Alert
+      color="pink"
+      title={`${count(errored)} ${errored === 1 ? "job" : "jobs"} ended by faults, and in no average`}
+    >
       <Stack gap={6}>
         <Text size="sm">{[...reasons].map(([reason, n]) => `${n} ${words(reason)}`).join(", ")}</Text>
         {jobs.slice(0, MAX_SHOWN).map((job) => (
@@ -47,7 +50,15 @@ export function DeadLetters({ sweep }: { sweep: SweepView }) {
               {job.detail === null ? "" : `: ${job.detail}`}
             </Text>
             {retriable(job) && (
-              <Button size="compact-xs" variant="default" loading={retry.isPending && retry.variables === job.id} aria-label={`Retry ${job.task} by ${job.model}, seed ${job.seed}`} onClick={() => { retry.mutate(job.id); }}>
+              <Button
+                size="compact-xs"
+                variant="default"
+                loading={retry.isPending && retry.variables === job.id}
+                aria-label={`Retry ${job.task} by ${job.model}, seed ${job.seed}`}
+                onClick={() => {
+                  retry.mutate(job.id);
+                }}
+              >
                 Retry
               </Button>
             )}
@@ -75,7 +86,14 @@ export function Troubles({ id }: { id: string }) {
       <Text size="sm" className="dimmed" mb="xs">
         {count(attempts)} attempts failed and were made again, or will be: faults never count as failures of a model.
       </Text>
-      <Table.ScrollContainer minWidth={560} type="native" mah={300} tabIndex={0} role="region" aria-label="Troubles, scrolls">
+      <Table.ScrollContainer
+        minWidth={560}
+        type="native"
+        mah={300}
+        tabIndex={0}
+        role="region"
+        aria-label="Troubles, scrolls"
+      >
         <Table fz="sm">
           <Table.Thead>
             <Table.Tr>
@@ -90,7 +108,9 @@ export function Troubles({ id }: { id: string }) {
           <Table.Tbody>
             {found.map((one) => (
               <Table.Tr key={`${one.model} ${one.stage} ${one.result} ${one.detail ?? ""}`}>
-                <Table.Td style={{ overflowWrap: "anywhere" }}>{one.detail ?? (one.result === "lost" ? "its worker was lost" : "a fault")}</Table.Td>
+                <Table.Td style={{ overflowWrap: "anywhere" }}>
+                  {one.detail ?? (one.result === "lost" ? "its worker was lost" : "a fault")}
+                </Table.Td>
                 <Table.Td>{one.model}</Table.Td>
                 <Table.Td>{one.stage}</Table.Td>
                 <Table.Td className="figures">{count(one.attempts)}</Table.Td>

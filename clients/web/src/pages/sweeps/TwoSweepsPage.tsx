@@ -16,18 +16,31 @@ export default function TwoSweepsPage() {
     <Stack gap="lg">
       <Title order={1}>Two sweeps</Title>
       <Choice a={a} b={b} />
-      {a !== undefined && b !== undefined ? <Compared a={a} b={b} /> : <Empty title="Choose two sweeps">What differs between their settings is then what is measured.</Empty>}
+      {a !== undefined && b !== undefined ? (
+        <Compared a={a} b={b} />
+      ) : (
+        <Empty title="Choose two sweeps">What differs between their settings is then what is measured.</Empty>
+      )}
     </Stack>
   );
 }
 
 function Choice({ a, b }: { a?: string; b?: string }) {
   const navigate = useNavigate({ from: "/sweeps/compare" });
-  const known = (useQuery(sweeps()).data?.sweeps ?? []).map((sweep) => ({ value: sweep.id, label: `${sweep.name} · ${sweep.id.slice(6, 14)}` }));
-  const choices = (id: string | undefined) => (id === undefined || known.some((one) => one.value === id) ? known : [...known, { value: id, label: id }]);
+  const known = (useQuery(sweeps()).data?.sweeps ?? []).map((sweep) => ({
+    value: sweep.id,
+    label: `${sweep.name} · ${sweep.id.slice(6, 14)}`,
+  }));
+  const choices = (id: string | undefined) =>
+    id === undefined || known.some((one) => one.value === id) ? known : [...known, { value: id, label: id }];
   return (
     <Group gap="sm" align="end">
-      {([["a", "First", a], ["b", "Second", b]] as const).map(([name, label, id]) => (
+      {(
+        [
+          ["a", "First", a],
+          ["b", "Second", b],
+        ] as const
+      ).map(([name, label, id]) => (
         <Select
           key={name}
           label={label}
@@ -53,7 +66,10 @@ function Compared({ a, b }: { a: string; b: string }) {
           <Sides found={found} />
           {found.pairs.length === 0 && <Empty title="No model and task is in both">Nothing can be set in pairs.</Empty>}
           {found.pairs.map((pair) => (
-            <Section key={`${pair.first} ${pair.second}`} title={pair.first === pair.second ? pair.first : `${pair.first} and ${pair.second}`}>
+            <Section
+              key={`${pair.first} ${pair.second}`}
+              title={pair.first === pair.second ? pair.first : `${pair.first} and ${pair.second}`}
+            >
               <Differences pair={pair} />
               <Pairs pair={pair} />
             </Section>
@@ -72,7 +88,12 @@ function Compared({ a, b }: { a: string; b: string }) {
 function Sides({ found }: { found: SweepComparison }) {
   return (
     <Group gap="xl" align="start">
-      {([["First", found.first], ["Second", found.second]] as const).map(([label, side]) => (
+      {(
+        [
+          ["First", found.first],
+          ["Second", found.second],
+        ] as const
+      ).map(([label, side]) => (
         <div key={label}>
           <Text size="xs" className="dimmed">
             {label}
@@ -129,7 +150,14 @@ function Differences({ pair }: { pair: Pair }) {
                 ))}
                 <Table.Td>
                   <Group gap={8} wrap="nowrap">
-                    <Interval low={task.low} high={task.high} value={task.difference} from={-1} to={1} label={`difference ${signed(task.difference)} points`} />
+                    <Interval
+                      low={task.low}
+                      high={task.high}
+                      value={task.difference}
+                      from={-1}
+                      to={1}
+                      label={`difference ${signed(task.difference)} points`}
+                    />
                     <Text size="sm" className="figures" style={{ whiteSpace: "nowrap" }}>
                       {signed(task.difference)} ({signed(task.low)} to {signed(task.high)})
                     </Text>
@@ -144,7 +172,8 @@ function Differences({ pair }: { pair: Pair }) {
         </Table>
       </Table.ScrollContainer>
       <Text size="xs" className="dimmed">
-        First minus second. Tests on shared seeds, exact McNemar and Wilcoxon signed-rank, adjusted over the model’s tests (Holm).
+        First minus second. Tests on shared seeds, exact McNemar and Wilcoxon signed-rank, adjusted over the model’s
+        tests (Holm).
       </Text>
     </>
   );
@@ -153,7 +182,8 @@ function Differences({ pair }: { pair: Pair }) {
 const MAX_PAIRS = 30;
 
 function Pairs({ pair }: { pair: Pair }) {
-  if (pair.differing.length === 0) return <Text size="sm">On every shared task and seed both succeeded, or both failed.</Text>;
+  if (pair.differing.length === 0)
+    return <Text size="sm">On every shared task and seed both succeeded, or both failed.</Text>;
   return (
     <details>
       <summary style={{ cursor: "pointer", fontSize: 14 }}>

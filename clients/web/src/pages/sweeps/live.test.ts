@@ -25,12 +25,19 @@ describe("events", () => {
   it("move a job on, with the reason of its end", () => {
     const jobs = live(job("a"));
     expect(jobs.apply([event("done", "2026-01-01T00:01:00Z", { outcome: "limit", reason: "tokens" })])).toBe(1);
-    expect(jobs.moment().jobs[0]).toMatchObject({ state: "done", outcome: "limit", reason: "tokens", finished_at: "2026-01-01T00:01:00Z" });
+    expect(jobs.moment().jobs[0]).toMatchObject({
+      state: "done",
+      outcome: "limit",
+      reason: "tokens",
+      finished_at: "2026-01-01T00:01:00Z",
+    });
   });
 
   it("never take back what was read after them, and count no end twice", () => {
     const jobs = live(done);
-    const old = ["queued", "running", "done"].map((kind) => event(kind, "2026-01-01T00:01:00Z", { stage: "construct" }));
+    const old = ["queued", "running", "done"].map((kind) =>
+      event(kind, "2026-01-01T00:01:00Z", { stage: "construct" }),
+    );
     expect(jobs.apply(old)).toBe(0);
     expect(jobs.apply([event("done", "2026-01-01T00:05:00Z", { outcome: "success" })])).toBe(0);
     expect(jobs.moment().jobs).toEqual([done]);
@@ -39,7 +46,12 @@ describe("events", () => {
   it("follow a retry, which is newer than the end", () => {
     const jobs = live({ ...done, outcome: "errored" });
     jobs.apply([event("queued", "2026-01-01T00:06:00Z", { stage: "simulate" })]);
-    expect(jobs.moment().jobs[0]).toMatchObject({ state: "queued", stage: "simulate", outcome: null, finished_at: null });
+    expect(jobs.moment().jobs[0]).toMatchObject({
+      state: "queued",
+      stage: "simulate",
+      outcome: null,
+      finished_at: null,
+    });
     expect([...jobs.moment().totals]).toEqual([["queued", 1]]);
   });
 
@@ -68,15 +80,29 @@ describe("what is read", () => {
       const found = jobs.moment().cells.get("m")?.get("lift-1");
       return [found?.total ?? 0, [...(found?.counts ?? [])]];
     };
-    expect(cell()).toEqual([2, [["success", 1], ["queued", 1]]]);
+    expect(cell()).toEqual([
+      2,
+      [
+        ["success", 1],
+        ["queued", 1],
+      ],
+    ]);
     jobs.apply([event("running", "2026-01-01T00:01:00Z", { stage: "construct" }, "b")]);
-    expect(cell()).toEqual([2, [["success", 1], ["running", 1]]]);
+    expect(cell()).toEqual([
+      2,
+      [
+        ["success", 1],
+        ["running", 1],
+      ],
+    ]);
     expect(jobs.moment().tasks).toEqual(["lift-1", "lift-2"]);
   });
 
   it("may be ten thousand jobs, and an event costs no more for it", () => {
     const jobs = live(...Array.from({ length: 10_000 }, (_, n) => job(`j${n}`, { task: `t${n % 9}` })));
-    const ends = Array.from({ length: 10_000 }, (_, n) => event("done", "2026-01-01T00:01:00Z", { outcome: "success" }, `j${n}`));
+    const ends = Array.from({ length: 10_000 }, (_, n) =>
+      event("done", "2026-01-01T00:01:00Z", { outcome: "success" }, `j${n}`),
+    );
     const start = performance.now();
     for (const end of ends) jobs.apply([end]);
     expect(performance.now() - start).toBeLessThan(1_000);

@@ -136,7 +136,8 @@ export class LiveJobs {
       else counts.set(name, n);
     }
     this.tasks.add(job.task);
-    if (by === 1 && job.finished_at !== null && job.state === "done") this.ends.set(job.id, Date.parse(job.finished_at));
+    if (by === 1 && job.finished_at !== null && job.state === "done")
+      this.ends.set(job.id, Date.parse(job.finished_at));
     else this.ends.delete(job.id);
   }
 }

@@ -21,7 +21,9 @@ async function readPages(id: string, take: (page: readonly JobView[]) => void, l
   const before = await taken(client.GET("/v1/sweeps/{sweep_id}", { params: { path: { sweep_id: id } } }));
   let cursor: string | undefined;
   do {
-    const page = await taken(client.GET("/v1/jobs", { params: { query: { sweep: id, limit: PAGE, cursor, sort: "task", order: "asc" } } }));
+    const page = await taken(
+      client.GET("/v1/jobs", { params: { query: { sweep: id, limit: PAGE, cursor, sort: "task", order: "asc" } } }),
+    );
     if (!live()) return before.last_event;
     take(page.jobs);
     cursor = page.next_cursor ?? undefined;

@@ -15,12 +15,24 @@ export default function Distribution({ task, track }: { task: TaskDetail; track:
   const query = useQuery({
     queryKey: ["indicators", task.name, task.version, track],
     queryFn: () =>
-      taken(client.GET("/v1/jobs", { params: { query: { task: task.name, task_version: task.version, track, state: "done", sort: "finished", limit: MOST } } })),
+      taken(
+        client.GET("/v1/jobs", {
+          params: {
+            query: { task: task.name, task_version: task.version, track, state: "done", sort: "finished", limit: MOST },
+          },
+        }),
+      ),
   });
   return (
     <Section title={`Distribution of ${words(task.indicator)}`}>
       <Answered query={query} rows={5}>
-        {(page) => <Drawn jobs={page.jobs.filter((job) => job.indicator !== null)} task={task} more={page.next_cursor !== null} />}
+        {(page) => (
+          <Drawn
+            jobs={page.jobs.filter((job) => job.indicator !== null)}
+            task={task}
+            more={page.next_cursor !== null}
+          />
+        )}
       </Answered>
     </Section>
   );
@@ -39,8 +51,21 @@ function Drawn({ jobs, task, more }: { jobs: readonly JobView[]; task: TaskDetai
     color: { domain: ["success", "failure"], range: ["#009e73", "#d55e00"], legend: true },
     symbol: { domain: ["success", "failure"], range: ["circle", "times"], legend: false },
     marks: [
-      Plot.tickX(jobs, Plot.groupY({ x: "median" }, { y: "model", x: "indicator", strokeWidth: 2, strokeOpacity: 0.5 })),
-      Plot.dot(jobs, { x: "indicator", y: "model", r: 4, strokeWidth: 1.6, stroke: (job: JobView) => (job.success === true ? "success" : "failure"), symbol: (job: JobView) => (job.success === true ? "success" : "failure"), tip: true, title: (job: JobView) => `${job.model}, seed ${job.seed}: ${number(job.indicator)} ${task.unit === "1" ? "" : task.unit}` }),
+      Plot.tickX(
+        jobs,
+        Plot.groupY({ x: "median" }, { y: "model", x: "indicator", strokeWidth: 2, strokeOpacity: 0.5 }),
+      ),
+      Plot.dot(jobs, {
+        x: "indicator",
+        y: "model",
+        r: 4,
+        strokeWidth: 1.6,
+        stroke: (job: JobView) => (job.success === true ? "success" : "failure"),
+        symbol: (job: JobView) => (job.success === true ? "success" : "failure"),
+        tip: true,
+        title: (job: JobView) =>
+          `${job.model}, seed ${job.seed}: ${number(job.indicator)} ${task.unit === "1" ? "" : task.unit}`,
+      }),
     ],
   });
   const range = (model: string): string => {
@@ -51,7 +76,8 @@ function Drawn({ jobs, task, more }: { jobs: readonly JobView[]; task: TaskDetai
     <>
       <Drawing options={options} label={models.map(range).join("; ")} />
       <Text size="xs" className="dimmed">
-        Each mark is a job: a circle succeeded, a cross failed; the line is the median. The scale is that of square roots. As scored, whatever the flags say
+        Each mark is a job: a circle succeeded, a cross failed; the line is the median. The scale is that of square
+        roots. As scored, whatever the flags say
         {more ? `; the ${MOST.toLocaleString("en")} that ended last` : ""}.
       </Text>
     </>

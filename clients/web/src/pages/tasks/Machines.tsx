@@ -37,7 +37,17 @@ export function Machines({ task }: { task: TaskDetail }) {
             The best
           </Title>
           <Answered query={best} rows={4}>
-            {(jobs) => (jobs.length === 0 ? <Text size="sm">No machine has succeeded yet.</Text> : <Gallery jobs={oneOfEach(jobs, (job) => job.model, SHOWN)} unit={task.unit === "1" ? "" : task.unit} by="model" />)}
+            {(jobs) =>
+              jobs.length === 0 ? (
+                <Text size="sm">No machine has succeeded yet.</Text>
+              ) : (
+                <Gallery
+                  jobs={oneOfEach(jobs, (job) => job.model, SHOWN)}
+                  unit={task.unit === "1" ? "" : task.unit}
+                  by="model"
+                />
+              )
+            }
           </Answered>
         </div>
         <div>
@@ -48,7 +58,17 @@ export function Machines({ task }: { task: TaskDetail }) {
             Machines that were tried and failed: of each model and reason the one that came nearest.
           </Text>
           <Answered query={failed} rows={4}>
-            {(jobs) => (jobs.length === 0 ? <Text size="sm">No finished machine has failed.</Text> : <Gallery jobs={oneOfEach(jobs, (job) => `${job.model} ${job.reason ?? ""} ${(job.flags ?? []).join()}`, SHOWN)} unit={task.unit === "1" ? "" : task.unit} by="model" />)}
+            {(jobs) =>
+              jobs.length === 0 ? (
+                <Text size="sm">No finished machine has failed.</Text>
+              ) : (
+                <Gallery
+                  jobs={oneOfEach(jobs, (job) => `${job.model} ${job.reason ?? ""} ${(job.flags ?? []).join()}`, SHOWN)}
+                  unit={task.unit === "1" ? "" : task.unit}
+                  by="model"
+                />
+              )
+            }
           </Answered>
         </div>
       </Stack>

@@ -79,7 +79,11 @@ function Standings({ task }: { task: TaskDetail }) {
         return (
           <>
             <Section title="Models" aside={<Tracks known={found.tracks} chosen={found.track} />}>
-              {ranked === undefined || ranked.rows.length === 0 ? <Empty title="No job of this task has ended on this track" /> : <TaskTable task={ranked} />}
+              {ranked === undefined || ranked.rows.length === 0 ? (
+                <Empty title="No job of this task has ended on this track" />
+              ) : (
+                <TaskTable task={ranked} />
+              )}
             </Section>
             {found.track !== null && (
               <Suspense fallback={<Loading rows={5} />}>
@@ -95,7 +99,13 @@ function Standings({ task }: { task: TaskDetail }) {
 
 function Tracks({ known, chosen }: { known: readonly string[]; chosen: string | null }) {
   const navigate = useNavigate({ from: "/tasks/$name" });
-  return <TrackSelect known={known} chosen={chosen} onTrack={(track) => void navigate({ search: { track }, replace: true, resetScroll: false })} />;
+  return (
+    <TrackSelect
+      known={known}
+      chosen={chosen}
+      onTrack={(track) => void navigate({ search: { track }, replace: true, resetScroll: false })}
+    />
+  );
 }
 
 function Rules({ task }: { task: TaskDetail }) {

@@ -20,21 +20,21 @@ from buildarena_benchmark.leaderboard.cells import (
 )
 from buildarena_benchmark.leaderboard.comparisons import Comparison, TaskComparison, compare_models
 from buildarena_benchmark.leaderboard.ended_jobs import EndedJob
-from buildarena_benchmark.leaderboard.figures import (
+from buildarena_benchmark.leaderboard.latex import cost_table, performance_table, plain_table
+from buildarena_benchmark.leaderboard.overall import OverallRow
+from buildarena_benchmark.leaderboard.plot_data import (
     FailureRow,
     cost_bins,
     cost_bins_of,
     failure_row,
     failure_rows,
 )
-from buildarena_benchmark.leaderboard.latex import cost_table, performance_table, plain_table
-from buildarena_benchmark.leaderboard.overall import OverallRow
 from buildarena_benchmark.leaderboard.published import (
     PublishedRow,
     published_overall,
     published_rows,
 )
-from buildarena_benchmark.leaderboard.standings import KeptTests
+from buildarena_benchmark.leaderboard.standings import TestCache
 from buildarena_benchmark.leaderboard.tallies import UNKNOWN_TOKENS, Tally, Total, tallied
 from buildarena_benchmark.outcomes import SCORED
 
@@ -51,12 +51,12 @@ __all__ = [
     "Comparison",
     "EndedJob",
     "FailureRow",
-    "KeptTests",
     "OverallRow",
     "PublishedRow",
     "Tally",
     "TaskBoard",
     "TaskComparison",
+    "TestCache",
     "Total",
     "TrackBoard",
     "choose_cells",

@@ -6,11 +6,11 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 
-from buildarena_benchmark.flags import Reading
+from buildarena_benchmark.flags import ScoringPolicy
 from buildarena_benchmark.leaderboard.cells import Cell, summarise
 from buildarena_benchmark.leaderboard.ended_jobs import EndedJob
 from buildarena_benchmark.leaderboard.overall import OverallRow, Weights, overall_rows
-from buildarena_benchmark.leaderboard.standings import KeptTests, Standing, standings
+from buildarena_benchmark.leaderboard.standings import Standing, TestCache, standings
 
 CellKey = tuple[str, str, str]
 """Task, task version, configuration."""
@@ -25,7 +25,7 @@ class BoardQuery:
         models: Model names.
         since: Only jobs that ended then or later.
         until: Only jobs that ended before.
-        reading: How flags are read.
+        policy: The scoring policy: how flags are read.
         overall: Tasks that the overall ranking is over, as far as they are on the board.
     """
 
@@ -33,7 +33,7 @@ class BoardQuery:
     models: frozenset[str] | None = None
     since: datetime | None = None
     until: datetime | None = None
-    reading: Reading = Reading.OURS
+    policy: ScoringPolicy = ScoringPolicy.OURS
     overall: frozenset[str] | None = None
 
     def holds(self, trial: EndedJob) -> bool:
@@ -145,7 +145,7 @@ def ranked_board(
     *,
     overall: frozenset[str] | None,
     weights: Weights,
-    tests: KeptTests,
+    tests: TestCache,
 ) -> Board:
     """Ranks chosen cells.
 
@@ -193,7 +193,7 @@ class TrackBoard:
         self._weights = weights
         self._cells: dict[CellKey, dict[str, EndedJob]] = {}
         self._places: dict[str, CellKey] = {}
-        self._tests = KeptTests()
+        self._tests = TestCache()
 
     def put(self, trial: EndedJob) -> bool:
         """Adds or replaces a trial; returns whether anything changed."""
@@ -226,7 +226,7 @@ class TrackBoard:
 
         def summary(key: CellKey) -> Cell | None:
             inside = self._inside(key, query)
-            return summarise(inside, reading=query.reading) if inside else None
+            return summarise(inside, policy=query.policy) if inside else None
 
         outdated = {
             task: sum(len(self._inside(key, query)) for key in keys)

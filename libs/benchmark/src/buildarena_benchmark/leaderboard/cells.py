@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from buildarena_benchmark.flags import Reading, is_censored, is_disqualified, is_left_out
+from buildarena_benchmark.flags import ScoringPolicy, is_censored, is_disqualified, is_left_out
 from buildarena_benchmark.leaderboard.ended_jobs import EndedJob
 from buildarena_benchmark.leaderboard.tallies import UNKNOWN_TOKENS, Tally, Total, tallied
 from buildarena_benchmark.outcomes import SIMULATED, Outcome
@@ -32,7 +32,7 @@ TRIES: Final = (1, 2, 4, 8)
 class Cell:
     """One model configuration on one task. What does not exist is None.
 
-    Averages are over counted trials: scored ones, as far as the reading of flags leaves them in.
+    Averages are over counted trials: scored ones, as far as the scoring policy leaves them in.
 
     Attributes:
         trials: Counted trials: the denominator of the averages.
@@ -40,7 +40,7 @@ class Cell:
             denominator.
         errored: Jobs that infrastructure faults ended.
         cancelled: Jobs that somebody cancelled.
-        flagged: Scored trials that a flag makes failures or, in the published reading, leaves out.
+        flagged: Scored trials that a flag makes failures or, under the published policy, omits.
         flags: Scored trials by flag; one may have several.
         imported: Jobs that came from another service's archive, unverified ones included.
         unverified: Those of them that were not found again here: they count in nothing else.
@@ -106,14 +106,14 @@ class Cell:
 
 
 def counted_trials(
-    trials: Iterable[EndedJob], *, reading: Reading = Reading.OURS
+    trials: Iterable[EndedJob], *, policy: ScoringPolicy = ScoringPolicy.OURS
 ) -> list[EndedJob]:
     """The trials that averages are made of: the same that `counted_tallies` counts."""
     counted = []
     for trial in trials:
-        if not trial.scored or is_left_out(trial.flags, reading):
+        if not trial.scored or is_left_out(trial.flags, policy):
             continue
-        if reading == Reading.OURS and is_disqualified(trial.flags):
+        if policy == ScoringPolicy.OURS and is_disqualified(trial.flags):
             counted.append(replace(trial, success=False, indicator=0.0))
         else:
             counted.append(trial)
@@ -130,7 +130,7 @@ class CellName:
     decoding: Mapping[str, Any]
 
 
-def summarise(trials: Sequence[EndedJob], *, reading: Reading = Reading.OURS) -> Cell:
+def summarise(trials: Sequence[EndedJob], *, policy: ScoringPolicy = ScoringPolicy.OURS) -> Cell:
     """Summarises the trials of one model configuration on one task; at least one.
 
     The order of the trials does not matter.
@@ -142,16 +142,16 @@ def summarise(trials: Sequence[EndedJob], *, reading: Reading = Reading.OURS) ->
         configuration=first.configuration,
         decoding=first.decoding,
     )
-    return summarise_tallies(name, tallied(trials), reading=reading)
+    return summarise_tallies(name, tallied(trials), policy=policy)
 
 
 def summarise_tallies(
-    name: CellName, given: Sequence[Tally], *, reading: Reading = Reading.OURS
+    name: CellName, given: Sequence[Tally], *, policy: ScoringPolicy = ScoringPolicy.OURS
 ) -> Cell:
     """Summarises a cell's tallies, whose order does not matter."""
     tallies = [tally for tally in given if not tally.unverified]
     scored = [tally for tally in tallies if tally.scored]
-    counted = counted_tallies(tallies, reading=reading)
+    counted = counted_tallies(tallies, policy=policy)
     number, ended = _number(counted), _number(tallies)
     successes = _number(tally for tally in counted if tally.success)
     outcomes = _counts((tally.outcome, tally.number) for tally in tallies)
@@ -170,7 +170,7 @@ def summarise_tallies(
         ended=ended,
         errored=outcomes.get(Outcome.ERRORED, 0),
         cancelled=outcomes.get(Outcome.CANCELLED, 0),
-        flagged=_number(tally for tally in scored if _is_flagged(tally, reading)),
+        flagged=_number(tally for tally in scored if _is_flagged(tally, policy)),
         flags=_counts((flag, tally.number) for tally in scored for flag in set(tally.flags)),
         imported=_number(tally for tally in given if tally.imported),
         unverified=_number(given) - ended,
@@ -206,17 +206,19 @@ def summarise_tallies(
     )
 
 
-def counted_tallies(tallies: Iterable[Tally], *, reading: Reading = Reading.OURS) -> list[Tally]:
-    """The tallies that averages are made of, as a reading of flags has them.
+def counted_tallies(
+    tallies: Iterable[Tally], *, policy: ScoringPolicy = ScoringPolicy.OURS
+) -> list[Tally]:
+    """The tallies that averages are made of, under a scoring policy.
 
     In ours a disqualified trial stays, as a failure with an indicator of 0: were it left out, a
     model would lose nothing by trying to cheat, and one whose machines blow up would gain.
     """
     counted = []
     for tally in tallies:
-        if not tally.scored or is_left_out(tally.flags, reading):
+        if not tally.scored or is_left_out(tally.flags, policy):
             continue
-        if reading == Reading.OURS and is_disqualified(tally.flags):
+        if policy == ScoringPolicy.OURS and is_disqualified(tally.flags):
             nothing = np.zeros(tally.number)
             counted.append(replace(tally, success=False, indicators=nothing))
         else:
@@ -224,10 +226,10 @@ def counted_tallies(tallies: Iterable[Tally], *, reading: Reading = Reading.OURS
     return counted
 
 
-def _is_flagged(tally: Tally, reading: Reading) -> bool:
-    if reading == Reading.OURS:
+def _is_flagged(tally: Tally, policy: ScoringPolicy) -> bool:
+    if policy == ScoringPolicy.OURS:
         return is_disqualified(tally.flags)
-    return is_left_out(tally.flags, reading)
+    return is_left_out(tally.flags, policy)
 
 
 def _number(tallies: Iterable[Tally]) -> int:

@@ -9,19 +9,18 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Protocol
 
-Column = tuple[str, str, int, bool]
-"""Heading, name of the figure, power of ten it is divided by, whether more is better."""
+from buildarena_benchmark.leaderboard.columns import (
+    INDICATOR,
+    INPUT_TOKENS,
+    OUTPUT_TOKENS,
+    PARTS,
+    REQUESTS,
+    SUCCESS,
+    Column,
+)
 
-PERFORMANCE: tuple[Column, ...] = (
-    ("Number of Parts", "parts_mean", 0, True),
-    (r"Success Rate (\%)↑", "success_rate", -2, True),
-    ("Indicator↑", "indicator_mean", 0, True),
-)
-COST: tuple[Column, ...] = (
-    (r"\# Input Tokens ($\times 10^3$)↓", "input_tokens_mean", 3, False),
-    (r"\# Output Tokens ($\times 10^3$)↓", "output_tokens_mean", 3, False),
-    (r"\# LLM Requests↓", "requests_mean", 0, False),
-)
+PERFORMANCE = (PARTS, SUCCESS, INDICATOR)
+COST = (INPUT_TOKENS, OUTPUT_TOKENS, REQUESTS)
 LEVELS = (1, 2, 3)
 
 
@@ -53,17 +52,17 @@ def plain_table(cells: Cells) -> str:
     lines = [
         r"\begin{tabular}{ll" + "c" * len(columns) + "}",
         r"\toprule",
-        f"Task & Model & {' & '.join(heading for heading, *_ in columns)} \\\\",
+        f"Task & Model & {' & '.join(str(column.latex) for column in columns)} \\\\",
     ]
     for task, rows in cells.items():
         lines += [r"\midrule", rf"\multirow{{{len(rows)}}}{{*}}{{{_escaped(task)}}}"]
         texts = [
             _marked(
-                [_scaled(getattr(row, name), power) for row in rows],
-                [_is_bound(row, name) for row in rows],
-                more=more,
+                [_scaled(row, column) for row in rows],
+                [column.is_bound(row) for row in rows],
+                more=column.more,
             )
-            for _, name, power, more in columns
+            for column in columns
         ]
         lines += [
             rf"& {_escaped(row.model)} & {' & '.join(column[i] for column in texts)} \\"
@@ -73,7 +72,7 @@ def plain_table(cells: Cells) -> str:
 
 
 def _table(cells: Cells, columns: Sequence[Column]) -> str:
-    groups = " & ".join(rf"\multicolumn{{3}}{{c}}{{{heading}}}" for heading, *_ in columns)
+    groups = " & ".join(rf"\multicolumn{{3}}{{c}}{{{column.latex}}}" for column in columns)
     levels = " & ".join(f"Lv.{level}" for _ in columns for level in LEVELS)
     lines = [
         r"\begin{tabular}{ll" + "c" * 3 * len(columns) + "}",
@@ -91,27 +90,23 @@ def _category(cells: Cells, category: str, columns: Sequence[Column]) -> list[st
     tasks = [f"{category}-{level}" for level in LEVELS]
     models = list(dict.fromkeys(row.model for task in tasks for row in cells.get(task, ())))
     texts: list[list[str]] = []
-    for _, name, power, more in columns:
+    for column in columns:
         for task in tasks:
             rows = {row.model: row for row in cells.get(task, ())}
-            shown = [_scaled(getattr(rows.get(model), name, None), power) for model in models]
-            bounds = [_is_bound(rows.get(model), name) for model in models]
-            texts.append(_marked(shown, bounds, more=more))
+            shown = [_scaled(rows.get(model), column) for model in models]
+            bounds = [column.is_bound(rows.get(model)) for model in models]
+            texts.append(_marked(shown, bounds, more=column.more))
     lines = [rf"\multirow{{{len(models)}}}{{*}}{{{_escaped(category.capitalize())}}}"]
     for number, model in enumerate(models):
-        figures = " & ".join(column[number] for column in texts)
+        figures = " & ".join(shown[number] for shown in texts)
         lines.append(rf"& {_escaped(model)} & {figures} \\")
     return lines
 
 
-def _scaled(value: float | None, power: int) -> float | None:
+def _scaled(row: Figures | None, column: Column) -> float | None:
     """A figure as it is printed: to one decimal, which also decides what is a tie."""
-    return None if value is None else round(value / 10.0**power, 1)
-
-
-def _is_bound(row: Figures | None, name: str) -> bool:
-    """Whether a figure is at least what it says: a mean over bridges that carried everything."""
-    return name == "indicator_mean" and bool(getattr(row, "censored", 0))
+    value = column.value(row)
+    return None if value is None else round(value / 10.0**column.power, 1)
 
 
 def _marked(values: Sequence[float | None], bounds: Sequence[bool], *, more: bool) -> list[str]:

@@ -23,9 +23,9 @@ from buildarena_benchmark.statistics import (
     rank_models,
 )
 
-KEPT_TESTS: Final = 256
+MAX_CACHED_TESTS: Final = 256
 """Tasks whose tests are kept: the present ones, and those of recent filters."""
-KEPT_PAIRS: Final = 100_000
+MAX_CACHED_PAIRS: Final = 100_000
 """Tests of single pairs that are kept, and as many of before: some 200 bytes each."""
 
 PairTest = tuple[float, float, bool]
@@ -58,7 +58,7 @@ class Standings:
 
 
 def standings(
-    cells: Mapping[str, Row], ranked: Callable[[str], bool], tests: KeptTests
+    cells: Mapping[str, Row], ranked: Callable[[str], bool], tests: TestCache
 ) -> Standings:
     """Ranks configurations on each task and over the ranked ones.
 
@@ -106,7 +106,7 @@ def standings(
     )
 
 
-class KeptTests:
+class TestCache:
     """Tests of all pairs of cells; one of cells with equal figures is not made twice.
 
     Memory is bounded, and no cell is kept alive: tests are found by the hashes of the figures.
@@ -124,7 +124,7 @@ class KeptTests:
         found = self._rows.get(key)
         if found is None:
             found = self._tested(cells)
-            if len(self._rows) >= KEPT_TESTS:
+            if len(self._rows) >= MAX_CACHED_TESTS:
                 self._rows.clear()
             self._rows[key] = found
         return found
@@ -156,7 +156,7 @@ class KeptTests:
         return test
 
     def _keep(self, name: tuple[bytes, bytes], test: PairTest) -> None:
-        if len(self._pairs) >= KEPT_PAIRS:
+        if len(self._pairs) >= MAX_CACHED_PAIRS:
             self._older, self._pairs = self._pairs, {}
         self._pairs[name] = test
 

@@ -1,19 +1,26 @@
 """Glide: how far a machine flies that is let go in the air, and how gently it lands."""
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
-from buildarena_benchmark.scorers.carrying import from_below
-from buildarena_benchmark.scorers.pieces import Mask, joined_to_start, masses_of
-from buildarena_benchmark.scorers.series import starting_block
-from buildarena_benchmark.scorers.unmeasured import unmeasured
-from buildarena_benchmark.scorers.verdict import Deciding, Metric, Verdict, rounded
-from buildarena_benchmark.tasks.workshop_scoring import GlideScoring
+from buildarena_benchmark.fields import Document, Threshold
+from buildarena_benchmark.scorers.measures.carrying import from_below
+from buildarena_benchmark.scorers.measures.components import Mask, joined_to_start, masses_of
+from buildarena_benchmark.scorers.measures.series import starting_block
+from buildarena_benchmark.scorers.measures.unmeasured import unmeasured
+from buildarena_benchmark.scorers.scorer import (
+    FORCES_NOT_MEASURED,
+    Deciding,
+    Metric,
+    Scorer,
+    Verdict,
+    rounded,
+)
+from buildarena_simulation import Scenario
 from buildarena_simulation.scenario import ReleasedPlacement
 
 if TYPE_CHECKING:
-    from buildarena_benchmark.tasks.task import Task
     from buildarena_geometry import Machine
     from buildarena_simulation import Trajectory
 
@@ -24,22 +31,45 @@ _LAST_SAMPLES: Final = 3
 """The speed at landing is the greatest over so many steps before the ground is touched."""
 
 
-def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict:
+class GlideScoring(Document):
+    """How far a machine that is let go in the air flies, and how gently it lands.
+
+    Attributes:
+        min_range: The horizontal distance to where it lands must exceed it, units.
+        max_sink: It must be falling more slowly when it lands, units/s.
+    """
+
+    name: Literal["glide"]
+    min_range: Threshold = 80.0
+    max_sink: Threshold = 6.0
+
+
+def infeasible(scoring: GlideScoring, scenario: Scenario) -> str | None:
+    """Why no machine can pass; see `Scorer`."""
+    del scoring
+    if not isinstance(scenario.placement, ReleasedPlacement):
+        return "a glider is judged, but scenario.placement.kind is not released"
+    return None
+
+
+def judge(
+    scoring: GlideScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
+) -> Verdict:
     """The indicator is the horizontal distance flown over the height of release.
 
     The flight ends when anything of the machine touches ground or terrain. The distance is the
     starting block's; the speed at landing is that of everything that is still joined to it.
 
     Args:
-        task: Thresholds.
+        scoring: Thresholds.
+        scenario: What the machine was put through.
         machine: The machine.
         trajectory: The trial.
 
     Flags:
         `forces_not_measured`: cannot be judged.
     """
-    scoring, placement = task.scoring, task.scenario.placement
-    assert isinstance(scoring, GlideScoring)  # noqa: S101 - the scorer is chosen by it
+    placement = scenario.placement
     assert isinstance(placement, ReleasedPlacement)  # noqa: S101 - the task was checked for it
     lacking = unmeasured(trajectory, cargo=False)
     if lacking is not None:
@@ -76,3 +106,11 @@ def _sink(machine: "Machine", trajectory: "Trajectory", joined: Mask, last: int)
     height = trajectory.positions[rows, :, 2].astype(np.float64) @ weights
     falls = -np.diff(height / max(float(weights.sum()), 1e-9)) / np.diff(trajectory.time_s[rows])
     return float(falls.max(initial=0.0))
+
+
+SCORER: Final = Scorer(
+    parameters=GlideScoring,
+    judge=judge,
+    infeasible=infeasible,
+    flags=(FORCES_NOT_MEASURED,),
+)

@@ -1,22 +1,58 @@
 """Lift, levels 2 and 3: how high a rocket rises."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
-from buildarena_benchmark.scorers.pieces import joined_to_start
-from buildarena_benchmark.scorers.series import speeds, starting_block
+from buildarena_benchmark.fields import Document, Threshold
+from buildarena_benchmark.scorers.measures.components import joined_to_start
+from buildarena_benchmark.scorers.measures.series import speeds, starting_block
+from buildarena_benchmark.scorers.scorer import Deciding, Flag, Metric, Scorer, Verdict, rounded
 from buildarena_benchmark.scorers.thrust import thrust_to_weight
-from buildarena_benchmark.scorers.verdict import Deciding, Metric, Verdict, rounded
-from buildarena_benchmark.tasks.document import HeightScoring
+from buildarena_simulation import Scenario
 
 if TYPE_CHECKING:
-    from buildarena_benchmark.tasks.task import Task
     from buildarena_geometry import Machine
     from buildarena_simulation import Trajectory
 
 
-def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict:
+TWR_BELOW_ONE: Final = Flag(
+    name="twr_below_one",
+    meaning="A rocket rose although its thrust is less than its weight.",
+    published=True,
+)
+
+
+class HeightScoring(Document):
+    """How high a rocket rises.
+
+    Attributes:
+        min_height: The indicator must exceed it, units.
+        early_s: (2,) first window, seconds, its start excluded.
+        late_s: (2,) second window.
+        min_rise: The mean height must rise by more from window to window, units.
+    """
+
+    name: Literal["height"]
+    min_height: Threshold = 30.0
+    early_s: tuple[Threshold, Threshold] = (2.0, 7.0)
+    late_s: tuple[Threshold, Threshold] = (7.0, 12.0)
+    min_rise: Threshold = 5.0
+
+
+def infeasible(scoring: HeightScoring, scenario: Scenario) -> str | None:
+    """Why no machine can pass; see `Scorer`."""
+    (start, end), (later, last) = scoring.early_s, scoring.late_s
+    if scenario.control.mode == "none":
+        return "a rocket is judged, but nothing fires: scenario.control.mode must be held"
+    if not start < end <= later < last <= scenario.duration_s:
+        return "early_s and late_s must be windows within the trial, one after the other"
+    return None
+
+
+def judge(
+    scoring: HeightScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
+) -> Verdict:
     """The indicator is the greatest height of any block that is joined to the starting block.
 
     The trial succeeds if it exceeds a height and the rocket still rises: the mean height of its
@@ -24,7 +60,8 @@ def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict
     nothing.
 
     Args:
-        task: Thresholds.
+        scoring: Thresholds.
+        scenario: What the machine was put through.
         machine: Gives the mass.
         trajectory: The trial.
 
@@ -33,8 +70,6 @@ def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict
 
     Source: the paper, section "Evaluation"; thresholds as in the published evaluation.
     """
-    scoring = task.scoring
-    assert isinstance(scoring, HeightScoring)  # noqa: S101 - the scorer is chosen by it
     time_s = trajectory.time_s
     positions = trajectory.positions.astype(np.float64)
     joined = joined_to_start(machine, trajectory)
@@ -59,7 +94,7 @@ def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict
         "lateral_deviation": rounded(sideways.mean()),
         "broken_joints": len(trajectory.breaks),
     }
-    flags = ("twr_below_one",) if success and ratio < 1.0 else ()
+    flags = (TWR_BELOW_ONE,) if success and ratio < 1.0 else ()
     return Verdict(
         success=success,
         indicator=rounded(indicator),
@@ -67,3 +102,11 @@ def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict
         flags=flags,
         deciding=Deciding(samples=len(time_s), members=joined, cargo=False),
     )
+
+
+SCORER: Final = Scorer(
+    parameters=HeightScoring,
+    judge=judge,
+    infeasible=infeasible,
+    flags=(TWR_BELOW_ONE,),
+)

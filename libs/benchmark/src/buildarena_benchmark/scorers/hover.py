@@ -1,19 +1,30 @@
 """Hover: how long a machine holds its height in the air with its cargo."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import numpy as np
+from pydantic import Field
 
-from buildarena_benchmark.scorers.carrying import bears_cargo, is_airborne
-from buildarena_benchmark.scorers.pieces import Mask, joined_to_start
-from buildarena_benchmark.scorers.series import Series, rotations, starting_block
-from buildarena_benchmark.scorers.unmeasured import unmeasured
-from buildarena_benchmark.scorers.verdict import Deciding, Metric, Verdict, rounded
-from buildarena_benchmark.tasks.workshop_scoring import HoverScoring
+from buildarena_benchmark.fields import Document, Threshold
+from buildarena_benchmark.scorers.measures.carrying import bears_cargo, is_airborne
+from buildarena_benchmark.scorers.measures.components import Mask, joined_to_start
+from buildarena_benchmark.scorers.measures.series import Series, rotations, starting_block
+from buildarena_benchmark.scorers.measures.unmeasured import unmeasured
+from buildarena_benchmark.scorers.scorer import (
+    FORCES_NOT_MEASURED,
+    NOT_CARRIED,
+    Deciding,
+    Flag,
+    Metric,
+    Scorer,
+    Verdict,
+    raised,
+    rounded,
+)
+from buildarena_simulation import Scenario
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
 
 if TYPE_CHECKING:
-    from buildarena_benchmark.tasks.task import Task
     from buildarena_geometry import Machine
     from buildarena_simulation import Trajectory
 
@@ -22,14 +33,51 @@ _BORNE_SAMPLES = 25
 """Whether the cargo is borne is judged over a second: forces swing while a machine settles."""
 
 
-def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict:
+NOT_AIRBORNE: Final = Flag(
+    name="not_airborne",
+    meaning="The machine was at its height, but touched the ground.",
+)
+
+
+class HoverScoring(Document):
+    """How long a machine holds a height with its cargo.
+
+    Attributes:
+        height: Of the starting block's centre, units.
+        band: How far it may be above or below, units.
+        hold_s: For how long in a row, seconds.
+        max_tilt_deg: Of the starting block against how it stood at the start, degrees.
+        max_drift: Horizontal distance of the starting block from its start, units.
+    """
+
+    name: Literal["hover"]
+    height: Threshold = 10.0
+    band: Threshold = 1.5
+    hold_s: Annotated[float, Field(gt=0, le=600)] = 8.0
+    max_tilt_deg: Annotated[float, Field(gt=0, le=180)] = 20.0
+    max_drift: Threshold = 5.0
+
+
+def infeasible(scoring: HoverScoring, scenario: Scenario) -> str | None:
+    """Why no machine can pass; see `Scorer`."""
+    if scenario.cargo is None:
+        return "the cargo is carried, but scenario has no cargo"
+    if scoring.hold_s > scenario.duration_s:
+        return f"hold_s {scoring.hold_s:g} is longer than the trial"
+    return None
+
+
+def judge(
+    scoring: HoverScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
+) -> Verdict:
     """The indicator is the longest time in a row within the band, seconds.
 
     At each moment the starting block must be within the band, nearly upright and near where it
     started, the machine must bear its cargo, and nothing of it may touch the ground.
 
     Args:
-        task: Thresholds.
+        scoring: Thresholds.
+        scenario: What the machine was put through.
         machine: The machine.
         trajectory: The trial.
 
@@ -37,8 +85,6 @@ def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict
         `not_airborne`: it would have passed, but touches the ground. `not_carried`: it would have
         passed, but without the cargo. `forces_not_measured`: cannot be judged.
     """
-    scoring = task.scoring
-    assert isinstance(scoring, HoverScoring)  # noqa: S101 - the scorer is chosen by it
     lacking = unmeasured(trajectory, cargo=True)
     if lacking is not None:
         return lacking
@@ -57,8 +103,8 @@ def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict
     longest = _longest_s(steady & borne & airborne)
     passes = longest >= scoring.hold_s
     flags = {
-        "not_airborne": not passes and _longest_s(steady & borne) >= scoring.hold_s,
-        "not_carried": not passes and _longest_s(steady & airborne) >= scoring.hold_s,
+        NOT_AIRBORNE: not passes and _longest_s(steady & borne) >= scoring.hold_s,
+        NOT_CARRIED: not passes and _longest_s(steady & airborne) >= scoring.hold_s,
     }
     metrics: dict[str, Metric] = {
         "max_height": rounded(path[:, 2].max()),
@@ -70,7 +116,7 @@ def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict
         success=passes,
         indicator=rounded(longest),
         metrics=metrics,
-        flags=tuple(flag for flag, holds in flags.items() if holds),
+        flags=raised(flags),
         deciding=Deciding(samples=len(path), members=joined, cargo=True),
     )
 
@@ -88,3 +134,11 @@ def _longest_s(holds: Mask) -> float:
     edges = np.flatnonzero(np.diff(np.concatenate([[False], holds, [False]]).astype(int)))
     runs = edges[1::2] - edges[::2] - 1
     return float(runs.max(initial=0)) / SAMPLE_RATE_HZ
+
+
+SCORER: Final = Scorer(
+    parameters=HoverScoring,
+    judge=judge,
+    infeasible=infeasible,
+    flags=(NOT_AIRBORNE, NOT_CARRIED, FORCES_NOT_MEASURED),
+)

@@ -1,20 +1,31 @@
 """Rough road: how far, and how gently, a cargo is driven over bumps."""
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
-from buildarena_benchmark.scorers.carrying import bears_cargo
-from buildarena_benchmark.scorers.pieces import Mask, joined_to_start
-from buildarena_benchmark.scorers.rolling import driven_distances, moved_upright
-from buildarena_benchmark.scorers.series import Series, rotations, starting_block
-from buildarena_benchmark.scorers.unmeasured import unmeasured
-from buildarena_benchmark.scorers.verdict import Deciding, Metric, Verdict, rounded
-from buildarena_benchmark.tasks.workshop_scoring import RoadScoring
+from buildarena_benchmark.fields import Document, Threshold
+from buildarena_benchmark.scorers.measures.carrying import bears_cargo
+from buildarena_benchmark.scorers.measures.components import Mask, joined_to_start
+from buildarena_benchmark.scorers.measures.rolling import driven_distances, moved_upright
+from buildarena_benchmark.scorers.measures.series import Series, rotations, starting_block
+from buildarena_benchmark.scorers.measures.unmeasured import unmeasured
+from buildarena_benchmark.scorers.scorer import (
+    FORCES_NOT_MEASURED,
+    NOT_CARRIED,
+    NOT_DRIVEN,
+    Deciding,
+    Metric,
+    Scorer,
+    Verdict,
+    raised,
+    rounded,
+    undriven,
+)
+from buildarena_simulation import Scenario
 from buildarena_simulation.constants import GRAVITY, SAMPLE_RATE_HZ
 
 if TYPE_CHECKING:
-    from buildarena_benchmark.tasks.task import Task
     from buildarena_geometry import Machine
     from buildarena_simulation import Trajectory
 
@@ -28,7 +39,41 @@ _BORNE_SAMPLES: Final = 25
 """Whether the cargo is borne is judged over a second: it may hop."""
 
 
-def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict:
+class RoadScoring(Document):
+    """How far, and how gently, a vehicle carries a cargo over a rough road northwards.
+
+    Attributes:
+        min_distance: The distance must exceed it, units.
+        max_rms: The root mean square of the cargo's vertical acceleration must lie below it, g.
+        max_shift: Farthest that the cargo may get from its place on the machine, units.
+        settle_s: When the cargo's place is taken, and accelerations begin to count, seconds.
+        half_width: Of the road about x = 0, units; beyond it nothing counts any more.
+        length: Of the road: farther distances count as this, units.
+    """
+
+    name: Literal["road"]
+    min_distance: Threshold = 30.0
+    max_rms: Threshold = 1.0
+    max_shift: Threshold = 1.5
+    settle_s: Threshold = 2.0
+    half_width: Threshold = 15.0
+    length: Threshold = 36.0
+
+
+def infeasible(scoring: RoadScoring, scenario: Scenario) -> str | None:
+    """Why no machine can pass; see `Scorer`."""
+    if scenario.cargo is None:
+        return "the cargo is judged, but scenario has no cargo"
+    if scoring.settle_s >= scenario.duration_s:
+        return f"settle_s {scoring.settle_s:g} is not within the trial"
+    if scoring.length <= scoring.min_distance:
+        return f"the road's length {scoring.length:g} does not exceed min_distance"
+    return undriven(scenario)
+
+
+def judge(
+    scoring: RoadScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
+) -> Verdict:
     """The indicator is the distance northwards over 1 + the RMS of the cargo's acceleration in g.
 
     The distance is the starting block's, as far as wheels drove it (see `driven_distances`), on the
@@ -37,7 +82,8 @@ def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict
     machine has got farthest, or to the road's end.
 
     Args:
-        task: Thresholds.
+        scoring: Thresholds.
+        scenario: What the machine was put through.
         machine: The machine.
         trajectory: The trial.
 
@@ -45,8 +91,6 @@ def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict
         `not_driven`: far enough, but not by wheels. `not_carried`: far enough, but without the
         cargo. `forces_not_measured`: cannot be judged.
     """
-    scoring = task.scoring
-    assert isinstance(scoring, RoadScoring)  # noqa: S101 - the scorer is chosen by it
     lacking = unmeasured(trajectory, cargo=True)
     if lacking is not None:
         return lacking
@@ -63,8 +107,8 @@ def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict
     rms = _ride(scoring, trajectory, path, farthest)
     far = distance > scoring.min_distance
     flags = {
-        "not_driven": ahead.max() > scoring.min_distance >= counted.max(),
-        "not_carried": counted.max() > scoring.min_distance and not far,
+        NOT_DRIVEN: ahead.max() > scoring.min_distance >= counted.max(),
+        NOT_CARRIED: counted.max() > scoring.min_distance and not far,
     }
     metrics: dict[str, Metric] = {
         "distance": rounded(distance),
@@ -76,7 +120,7 @@ def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict
         success=far and rms < scoring.max_rms,
         indicator=rounded(distance / (1.0 + rms)),
         metrics=metrics,
-        flags=tuple(flag for flag, holds in flags.items() if holds),
+        flags=raised(flags),
         deciding=Deciding(samples=len(path), members=joined, cargo=True),
     )
 
@@ -111,3 +155,11 @@ def _ride(scoring: RoadScoring, trajectory: "Trajectory", path: Series, farthest
     )
     counts[farthest + 1 :] = False
     return float(np.sqrt(np.mean(pull[counts] ** 2))) if counts.any() else 0.0
+
+
+SCORER: Final = Scorer(
+    parameters=RoadScoring,
+    judge=judge,
+    infeasible=infeasible,
+    flags=(NOT_DRIVEN, NOT_CARRIED, FORCES_NOT_MEASURED),
+)

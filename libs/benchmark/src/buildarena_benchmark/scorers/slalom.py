@@ -1,24 +1,54 @@
 """Slalom: gates passed in order by a vehicle that keeps its wheels."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
-from buildarena_benchmark.scorers.pieces import Mask, joined_to_start
-from buildarena_benchmark.scorers.rolling import driven_distances, moved_upright
-from buildarena_benchmark.scorers.series import Series, starting_block
-from buildarena_benchmark.scorers.unmeasured import unmeasured
-from buildarena_benchmark.scorers.verdict import Deciding, Metric, Verdict, rounded
-from buildarena_benchmark.tasks.workshop_scoring import SlalomScoring
+from buildarena_benchmark.fields import Count, Document
+from buildarena_benchmark.scorers.measures.components import Mask, joined_to_start
+from buildarena_benchmark.scorers.measures.rolling import driven_distances, moved_upright
+from buildarena_benchmark.scorers.measures.series import Series, starting_block
+from buildarena_benchmark.scorers.measures.unmeasured import unmeasured
+from buildarena_benchmark.scorers.scorer import (
+    FORCES_NOT_MEASURED,
+    NOT_DRIVEN,
+    Deciding,
+    Metric,
+    Scorer,
+    Verdict,
+    rounded,
+    undriven,
+)
+from buildarena_simulation import Scenario
 
 if TYPE_CHECKING:
-    from buildarena_benchmark.tasks.task import Task
     from buildarena_geometry import Machine
     from buildarena_simulation import Trajectory
     from buildarena_simulation.scenario import Gate
 
 
-def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict:
+class SlalomScoring(Document):
+    """How many gates a vehicle passes in order.
+
+    Attributes:
+        min_gates: Fewest gates of a trial that passes.
+    """
+
+    name: Literal["slalom"]
+    min_gates: Count = 4
+
+
+def infeasible(scoring: SlalomScoring, scenario: Scenario) -> str | None:
+    """Why no machine can pass; see `Scorer`."""
+    count = len(scenario.gates)
+    if not count or count < scoring.min_gates:
+        return f"{scoring.min_gates} gates are asked for, but scenario.gates has {count}"
+    return undriven(scenario)
+
+
+def judge(
+    scoring: SlalomScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
+) -> Verdict:
     """The indicator is the number of gates passed, and the share of the time that was left then.
 
     A gate is passed when the starting block crosses its line in its direction, on its wheels, with
@@ -26,15 +56,14 @@ def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict
     trials with as many gates the faster one.
 
     Args:
-        task: Gates and thresholds.
+        scoring: Gates and thresholds.
+        scenario: What the machine was put through.
         machine: Gives the wheels.
         trajectory: The trial.
 
     Flags:
         `not_driven`: gates enough, but not by wheels. `forces_not_measured`: cannot be judged.
     """
-    scoring, scenario = task.scoring, task.scenario
-    assert isinstance(scoring, SlalomScoring)  # noqa: S101 - the scorer is chosen by it
     lacking = unmeasured(trajectory, cargo=False)
     if lacking is not None:
         return lacking
@@ -62,7 +91,7 @@ def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict
         success=gates >= scoring.min_gates,
         indicator=rounded(indicator),
         metrics=metrics,
-        flags=("not_driven",) if len(anyhow) >= scoring.min_gates > gates else (),
+        flags=(NOT_DRIVEN,) if len(anyhow) >= scoring.min_gates > gates else (),
         deciding=Deciding(samples=len(path), members=joined, cargo=False),
     )
 
@@ -107,3 +136,11 @@ def _has_wheels(machine: "Machine", trajectory: "Trajectory", joined: Mask) -> M
     columns = [k for k, block in enumerate(trajectory.block_ids) if block in wheels]
     whole = joined[:, columns].all(axis=1) if columns else np.zeros(len(joined), dtype=bool)
     return np.asarray(np.logical_and.accumulate(whole))
+
+
+SCORER: Final = Scorer(
+    parameters=SlalomScoring,
+    judge=judge,
+    infeasible=infeasible,
+    flags=(NOT_DRIVEN, FORCES_NOT_MEASURED),
+)

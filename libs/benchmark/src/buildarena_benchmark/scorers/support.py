@@ -1,29 +1,84 @@
 """Support: how heavy a cargo a bridge carries before it falls into the gap."""
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from buildarena_benchmark.scorers.pieces import Mask, spans_of
-from buildarena_benchmark.scorers.spanning import (
+from buildarena_benchmark.fields import Document, Threshold
+from buildarena_benchmark.scorers.measures.components import Mask, spans_of
+from buildarena_benchmark.scorers.measures.spanning import (
     Span,
     deciding_sample,
     is_lost,
     measure_span,
     terrain_sides,
 )
-from buildarena_benchmark.scorers.verdict import Deciding, Metric, Verdict, rounded
-from buildarena_benchmark.tasks.document import SupportScoring
+from buildarena_benchmark.scorers.scorer import (
+    START_TOO_HIGH,
+    Deciding,
+    Flag,
+    Metric,
+    Scorer,
+    Verdict,
+    raised,
+    rounded,
+)
+from buildarena_simulation import Scenario
 
 if TYPE_CHECKING:
-    from buildarena_benchmark.tasks.task import Task
     from buildarena_geometry import Machine
     from buildarena_simulation import Trajectory
 
 
-def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict:
+DOES_NOT_SPAN: Final = Flag(
+    name="does_not_span",
+    meaning="The load did not go to both terrains: the gap's floor bore more than a tenth of it, "
+    "or one terrain bore nothing.",
+)
+NEVER_FELL: Final = Flag(
+    name="never_fell",
+    meaning="The bridge carried everything there was: its load is at least the figure that is "
+    "shown.",
+    disqualifying=False,
+    published=True,
+    censoring=True,
+)
+SPAN_NOT_MEASURED: Final = Flag(
+    name="span_not_measured",
+    meaning="The trial has no contact forces, so whether the bridge spans was not measured.",
+    disqualifying=False,
+)
+
+
+class SupportScoring(Document):
+    """How heavy a cargo is carried over a gap.
+
+    Attributes:
+        fall_height: The cargo has fallen when its centre is below it, units.
+        min_time_s: How long in all it must be at or above that height.
+        max_start_height: Its start height may not exceed it, units.
+    """
+
+    name: Literal["support"]
+    fall_height: Threshold = 4.0
+    min_time_s: Threshold = 2.0
+    max_start_height: Threshold = 20.0
+
+
+def infeasible(scoring: SupportScoring, scenario: Scenario) -> str | None:
+    """Why no machine can pass; see `Scorer`."""
+    if scenario.cargo is None:
+        return "the cargo is judged, but scenario has no cargo"
+    if scoring.min_time_s > scenario.duration_s:
+        return f"min_time_s {scoring.min_time_s:g} is longer than the trial"
+    return None
+
+
+def judge(
+    scoring: SupportScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
+) -> Verdict:
     """The indicator is the cargo's mass at the first moment it is not carried over the gap.
 
     That is when its centre sinks below the fall height or leaves the gap to either terrain; it is
@@ -32,7 +87,8 @@ def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict
     otherwise.
 
     Args:
-        task: Thresholds, gap and terrains.
+        scoring: Thresholds, gap and terrains.
+        scenario: What the machine was put through.
         machine: Gives masses.
         trajectory: The trial; without cargo it fails.
 
@@ -43,27 +99,24 @@ def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict
 
     Source: the paper, section "Evaluation"; thresholds as in the published evaluation.
     """
-    scoring = task.scoring
-    assert isinstance(scoring, SupportScoring)  # noqa: S101 - the scorer is chosen by it
     if trajectory.cargo_position is None or trajectory.cargo_mass is None:
         return Verdict(success=False, indicator=0.0)
     height = trajectory.cargo_position[:, 2].astype(np.float64)
-    decided = deciding_sample(task.scenario, trajectory, fall_height=scoring.fall_height)
+    decided = deciding_sample(scenario, trajectory, fall_height=scoring.fall_height)
     carried = len(height) if decided is None else decided
     step = float(np.median(np.diff(trajectory.time_s))) if len(height) > 1 else 0.0
     time_above = carried * step
     too_high = bool(height[0] > scoring.max_start_height)
     lasted = time_above >= scoring.min_time_s - 1e-9 and not too_high
-    span = measure_span(task.scenario, trajectory, decided)
+    span = measure_span(scenario, trajectory, decided)
     spans = span is None or span.spans
     load = float(trajectory.cargo_mass[-1 if decided is None else decided])
     success = lasted and spans
     flags = {
-        "start_too_high": too_high,
-        "does_not_span": lasted and not spans,
-        "never_fell": success and decided is None,
-        "span_not_measured": trajectory.bearing is None
-        and terrain_sides(task.scenario) is not None,
+        START_TOO_HIGH: too_high,
+        DOES_NOT_SPAN: lasted and not spans,
+        NEVER_FELL: success and decided is None,
+        SPAN_NOT_MEASURED: trajectory.bearing is None and terrain_sides(scenario) is not None,
     }
     first = trajectory.breaks[0] if trajectory.breaks else None
     metrics: dict[str, Metric] = {
@@ -80,7 +133,7 @@ def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict
         success=success,
         indicator=rounded(load) if success else 0.0,
         metrics=metrics,
-        flags=tuple(flag for flag, holds in flags.items() if holds),
+        flags=raised(flags),
         deciding=Deciding(
             samples=len(height) if decided is None else decided + 1,
             members=_largest_piece(machine, trajectory),
@@ -89,17 +142,18 @@ def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict
     )
 
 
-def decision(task: "Task") -> Callable[[NDArray[np.float32] | None], bool]:
+def decision(
+    scoring: SupportScoring, scenario: Scenario
+) -> Callable[[NDArray[np.float32] | None], bool]:
     """Tells the sample after which nothing changes success, indicator and flags.
 
     Args:
-        task: Fall height and gap.
+        scoring: Fall height.
+        scenario: Gives the gap.
 
     Returns:
         Whether the cargo at a position is lost, as `judge` reads it.
     """
-    scoring, scenario = task.scoring, task.scenario
-    assert isinstance(scoring, SupportScoring)  # noqa: S101 - the scorer is chosen by it
 
     def decided(cargo: NDArray[np.float32] | None) -> bool:
         return cargo is not None and bool(
@@ -134,3 +188,12 @@ def _largest_piece(machine: "Machine", trajectory: "Trajectory") -> Mask:
         labels, of = np.unique(pieces[first], return_inverse=True)
         largest[first:last] = pieces[first] == labels[np.bincount(of, masses).argmax()]
     return largest
+
+
+SCORER: Final = Scorer(
+    parameters=SupportScoring,
+    judge=judge,
+    infeasible=infeasible,
+    flags=(DOES_NOT_SPAN, START_TOO_HIGH, NEVER_FELL, SPAN_NOT_MEASURED),
+    decision=decision,
+)

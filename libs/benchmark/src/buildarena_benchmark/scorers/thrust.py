@@ -1,16 +1,16 @@
 """Lift, level 1: thrust over weight."""
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
-from buildarena_benchmark.scorers.pieces import Mask, joined_to_start, mass_of
-from buildarena_benchmark.scorers.verdict import Deciding, Metric, Verdict, rounded
-from buildarena_benchmark.tasks.document import ThrustScoring
+from buildarena_benchmark.fields import Document, Threshold
+from buildarena_benchmark.scorers.measures.components import Mask, joined_to_start, mass_of
+from buildarena_benchmark.scorers.scorer import Deciding, Metric, Scorer, Verdict, rounded
+from buildarena_simulation import Scenario
 
 if TYPE_CHECKING:
-    from buildarena_benchmark.tasks.task import Task
     from buildarena_geometry import Machine
     from buildarena_simulation import Trajectory
 
@@ -18,18 +18,36 @@ _WARM_UP_S = 1.0
 _HEATED_SHARE = 0.5
 
 
-def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict:
+class ThrustScoring(Document):
+    """Thrust over weight.
+
+    Attributes:
+        min_ratio: The indicator must exceed it.
+    """
+
+    name: Literal["thrust"]
+    min_ratio: Threshold = 1.0
+
+
+def infeasible(scoring: ThrustScoring, scenario: Scenario) -> str | None:
+    """Some machine can always pass."""
+    del scoring, scenario
+    return None
+
+
+def judge(
+    scoring: ThrustScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
+) -> Verdict:
     """The indicator is the net thrust's length over the weight.
 
     Args:
-        task: Thresholds.
+        scoring: Thresholds.
+        scenario: What the machine was put through.
         machine: Gives the mass, the cannons' thrusts and directions.
         trajectory: Gives the heated cannons, and those that stay joined.
 
     Source: the paper, section "Evaluation", with thrusts added as vectors.
     """
-    scoring = task.scoring
-    assert isinstance(scoring, ThrustScoring)  # noqa: S101 - the scorer is chosen by it
     joined = joined_to_start(machine, trajectory)
     count = len(trajectory.time_s)
     ratio, metrics = thrust_to_weight(machine, trajectory, joined, count)
@@ -76,3 +94,10 @@ def thrust_to_weight(
     mass = mass_of(machine, trajectory, joined[0])
     ratio = math.hypot(*net) / mass if mass > 0 else 0.0
     return ratio, {"heated_cannons": heated, "cold_cannons": len(pushes) - heated}
+
+
+SCORER: Final = Scorer(
+    parameters=ThrustScoring,
+    judge=judge,
+    infeasible=infeasible,
+)

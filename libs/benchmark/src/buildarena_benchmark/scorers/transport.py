@@ -1,19 +1,29 @@
 """Transport: how far a vehicle, or a cargo on it, is moved over the ground."""
 
 from itertools import combinations
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
-from buildarena_benchmark.scorers.carrying import bears_cargo
-from buildarena_benchmark.scorers.pieces import joined_to_start
-from buildarena_benchmark.scorers.rolling import driven_distances, moved_upright
-from buildarena_benchmark.scorers.series import Series, speeds, starting_block
-from buildarena_benchmark.scorers.verdict import Deciding, Metric, Verdict, rounded
-from buildarena_benchmark.tasks.document import TransportScoring
+from buildarena_benchmark.fields import Coordinate, Count, Document, Threshold
+from buildarena_benchmark.scorers.measures.carrying import bears_cargo
+from buildarena_benchmark.scorers.measures.components import joined_to_start
+from buildarena_benchmark.scorers.measures.rolling import driven_distances, moved_upright
+from buildarena_benchmark.scorers.measures.series import Series, speeds, starting_block
+from buildarena_benchmark.scorers.scorer import (
+    NOT_DRIVEN,
+    START_TOO_HIGH,
+    Deciding,
+    Flag,
+    Metric,
+    Scorer,
+    Verdict,
+    raised,
+    rounded,
+)
+from buildarena_simulation import Scenario
 
 if TYPE_CHECKING:
-    from buildarena_benchmark.tasks.task import Task
     from buildarena_geometry import Machine
     from buildarena_simulation import Trajectory
 
@@ -27,7 +37,47 @@ _RESTING = 1e-3
 """Slower movement has no direction worth judging, units/s."""
 
 
-def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict:
+NO_WHEELS: Final = Flag(
+    name="no_wheels", meaning="A vehicle got far without a single wheel.", published=True
+)
+DRIVE_NOT_MEASURED: Final = Flag(
+    name="drive_not_measured",
+    meaning="The trial has no contacts of wheels, so whether they drove was not measured.",
+    disqualifying=False,
+)
+
+
+class TransportScoring(Document):
+    """How far something is moved over the ground.
+
+    Attributes:
+        subject: Whose horizontal distance from its start counts.
+        min_distance: The indicator must exceed it, units.
+        min_wheels: Fewest wheels of a machine that passes.
+        max_start_height: The highest start position must lie below it, units.
+        target: (2,) where to go, units; for secondary metrics only.
+    """
+
+    name: Literal["transport"]
+    subject: Literal["starting_block", "cargo"]
+    min_distance: Threshold = 10.0
+    min_wheels: Count = 0
+    max_start_height: Threshold = 20.0
+    target: tuple[Coordinate, Coordinate] = (10.0, 10.0)
+
+
+def infeasible(scoring: TransportScoring, scenario: Scenario) -> str | None:
+    """Why no machine can pass; see `Scorer`."""
+    if scoring.subject == "cargo" and scenario.cargo is None:
+        return "the cargo is judged, but scenario has no cargo"
+    if scenario.control.mode != "agent":
+        return "a vehicle is judged, but nobody drives: scenario.control.mode must be agent"
+    return None
+
+
+def judge(
+    scoring: TransportScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
+) -> Verdict:
     """The indicator is the greatest horizontal distance the subject was driven from its start.
 
     At each moment the distance counts as far as wheels have carried the machine, see
@@ -37,7 +87,8 @@ def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict
     bound, none pressed, nothing powered) fails with an indicator of 0.
 
     Args:
-        task: Thresholds and target.
+        scoring: Thresholds and target.
+        scenario: What the machine was put through.
         machine: Gives wheels and bindings.
         trajectory: The trial.
 
@@ -48,8 +99,6 @@ def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict
 
     Source: the paper, section "Evaluation"; thresholds as in the published evaluation.
     """
-    scoring = task.scoring
-    assert isinstance(scoring, TransportScoring)  # noqa: S101 - the scorer is chosen by it
     path = _subject_path(scoring, machine, trajectory)
     wheels = [b.id for b in machine.blocks.values() if b.module.motor]
     if path is None or not _is_driven(machine, trajectory):
@@ -75,10 +124,10 @@ def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict
     reached = indicator > scoring.min_distance and enough
     moved_enough = distance > scoring.min_distance and enough
     flags = {
-        "no_wheels": moved_enough and not wheels,
-        "start_too_high": too_high,
-        "not_driven": moved_enough and not reached,
-        "drive_not_measured": driven is None,
+        NO_WHEELS: moved_enough and not wheels,
+        START_TOO_HIGH: too_high,
+        NOT_DRIVEN: moved_enough and not reached,
+        DRIVE_NOT_MEASURED: driven is None,
     }
     settled = trajectory.time_s >= _SETTLED_S
     metrics: dict[str, Metric] = {
@@ -95,7 +144,7 @@ def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict
         success=reached and not too_high,
         indicator=rounded(indicator),
         metrics=metrics,
-        flags=tuple(flag for flag, holds in flags.items() if holds),
+        flags=raised(flags),
         deciding=Deciding(samples=len(path), members=joined, cargo=scoring.subject == "cargo"),
     )
 
@@ -167,3 +216,11 @@ def _path_metrics(time_s: Series, path: Series, target: tuple[float, float]) -> 
         else None,
         "final_distance_ratio": rounded(remaining / distance),
     }
+
+
+SCORER: Final = Scorer(
+    parameters=TransportScoring,
+    judge=judge,
+    infeasible=infeasible,
+    flags=(NOT_DRIVEN, NO_WHEELS, START_TOO_HIGH, DRIVE_NOT_MEASURED),
+)

@@ -1,25 +1,73 @@
 """Winch: how high a cargo is raised, and held when no key is pressed."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
+from pydantic import Field
 
-from buildarena_benchmark.scorers.carrying import bears_cargo, stands
-from buildarena_benchmark.scorers.pieces import Mask, joined_to_start
-from buildarena_benchmark.scorers.unmeasured import unmeasured
-from buildarena_benchmark.scorers.verdict import Deciding, Metric, Verdict, rounded
-from buildarena_benchmark.tasks.workshop_scoring import WinchScoring
+from buildarena_benchmark.fields import Document, Threshold
+from buildarena_benchmark.scorers.measures.carrying import bears_cargo, stands
+from buildarena_benchmark.scorers.measures.components import Mask, joined_to_start
+from buildarena_benchmark.scorers.measures.unmeasured import unmeasured
+from buildarena_benchmark.scorers.scorer import (
+    CAME_APART,
+    FORCES_NOT_MEASURED,
+    NOT_CARRIED,
+    Deciding,
+    Flag,
+    Metric,
+    Scorer,
+    Verdict,
+    rounded,
+    undriven,
+)
+from buildarena_simulation import Scenario
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
 
 if TYPE_CHECKING:
-    from buildarena_benchmark.scorers.series import Series
-    from buildarena_benchmark.tasks.task import Task
+    from buildarena_benchmark.scorers.measures.series import Series
     from buildarena_geometry import Machine
     from buildarena_simulation import Trajectory
 
 
-def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict:
+NOT_STANDING: Final = Flag(
+    name="not_standing",
+    meaning="The ground did not bear machine and cargo while the cargo was held.",
+)
+
+
+class WinchScoring(Document):
+    """How high a cargo is raised and held when no key is pressed any more.
+
+    Attributes:
+        min_rise: The height held, above where the cargo stood, must be no less, units.
+        hold_s: For how long it must be held, seconds.
+        max_play: How far the height may vary meanwhile, up or down, units.
+    """
+
+    name: Literal["winch"]
+    min_rise: Threshold = 5.0
+    hold_s: Annotated[float, Field(gt=0, le=600)] = 5.0
+    max_play: Threshold = 0.3
+
+
+def infeasible(scoring: WinchScoring, scenario: Scenario) -> str | None:
+    """Why no machine can pass; see `Scorer`."""
+    if scenario.cargo is None or scenario.cargo.at is None:
+        return "the cargo is raised from its place, but scenario.cargo has no place: give cargo.at"
+    end_s = scenario.control.until_s
+    if end_s is None or end_s + scoring.hold_s > scenario.duration_s:
+        return (
+            f"the cargo is held for {scoring.hold_s:g} s without keys: scenario.control.until_s "
+            "must be as long before the trial's end"
+        )
+    return undriven(scenario)
+
+
+def judge(
+    scoring: WinchScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
+) -> Verdict:
     """The indicator is the height held, times the cargo's mass.
 
     The height is the least of the cargo's heights above where it stood, over the best stretch of
@@ -27,7 +75,8 @@ def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict
     cargo, and stands on the ground with it.
 
     Args:
-        task: Thresholds.
+        scoring: Thresholds.
+        scenario: What the machine was put through.
         machine: The machine.
         trajectory: The trial.
 
@@ -36,8 +85,6 @@ def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict
         ground did not bear machine and cargo. `came_apart`: parts came off. `forces_not_measured`:
         cannot be judged.
     """
-    scoring, scenario = task.scoring, task.scenario
-    assert isinstance(scoring, WinchScoring)  # noqa: S101 - the scorer is chosen by it
     lacking = unmeasured(trajectory, cargo=True)
     if lacking is not None:
         return lacking
@@ -47,17 +94,17 @@ def judge(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Verdict
     height = trajectory.cargo_position[:, 2].astype(np.float64)
     height -= height[0]
     free = trajectory.time_s >= (scenario.control.until_s or 0.0)
-    rules: dict[str, Mask] = {
-        "not_carried": bears_cargo(trajectory, share=0.8),
-        "not_standing": stands(machine, trajectory, joined),
-        "came_apart": np.asarray(joined.all(axis=1)),
+    rules: dict[Flag, Mask] = {
+        NOT_CARRIED: bears_cargo(trajectory, share=0.8),
+        NOT_STANDING: stands(machine, trajectory, joined),
+        CAME_APART: np.asarray(joined.all(axis=1)),
     }
     held = _held(scoring, height, free & np.all(list(rules.values()), axis=0))
     passes = held >= scoring.min_rise
     flags = [
-        name
-        for name in rules
-        if not passes and _held_but_for(scoring, height, free, rules, name) >= scoring.min_rise
+        flag
+        for flag in rules
+        if not passes and _held_but_for(scoring, height, free, rules, flag) >= scoring.min_rise
     ]
     metrics: dict[str, Metric] = {
         "held_height": rounded(held),
@@ -86,8 +133,16 @@ def _held(scoring: WinchScoring, height: "Series", counts: "Mask") -> float:
 
 
 def _held_but_for(
-    scoring: WinchScoring, height: "Series", free: "Mask", rules: dict[str, "Mask"], name: str
+    scoring: WinchScoring, height: "Series", free: "Mask", rules: dict[Flag, "Mask"], without: Flag
 ) -> float:
     """What would be held if it were not for one of the rules."""
-    others = [mask for other, mask in rules.items() if other != name]
+    others = [mask for other, mask in rules.items() if other != without]
     return _held(scoring, height, free & np.all(others, axis=0))
+
+
+SCORER: Final = Scorer(
+    parameters=WinchScoring,
+    judge=judge,
+    infeasible=infeasible,
+    flags=(NOT_CARRIED, NOT_STANDING, CAME_APART, FORCES_NOT_MEASURED),
+)

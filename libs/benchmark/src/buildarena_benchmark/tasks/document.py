@@ -6,13 +6,21 @@ and what nobody could ever pass is refused.
 """
 
 import unicodedata
-from typing import Annotated, Final, Literal
+from typing import Annotated, Any, Final, Literal, Protocol
 
-from pydantic import AfterValidator, Discriminator, Field, Tag, ValidationInfo, field_validator
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Discriminator,
+    Field,
+    Tag,
+    ValidationInfo,
+    field_validator,
+)
 from pydantic_core import PydanticCustomError
 
-from buildarena_benchmark.tasks.fields import Coordinate, Count, Document, Threshold
-from buildarena_benchmark.tasks.workshop_scoring import WorkshopScoring, hopeless
+from buildarena_benchmark.fields import Count, Document
+from buildarena_benchmark.scorers.registry import known_scorers, scoring_type
 from buildarena_geometry import (
     MODULE_SETS,
     Catalogue,
@@ -66,6 +74,9 @@ ModuleSet = Annotated[str, AfterValidator(_known_set)]
 ModuleNames = Annotated[tuple[ModuleName, ...], Field(min_length=1, max_length=50)]
 
 
+_FORMER_LISTS: Final = {"told": "inline", "looked_up": "on_demand"}
+
+
 class Constraints(Document):
     """What a machine for the task may be made of.
 
@@ -91,14 +102,16 @@ class Constraints(Document):
         ]
         | None
     ) = None
-    module_list: Literal["told", "looked_up"] = "told"
+    module_list: Annotated[
+        Literal["inline", "on_demand"], BeforeValidator(lambda said: _FORMER_LISTS.get(said, said))
+    ] = "inline"
     min_modules: dict[ModuleName, Annotated[int, Field(ge=1, le=1000)]] = Field(default={})
     min_wheels: Count = 0
 
     @property
-    def looked_up(self) -> bool:
+    def on_demand(self) -> bool:
         """Whether builders look modules up by tools instead of being told them."""
-        return self.module_list == "looked_up"
+        return self.module_list == "on_demand"
 
     @property
     def catalogue(self) -> Catalogue:
@@ -130,72 +143,15 @@ class Constraints(Document):
         return wanted
 
 
-class TransportScoring(Document):
-    """How far something is moved over the ground.
+class Scoring(Protocol):
+    """What a task file says under `scoring`: a scorer's name, and its parameters beside it."""
 
-    Attributes:
-        subject: Whose horizontal distance from its start counts.
-        min_distance: The indicator must exceed it, units.
-        min_wheels: Fewest wheels of a machine that passes.
-        max_start_height: The highest start position must lie below it, units.
-        target: (2,) where to go, units; for secondary metrics only.
-    """
+    @property
+    def name(self) -> str:
+        """The scorer's."""
 
-    name: Literal["transport"]
-    subject: Literal["starting_block", "cargo"]
-    min_distance: Threshold = 10.0
-    min_wheels: Count = 0
-    max_start_height: Threshold = 20.0
-    target: tuple[Coordinate, Coordinate] = (10.0, 10.0)
-
-
-class SupportScoring(Document):
-    """How heavy a cargo is carried over a gap.
-
-    Attributes:
-        fall_height: The cargo has fallen when its centre is below it, units.
-        min_time_s: How long in all it must be at or above that height.
-        max_start_height: Its start height may not exceed it, units.
-    """
-
-    name: Literal["support"]
-    fall_height: Threshold = 4.0
-    min_time_s: Threshold = 2.0
-    max_start_height: Threshold = 20.0
-
-
-class ThrustScoring(Document):
-    """Thrust over weight.
-
-    Attributes:
-        min_ratio: The indicator must exceed it.
-    """
-
-    name: Literal["thrust"]
-    min_ratio: Threshold = 1.0
-
-
-class HeightScoring(Document):
-    """How high a rocket rises.
-
-    Attributes:
-        min_height: The indicator must exceed it, units.
-        early_s: (2,) first window, seconds, its start excluded.
-        late_s: (2,) second window.
-        min_rise: The mean height must rise by more from window to window, units.
-    """
-
-    name: Literal["height"]
-    min_height: Threshold = 30.0
-    early_s: tuple[Threshold, Threshold] = (2.0, 7.0)
-    late_s: tuple[Threshold, Threshold] = (7.0, 12.0)
-    min_rise: Threshold = 5.0
-
-
-Scoring = Annotated[
-    TransportScoring | SupportScoring | ThrustScoring | HeightScoring | WorkshopScoring,
-    Field(discriminator="name"),
-]
+    def model_dump(self, *, mode: Literal["json"]) -> dict[str, Any]:
+        """The parameters, defaults included, as JSON values."""
 
 
 class Indicator(Document):
@@ -231,7 +187,7 @@ class TaskDocument(Document):
     statement: Annotated[Text, Field(min_length=1, max_length=20_000)]
     constraints: Constraints = Constraints()
     scenario: Scenario
-    scoring: Scoring
+    scoring: scoring_type()  # type: ignore[valid-type]  # known when the registry is read
     indicator: Indicator
     difficulty: Difficulty | None = None
 
@@ -256,31 +212,7 @@ class TaskDocument(Document):
         scenario: Scenario | None = info.data.get("scenario")
         if scenario is None:
             return scoring
-        if isinstance(scoring, WorkshopScoring):
-            problem = hopeless(scoring, scenario)
-        else:
-            problem = _hopeless(scoring, scenario)
+        problem = known_scorers()[scoring.name].infeasible(scoring, scenario)
         if problem is not None:
             raise ValueError(problem)
         return scoring
-
-
-def _hopeless(scoring: Scoring, scenario: Scenario) -> str | None:
-    """Why no machine can pass: the scorer asks for what the scenario does not have."""
-    wants_cargo = isinstance(scoring, SupportScoring) or (
-        isinstance(scoring, TransportScoring) and scoring.subject == "cargo"
-    )
-    mode, problem = scenario.control.mode, None
-    if wants_cargo and scenario.cargo is None:
-        problem = "the cargo is judged, but scenario has no cargo"
-    elif isinstance(scoring, TransportScoring) and mode != "agent":
-        problem = "a vehicle is judged, but nobody drives: scenario.control.mode must be agent"
-    elif isinstance(scoring, SupportScoring) and scoring.min_time_s > scenario.duration_s:
-        problem = f"min_time_s {scoring.min_time_s:g} is longer than the trial"
-    elif isinstance(scoring, HeightScoring):
-        (start, end), (later, last) = scoring.early_s, scoring.late_s
-        if mode == "none":
-            problem = "a rocket is judged, but nothing fires: scenario.control.mode must be held"
-        elif not start < end <= later < last <= scenario.duration_s:
-            problem = "early_s and late_s must be windows within the trial, one after the other"
-    return problem

@@ -94,9 +94,10 @@ def _version_of(document: TaskDocument) -> str:
     content = document.model_dump(
         mode="json", include={"statement", "constraints", "scenario", "scoring"}
     )
-    if not document.constraints.looked_up:
-        # Tasks that say nothing of it keep the versions they had before it could be said.
-        del content["constraints"]["module_list"]
+    del content["constraints"]["module_list"]
+    if document.constraints.on_demand:
+        # A version is that of the word which the list was first known by; without, there is none.
+        content["constraints"]["module_list"] = "looked_up"
     content["scorer_version"] = SCORER_VERSION
     text = json.dumps(content, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()[:12]

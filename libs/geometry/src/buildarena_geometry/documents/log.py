@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, overload
+from typing import TYPE_CHECKING, Any, overload
 
 from buildarena_geometry.outcomes import RefusalClass
+from buildarena_geometry.reading import Form
 
 if TYPE_CHECKING:
     from buildarena_geometry.modules.module import Catalogue
     from buildarena_geometry.state import MachineState
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ActionRecord:
+class ActionRecord(Form, frozen=True, kw_only=True):
     """One action as it arrived.
 
     Attributes:
@@ -25,7 +25,7 @@ class ActionRecord:
     """
 
     name: str
-    arguments: object
+    arguments: Any
     reason: RefusalClass | None = None
 
     @property

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from typing import TYPE_CHECKING, Annotated, Any
+
+from msgspec import Meta
 
 from buildarena_geometry.blocks import Block, Connector, FaceRef, KeyPress
 from buildarena_geometry.collision import CollisionWorld, unwanted
@@ -13,32 +16,67 @@ from buildarena_geometry.feedback.words import listing
 from buildarena_geometry.keys import KEYS
 from buildarena_geometry.modules.parameters import LARGEST_NUMBER, LONGEST_TEXT
 from buildarena_geometry.modules.sets import module_set, modules_of_action, smallest_set
-from buildarena_geometry.outcomes import RefusalClass
 from buildarena_geometry.poses import Pose
-from buildarena_geometry.reading import Fields, Reader
+from buildarena_geometry.reading import Finite, Form, MisfitError, Point, Whole, read, refuse
 from buildarena_geometry.rotations import SHORTEST_QUATERNION
 from buildarena_geometry.state import MachineState, SubStructure
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
+    from collections.abc import Collection, Iterable, Iterator, Mapping
 
     from buildarena_geometry.modules.module import Catalogue, Module
 
-_FIELDS = (
-    "version",
-    "blocks",
-    "joints",
-    "connectors",
-    "control_sequence",
-    "structures",
-    "structures_made",
-    "next_id",
-    "available",
-    "log",
-)
-_BLOCK = ("id", "module", "position", "quaternion")
-_BLOCK_OPTIONAL = ("mount", "lost_mount", "flipped", "bindings", "structure", "note")
-_CONNECTOR = ("id", "module", "start", "end", "position", "quaternion", "span")
+Text = Annotated[str, Meta(max_length=LONGEST_TEXT)]
+
+
+class _Entry(Form, frozen=True, kw_only=True):
+    """What entries of blocks and connectors share."""
+
+    id: Text
+    module: str
+    position: Point
+    quaternion: tuple[Finite, Finite, Finite, Finite]
+    bindings: dict[str, tuple[str, ...]] | None = None
+    structure: Text | None = None
+    note: Text | None = None
+
+    @property
+    def pose(self) -> Pose:
+        """Where the part is and how it is turned."""
+        return Pose(position=self.position, quaternion=self.quaternion)
+
+    def __post_init__(self) -> None:
+        """Refuses places out of the world, and what is no rotation."""
+        # A connector may begin on a face a little beyond the farthest block's root.
+        if max(map(abs, self.position)) > 2 * LARGEST_NUMBER:
+            refuse("position", f"a position within ±{LARGEST_NUMBER:.0f}", self.position)
+        if abs(sum(value * value for value in self.quaternion) - 1) > SHORTEST_QUATERNION:
+            refuse("quaternion", "a quaternion of length 1", self.quaternion)
+
+
+class _BlockEntry(_Entry, frozen=True, kw_only=True):
+    mount: FaceRef | None = None
+    lost_mount: FaceRef | None = None
+    flipped: bool | None = None
+
+
+class _ConnectorEntry(_Entry, frozen=True, kw_only=True):
+    start: FaceRef
+    end: FaceRef
+    span: Point
+
+
+class _Document(Form, frozen=True, kw_only=True):
+    version: Whole
+    blocks: tuple[_BlockEntry, ...]
+    joints: Any
+    connectors: tuple[_ConnectorEntry, ...]
+    control_sequence: tuple[KeyPress, ...]
+    structures: tuple[SubStructure, ...]
+    structures_made: Whole
+    next_id: Whole
+    available: dict[str, Any]
+    log: tuple[ActionRecord, ...]
 
 
 def read_machine(
@@ -62,34 +100,53 @@ def read_machine(
         DocumentError: it is not a machine; the message names the entry.
     """
     known = module_set("all") if catalogue is None else catalogue
-    fields = Reader(value=document, where=where, error=DocumentError).fields(required=_FIELDS)
-    if fields["version"].integer() != DOCUMENT_VERSION:
-        fields["version"].fail(f"version {DOCUMENT_VERSION}")
+    entries = read(document, _Document, where=where, error=DocumentError)
     available = {
-        name: read_machine(entry.value, catalogue=catalogue, where=entry.where, overlaps=overlaps)
-        for name, entry in fields["available"].entries()
+        name: read_machine(
+            inner, catalogue=catalogue, where=f"{where}.available.{name}", overlaps=overlaps
+        )
+        for name, inner in entries.available.items()
     }
-    blocks = _read_blocks(fields["blocks"], known)
-    connectors = _read_connectors(fields["connectors"], known, blocks)
-    structures = _read_structures(fields["structures"], blocks)
-    records = tuple(_record(entry) for entry in fields["log"].items())
+    try:
+        state = _state(entries, known, {name: held.state for name, held in available.items()})
+        _check_whole(state)
+        if not overlaps:
+            _check_apart(state)
+    except MisfitError as misfit:
+        raise DocumentError(f"{where}{misfit}") from None
     if catalogue is None:
-        catalogue = smallest_set(_used(blocks, connectors, available, records))
-    state = MachineState(
+        used = _used(state.blocks, state.connectors, available, entries.log)
+        state = replace(state, catalogue=smallest_set(used))
+    return LoggedState(state=state, records=entries.log, available=available)
+
+
+def _state(
+    document: _Document, catalogue: Catalogue, available: dict[str, MachineState]
+) -> MachineState:
+    if document.version != DOCUMENT_VERSION:
+        refuse("version", f"version {DOCUMENT_VERSION}", document.version)
+    blocks = _read_blocks(document.blocks, catalogue)
+    structures = {structure.letter: structure for structure in document.structures}
+    for index, structure in enumerate(document.structures):
+        root = structure.root
+        if root not in blocks or blocks[root].module.kind != "start":
+            refuse(f"structures[{index}].root", "the id of a starting block", root)
+    if document.structures_made < len(structures):
+        expected = f"a whole number of at least {len(structures)}"
+        refuse("structures_made", expected, document.structures_made)
+    for index, press in enumerate(document.control_sequence):
+        _check_choice(f"control_sequence[{index}].key", press.key, KEYS)
+    return MachineState(
         catalogue=catalogue,
-        available={name: machine.state for name, machine in available.items()},
+        available=available,
         blocks=blocks,
-        connectors=connectors,
+        connectors=_read_connectors(document.connectors, catalogue, blocks),
         occupants={block.mount: block.id for block in blocks.values() if block.mount is not None},
         structures=structures,
-        structures_made=fields["structures_made"].integer(least=len(structures)),
-        control_sequence=tuple(_press(entry) for entry in fields["control_sequence"].items()),
-        next_id=fields["next_id"].integer(least=1),
+        structures_made=document.structures_made,
+        control_sequence=document.control_sequence,
+        next_id=document.next_id,
     )
-    _check_whole(state, fields)
-    if not overlaps:
-        _check_apart(state, fields)
-    return LoggedState(state=state, records=records, available=available)
 
 
 def _used(
@@ -108,179 +165,122 @@ def _used(
             yield from (module.name for module in modules_of_action(record.arguments))
 
 
-def _read_blocks(entries: Reader, catalogue: Catalogue) -> dict[str, Block]:
+def _read_blocks(entries: Iterable[_BlockEntry], catalogue: Catalogue) -> dict[str, Block]:
+    placeable = [
+        name for name, kind in catalogue.items() if kind.kind not in ("connector", "cargo")
+    ]
     blocks: dict[str, Block] = {}
     used: set[FaceRef] = set()
-    for entry in entries.items():
-        block = _block(entry, catalogue)
+    for index, entry in enumerate(entries):
+        place = f"blocks[{index}]"
+        _check_choice(f"{place}.module", entry.module, placeable)
+        block = _block(entry, catalogue[entry.module], place)
         if block.id in blocks:
-            raise DocumentError(f"{entry.where}.id: a block {block.id!r} exists already")
+            raise MisfitError(f".{place}.id: a block {block.id!r} exists already")
         if block.mount is not None:
             # A block is attached to one that is there, so its base always comes first.
-            place = f"{entry.where}.mount"
-            _check_face(block.mount, blocks, place)
+            _check_face(block.mount, blocks, f"{place}.mount")
             base, label = blocks[block.mount[0]], block.mount[1]
             if block.mount in used or (base.mount is not None and label == base.module.root_face):
-                raise DocumentError(f"{place}: face {label} of block {base.id} is used twice")
+                raise MisfitError(f".{place}.mount: face {label} of block {base.id} is used twice")
             used.add(block.mount)
         blocks[block.id] = block
     return blocks
 
 
-def _block(entry: Reader, catalogue: Catalogue) -> Block:
-    fields = entry.fields(required=_BLOCK, optional=_BLOCK_OPTIONAL)
-    placeable = [
-        name for name, kind in catalogue.items() if kind.kind not in ("connector", "cargo")
-    ]
-    module = catalogue[fields["module"].choice(placeable)]
-    mount = _face(fields["mount"]) if fields.has("mount") else None
-    if mount is not None and module.kind == "start":
-        fields["mount"].fail("null: a starting block sits on nothing")
+def _block(entry: _BlockEntry, module: Module, place: str) -> Block:
+    if entry.mount is not None and module.kind == "start":
+        refuse(f"{place}.mount", "null: a starting block sits on nothing", entry.mount)
+    if entry.flipped and not module.spins:
+        refuse(f"{place}.flipped", f"false: a {module.name} does not spin", entry.flipped)
     return Block(
-        id=fields["id"].text(longest=LONGEST_TEXT),
+        id=entry.id,
         module=module,
-        world_from_block=_pose(fields),
-        mount=mount,
-        lost_mount=_face(fields["lost_mount"]) if fields.has("lost_mount") else None,
-        flipped=_flipped(fields, module),
-        bindings=_bindings(fields, module),
-        structure=_optional_text(fields, "structure"),
-        note=_optional_text(fields, "note"),
+        world_from_block=entry.pose,
+        mount=entry.mount,
+        lost_mount=entry.lost_mount,
+        flipped=bool(entry.flipped),
+        bindings=_bindings(entry, module, place),
+        structure=entry.structure or "",
+        note=entry.note or "",
     )
 
 
-def _flipped(fields: Fields, module: Module) -> bool:
-    flipped = fields["flipped"].truth() if fields.has("flipped") else False
-    if flipped and not module.spins:
-        fields["flipped"].fail(f"false: a {module.name} does not spin")
-    return flipped
-
-
-def _bindings(fields: Fields, module: Module) -> dict[str, tuple[str, ...]]:
+def _bindings(entry: _Entry, module: Module, place: str) -> dict[str, tuple[str, ...]]:
     bindings: dict[str, tuple[str, ...]] = dict.fromkeys(module.actions, ())
-    if fields.has("bindings"):
-        for action, keys in fields["bindings"].entries():
-            if action not in bindings:
-                raise DocumentError(f"{keys.where}: a {module.name} has no such action")
-            bindings[action] = tuple(key.choice(KEYS) for key in keys.items())
+    for action, keys in (entry.bindings or {}).items():
+        if action not in bindings:
+            raise MisfitError(f".{place}.bindings.{action}: a {module.name} has no such action")
+        for index, key in enumerate(keys):
+            _check_choice(f"{place}.bindings.{action}[{index}]", key, KEYS)
+        bindings[action] = keys
     return bindings
 
 
 def _read_connectors(
-    entries: Reader, catalogue: Catalogue, blocks: Mapping[str, Block]
+    entries: Iterable[_ConnectorEntry], catalogue: Catalogue, blocks: Mapping[str, Block]
 ) -> dict[str, Connector]:
     connectors: dict[str, Connector] = {}
-    for entry in entries.items():
-        fields = entry.fields(required=_CONNECTOR, optional=("bindings", "structure", "note"))
-        start, end = _face(fields["start"]), _face(fields["end"])
-        for face, name in ((start, "start"), (end, "end")):
-            _check_face(face, blocks, f"{entry.where}.{name}")
-        module = catalogue[fields["module"].choice(catalogue.connectors)]
-        link = Connector(
-            id=fields["id"].text(longest=LONGEST_TEXT),
+    for index, entry in enumerate(entries):
+        place, start, end = f"connectors[{index}]", entry.start, entry.end
+        _check_face(start, blocks, f"{place}.start")
+        _check_face(end, blocks, f"{place}.end")
+        _check_choice(f"{place}.module", entry.module, catalogue.connectors)
+        if entry.id in connectors or entry.id in blocks:
+            raise MisfitError(f".{place}.id: a part {entry.id!r} exists already")
+        module = catalogue[entry.module]
+        connectors[entry.id] = Connector(
+            id=entry.id,
             module=module,
             start=start,
             end=end,
             start_xyz=blocks[start[0]].face_center(start[1]),
             end_xyz=blocks[end[0]].face_center(end[1]),
-            world_from_connector=_pose(fields),
-            span=fields["span"].vector(),
-            bindings=_bindings(fields, module),
-            structure=_optional_text(fields, "structure"),
-            note=_optional_text(fields, "note"),
+            world_from_connector=entry.pose,
+            span=entry.span,
+            bindings=_bindings(entry, module, place),
+            structure=entry.structure or "",
+            note=entry.note or "",
         )
-        if link.id in connectors or link.id in blocks:
-            raise DocumentError(f"{entry.where}.id: a part {link.id!r} exists already")
-        connectors[link.id] = link
     return connectors
 
 
-def _read_structures(entries: Reader, blocks: Mapping[str, Block]) -> dict[str, SubStructure]:
-    structures: dict[str, SubStructure] = {}
-    for entry in entries.items():
-        fields = entry.fields(required=("letter", "source", "root"))
-        root = fields["root"].text()
-        if root not in blocks or blocks[root].module.kind != "start":
-            fields["root"].fail("the id of a starting block")
-        letter = fields["letter"].text()
-        structures[letter] = SubStructure(letter=letter, source=fields["source"].text(), root=root)
-    return structures
-
-
-def _check_whole(state: MachineState, fields: Fields) -> None:
+def _check_whole(state: MachineState) -> None:
     """Refuses documents whose entries are good one by one and make no machine together."""
-    where = fields["blocks"].where
-    parts = (*state.blocks, *state.connectors)
-    for part in parts:
+    for part in (*state.blocks, *state.connectors):
         if part.isdecimal() and int(part) >= state.next_id:
-            fields["next_id"].fail(f"a number above every id, such as {part}")
+            refuse("next_id", f"a number above every id, such as {part}", state.next_id)
     starts = [block for block in state.blocks.values() if block.module.kind == "start"]
     wanted = len(state.structures) if state.available else min(1, len(state.blocks))
     if len(starts) != wanted or (starts and next(iter(state.blocks)) != starts[0].id):
-        raise DocumentError(
-            f"{where}: expected {wanted} starting block, at its head, found {len(starts)}"
+        raise MisfitError(
+            f".blocks: expected {wanted} starting block, at its head, found {len(starts)}"
         )
     for block in state.blocks.values():
         if block.structure != "" and block.structure not in state.structures:
-            raise DocumentError(f"{where}: block {block.id} is of an unknown sub-structure")
+            raise MisfitError(f".blocks: block {block.id} is of an unknown sub-structure")
 
 
-def _check_apart(state: MachineState, fields: Fields) -> None:
-    where = fields["blocks"].where
+def _check_apart(state: MachineState) -> None:
     world = CollisionWorld()
     for block in state.blocks.values():
         pairs = unwanted(world.overlaps([block]), state.blocks)
         if pairs:
-            raise DocumentError(f"{where}: blocks {pairs[0][1]} and {pairs[0][0]} overlap")
+            raise MisfitError(f".blocks: blocks {pairs[0][1]} and {pairs[0][0]} overlap")
         world.place([block])
 
 
-def _check_face(face: FaceRef, blocks: Mapping[str, Block], where: str) -> None:
+def _check_face(face: FaceRef, blocks: Mapping[str, Block], place: str) -> None:
     block_id, label = face
     if block_id not in blocks:
-        raise DocumentError(f"{where}: there is no block {block_id!r} before it")
+        raise MisfitError(f".{place}: there is no block {block_id!r} before it")
     labels = blocks[block_id].module.face_of_label
     if label not in labels:
-        raise DocumentError(
-            f"{where}: block {block_id} has no face {label!r}; its faces: {listing(labels)}"
+        raise MisfitError(
+            f".{place}: block {block_id} has no face {label!r}; its faces: {listing(labels)}"
         )
 
 
-def _face(entry: Reader) -> FaceRef:
-    names = [part.text() for part in entry.items()]
-    if len(names) != 2:  # noqa: PLR2004  a block and one of its faces
-        entry.fail("a block's id and a face's label")
-    return (names[0], names[1])
-
-
-def _pose(fields: Fields) -> Pose:
-    position, quaternion = fields["position"].vector(), fields["quaternion"].numbers(4)
-    # A connector may begin on a face a little beyond the farthest block's root.
-    if max(map(abs, position)) > 2 * LARGEST_NUMBER:
-        fields["position"].fail(f"a position within ±{LARGEST_NUMBER:.0f}")
-    if abs(sum(value * value for value in quaternion) - 1) > SHORTEST_QUATERNION:
-        fields["quaternion"].fail("a quaternion of length 1")
-    return Pose(position=position, quaternion=quaternion)
-
-
-def _press(entry: Reader) -> KeyPress:
-    fields = entry.fields(required=("time_s", "key", "hold_for_s"))
-    return KeyPress(
-        time_s=fields["time_s"].number(least=0),
-        key=fields["key"].choice(KEYS),
-        hold_for_s=fields["hold_for_s"].number(above=0),
-    )
-
-
-def _record(entry: Reader) -> ActionRecord:
-    fields = entry.fields(required=("name", "arguments"), optional=("reason",))
-    reason = fields["reason"].choice(list(RefusalClass)) if fields.has("reason") else None
-    return ActionRecord(
-        name=fields["name"].text(),
-        arguments=fields["arguments"].value,
-        reason=None if reason is None else RefusalClass(reason),
-    )
-
-
-def _optional_text(fields: Fields, name: str) -> str:
-    return fields[name].text(longest=LONGEST_TEXT) if fields.has(name) else ""
+def _check_choice(place: str, value: str, choices: Collection[str]) -> None:
+    if value not in choices:
+        refuse(place, f"one of {', '.join(choices)}", value)

@@ -14,7 +14,7 @@ from buildarena_geometry.modules.solids import Ball, Box, Solid
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-CYLINDER_SIDES = 24
+ROUND_SIDES = 24
 BALL_RINGS = 8  # from pole to pole
 CONNECTOR_RADIUS = 0.06  # units; connectors have no volume, this is for the eye alone
 
@@ -36,49 +36,44 @@ _BOX_FACES = ((4, 6, 7, 5), (0, 1, 3, 2), (2, 3, 7, 6), (0, 4, 5, 1), (1, 5, 7, 
 
 
 @cache
-def polygons(solid: Solid) -> tuple[NDArray[np.float64], ...]:
+def polygons(solid: Solid, sides: int = ROUND_SIDES) -> tuple[NDArray[np.float64], ...]:
     """The flat faces of a solid.
 
+    Args:
+        solid: block frame, units.
+        sides: into how many a circle is cut.
+
     Returns:
-        Arrays of (n, 3) corners, block frame, units, counter-clockwise seen from outside.
+        Arrays of (n, 3) corners, block frame, units, counter-clockwise seen from outside; of a
+        cylinder first the base and the top.
     """
     if isinstance(solid, Box):
         corners = np.array(solid.lowest) + _CORNERS * np.array(solid.size)
         return tuple(corners[list(face)] for face in _BOX_FACES)
-    if isinstance(solid, Ball):
-        return _ball(solid)
-    angles = np.arange(CYLINDER_SIDES) * (2 * math.pi / CYLINDER_SIDES)
+    angles = np.arange(sides) * (2 * math.pi / sides)
     circle = np.stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)], axis=1)
+    if isinstance(solid, Ball):
+        return _ball(solid, circle)
     axis = solid.block_from_axis
     half = np.array([0.0, 0.0, solid.length / 2])
     base, top = (axis.apply(circle * solid.radius + end) for end in (-half, half))
     around = [
-        np.array([base[side - 1], base[side], top[side], top[side - 1]])
-        for side in range(CYLINDER_SIDES)
+        np.array([base[side - 1], base[side], top[side], top[side - 1]]) for side in range(sides)
     ]
     return (base[::-1], top, *around)
 
 
-def _ball(solid: Ball) -> tuple[NDArray[np.float64], ...]:
+def _ball(solid: Ball, circle: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
     """Rings of quads from pole to pole; those at the poles are triangles."""
-    angles = np.arange(CYLINDER_SIDES) * (2 * math.pi / CYLINDER_SIDES)
+    sides, pole = len(circle), np.array([0.0, 0.0, 1.0])
     falls = np.arange(BALL_RINGS + 1) * (math.pi / BALL_RINGS)
     rings = [
-        np.array(solid.center)
-        + solid.radius
-        * np.stack(
-            [
-                math.sin(fall) * np.cos(angles),
-                math.sin(fall) * np.sin(angles),
-                np.full_like(angles, math.cos(fall)),
-            ],
-            axis=1,
-        )
+        np.array(solid.center) + solid.radius * (math.sin(fall) * circle + math.cos(fall) * pole)
         for fall in falls
     ]
     faces = []
     for index, (upper, lower) in enumerate(pairwise(rings)):
-        for side in range(CYLINDER_SIDES):
+        for side in range(sides):
             corners = [upper[side - 1], lower[side - 1], lower[side], upper[side]]
             if index == 0:
                 del corners[3]

@@ -10,7 +10,7 @@ from xml.sax.saxutils import escape
 import numpy as np
 
 from buildarena_geometry.blocks import Block
-from buildarena_geometry.export.meshes import COLOURS, CYLINDER_SIDES, normal, polygons
+from buildarena_geometry.export.meshes import COLOURS, ROUND_SIDES, normal, polygons
 from buildarena_geometry.modules.solids import Box
 from buildarena_geometry.poses import Pose
 
@@ -123,7 +123,7 @@ class _Drawing:
         for solid in block.module.body:
             for polygon in polygons(solid):
                 # A cylinder's side is round: only its two ends have edges.
-                edged = isinstance(solid, Box) or len(polygon) == CYLINDER_SIDES
+                edged = isinstance(solid, Box) or len(polygon) == ROUND_SIDES
                 corners = block.world_from_block.apply(polygon)
                 self._add_polygon(corners, block.module.kind, edged=edged)
         if self._view.ids:

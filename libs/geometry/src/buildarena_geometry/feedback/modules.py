@@ -81,13 +81,13 @@ def modules_of_category(catalogue: Catalogue) -> dict[str, list[Module]]:
     found: dict[str, list[Module]] = {}
     for module in catalogue.values():
         if module.kind != "cargo":
-            for category in module.facts.categories or (OTHER,):
+            for category in module.categories or (OTHER,):
                 found.setdefault(category, []).append(module)
     return found
 
 
 def _short_line(module: Module) -> str:
-    first = module.facts.brief or module.description.partition(". ")[0]
+    first = module.brief or module.description.partition(". ")[0]
     first = first.rstrip(".")
     return f"- {module.name} (mass {plain(module.mass)}): {first}."
 

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from buildarena_geometry.blocks import Block
-    from buildarena_geometry.modules.joints import Drive, SeatJoint
+    from buildarena_geometry.modules.joints import Drive, MovingJoint
     from buildarena_geometry.rotations import Vector
 
 _ALONG = 0.9999  # cosine; an axis nearer to the block's own than this is that axis
@@ -25,8 +25,8 @@ def motions(block: Block) -> list[str]:
     module = block.module
     facts: list[str] = []
     if module.joint is not None and module.physics is not None:
-        facts.extend(_joint(block, module.physics.seat, module.joint))
-    wing, push = module.forces.wing, module.forces.push
+        facts.extend(_joint(block, module.physics.joint_type, module.joint))
+    wing, push = module.wing, module.push
     if wing is not None:
         towards = caption(block.world_from_block.direction(wing.normal))
         facts.append(f"open to {towards}" if wing.one_sided else f"flat side faces {towards}")
@@ -36,7 +36,7 @@ def motions(block: Block) -> list[str]:
     return facts
 
 
-def _joint(block: Block, seat: str, joint: SeatJoint) -> Iterator[str]:
+def _joint(block: Block, seat: str, joint: MovingJoint) -> Iterator[str]:
     axis = block.world_from_block.direction(joint.axis)
     if seat == "ball":
         yield "turns freely every way"

@@ -12,61 +12,107 @@ then what the first basic module of the same kind does.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
-from dataclasses import dataclass
+import math
 from functools import cache
 from importlib import resources
 from pathlib import Path
-from typing import cast
+from typing import TYPE_CHECKING, Annotated, Any
+
+from msgspec import Meta, field
 
 from buildarena_geometry.errors import CatalogueError
-from buildarena_geometry.modules.facts import FACT_FIELDS, read_facts
-from buildarena_geometry.modules.forces import FORCE_FIELDS, read_forces
-from buildarena_geometry.modules.joints import SENSES, Sense, read_gear, read_joint
+from buildarena_geometry.modules.forces import check_forces
+from buildarena_geometry.modules.joints import checked_joint
 from buildarena_geometry.modules.module import (
-    KINDS,
-    LINKS,
-    MASS_PLACES,
-    SEATS,
     Catalogue,
     Face,
-    Kind,
     Landmark,
     Link,
-    MassPlace,
     Module,
-    Motor,
-    Physics,
-    Seat,
+    ModuleFields,
     Sphere,
-    Thrust,
 )
-from buildarena_geometry.modules.solids import Ball, Box, Cylinder, Solid
 from buildarena_geometry.poses import Pose
-from buildarena_geometry.reading import Fields, Reader
-from buildarena_geometry.rotations import ORIGIN, dot, from_axes
+from buildarena_geometry.reading import (
+    Form,
+    MisfitError,
+    Name,
+    Point,
+    Whole,
+    read,
+    refuse,
+)
+from buildarena_geometry.rotations import dot, from_axes
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
 
 CATALOGUE_VERSION = 1
-_REQUIRED = ("name", "kind", "mass", "cost", "size", "description", "besiege")
-_SHAPE = ("center", "faces", "colliders", "body", "pointing", "landmarks")
-_USE = ("actions", "motor", "joint", "gear", "thrust", "physics", "grabs", "link")
-_RULES = ("root_offset", "overlaps_base", "spin")
-_OPTIONAL = (*_SHAPE, *_USE, *_RULES, *FACT_FIELDS, *FORCE_FIELDS)
-_MOTOR = ("speed_rpm", "lag_per_s", "torque", "forward", "backward", "forward_sense")
-_THRUST = ("action", "along", "cold", "heated", "spheres")
-_PHYSICS = ("seat", "mass_at", "structural", "friction", "linear_drag", "angular_drag")
+CONFIDENCES = ("known", "community", "chosen", "unknown")
 _WITHOUT_PHYSICS = ("connector", "cargo")
-_PERPENDICULAR = 1e-6
+_TOLERANCE = 1e-6  # what six written digits may miss of a unit length or a right angle
+_DIRECTIONS = ("pointing", "joint.axis", "push.direction", "wing.normal")
+_ACTIONS = (
+    *("motor.forward", "motor.backward", "thrust.action", "push.action"),
+    *("joint.drive.forward", "joint.drive.backward", "altitude.rise", "altitude.sink"),
+    *("spring.contract", "decouple.action", "grip.grab", "grip.release"),
+)
+_OLD_FIELDS = {"seat": "joint_type", "idle": "default_mode", "tether": "rope_mount"}
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Usual:
-    """What modules of a kind do unless they say otherwise; fields as in `Module`."""
+class FaceEntry(Form, frozen=True, kw_only=True):
+    """A face as a module file describes it.
 
-    motor: Motor | None = None
-    thrust: Thrust | None = None
-    physics: Physics | None = None
-    flames: tuple[Sphere, ...] = ()
+    Attributes:
+        label: the letter models name it by.
+        center: (3,) block frame, units.
+        normal: (3,) outwards, block frame, unit length.
+        x_axis: (3,) the x axis of a block attached here, perpendicular to the normal, unit length.
+    """
+
+    label: Annotated[str, Meta(max_length=20)]
+    center: Point
+    normal: Point
+    x_axis: Point
+
+    def __post_init__(self) -> None:
+        """Refuses axes that are none."""
+        _check_direction("normal", self.normal)
+        _check_direction("x_axis", self.x_axis)
+        if abs(dot(self.normal, self.x_axis)) > _TOLERANCE:
+            refuse("x_axis", "a direction perpendicular to the normal", self.x_axis)
+
+
+class BesiegeDatum(Form, frozen=True, kw_only=True):
+    """A further entry of a block in Besiege's machine files."""
+
+    type: str
+    key: str
+    value: str | int | float | bool
+
+
+class BesiegeEntry(Form, frozen=True, kw_only=True):
+    """How Besiege's machine files write a module; see `Module`."""
+
+    id: Whole
+    data: tuple[BesiegeDatum, ...]
+    keys: dict[str, Name] = field(default_factory=dict)
+
+
+class ModuleEntry(ModuleFields, frozen=True, kw_only=True):
+    """A module as a module file describes it; see `Module`."""
+
+    cost: Whole
+    faces: tuple[FaceEntry, ...] = ()
+    link: Link | None = None
+    besiege: BesiegeEntry
+
+
+class ModuleFile(Form, frozen=True, kw_only=True):
+    """A module file."""
+
+    version: Whole
+    modules: list[Any]
 
 
 def load_catalogue(*files: str | Path) -> Catalogue:
@@ -125,21 +171,16 @@ def read_modules(
     Raises:
         CatalogueError: the content breaks the format.
     """
-    fields = Reader(value=content, where=where, error=CatalogueError).fields(
-        required=("version", "modules")
-    )
-    if fields["version"].integer() != CATALOGUE_VERSION:
-        fields["version"].fail(f"version {CATALOGUE_VERSION}")
-    usual_of = {
-        module.kind: _Usual(
-            motor=module.motor,
-            thrust=module.thrust,
-            physics=module.physics,
-            flames=module.flames,
+    file = read(content, ModuleFile, where=where, error=CatalogueError)
+    if file.version != CATALOGUE_VERSION:
+        raise CatalogueError(
+            f"{where}.version: expected version {CATALOGUE_VERSION}, found {file.version}"
         )
-        for module in reversed(basic)
-    }
-    return tuple(_module(entry, usual_of) for entry in fields["modules"].items())
+    usual_of: dict[str, Module] = {module.kind: module for module in reversed(basic)}
+    return tuple(
+        _module(entry, f"{where}.modules[{index}]", usual_of)
+        for index, entry in enumerate(file.modules)
+    )
 
 
 def _read_file(file: Path, basic: tuple[Module, ...]) -> tuple[Module, ...]:
@@ -168,187 +209,136 @@ def _parse_yaml(text: str, file: Path) -> object:
     return content
 
 
-def _module(entry: Reader, usual_of: Mapping[Kind, _Usual]) -> Module:
-    fields = entry.fields(required=_REQUIRED, optional=_OPTIONAL)
-    name = fields["name"].text(longest=60)
-    entry = Reader(value=entry.value, where=f"{entry.where} ({name})", error=entry.error)
-    fields = entry.fields(required=_REQUIRED, optional=_OPTIONAL)
-    kind = cast("Kind", fields["kind"].choice(KINDS))
-    besiege = fields["besiege"].fields(required=("id", "data"), optional=("keys",))
-    usual = usual_of.get(kind, _Usual())
-    landmarks = tuple(map(_landmark, fields.items("landmarks")))
-    actions = tuple(action.text(longest=60) for action in fields.items("actions"))
-    physics = _physics(fields["physics"]) if fields.has("physics") else usual.physics
-    seat = None if physics is None else physics.seat
-    # A joint says all of how its module turns: one without a motor is free of the usual one.
-    motor = None if fields.has("joint") else usual.motor
-    module = Module(
-        name=name,
-        besiege_id=besiege["id"].integer(least=0),
-        kind=kind,
-        mass=fields["mass"].number(above=0),
-        cost=fields["cost"].integer(least=0),
-        size=fields["size"].vector() if fields.has("size") else None,
-        center=fields["center"].vector() if "center" in fields else ORIGIN,
-        faces=tuple(map(_face, fields.items("faces"))),
-        colliders=tuple(map(_solid, fields.items("colliders"))),
-        body=tuple(map(_solid, fields.items("body"))),
-        pointing=fields["pointing"].direction() if fields.has("pointing") else None,
-        landmarks=landmarks,
-        flames=_flames(landmarks) or usual.flames,
-        actions=actions,
-        motor=_motor(fields["motor"], actions) if fields.has("motor") else motor,
-        joint=read_joint(fields["joint"], seat=seat, actions=actions)
-        if fields.has("joint")
-        else None,
-        gear=read_gear(fields["gear"], seat=seat) if fields.has("gear") else None,
-        thrust=_thrust(fields["thrust"], actions) if fields.has("thrust") else usual.thrust,
-        physics=physics,
-        grabs=fields["grabs"].truth() if "grabs" in fields else False,
-        link=cast("Link", fields["link"].choice(LINKS)) if fields.has("link") else "rigid",
-        description=fields["description"].text(),
-        besiege_data=tuple(map(_besiege_entry, besiege["data"].items())),
-        besiege_keys=_besiege_keys(besiege["keys"], actions) if "keys" in besiege else {},
-        root_offset=fields["root_offset"].number(least=0) if "root_offset" in fields else 0.0,
-        overlaps_base=fields["overlaps_base"].truth() if "overlaps_base" in fields else False,
-        spin=cast("Sense", fields["spin"].choice(SENSES)) if fields.has("spin") else None,
-        facts=read_facts(fields, actions),
-        forces=read_forces(fields, actions),
-    )
-    _check_sense(module, entry)
-    _check_use(module, fields)
+def _module(content: object, where: str, usual_of: Mapping[str, Module]) -> Module:
+    name = content.get("name") if isinstance(content, dict) else None
+    where = f"{where} ({name:.60})" if isinstance(name, str) else where
+    entry = read(_renamed(content), ModuleEntry, where=where, error=CatalogueError)
+    usual = usual_of.get(entry.kind)
+    try:
+        _check_entry(entry)
+        module = _made(entry, usual)
+        _check_use(entry, module)
+    except MisfitError as misfit:
+        raise CatalogueError(f"{where}{misfit}") from None
     return module
 
 
-def _check_sense(module: Module, entry: Reader) -> None:
-    """Refuses modules whose fields are good one by one and make no sense together."""
-    if len(module.face_of_label) != len(module.faces):
-        raise CatalogueError(f"{entry.where}.faces: two faces share a label")
-    if module.landmarks and module.pointing is None:
-        raise CatalogueError(
-            f"{entry.where}.landmarks: they lie along `pointing`, which is missing"
-        )
-    if module.kind == "connector" and (module.colliders or module.faces):
-        raise CatalogueError(f"{entry.where}: a connector has neither faces nor colliders")
-    if module.kind != "connector" and (module.size is None or not module.colliders):
-        raise CatalogueError(f"{entry.where}: a {module.kind} needs a size and colliders")
+def _renamed(content: object) -> object:
+    """An entry whose fields have their present names; older files call three of them otherwise."""
+    if not isinstance(content, dict):
+        return content
+    entry = {_OLD_FIELDS.get(name, name): value for name, value in content.items()}
+    for name in ("physics", "joint", "drive"):
+        if isinstance(entry.get(name), dict):
+            entry[name] = _renamed(entry[name])
+    return entry
 
 
-def _check_use(module: Module, fields: Fields) -> None:
+def _made(entry: ModuleEntry, usual: Module | None) -> Module:
+    """The module of an entry, which does what is usual for its kind where it does not say."""
+    shared = {name: getattr(entry, name) for name in ModuleFields.__struct_fields__}
+    for name in ("thrust", "physics"):
+        shared[name] = shared[name] or getattr(usual, name, None)
+    if entry.joint is not None:
+        # A joint says all of how its module turns: one without a motor is free of the usual one.
+        joint_type = getattr(shared["physics"], "joint_type", None)
+        shared["joint"] = checked_joint(entry.joint, joint_type)
+    elif entry.motor is None and usual is not None:
+        shared["motor"] = usual.motor
+    besiege = entry.besiege
+    return Module(
+        **shared,
+        cost=entry.cost,
+        faces=tuple(map(_face, entry.faces)),
+        flames=tuple(_flames(entry.landmarks)) or (usual.flames if usual else ()),
+        link=entry.link or "rigid",
+        besiege_id=besiege.id,
+        besiege_data=tuple((datum.type, datum.key, datum.value) for datum in besiege.data),
+        besiege_keys=besiege.keys,
+    )
+
+
+def _face(entry: FaceEntry) -> Face:
+    pose = Pose(position=entry.center, quaternion=from_axes(entry.x_axis, entry.normal))
+    return Face(label=entry.label, block_from_face=pose)
+
+
+def _flames(landmarks: tuple[Landmark, ...]) -> Iterator[Sphere]:
+    for mark in landmarks:
+        if mark.heats and mark.radius is not None:
+            yield Sphere(along=mark.along, radius=mark.radius)
+
+
+def _check_entry(entry: ModuleEntry) -> None:
+    """Refuses entries whose fields are good one by one and make no sense together."""
+    for place in _DIRECTIONS:
+        direction = _at(entry, place)
+        if direction is not None:
+            _check_direction(place, direction)
+    for place in _ACTIONS:
+        action = _at(entry, place)
+        if action is not None and action not in entry.actions:
+            refuse(place, f"one of {', '.join(entry.actions)}", action)
+    _check_names(entry)
+    check_forces(entry, kind=entry.kind, mass=entry.mass, link=entry.link)
+    if len({face.label for face in entry.faces}) != len(entry.faces):
+        raise MisfitError(".faces: two faces share a label")
+    if entry.landmarks and entry.pointing is None:
+        raise MisfitError(".landmarks: they lie along `pointing`, which is missing")
+    if entry.kind == "connector" and (entry.colliders or entry.faces):
+        raise MisfitError(": a connector has neither faces nor colliders")
+    if entry.kind != "connector" and (entry.size is None or not entry.colliders):
+        raise MisfitError(f": a {entry.kind} needs a size and colliders")
+
+
+def _check_names(entry: ModuleEntry) -> None:
+    """Refuses keys of actions that the module does not have, and sources of no known kind."""
+    for place, keys in (("default_keys", entry.default_keys), ("besiege.keys", entry.besiege.keys)):
+        for action, key in keys.items():
+            if action not in entry.actions:
+                names = ", ".join(entry.actions) or "none"
+                refuse(f"{place}.{action}", f"keys of the actions {names} only", key)
+    for figure, source in entry.sources.items():
+        if source.partition(":")[0] not in CONFIDENCES:
+            sure = f"a text that begins with one of {', '.join(CONFIDENCES)}"
+            refuse(f"sources.{figure}", sure, source)
+
+
+def _check_use(entry: ModuleEntry, module: Module) -> None:
     """Refuses what a module of this form cannot do."""
-    for name in ("motor", "thrust"):
-        if fields.has(name) and module.kind in _WITHOUT_PHYSICS:
-            fields[name].fail(f"no {name}: a {module.kind} does nothing by itself")
-    if fields.has("physics") and module.kind in _WITHOUT_PHYSICS:
-        fields["physics"].fail(f"no physics: a {module.kind} is not a body of its own")
-    if fields.has("link") and module.kind != "connector":
-        fields["link"].fail(f"no link: a {module.kind} is not a connector")
-    if fields.has("spin") and module.motor is not None and module.spin != module.spin_sense:
-        fields["spin"].fail(f"{module.spin_sense}, as its motor's forward_sense")
-    if fields.has("thrust") and module.pointing is None:
-        fields["thrust"].fail("no thrust: it acts along `pointing`, which is missing")
-    seat, place = None if module.physics is None else module.physics.seat, fields.reader.where
-    if module.motor is not None and seat != "axle":
-        raise CatalogueError(f"{place}: a motor needs the seat axle")
-    if seat == "axle" and (module.motor is None) == (module.joint is None):
-        raise CatalogueError(f"{place}: the seat axle needs either a motor or a joint")
+    kind = module.kind
+    if kind in _WITHOUT_PHYSICS:
+        for name in ("motor", "thrust"):
+            _check_absent(entry, name, f"a {kind} does nothing by itself")
+        _check_absent(entry, "physics", f"a {kind} is not a body of its own")
+    if kind != "connector":
+        _check_absent(entry, "link", f"a {kind} is not a connector")
+    if entry.spin and module.motor is not None and entry.spin != module.spin_sense:
+        refuse("spin", f"{module.spin_sense}, as its motor's forward_sense", entry.spin)
+    if module.pointing is None:
+        _check_absent(entry, "thrust", "it acts along `pointing`, which is missing")
+    joint_type = None if module.physics is None else module.physics.joint_type
+    if joint_type != "axle":
+        _check_absent(entry, "gear", f"a cog's joint type is axle, not {joint_type}")
+        if module.motor is not None:
+            raise MisfitError(": a motor needs the joint type axle")
+    elif (module.motor is None) == (module.joint is None):
+        raise MisfitError(": the joint type axle needs either a motor or a joint")
 
 
-def _face(entry: Reader) -> Face:
-    fields = entry.fields(required=("label", "center", "normal", "x_axis"))
-    normal, x_axis = fields["normal"].direction(), fields["x_axis"].direction()
-    if abs(dot(normal, x_axis)) > _PERPENDICULAR:
-        fields["x_axis"].fail("a direction perpendicular to the normal")
-    pose = Pose(position=fields["center"].vector(), quaternion=from_axes(x_axis, normal))
-    return Face(label=fields["label"].text(longest=20), block_from_face=pose)
+def _check_absent(entry: ModuleEntry, name: str, why: str) -> None:
+    if (value := getattr(entry, name)) is not None:
+        refuse(name, f"no {name}: {why}", value)
 
 
-def _solid(entry: Reader) -> Solid:
-    if isinstance(entry.value, dict) and entry.value.get("shape") == "sphere":
-        ball = entry.fields(required=("shape", "radius", "center"))
-        return Ball(radius=ball["radius"].number(above=0), center=ball["center"].vector())
-    shape = entry.fields(required=("shape", "from", "to"), optional=("radius",))
-    start, end = shape["from"].vector(), shape["to"].vector()
-    if shape["shape"].choice(("box", "cylinder", "sphere")) == "box":
-        if not all(low < high for low, high in zip(start, end, strict=True)):
-            shape["to"].fail(f"three numbers, each larger than in {list(start)}")
-        if "radius" in shape:
-            shape["radius"].fail("no radius: a box has none")
-        return Box(lowest=start, highest=end)
-    if start == end:
-        shape["to"].fail("another point than `from`")
-    return Cylinder(radius=shape["radius"].number(above=0), base=start, top=end)
+def _check_direction(place: str, vector: Point) -> None:
+    if abs(math.hypot(*vector) - 1) > _TOLERANCE:
+        refuse(place, "a direction, three numbers with length 1", vector)
 
 
-def _landmark(entry: Reader) -> Landmark:
-    fields = entry.fields(required=("name", "along"), optional=("radius", "heats"))
-    radius = fields["radius"].number(above=0) if "radius" in fields else None
-    heats = fields["heats"].truth() if "heats" in fields else False
-    if heats and radius is None:
-        raise CatalogueError(f"{entry.where}.radius: it is missing; a flame is a sphere")
-    name = fields["name"].text(longest=60)
-    return Landmark(name=name, along=fields["along"].number(), radius=radius, heats=heats)
-
-
-def _flames(landmarks: tuple[Landmark, ...]) -> tuple[Sphere, ...]:
-    return tuple(
-        Sphere(along=mark.along, radius=mark.radius)
-        for mark in landmarks
-        if mark.heats and mark.radius is not None
-    )
-
-
-def _sphere(entry: Reader) -> Sphere:
-    fields = entry.fields(required=("along", "radius"))
-    return Sphere(along=fields["along"].number(), radius=fields["radius"].number(above=0))
-
-
-def _motor(entry: Reader, actions: tuple[str, ...]) -> Motor:
-    fields = entry.fields(required=_MOTOR, optional=("origin",))
-    return Motor(
-        speed_rpm=fields["speed_rpm"].number(above=0),
-        lag_per_s=fields["lag_per_s"].number(above=0),
-        torque=fields["torque"].number(above=0),
-        forward=fields["forward"].choice(actions),
-        backward=fields["backward"].choice(actions),
-        forward_sense=cast("Sense", fields["forward_sense"].choice(SENSES)),
-        origin=fields.text("origin"),
-    )
-
-
-def _thrust(entry: Reader, actions: tuple[str, ...]) -> Thrust:
-    fields = entry.fields(required=_THRUST, optional=("origin",))
-    return Thrust(
-        action=fields["action"].choice(actions),
-        along=fields["along"].number(),
-        cold=fields["cold"].number(least=0),
-        heated=fields["heated"].number(least=0),
-        spheres=tuple(map(_sphere, fields["spheres"].items())),
-        origin=fields.text("origin"),
-    )
-
-
-def _physics(entry: Reader) -> Physics:
-    fields = entry.fields(required=_PHYSICS, optional=("origin",))
-    return Physics(
-        seat=cast("Seat", fields["seat"].choice(SEATS)),
-        mass_at=cast("MassPlace", fields["mass_at"].choice(MASS_PLACES)),
-        structural=fields["structural"].truth(),
-        friction=fields["friction"].number(least=0),
-        linear_drag=fields["linear_drag"].number(least=0),
-        angular_drag=fields["angular_drag"].number(least=0),
-        origin=fields.text("origin"),
-    )
-
-
-def _besiege_entry(entry: Reader) -> tuple[str, str, str | int | float | bool]:
-    fields = entry.fields(required=("type", "key", "value"))
-    value = fields["value"]
-    if not isinstance(value.value, str | int | float):
-        value.fail("a text, a number, or true or false")
-    return (fields["type"].text(), fields["key"].text(), value.value)
-
-
-def _besiege_keys(entry: Reader, actions: tuple[str, ...]) -> dict[str, str]:
-    fields = entry.fields(required=(), optional=actions)
-    return {action: fields[action].text(longest=60) for action in actions if action in fields}
+def _at(entry: ModuleEntry, place: str) -> Any:
+    """What an entry has at a place; None where it has nothing."""
+    value: Any = entry
+    for name in place.split("."):
+        value = None if value is None else getattr(value, name)
+    return value

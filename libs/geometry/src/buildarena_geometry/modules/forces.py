@@ -3,24 +3,20 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Annotated, Literal
 
+from msgspec import Meta
+
+from buildarena_geometry.reading import Amount, Finite, Form, Point, Positive, refuse
 from buildarena_geometry.rotations import Vector
 
-if TYPE_CHECKING:
-    from buildarena_geometry.reading import Fields, Reader
-
-FORCE_FIELDS = ("push", "wing", "lift", "altitude", "tether", "spring", "decouple", "grip")
-_POWERS = (0, 1, 2)
 _FASTEST_LOSS = 100.0  # 1/s; what air takes from a block faster than this, no step follows
 _MOST_DAMPING = 3.0  # mass·g per unit/s and mass unit; the same for a held height
 _STIFFEST = 1000.0  # mass·g per unit; a stiffer spring between small blocks outruns the step
 _MOST_SPRING_DAMPING = 10.0  # mass·g per unit/s
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Push:
+class Push(Form, frozen=True, kw_only=True):
     """What pushes a block along one of its own directions while its key is held.
 
     Attributes:
@@ -31,13 +27,12 @@ class Push:
     """
 
     action: str
-    direction: Vector
-    force: float
+    direction: Point
+    force: Amount
     origin: str = ""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Wing:
+class Wing(Form, frozen=True, kw_only=True):
     """What air that streams past a block does to it.
 
     With v the velocity of the block's centre, n the normal and s the normal turned by the pitch,
@@ -54,11 +49,11 @@ class Wing:
         origin: where the figures come from.
     """
 
-    normal: Vector
-    pitch_deg: float
-    coefficient: float
-    power: int
-    cap_speed: float
+    normal: Point
+    pitch_deg: Finite = 0.0
+    coefficient: Amount
+    power: Literal[0, 1, 2]
+    cap_speed: Positive
     one_sided: bool = False
     origin: str = ""
 
@@ -71,8 +66,7 @@ class Wing:
         return (x * cosine + y * sine, y * cosine - x * sine, z)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Lift:
+class Lift(Form, frozen=True, kw_only=True):
     """What always pulls a block up.
 
     Attributes:
@@ -80,12 +74,11 @@ class Lift:
         origin: where the figure comes from.
     """
 
-    force: float
+    force: Amount
     origin: str = ""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Altitude:
+class Altitude(Form, frozen=True, kw_only=True):
     """What holds a block at a height: a lift that grows with how far it is below.
 
     The lift is stiffness · (target - height) - damping · (rate of climb), from 0 to `most`.
@@ -100,17 +93,16 @@ class Altitude:
         origin: where the figures come from.
     """
 
-    most: float
-    stiffness: float
-    damping: float
+    most: Amount
+    stiffness: Positive
+    damping: Amount
     rise: str
     sink: str
-    rate: float
+    rate: Positive
     origin: str = ""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Tether:
+class RopeMount(Form, frozen=True, kw_only=True):
     """A rope that holds a block to the face it sits on, in place of a joint.
 
     Attributes:
@@ -118,12 +110,11 @@ class Tether:
         origin: where the figure comes from.
     """
 
-    length: float
+    length: Positive
     origin: str = ""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Spring:
+class Spring(Form, frozen=True, kw_only=True):
     """What a connector does that is neither a strut nor a rope: it pulls and pushes elastically.
 
     Attributes:
@@ -136,17 +127,16 @@ class Spring:
         origin: where the figures come from.
     """
 
-    stiffness: float
-    damping: float
-    contract: str | None
-    shortest: float
-    rate: float
-    limit: float
+    stiffness: Annotated[float, Meta(gt=0.0, le=_STIFFEST)]
+    damping: Annotated[float, Meta(ge=0.0, le=_MOST_SPRING_DAMPING)]
+    contract: str | None = None
+    shortest: Annotated[float, Meta(gt=0.0, le=1.0)]
+    rate: Positive
+    limit: Positive
     origin: str = ""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Decoupling:
+class Decoupling(Form, frozen=True, kw_only=True):
     """What lets go of the face that a block sits on, once, and pushes the two apart.
 
     Attributes:
@@ -156,12 +146,11 @@ class Decoupling:
     """
 
     action: str
-    impulse: float
+    impulse: Amount
     origin: str = ""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Grip:
+class Grip(Form, frozen=True, kw_only=True):
     """What holds the first thing that comes near a block's far end.
 
     Attributes:
@@ -175,14 +164,13 @@ class Grip:
 
     grab: str
     release: str
-    reach: float
-    force: float
-    moment: float
+    reach: Positive
+    force: Positive
+    moment: Positive
     origin: str = ""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Forces:
+class Forces(Form, frozen=True, kw_only=True):
     """The forces that a module exerts by itself; None where it has none of a kind.
 
     Attributes:
@@ -190,7 +178,7 @@ class Forces:
         wing: what air does to it.
         lift: a balloon's.
         altitude: that of a balloon that holds its height.
-        tether: the rope it hangs on.
+        rope_mount: the rope it hangs on.
         spring: a connector's.
         decouple: what lets go.
         grip: what holds.
@@ -200,157 +188,54 @@ class Forces:
     wing: Wing | None = None
     lift: Lift | None = None
     altitude: Altitude | None = None
-    tether: Tether | None = None
+    rope_mount: RopeMount | None = None
     spring: Spring | None = None
     decouple: Decoupling | None = None
     grip: Grip | None = None
 
     @property
-    def greatest(self) -> float:
+    def greatest_push(self) -> float:
         """The most that fan and balloon together push the block with, mass·g."""
         push = self.push.force if self.push else 0.0
         lift = self.lift.force if self.lift else 0.0
         return push + lift + (self.altitude.most if self.altitude else 0.0)
 
 
-NO_FORCES = Forces()
+FORCE_FIELDS = Forces.__struct_fields__
 
 
-def read_forces(fields: Fields, actions: tuple[str, ...]) -> Forces:
-    """The forces of an entry of a module file.
+def check_forces(forces: Forces, *, kind: str, mass: float, link: str | None) -> None:
+    """Refuses forces that make no sense for a module.
 
     Args:
-        fields: the entry's fields.
-        actions: what the module's keys can make it do.
+        forces: those of its entry in a module file.
+        kind: what the module does.
+        mass: mass units.
+        link: what a connector is.
 
     Raises:
-        CatalogueError: a field breaks the format.
+        MisfitError: one has no place in such a module, or is too strong for its mass.
     """
-    connector = fields["kind"].value == "connector"
     for name in FORCE_FIELDS:
-        if fields.has(name) and connector != (name == "spring"):
-            fields[name].fail(
-                f"no {name}: a connector has no force but a spring's, "
-                "and only connectors have a spring"
+        force = getattr(forces, name)
+        if force is not None and (kind == "connector") != (name == "spring"):
+            expected = (
+                f"no {name}: a connector has no force but a spring's,"
+                " and only connectors have a spring"
             )
-    mass = fields["mass"].number(above=0)
-    springs = fields.has("link") and fields["link"].value == "spring"
-    if fields.has("spring") != springs:
-        fields["spring"].fail("a spring with the link spring, and none with another link")
-    return Forces(
-        push=_push(fields["push"], actions) if fields.has("push") else None,
-        wing=_wing(fields["wing"], mass) if fields.has("wing") else None,
-        lift=_lift(fields["lift"]) if fields.has("lift") else None,
-        altitude=_altitude(fields["altitude"], actions, mass) if fields.has("altitude") else None,
-        tether=_tether(fields["tether"]) if fields.has("tether") else None,
-        spring=_spring(fields["spring"], actions) if fields.has("spring") else None,
-        decouple=_decoupling(fields["decouple"], actions) if fields.has("decouple") else None,
-        grip=_grip(fields["grip"], actions) if fields.has("grip") else None,
-    )
+            refuse(name, expected, force)
+    if (forces.spring is not None) != (link == "spring"):
+        expected = "a spring with the link spring, and none with another link"
+        refuse("spring", expected, forces.spring)
+    wing, altitude = forces.wing, forces.altitude
+    if wing is not None:
+        most = _FASTEST_LOSS * mass / math.pow(wing.cap_speed, wing.power)
+        _check_most("wing.coefficient", wing.coefficient, most)
+    if altitude is not None:
+        _check_most("altitude.damping", altitude.damping, _MOST_DAMPING * mass)
 
 
-def _push(entry: Reader, actions: tuple[str, ...]) -> Push:
-    fields = entry.fields(required=("action", "direction", "force"), optional=("origin",))
-    return Push(
-        action=fields["action"].choice(actions),
-        direction=fields["direction"].direction(),
-        force=fields["force"].number(least=0),
-        origin=fields.text("origin"),
-    )
-
-
-def _wing(entry: Reader, mass: float) -> Wing:
-    fields = entry.fields(
-        required=("normal", "coefficient", "power", "cap_speed"),
-        optional=("pitch_deg", "one_sided", "origin"),
-    )
-    power = fields["power"].integer()
-    if power not in _POWERS:
-        fields["power"].fail("0, 1 or 2")
-    cap_speed = fields["cap_speed"].number(above=0)
-    most = _FASTEST_LOSS * mass / cap_speed**power
-    return Wing(
-        normal=fields["normal"].direction(),
-        pitch_deg=fields["pitch_deg"].number() if "pitch_deg" in fields else 0.0,
-        coefficient=_up_to(most, fields["coefficient"], least=0.0),
-        power=power,
-        cap_speed=cap_speed,
-        one_sided=fields["one_sided"].truth() if "one_sided" in fields else False,
-        origin=fields.text("origin"),
-    )
-
-
-def _lift(entry: Reader) -> Lift:
-    fields = entry.fields(required=("force",), optional=("origin",))
-    return Lift(force=fields["force"].number(least=0), origin=fields.text("origin"))
-
-
-def _altitude(entry: Reader, actions: tuple[str, ...], mass: float) -> Altitude:
-    fields = entry.fields(
-        required=("most", "stiffness", "damping", "rise", "sink", "rate"), optional=("origin",)
-    )
-    return Altitude(
-        most=fields["most"].number(least=0),
-        stiffness=fields["stiffness"].number(above=0),
-        damping=_up_to(_MOST_DAMPING * mass, fields["damping"], least=0.0),
-        rise=fields["rise"].choice(actions),
-        sink=fields["sink"].choice(actions),
-        rate=fields["rate"].number(above=0),
-        origin=fields.text("origin"),
-    )
-
-
-def _tether(entry: Reader) -> Tether:
-    fields = entry.fields(required=("length",), optional=("origin",))
-    return Tether(length=fields["length"].number(above=0), origin=fields.text("origin"))
-
-
-def _spring(entry: Reader, actions: tuple[str, ...]) -> Spring:
-    fields = entry.fields(
-        required=("stiffness", "damping", "shortest", "rate", "limit"),
-        optional=("contract", "origin"),
-    )
-    shortest = fields["shortest"].number(above=0)
-    if shortest > 1.0:
-        fields["shortest"].fail("a share, above 0 and at most 1")
-    return Spring(
-        stiffness=_up_to(_STIFFEST, fields["stiffness"], above=0.0),
-        damping=_up_to(_MOST_SPRING_DAMPING, fields["damping"], least=0.0),
-        contract=fields["contract"].choice(actions) if fields.has("contract") else None,
-        shortest=shortest,
-        rate=fields["rate"].number(above=0),
-        limit=fields["limit"].number(above=0),
-        origin=fields.text("origin"),
-    )
-
-
-def _decoupling(entry: Reader, actions: tuple[str, ...]) -> Decoupling:
-    fields = entry.fields(required=("action", "impulse"), optional=("origin",))
-    return Decoupling(
-        action=fields["action"].choice(actions),
-        impulse=fields["impulse"].number(least=0),
-        origin=fields.text("origin"),
-    )
-
-
-def _grip(entry: Reader, actions: tuple[str, ...]) -> Grip:
-    fields = entry.fields(
-        required=("grab", "release", "reach", "force", "moment"), optional=("origin",)
-    )
-    return Grip(
-        grab=fields["grab"].choice(actions),
-        release=fields["release"].choice(actions),
-        reach=fields["reach"].number(above=0),
-        force=fields["force"].number(above=0),
-        moment=fields["moment"].number(above=0),
-        origin=fields.text("origin"),
-    )
-
-
-def _up_to(
-    most: float, entry: Reader, *, least: float | None = None, above: float | None = None
-) -> float:
-    number = entry.number(least=least, above=above)
-    if number > most:
-        entry.fail(f"a number of at most {most:g}, which a simulation's steps can follow")
-    return number
+def _check_most(place: str, value: float, most: float) -> None:
+    if value > most:
+        expected = f"a number of at most {most:g}, which a simulation's steps can follow"
+        refuse(place, expected, value)

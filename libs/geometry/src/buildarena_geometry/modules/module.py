@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
-from typing import Literal, get_args
+from dataclasses import dataclass
+from typing import Annotated, Literal
 
-from buildarena_geometry.modules.facts import NO_FACTS, Facts
-from buildarena_geometry.modules.forces import NO_FORCES, Forces
-from buildarena_geometry.modules.joints import Gear, SeatJoint, Sense
+from msgspec import Meta, field
+from msgspec.structs import force_setattr
+
+from buildarena_geometry.modules.forces import Forces
+from buildarena_geometry.modules.joints import Gear, MovingJoint, Sense
 from buildarena_geometry.modules.names import CaselessNames
 from buildarena_geometry.modules.solids import Solid
 from buildarena_geometry.poses import Pose
+from buildarena_geometry.reading import Amount, Finite, Form, Name, Point, Positive, refuse
 from buildarena_geometry.rotations import ORIGIN, Vector, distance
 
 Kind = Literal[
@@ -27,14 +30,9 @@ Kind = Literal[
     "connector",
     "cargo",
 ]
-KINDS: tuple[str, ...] = get_args(Kind)
 ATTACHABLE_KINDS = ("block", "joint", "wheel", "flight", "cannon", "torch", "device")
-Seat = Literal["attachment", "axle", "mount", "hinge", "slider", "ball", "constant_velocity"]
-SEATS: tuple[str, ...] = get_args(Seat)
-MassPlace = Literal["center", "body"]
-MASS_PLACES: tuple[str, ...] = get_args(MassPlace)
+JointType = Literal["attachment", "axle", "mount", "hinge", "slider", "ball", "constant_velocity"]
 Link = Literal["rigid", "rope", "spring"]
-LINKS: tuple[str, ...] = get_args(Link)
 FLUSH_TOLERANCE = 1e-6  # units; faces nearer than this are the same place
 _FACING = -0.9  # cosine; a face that looks this way looks at the block it sits on
 
@@ -63,8 +61,7 @@ class Face:
         return self.block_from_face.direction((0.0, 0.0, 1.0))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Landmark:
+class Landmark(Form, frozen=True, kw_only=True):
     """A point of a module that matters to its use, such as a cannon's outlet or a torch's flame.
 
     Attributes:
@@ -74,14 +71,18 @@ class Landmark:
         heats: whether it is a flame, a sphere that heats what it touches.
     """
 
-    name: str
-    along: float
-    radius: float | None = None
+    name: Name
+    along: Finite
+    radius: Positive | None = None
     heats: bool = False
 
+    def __post_init__(self) -> None:
+        """Refuses a flame without a radius."""
+        if self.heats and self.radius is None:
+            refuse("radius", "the radius of a flame, which is a sphere", self.radius)
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Sphere:
+
+class Sphere(Form, frozen=True, kw_only=True):
     """A sphere on the line through a block's centre in the pointing direction.
 
     Attributes:
@@ -89,12 +90,11 @@ class Sphere:
         radius: units.
     """
 
-    along: float
-    radius: float
+    along: Finite
+    radius: Positive
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Motor:
+class Motor(Form, frozen=True, kw_only=True):
     """What turns a wheel about its axle while a key is held; without a key it brakes.
 
     Attributes:
@@ -108,9 +108,9 @@ class Motor:
         origin: where the figures come from.
     """
 
-    speed_rpm: float
-    lag_per_s: float
-    torque: float
+    speed_rpm: Positive
+    lag_per_s: Positive
+    torque: Positive
     forward: str
     backward: str
     forward_sense: Sense
@@ -122,8 +122,7 @@ class Motor:
         return self.speed_rpm * 2.0 * math.pi / 60.0
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Thrust:
+class Thrust(Form, frozen=True, kw_only=True):
     """What pushes a cannon against the way it points while its key is held.
 
     Attributes:
@@ -137,21 +136,20 @@ class Thrust:
     """
 
     action: str
-    along: float
-    cold: float
-    heated: float
+    along: Finite
+    cold: Amount
+    heated: Amount
     spheres: tuple[Sphere, ...]
     origin: str = ""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Physics:
+class Physics(Form, frozen=True, kw_only=True):
     """How a block behaves as a body, whatever simulates it.
 
     Attributes:
-        seat: what holds it to the face it sits on: an ordinary attachment, a mount that practically
-            never breaks, or a joint it moves on: an axle, a hinge, a slider, a ball, or a
-            constant-velocity joint.
+        joint_type: what holds it to the face it sits on: an ordinary attachment, a mount that
+            practically never breaks, or a joint it moves on: an axle, a hinge, a slider, a ball, or
+            a constant-velocity joint.
         mass_at: where its mass lies: at the point shown as its position, or in the middle of its
             body.
         structural: whether it is part of the frame that bears loads: what a far end can grab, and
@@ -162,17 +160,80 @@ class Physics:
         origin: where the figures come from.
     """
 
-    seat: Seat = "attachment"
-    mass_at: MassPlace = "center"
-    structural: bool = True
-    friction: float = 0.0
-    linear_drag: float = 0.0
-    angular_drag: float = 0.0
+    joint_type: JointType
+    mass_at: Literal["center", "body"]
+    structural: bool
+    friction: Amount
+    linear_drag: Amount
+    angular_drag: Amount
     origin: str = ""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Module:
+class ModuleFields(Forces, frozen=True, kw_only=True):
+    """What a module and its entry in a module file both say, besides the forces it exerts.
+
+    Attributes:
+        name: what models call it.
+        kind: what it does.
+        mass: mass units; a cargo's until its task sets another.
+        size: (3,) its extent along x, y and z, units; None for connectors.
+        center: (3,) the point shown to models as its position.
+        colliders: the convex solids that may not overlap another block's; smaller than the body, so
+            that neighbours on a lattice stay clear of each other.
+        body: the solids people see.
+        pointing: (3,) the way a cannon or torch points; None for the others.
+        landmarks: further points along the pointing direction.
+        actions: what its keys can make it do.
+        motor: what turns it on its axle; None for blocks that do not turn.
+        joint: how it moves on the block it sits on; None for one that does not, and for an axle
+            whose motor says all there is to say.
+        gear: its teeth; None for all but cogs.
+        thrust: what pushes it; None for blocks that do not push.
+        physics: how it behaves as a body; None for connectors and cargo, which a task describes.
+        grabs: whether its far end, opposite to the face it sits on, holds what it touches.
+        description: what models read about it.
+        root_offset: how far off the face it sits on its root point lies, along the face's normal,
+            units.
+        overlaps_base: whether its own shape reaches into the block it sits on by design, so that
+            the two are never compared.
+        spin: which way it turns as it is, seen from outside against its axis; None where it has no
+            spin of its own, or the one of its motor.
+        brief: what models read about it in a list; "" for the first sentence of its description.
+        categories: the groups it is looked up in; the first one is its own.
+        simulated: whether both engines have its physics; without, it can be built and not tried.
+        default_keys: the keys the game binds to its actions unless told otherwise, by action.
+        sources: where a figure comes from, by its name: a confidence ("known", "community",
+            "chosen" or "unknown"), or that and the source or reason after a colon.
+    """
+
+    name: Name
+    kind: Kind
+    mass: Positive
+    size: Point | None
+    center: Point = ORIGIN
+    colliders: tuple[Solid, ...] = ()
+    body: tuple[Solid, ...] = ()
+    pointing: Point | None = None
+    landmarks: tuple[Landmark, ...] = ()
+    actions: tuple[Name, ...] = ()
+    motor: Motor | None = None
+    joint: MovingJoint | None = None
+    gear: Gear | None = None
+    thrust: Thrust | None = None
+    physics: Physics | None = None
+    grabs: bool = False
+    description: str
+    root_offset: Amount = 0.0
+    overlaps_base: bool = False
+    spin: Sense | None = None
+    brief: Annotated[str, Meta(max_length=100)] = ""
+    categories: tuple[Name, ...] = ()
+    simulated: bool = True
+    default_keys: dict[str, Name] = field(default_factory=dict)
+    sources: dict[str, str] = field(default_factory=dict)
+
+
+class Module(ModuleFields, frozen=True, kw_only=True):
     """A kind of part, as the catalogue describes it.
 
     Shapes are in the block's frame: its origin is the root point, where the block touches the face
@@ -180,79 +241,32 @@ class Module:
     axes are the world's when it is not turned.
 
     Attributes:
-        name: what models call it.
-        besiege_id: its number in Besiege's machine files.
-        kind: what it does; see `KINDS`.
-        mass: mass units; a cargo's until its task sets another.
         cost: Besiege's price.
-        size: (3,) its extent along x, y and z, units; None for connectors.
-        center: (3,) the point shown to models as its position.
         faces: the places where others attach, in the order of their labels.
-        colliders: the convex solids that may not overlap another block's; smaller than the body, so
-            that neighbours on a lattice stay clear of each other.
-        body: the solids people see.
-        pointing: (3,) the way a cannon or torch points; None for the others.
-        landmarks: further points along the pointing direction.
         flames: spheres of fire, which heat what they touch.
-        actions: what its keys can make it do.
-        motor: what turns it on its axle; None for blocks that do not turn.
-        joint: how it moves on its seat; None for one that does not, and for an axle whose motor
-            says all there is to say.
-        gear: its teeth; None for all but cogs.
-        thrust: what pushes it; None for blocks that do not push.
-        physics: how it behaves as a body; None for connectors and cargo, which a task describes.
-        grabs: whether its far end, opposite to the face it sits on, holds what it touches.
         link: what a connector is: a rigid strut, a rope that pulls and never pushes, or a spring.
-        description: what models read about it.
+        besiege_id: its number in Besiege's machine files.
         besiege_data: further entries of its block in Besiege's machine files: type, key, value.
         besiege_keys: the entry there that holds the keys of an action, by the action.
-        root_offset: how far off the face it sits on its root point lies, along the face's normal,
-            units.
-        overlaps_base: whether its own shape reaches into the block it sits on by design, so that
-            the two are never compared.
-        spin: which way it turns as it is, seen from outside against its axis; None where it has no
-            spin of its own, or the one of its motor.
-        facts: what is known about it besides, and from where.
-        forces: what it exerts by itself: fans, wings, balloons, springs and what lets go.
+        face_of_label: its faces by label.
+        root_face: the label of the face it sits by; None if it has none.
     """
 
-    name: str
-    besiege_id: int
-    kind: Kind
-    mass: float
     cost: int
-    size: Vector | None
-    center: Vector = ORIGIN
     faces: tuple[Face, ...] = ()
-    colliders: tuple[Solid, ...] = ()
-    body: tuple[Solid, ...] = ()
-    pointing: Vector | None = None
-    landmarks: tuple[Landmark, ...] = ()
     flames: tuple[Sphere, ...] = ()
-    actions: tuple[str, ...] = ()
-    motor: Motor | None = None
-    joint: SeatJoint | None = None
-    gear: Gear | None = None
-    thrust: Thrust | None = None
-    physics: Physics | None = None
-    grabs: bool = False
     link: Link = "rigid"
-    description: str = ""
+    besiege_id: int
     besiege_data: tuple[tuple[str, str, str | int | float | bool], ...] = ()
     besiege_keys: Mapping[str, str] = field(default_factory=dict)
-    root_offset: float = 0.0
-    overlaps_base: bool = False
-    spin: Sense | None = None
-    facts: Facts = NO_FACTS
-    forces: Forces = NO_FORCES
-    face_of_label: Mapping[str, Face] = field(init=False, repr=False, compare=False)
-    root_face: str | None = field(init=False, repr=False, compare=False)
+    face_of_label: Mapping[str, Face] = field(default_factory=dict)
+    root_face: str | None = None
 
     def __post_init__(self) -> None:
         """Derives the lookups of faces: by label, and the one the block sits on."""
-        object.__setattr__(self, "face_of_label", {face.label: face for face in self.faces})
+        force_setattr(self, "face_of_label", {face.label: face for face in self.faces})
         root_face = None if self.kind == "start" else _mount_face(self.faces, self.root_offset)
-        object.__setattr__(self, "root_face", root_face)
+        force_setattr(self, "root_face", root_face)
 
     @property
     def attachable(self) -> bool:
@@ -324,10 +338,10 @@ def _mount_face(faces: tuple[Face, ...], root_offset: float) -> str | None:
 
     It is the one that coincides with the face it sits on, else the lowest that looks there.
     """
-    seat = (0.0, 0.0, -root_offset)
+    touched = (0.0, 0.0, -root_offset)
     facing = [face for face in faces if face.normal[2] < _FACING]
     for face in facing:
-        flush = distance(face.center, seat) < FLUSH_TOLERANCE
+        flush = distance(face.center, touched) < FLUSH_TOLERANCE
         if flush and face.normal[2] < FLUSH_TOLERANCE - 1:
             return face.label
     return min(facing, key=lambda face: face.center[2]).label if facing else None

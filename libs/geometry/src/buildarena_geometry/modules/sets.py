@@ -36,7 +36,7 @@ def module_set(name: str) -> Catalogue:
     if name == "basic":
         return Catalogue(basic_modules())
     built = [module for module in basic_modules() if module.kind != "cargo"]
-    further = [one for one in extended_modules() if name == "all" or one.facts.simulated]
+    further = [one for one in extended_modules() if name == "all" or one.simulated]
     return Catalogue((*built, *further))
 
 

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from buildarena_geometry.poses import Pose
+from buildarena_geometry.reading import Form, Point, Positive, refuse
 from buildarena_geometry.rotations import ORIGIN, Vector, distance, from_axes
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Box:
+class Box(
+    Form,
+    frozen=True,
+    kw_only=True,
+    tag_field="shape",
+    tag="box",
+    rename={"lowest": "from", "highest": "to"},
+):
     """A box with its edges along the block's axes.
 
     Attributes:
@@ -17,8 +22,13 @@ class Box:
         highest: (3,) the corner opposite.
     """
 
-    lowest: Vector
-    highest: Vector
+    lowest: Point
+    highest: Point
+
+    def __post_init__(self) -> None:
+        """Refuses a box without a volume."""
+        if not all(low < high for low, high in zip(self.lowest, self.highest, strict=True)):
+            refuse("to", f"three numbers, each larger than in {list(self.lowest)}", self.highest)
 
     @property
     def center(self) -> Vector:
@@ -32,8 +42,14 @@ class Box:
         return (x - a, y - b, z - c)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Cylinder:
+class Cylinder(
+    Form,
+    frozen=True,
+    kw_only=True,
+    tag_field="shape",
+    tag="cylinder",
+    rename={"base": "from", "top": "to"},
+):
     """A right circular cylinder.
 
     Attributes:
@@ -42,9 +58,14 @@ class Cylinder:
         top: (3,) centre of the other.
     """
 
-    radius: float
-    base: Vector
-    top: Vector
+    radius: Positive
+    base: Point
+    top: Point
+
+    def __post_init__(self) -> None:
+        """Refuses a cylinder without a length."""
+        if self.base == self.top:
+            refuse("to", "another point than `from`", self.top)
 
     @property
     def length(self) -> float:
@@ -69,8 +90,7 @@ class Cylinder:
         return Pose(position=self.center, quaternion=turn)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Ball:
+class Ball(Form, frozen=True, kw_only=True, tag_field="shape", tag="sphere"):
     """A solid sphere.
 
     Attributes:
@@ -78,8 +98,8 @@ class Ball:
         center: (3,) its middle, block frame, units.
     """
 
-    radius: float
-    center: Vector
+    radius: Positive
+    center: Point
 
     @property
     def size(self) -> Vector:

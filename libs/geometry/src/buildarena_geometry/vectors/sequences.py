@@ -6,12 +6,14 @@ import gzip
 import zlib
 from typing import TYPE_CHECKING, Any
 
+from msgspec import Struct
+
+from buildarena_geometry.dialects import Dialect
 from buildarena_geometry.errors import SequenceError
 from buildarena_geometry.json_texts import read_json
 from buildarena_geometry.machine import Machine
 from buildarena_geometry.outcomes import Cause, Refused
-from buildarena_geometry.reading import Reader
-from buildarena_geometry.vectors.dialects import Dialect
+from buildarena_geometry.reading import read
 from buildarena_geometry.vectors.state import kind_of, state_entry
 
 if TYPE_CHECKING:
@@ -46,18 +48,17 @@ def run_sequences(
     """
     words = Dialect() if speaking is None else speaking
     catalogue = words.catalogue if catalogue is None else catalogue
-    for sequence in _sequences(Reader(value=content, where="input", error=SequenceError)):
-        run, steps = _prepare(sequence, catalogue)
+    for sequence in _sequences(content):
+        run = _prepare(sequence, catalogue)
         done: list[dict[str, Any]] = []
-        for step in steps:
+        for step in sequence.steps:
             outcome = run.act(step)
             done.append({"ok": outcome.ok, "kind": kind_of(outcome, words.kinds)})
             if every_state:
                 done[-1]["state"] = run.state(words)
         if done and not every_state:
             done[-1]["state"] = run.state(words)
-        seed = sequence.value.get("seed") if isinstance(sequence.value, dict) else None
-        yield {"seed": seed, "steps": done}
+        yield {"seed": sequence.seed, "steps": done}
 
 
 def parse(data: bytes) -> object:
@@ -76,6 +77,17 @@ def parse(data: bytes) -> object:
     return content
 
 
+class _Step(Struct, frozen=True, kw_only=True):
+    op: Any
+    params: Any = None
+
+
+class _Sequence(Struct, frozen=True, kw_only=True):
+    seed: Any = None
+    sub_machines: dict[str, tuple[_Step, ...]] = {}
+    steps: tuple[_Step, ...]
+
+
 class _Run:
     """A machine on its way through a sequence, with the order the vectors list its parts in.
 
@@ -89,12 +101,9 @@ class _Run:
         self._sources = sources
         self.order: list[str] = []
 
-    def act(self, step: Reader) -> Outcome:
-        if not isinstance(step.value, dict) or "op" not in step.value:
-            step.fail("an object with op and params")
-        name, arguments = step.value["op"], step.value.get("params")
-        outcome = self.machine.act(name, arguments)
-        self._put_in_order(name, arguments, outcome)
+    def act(self, step: _Step) -> Outcome:
+        outcome = self.machine.act(step.op, step.params)
+        self._put_in_order(step.op, step.params, outcome)
         return outcome
 
     def state(self, words: Dialect) -> dict[str, Any]:
@@ -117,34 +126,26 @@ class _Run:
             self.order.append(moved)
 
 
-def _sequences(root: Reader) -> Iterator[Reader]:
-    if isinstance(root.value, dict):
-        yield root
-        return
-    entries = list(root.items())
-    whole = [isinstance(entry.value, dict) and "steps" in entry.value for entry in entries]
-    if entries and all(whole):
-        yield from entries
+def _sequences(content: object) -> Iterator[_Sequence]:
+    """The sequences of a file: several, one, or the steps of one."""
+    if isinstance(content, dict):
+        yield read(content, _Sequence, where="input", error=SequenceError)
+    elif isinstance(content, list) and content and all(map(_is_sequence, content)):
+        for index, entry in enumerate(content):
+            yield read(entry, _Sequence, where=f"input[{index}]", error=SequenceError)
     else:
-        yield root
+        steps = read(content, tuple[_Step, ...], where="input", error=SequenceError)
+        yield _Sequence(steps=steps)
 
 
-def _prepare(sequence: Reader, catalogue: Catalogue | None) -> tuple[_Run, list[Reader]]:
-    values = sequence.value
-    if not isinstance(values, dict):
-        return _Run(catalogue, {}), list(sequence.items())
-    if "steps" not in values:
-        raise SequenceError(f"{sequence.where}: steps are missing")
+def _is_sequence(entry: object) -> bool:
+    return isinstance(entry, dict) and "steps" in entry
+
+
+def _prepare(sequence: _Sequence, catalogue: Catalogue | None) -> _Run:
     sources: dict[str, _Run] = {}
-    subs, steps = (
-        Reader(value=value, where=f"{sequence.where}.{name}", error=SequenceError)
-        for name, value in (
-            ("sub_machines", values.get("sub_machines", {})),
-            ("steps", values["steps"]),
-        )
-    )
-    for name, actions in subs.entries():
+    for name, actions in sequence.sub_machines.items():
         sources[name] = _Run(catalogue, {})
-        for action in actions.items():
+        for action in actions:
             sources[name].act(action)
-    return _Run(catalogue, sources), list(steps.items())
+    return _Run(catalogue, sources)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from buildarena_geometry.besiege_components import besiege_point, besiege_rotation, besiege_span
+from buildarena_geometry.dialects import Dialect
 from buildarena_geometry.outcomes import Cause, Refused
 from buildarena_geometry.rotations import scaled
-from buildarena_geometry.vectors.dialects import Dialect
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping

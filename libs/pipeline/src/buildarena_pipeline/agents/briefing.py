@@ -56,7 +56,7 @@ def briefing(task: Task) -> str:
     return words_around.briefing(
         task,
         trials=TRIALS,
-        conduct=_conduct(),
+        guidelines=_guidelines(),
         values={
             "calls": f"{LIMITS.calls:,}",
             "bytes": f"{LIMITS.session_bytes:,}",
@@ -66,15 +66,15 @@ def briefing(task: Task) -> str:
     )
 
 
-def briefing_digest(*, looked_up: bool = False) -> str:
+def briefing_digest(*, on_demand: bool = False) -> str:
     """Hash of the words around a statement: results of different ones don't compare.
 
     Args:
-        looked_up: Whether the task's modules are looked up instead of told.
+        on_demand: Whether the task's modules are looked up instead of told.
     """
-    return words_around.briefing_digest(TRIALS, _conduct(), looked_up=looked_up)
+    return words_around.briefing_digest(TRIALS, _guidelines(), on_demand=on_demand)
 
 
 @cache
-def _conduct() -> str:
-    return resources.files(__package__).joinpath("conduct.md").read_text(encoding="utf-8")
+def _guidelines() -> str:
+    return resources.files(__package__).joinpath("guidelines.md").read_text(encoding="utf-8")

@@ -7,11 +7,11 @@ from typing import Final
 
 from buildarena_geometry import Machine
 from buildarena_geometry.machine_files import machine_bytes
-from buildarena_pipeline.agents.handing_in import chosen_task, hand_in
-from buildarena_pipeline.catalog.simulators import simulation_version
+from buildarena_pipeline.agents.submission import chosen_task, submit_machine
 from buildarena_pipeline.catalog.tracks import file_track
 from buildarena_pipeline.errors import PipelineError
 from buildarena_pipeline.runtime.context import Context
+from buildarena_pipeline.runtime.simulators.known import simulation_version
 from buildarena_store import Job, JobKey, NewJob
 from buildarena_store.jobs.files import files_under_way
 from buildarena_store.jobs.job import configuration_hash
@@ -58,7 +58,7 @@ def try_machine(
     digest = sha256(machine_bytes(machine)).hexdigest()
     name = f"file/{digest[:NAME_LENGTH]}"
     config = {"name": name, "provider": FILE_PROVIDER, "model": digest}
-    track = file_track(simulator, simulation_version(simulator, context.settings.besiege_version))
+    track = file_track(simulator, simulation_version(context, simulator))
     key = JobKey(
         task=task,
         task_version=found.version,
@@ -82,7 +82,7 @@ def try_machine(
             lease = context.store.external_calls.lease(key.job_id, connection=connection)
             if lease is None:
                 raise RuntimeError(f"job {key.job_id} was opened and is not open")
-            queue = hand_in(context, lease, machine, None, connection=connection)
+            queue = submit_machine(context, lease, machine, None, connection=connection)
     if queue is not None:
         context.queues.announce(queue, [key.job_id])
     return context.store.jobs.get(key.job_id), fresh

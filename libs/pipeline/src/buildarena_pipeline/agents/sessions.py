@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections import OrderedDict
 from collections.abc import Mapping
 from dataclasses import dataclass
 from threading import Lock
 from typing import Any, Literal
+
+from cachetools import LRUCache
 
 from buildarena_benchmark import Task, ValidationIssue
 from buildarena_geometry import Machine
@@ -17,12 +18,12 @@ from buildarena_pipeline.agents.briefing import (
     briefing,
     briefing_digest,
 )
-from buildarena_pipeline.agents.handing_in import chosen_task, hand_in
+from buildarena_pipeline.agents.submission import chosen_task, submit_machine
 from buildarena_pipeline.agents.workbench import Workbench, check_arguments, rebuild
-from buildarena_pipeline.catalog.simulators import simulation_version
 from buildarena_pipeline.catalog.tracks import EXTERNAL_WORKFLOW, external_track
 from buildarena_pipeline.errors import PipelineError, SubmissionError
 from buildarena_pipeline.runtime.context import Context
+from buildarena_pipeline.runtime.simulators.known import simulation_version
 from buildarena_pipeline.transcript import Transcript
 from buildarena_pipeline.turns import turn_of_call
 from buildarena_store import (
@@ -93,7 +94,7 @@ class ExternalSessions:
 
     def __init__(self, context: Context) -> None:
         self._context = context
-        self._benches: OrderedDict[tuple[str, int], Workbench] = OrderedDict()
+        self._benches: LRUCache[tuple[str, int], Workbench] = LRUCache(CACHED_BENCHES)
         self._lock = Lock()
 
     def open(
@@ -130,10 +131,10 @@ class ExternalSessions:
             message = "1 to 80 letters, digits, dots, dashes and underscores"
             further.append(ValidationIssue(path="agent", message=message))
         chosen = chosen_task(self._context, task, simulator, further=further)
-        version = simulation_version(simulator, self._context.settings.besiege_version)
-        looked_up = chosen.constraints.looked_up
+        version = simulation_version(self._context, simulator)
+        on_demand = chosen.constraints.on_demand
         track = external_track(
-            simulator, version, briefing_digest(looked_up=looked_up), looked_up=looked_up
+            simulator, version, briefing_digest(on_demand=on_demand), on_demand=on_demand
         )
         model = f"{kind}/{agent}"
         config = {"name": model, "provider": EXTERNAL_PROVIDER, "model": agent}
@@ -242,7 +243,7 @@ class ExternalSessions:
             bench = rebuild(calls, self._task(lease.job))
             machine = bench.submitted()
             transcript = Transcript([turn_of_call(i, call) for i, call in enumerate(calls)])
-            queue = hand_in(context, lease, machine, transcript, connection=connection)
+            queue = submit_machine(context, lease, machine, transcript, connection=connection)
         if queue is not None:
             context.queues.announce(queue, [job_id])
         return context.store.jobs.get(job_id)
@@ -273,5 +274,3 @@ class ExternalSessions:
     def _keep_bench(self, job_id: str, count: int, bench: Workbench) -> None:
         with self._lock:
             self._benches[job_id, count] = bench
-            while len(self._benches) > CACHED_BENCHES:
-                self._benches.popitem(last=False)

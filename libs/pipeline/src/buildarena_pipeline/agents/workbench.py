@@ -25,8 +25,8 @@ class Workbench(building.Workbench):
         size: Bytes of all arguments and feedback so far.
     """
 
-    def __init__(self, catalogue: Catalogue | None = None, *, looked_up: bool = False) -> None:
-        super().__init__(catalogue, looked_up=looked_up)
+    def __init__(self, catalogue: Catalogue | None = None, *, on_demand: bool = False) -> None:
+        super().__init__(catalogue, on_demand=on_demand)
         self.size = 0
 
     def call(self, machine: str, tool: str, arguments: Any) -> ExternalCall:
@@ -71,7 +71,7 @@ def bench_of(task: Task | None) -> Workbench:
     """An empty workbench with what a task offers; None for one whose task is no longer known."""
     if task is None:
         return Workbench()
-    return Workbench(task.constraints.catalogue, looked_up=task.constraints.looked_up)
+    return Workbench(task.constraints.catalogue, on_demand=task.constraints.on_demand)
 
 
 def rebuild(calls: Sequence[ExternalCall], task: Task | None) -> Workbench:

@@ -8,7 +8,7 @@ from celery import Celery
 from celery.app.amqp import AMQP
 from kombu.connection import Connection
 
-from buildarena_pipeline.dead_links import tcp_options
+from buildarena_pipeline.keepalive import tcp_options
 
 LONGEST_PAUSE_S = 5
 """Between two tries to reach a broker that is away."""

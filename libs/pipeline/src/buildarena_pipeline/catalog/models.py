@@ -10,12 +10,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Final
 
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AliasChoices, BaseModel, ConfigDict, Field, ValidationError
 
 from buildarena_pipeline.errors import StartupError
+
+BUILTIN_PROTOCOL: Final = "builtin"
+"""Of models that play inside the worker."""
 
 
 class Price(BaseModel):
@@ -34,9 +37,13 @@ class ProviderEntry(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    wire: Annotated[
-        Literal["builtin", "openai", "anthropic", "google"],
-        Field(description="Wire format that the provider speaks"),
+    protocol: Annotated[
+        str,
+        Field(
+            pattern=r"^[a-z0-9-]+$",
+            description="What the provider speaks: openai, anthropic, google, or a worker's own",
+            validation_alias=AliasChoices("protocol", "wire"),  # its former name
+        ),
     ]
     base_url: str | None = None
     key: Annotated[str | None, Field(description="Environment variable of the API key")] = None

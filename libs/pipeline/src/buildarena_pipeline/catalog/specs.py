@@ -7,7 +7,8 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, StrictInt, ValidationInfo, field_validator
 
-from buildarena_simulation import ENGINES
+from buildarena_pipeline.catalog.workflows import DEFAULT_WORKFLOW
+from buildarena_simulation import DEFAULT_ENGINE
 from buildarena_store import BudgetLimits
 
 MAX_SEED = 2**53 - 1
@@ -77,8 +78,8 @@ class Variant(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    workflow: Name = "five-role"
-    simulator: Name = ENGINES[0]
+    workflow: Name = DEFAULT_WORKFLOW
+    simulator: Name = DEFAULT_ENGINE
     prompts: Name = "default"
     one_shot: Annotated[bool, Field(description="Show an example construction")] = False
     closed_loop: ClosedLoop | None = None

@@ -32,7 +32,7 @@ class Track:
         one_shot: Whether an example construction is shown.
         rounds: Rounds of the closed loop; 1 without one.
         analyst: Whether an analyst advises between rounds.
-        looked_up: Whether roles look modules up instead of being told them.
+        on_demand: Whether roles look modules up instead of being told them.
     """
 
     workflow: str
@@ -45,7 +45,7 @@ class Track:
     one_shot: bool = False
     rounds: int = 1
     analyst: bool = False
-    looked_up: bool = False
+    on_demand: bool = False
 
     @property
     def id(self) -> str:
@@ -55,7 +55,7 @@ class Track:
             workflow += f"-{self.workflow_digest[:8]}"
         if self.one_shot:
             workflow += "+one-shot"
-        if self.looked_up:
+        if self.on_demand:
             workflow += "+looked-up"
         if self.rounds > 1:
             workflow += f"+{self.rounds}-rounds" + ("-analyst" if self.analyst else "")
@@ -67,14 +67,12 @@ class Track:
     def as_config(self) -> Mapping[str, Any]:
         """The parts as a JSON object."""
         parts = {name: getattr(self, name) for name in self.__dataclass_fields__}
-        if not self.looked_up:
-            # Tracks from before modules could be looked up say nothing of it.
-            del parts["looked_up"]
-        return parts
+        # Rows have the older word; tracks from before modules could be looked up say nothing of it.
+        return {**parts, "looked_up": True} if parts.pop("on_demand") else parts
 
 
 def external_track(
-    simulator: str, version: str, briefing_digest: str, *, looked_up: bool = False
+    simulator: str, version: str, briefing_digest: str, *, on_demand: bool = False
 ) -> Track:
     """The track of external agents, which bring their own prompts.
 
@@ -82,7 +80,7 @@ def external_track(
         simulator: Simulator name.
         version: Its version, see `simulation_version`.
         briefing_digest: Hash of what they read around a task's statement.
-        looked_up: Whether they look modules up instead of being told them.
+        on_demand: Whether they look modules up instead of being told them.
     """
     return Track(
         workflow=EXTERNAL_WORKFLOW,
@@ -91,7 +89,7 @@ def external_track(
         prompts="own",
         prompts_digest=briefing_digest,
         feedback_version=FEEDBACK_VERSION,
-        looked_up=looked_up,
+        on_demand=on_demand,
     )
 
 
@@ -120,7 +118,7 @@ def make_track(
     version: str,
     one_shot: bool = False,
     closed_loop: ClosedLoop | None = None,
-    looked_up: bool = False,
+    on_demand: bool = False,
 ) -> Track:
     """The track of a submission, with the prompts and feedback that are installed now.
 
@@ -131,7 +129,7 @@ def make_track(
         version: The simulator's version, see `simulation_version`.
         one_shot: Whether an example construction is shown.
         closed_loop: The closed loop, if there is one.
-        looked_up: Whether the task's modules are looked up instead of told.
+        on_demand: Whether the task's modules are looked up instead of told.
     """
     return Track(
         workflow=workflow.name,
@@ -144,5 +142,5 @@ def make_track(
         one_shot=one_shot,
         rounds=1 if closed_loop is None else closed_loop.rounds,
         analyst=closed_loop is not None and closed_loop.analyst,
-        looked_up=looked_up,
+        on_demand=on_demand,
     )

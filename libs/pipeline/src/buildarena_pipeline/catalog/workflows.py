@@ -1,4 +1,7 @@
-"""What an operator adds: workflows of their own, by name, from a file or an installed module."""
+"""The workflows by name: the built-in ones, and what an operator adds from files or modules.
+
+The API knows them without the worker's package; the worker loads each from its `place`.
+"""
 
 from __future__ import annotations
 
@@ -6,11 +9,9 @@ import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 from buildarena_pipeline.errors import StartupError
-
-BUILTIN_WORKFLOWS = ("five-role", "guidance-builder", "builder")
-ONE_STRUCTURE = frozenset({"guidance-builder", "builder"})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -19,17 +20,37 @@ class WorkflowSource:
 
     Attributes:
         name: What submissions call it.
-        place: ``module`` or ``path/to/file.py``; "" for a built-in one.
+        place: ``module`` or ``path/to/file.py``.
         class_name: Name of the class there.
-        digest: Hash of the file, part of the track; "" for built-in ones and installed modules.
+        digest: Hash of the file, part of the track; "" for installed modules.
         one_structure: Whether it builds one structure and never puts several together.
     """
 
     name: str
-    place: str = ""
-    class_name: str = ""
+    place: str
+    class_name: str
     digest: str = ""
     one_structure: bool = False
+
+
+BUILTIN: Final = (
+    WorkflowSource(
+        name="five-role", place="buildarena_worker.workflow.five_role", class_name="FiveRole"
+    ),
+    WorkflowSource(
+        name="guidance-builder",
+        place="buildarena_worker.workflow.guidance_builder",
+        class_name="GuidanceBuilder",
+        one_structure=True,
+    ),
+    WorkflowSource(
+        name="builder",
+        place="buildarena_worker.workflow.builder",
+        class_name="Builder",
+        one_structure=True,
+    ),
+)
+DEFAULT_WORKFLOW: Final = BUILTIN[0].name
 
 
 def workflow_sources(settings: Mapping[str, str]) -> dict[str, WorkflowSource]:
@@ -41,10 +62,7 @@ def workflow_sources(settings: Mapping[str, str]) -> dict[str, WorkflowSource]:
     Raises:
         StartupError: An entry can't be used; the message names it.
     """
-    sources = {
-        name: WorkflowSource(name=name, one_structure=name in ONE_STRUCTURE)
-        for name in BUILTIN_WORKFLOWS
-    }
+    sources = {source.name: source for source in BUILTIN}
     for name, target in settings.items():
         place, colon, class_name = target.rpartition(":")
         if not colon or not place or not class_name.isidentifier():

@@ -68,7 +68,7 @@ def _offered(turns: Sequence[Turn]) -> Catalogue:
 
 def _replay_of_calls(turns: Sequence[Turn]) -> Replay:
     """An agent's machines grow side by side, each in a chapter of its own."""
-    bench = Workbench(_offered(turns), looked_up=True)
+    bench = Workbench(_offered(turns), on_demand=True)
     recorder, chapters = Recorder(), dict[str, Chapter]()
     for turn in turns:
         name = str(turn["sub_structure"])

@@ -8,8 +8,7 @@ from typing import Any
 from buildarena_benchmark import Task, score
 from buildarena_besiege import game_start
 from buildarena_geometry import KeyPress, Machine
-from buildarena_pipeline.catalog.simulators import ENGINE_SIMULATORS
-from buildarena_simulation import BuildarenaSimulationError, simulate
+from buildarena_simulation import ENGINES, BuildarenaSimulationError, simulate
 
 
 def annotate(
@@ -26,7 +25,7 @@ def annotate(
         By engine: success, indicator, flags, and the versions of model and engine.
     """
     found: dict[str, dict[str, Any]] = {}
-    for engine in ENGINE_SIMULATORS:
+    for engine in ENGINES:
         try:
             start = game_start(machine, task.scenario)
             trajectory = simulate(machine, task.scenario, engine, controls=controls, start=start)

@@ -68,7 +68,7 @@ class Reaper:
             if checks:
                 self._context.queues.announce(VERIFY_QUEUE, checks)
             # So that whoever reads the counts first after a year finds little to add.
-            self._context.store.figures.gather()
+            self._context.store.metrics.gather()
 
     def _notify(self, queue: str) -> None:
         """Notifies a queue's workers; of twice as many jobs each time they have taken all."""

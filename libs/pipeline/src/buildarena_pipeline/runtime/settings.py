@@ -9,7 +9,7 @@ from ipaddress import ip_network
 from pathlib import Path
 from typing import Annotated, Any, Final
 
-from pydantic import Field, PrivateAttr, SecretStr, ValidationError, field_validator
+from pydantic import AfterValidator, Field, PrivateAttr, SecretStr, ValidationError, field_validator
 from pydantic.fields import FieldInfo
 from pydantic_settings import (
     BaseSettings,
@@ -24,6 +24,17 @@ from buildarena_pipeline.secret_files import read_secret
 PREFIX: Final = "BUILDARENA_"
 DEFAULT_PORT = 8321
 VERSION = r"^[A-Za-z0-9._-]{0,40}$"
+SIMULATOR_NAME: Final = re.compile(r"[a-z0-9][a-z0-9_-]{0,39}")
+
+
+def _simulator_name(name: str) -> str:
+    if not SIMULATOR_NAME.fullmatch(name):
+        raise ValueError(f"{name!r} names no simulator: up to 40 of a-z, 0-9, - and _")
+    return name
+
+
+SimulatorName = Annotated[str, AfterValidator(_simulator_name)]
+SimulatorVersion = Annotated[str, Field(pattern=r"^[A-Za-z0-9._-]{1,40}$")]
 BASE_PATH: Final = re.compile(r"(?:/(?!\.{1,2}(?:/|$))[A-Za-z0-9._~-]+)+")
 OWN_PATHS: Final = frozenset(
     (
@@ -167,6 +178,13 @@ class Settings(BaseSettings):
     besiege_mod: Annotated[
         str, Field(description="Version of the game's Lua Scripting Mod", pattern=VERSION)
     ] = ""
+    further_simulators: Annotated[
+        dict[SimulatorName, SimulatorVersion],
+        Field(
+            description="Simulators of other distributions, each with its version, that jobs and "
+            'keys of runners may name before a worker has announced them; JSON: {"drake": "1"}'
+        ),
+    ] = {}
     alive_file: Annotated[
         Path | None,
         Field(
@@ -236,7 +254,7 @@ class Settings(BaseSettings):
         }
 
     @property
-    def kept_folder(self) -> Path:
+    def artifact_folder(self) -> Path:
         """The folder whose disk fills up: that of artifacts, or the data folder without one."""
         location = self.artifacts_location
         return self.data.absolute() if "://" in location else Path(location).absolute()

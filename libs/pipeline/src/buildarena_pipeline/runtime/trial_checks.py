@@ -17,8 +17,8 @@ import numpy as np
 from buildarena_besiege import MachineNotPlayableError, prepare_run
 from buildarena_besiege.keys import cannons
 from buildarena_besiege.tracking import tracked_blocks
-from buildarena_pipeline.catalog.simulators import BESIEGE
 from buildarena_pipeline.errors import PipelineError
+from buildarena_pipeline.runtime.simulators.simulator import BESIEGE
 from buildarena_simulation import MachineNotSimulable, Trajectory
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
 from buildarena_simulation.machine import structure_of

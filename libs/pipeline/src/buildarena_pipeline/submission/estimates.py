@@ -9,7 +9,7 @@ from decimal import Decimal
 from functools import cache
 from importlib import resources
 
-from buildarena_pipeline.catalog.models import ModelRegistry
+from buildarena_pipeline.catalog.models import BUILTIN_PROTOCOL, ModelRegistry
 from buildarena_pipeline.catalog.prices import price_usd
 from buildarena_store import NewJob
 
@@ -60,7 +60,7 @@ def estimate(jobs: Sequence[NewJob], registry: ModelRegistry) -> SweepEstimate:
 
 def _model(name: str, jobs: Sequence[NewJob], registry: ModelRegistry) -> ModelEstimate:
     entry = registry.models[name]
-    builtin = registry.provider_of(entry).wire == "builtin"
+    builtin = registry.provider_of(entry).protocol == BUILTIN_PROTOCOL
     figures = [Figures() if builtin else _figures(job.key.task) for job in jobs]
     used_in = sum(f.input_tokens for f in figures)
     used_out = sum(f.output_tokens for f in figures)

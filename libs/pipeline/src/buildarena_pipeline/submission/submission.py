@@ -9,19 +9,19 @@ from typing import Any
 from buildarena_benchmark import Task, ValidationIssue
 from buildarena_pipeline.catalog.models import ModelRegistry
 from buildarena_pipeline.catalog.prompt_packs import PromptPacks
-from buildarena_pipeline.catalog.simulators import simulation_version, simulator_issues
 from buildarena_pipeline.catalog.specs import Budget, Decoding, JobSpec, SweepSpec, Variant
 from buildarena_pipeline.catalog.tracks import Track, make_track
 from buildarena_pipeline.catalog.workflows import workflow_sources
 from buildarena_pipeline.errors import SubmissionError
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.notify import notify_waiting
+from buildarena_pipeline.runtime.simulators.known import simulation_version, simulator_issues
 from buildarena_pipeline.submission.estimates import SweepEstimate, estimate
 from buildarena_store import Job, JobKey, NewJob, NewSweep, Sweep
 from buildarena_store.ids import content_hash, new_id
 from buildarena_store.jobs.job import configuration_hash
 from buildarena_store.states import CONSTRUCT_QUEUE
-from buildarena_store.sweeps.wants import want
+from buildarena_store.sweeps.claims import add_claim
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,7 +72,7 @@ class Submissions:
         own = [replace(job, owner=owner) for job in new]
         with self._context.store.lifecycle.submission() as connection:
             added = self._context.store.jobs.add(own, connection=connection)
-            want(own[0].key.job_id, owner, connection=connection)
+            add_claim(own[0].key.job_id, owner, connection=connection)
         notify_waiting(self._context, CONSTRUCT_QUEUE)
         return self._context.store.jobs.get(new[0].key.job_id), added > 0
 
@@ -171,12 +171,12 @@ class Submissions:
         self._require_known(variant, tasks, models, found)
         task_names, model_names = set(tasks.values()), set(models.values())
         self._require_size(len(task_names) * len(model_names) * len(seeds))
-        tracks = {looked_up: self._track(variant, looked_up) for looked_up in (False, True)}
-        configs = {looked_up: track.as_config() for looked_up, track in tracks.items()}
+        tracks = {on_demand: self._track(variant, on_demand) for on_demand in (False, True)}
+        configs = {on_demand: track.as_config() for on_demand, track in tracks.items()}
         limits = variant.limits.model_dump(exclude_none=True)
         new = []
         for task_name in dict.fromkeys(tasks.values()):
-            looked_up = found[task_name].constraints.looked_up
+            on_demand = found[task_name].constraints.on_demand
             for model_name in dict.fromkeys(models.values()):
                 config = model_config(self._registry, model_name, variant.decoding)
                 config_hash = configuration_hash(config, limits)
@@ -186,27 +186,27 @@ class Submissions:
                             task=task_name,
                             task_version=found[task_name].version,
                             model_hash=config_hash,
-                            track=tracks[looked_up].id,
+                            track=tracks[on_demand].id,
                             seed=seed,
                         ),
                         model=model_name,
                         model_config=config,
-                        track_config=configs[looked_up],
+                        track_config=configs[on_demand],
                         limits=limits,
                     )
                     for seed in seeds
                 ]
         return new
 
-    def _track(self, variant: Variant, looked_up: bool) -> Track:
+    def _track(self, variant: Variant, on_demand: bool) -> Track:
         return make_track(
             self._workflows[variant.workflow],
             variant.simulator,
             self._packs.load(variant.prompts),
-            version=simulation_version(variant.simulator, self._context.settings.besiege_version),
+            version=simulation_version(self._context, variant.simulator),
             one_shot=variant.one_shot,
             closed_loop=variant.closed_loop,
-            looked_up=looked_up,
+            on_demand=on_demand,
         )
 
     def _require_known(
@@ -223,7 +223,7 @@ class Submissions:
             *_unknown("task", tasks, found),
             *_unknown("model", models, self._registry.models),
             *_unknown("workflow", {"workflow": variant.workflow}, self._workflows),
-            *simulator_issues(variant.simulator, self._context.settings.besiege_version),
+            *simulator_issues(self._context, variant.simulator),
             *_unknown("prompt pack", {"prompts": variant.prompts}, self._packs.names),
         ]
         issues = issues or self._hopeless(variant.workflow, tasks, found)

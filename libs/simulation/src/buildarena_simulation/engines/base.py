@@ -44,7 +44,7 @@ class World:
         terrain: Fixed boxes.
         cargo: The cargo, if there is one.
         gravity: Downward acceleration, units/s².
-        finer: By how much an engine's steps are shorter than usual.
+        substeps: Into how many each usual step of the engine is divided.
         field: What the blocks exert by themselves; None where none does.
     """
 
@@ -53,7 +53,7 @@ class World:
     terrain: tuple[TerrainBox, ...]
     cargo: CargoBox | None
     gravity: float
-    finer: int = 1
+    substeps: int = 1
     field: ForceField | None = None
 
 

@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from buildarena_geometry.export.meshes import polygons
+from buildarena_geometry.modules.solids import Ball, Box, Cylinder, Solid
+from buildarena_geometry.rotations import ORIGIN
 from buildarena_simulation.engines.base import rotation_of
 from buildarena_simulation.machine import structure_of
 from buildarena_simulation.structure.model import FloatArray, Shape, ShapeKind
@@ -39,17 +42,10 @@ _SIGN: Final[Color] = (194, 65, 12)
 _POST: Final = 2.0
 """Height of a gate's posts, units."""
 _ROUND_SIDES: Final = 16
+_FIRST_SIDE: Final = 2
+"""Where a cylinder's sides begin among its faces."""
+_SPOKE: Final[Color] = (200, 200, 200)
 _LIGHT: Final = np.array([0.35, -0.5, 0.79])
-
-_CUBE_FACES: Final = (
-    (0, 1, 3, 2),
-    (4, 6, 7, 5),
-    (0, 4, 5, 1),
-    (2, 3, 7, 6),
-    (0, 2, 6, 4),
-    (1, 5, 7, 3),
-)
-"""Corners of each face of a box; corner k has its x, y and z signs in bits 4, 2 and 1."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -154,9 +150,13 @@ class Scene:
                 picture.lines.append((line, color))
         if trajectory.cargo_position is not None and trajectory.cargo_quaternion is not None:
             turn = rotation_of(trajectory.cargo_quaternion[sample].astype(np.float64))
-            half = np.array(trajectory.cargo_size) / 2
-            center = trajectory.cargo_position[sample].astype(np.float64)
-            picture.faces.extend(_box(center, turn, half, _CARGO))
+            cargo = Shape(
+                kind=ShapeKind.BOX,
+                center=trajectory.cargo_position[sample].astype(np.float64),
+                rotation=turn,
+                half_extents=np.array(trajectory.cargo_size) / 2,
+            )
+            picture.faces.extend(_faces(cargo, cargo.center, np.eye(3), _CARGO))
         return picture
 
 
@@ -185,64 +185,20 @@ def _faces(
     shape: Shape, center: FloatArray, turn: FloatArray, color: Color
 ) -> Iterator[tuple[FloatArray, Color]]:
     rotation = turn @ shape.rotation
-    if shape.kind is ShapeKind.BOX:
-        return _box(center, rotation, shape.half_extents, color)
+    for index, corners in enumerate(polygons(_solid(shape), _ROUND_SIDES)):
+        # One spoke-like lighter patch shows that a wheel turns.
+        is_spoke = shape.kind is ShapeKind.CYLINDER and index == _FIRST_SIDE
+        yield _shaded(center + corners @ rotation.T, center, _SPOKE if is_spoke else color)
+
+
+def _solid(shape: Shape) -> Solid:
+    """The shape about the origin of its own frame."""
+    x, y, z = shape.half_extents.tolist()
     if shape.kind is ShapeKind.SPHERE:
-        return _ball(center, rotation, float(shape.half_extents[0]), color)
-    return _cylinder(center, rotation, shape.half_extents, color)
-
-
-def _box(
-    center: FloatArray, rotation: FloatArray, half: FloatArray, color: Color
-) -> Iterator[tuple[FloatArray, Color]]:
-    signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
-    corners = center + (signs * half) @ rotation.T
-    for face in _CUBE_FACES:
-        yield _shaded(corners[list(face)], center, color)
-
-
-def _cylinder(
-    center: FloatArray, rotation: FloatArray, half: FloatArray, color: Color
-) -> Iterator[tuple[FloatArray, Color]]:
-    angles = np.linspace(0.0, 2 * np.pi, _ROUND_SIDES, endpoint=False)
-    rim = half[0] * np.stack([np.cos(angles), np.sin(angles), np.zeros(_ROUND_SIDES)], axis=1)
-    up = np.array([0.0, 0.0, half[2]])
-    low, high = (center + (rim + offset) @ rotation.T for offset in (-up, up))
-    yield _shaded(low[::-1], center, color)
-    yield _shaded(high, center, color)
-    for k in range(_ROUND_SIDES):
-        after = (k + 1) % _ROUND_SIDES
-        # One spoke-like darker patch shows that a wheel turns.
-        shade = color if k else (200, 200, 200)
-        yield _shaded(np.array([low[k], low[after], high[after], high[k]]), center, shade)
-
-
-def _ball(
-    center: FloatArray, rotation: FloatArray, radius: float, color: Color
-) -> Iterator[tuple[FloatArray, Color]]:
-    around = np.linspace(0.0, 2 * np.pi, _ROUND_SIDES, endpoint=False)
-    falls = np.linspace(0.0, np.pi, _ROUND_SIDES // 2 + 1)
-    rings = [
-        center
-        + radius
-        * np.stack(
-            [
-                np.sin(fall) * np.cos(around),
-                np.sin(fall) * np.sin(around),
-                np.full(_ROUND_SIDES, np.cos(fall)),
-            ],
-            axis=1,
-        )
-        @ rotation.T
-        for fall in falls
-    ]
-    for ring, (upper, lower) in enumerate(pairwise(rings)):
-        # Quads touch the poles with two corners at one place: the ring's other edge has their turn.
-        first, second = (lower, upper) if ring == 0 else (upper, lower)
-        for k in range(_ROUND_SIDES):
-            after = (k + 1) % _ROUND_SIDES
-            corners = np.array([first[after], first[k], second[k], second[after]])
-            yield _shaded(corners, center, color)
+        return Ball(radius=x, center=ORIGIN)
+    if shape.kind is ShapeKind.CYLINDER:
+        return Cylinder(radius=x, base=(0.0, 0.0, -z), top=(0.0, 0.0, z))
+    return Box(lowest=(-x, -y, -z), highest=(x, y, z))
 
 
 def _shaded(corners: FloatArray, center: FloatArray, color: Color) -> tuple[FloatArray, Color]:

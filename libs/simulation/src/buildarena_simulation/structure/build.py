@@ -66,11 +66,11 @@ class Link:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rope:
-    """A winch, tether or spring between two blocks; fields as in `Link`.
+    """A winch, rope_mount or spring between two blocks; fields as in `Link`.
 
     Attributes:
         share: Its share of a rope's strength, or of a spring's strength, stiffness and damping.
-        length: Of a tether, units; None for as long as it is built.
+        length: Of a rope_mount, units; None for as long as it is built.
         spring: What it does as a spring; None for a rope.
     """
 

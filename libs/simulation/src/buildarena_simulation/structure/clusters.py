@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from buildarena_geometry.modules.joints import MOVING_SEATS
+from buildarena_geometry.modules.joints import MOVING_JOINTS
 from buildarena_simulation.constants import JointKind
 from buildarena_simulation.structure.model import (
     JOINT_KINDS,
@@ -21,7 +21,7 @@ from buildarena_simulation.structure.model import (
     Structure,
 )
 
-_MOVING: Final = [JOINT_KINDS.index(JointKind(seat)) for seat in MOVING_SEATS]
+_MOVING: Final = [JOINT_KINDS.index(JointKind(seat)) for seat in MOVING_JOINTS]
 _TURNING: Final = [JOINT_KINDS.index(kind) for kind in (JointKind.AXLE, JointKind.HINGE)]
 _COLLINEAR: Final = 1e-3
 

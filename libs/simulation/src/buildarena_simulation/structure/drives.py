@@ -20,11 +20,11 @@ def speed_targets(
         sign: Which way forward is along the joint's axis.
         time_step_s: Length of a step, seconds.
     """
-    if drive.idle == "forward":
+    if drive.default_mode == "forward":
         forward = np.ones_like(forward)
     wanted = sign * drive.rate * (forward.astype(np.float64) - backward)
     speeds = lagged(wanted[:, None], np.array([drive.lag_per_s]), time_step_s)[:, 0]
-    if drive.idle == "free":
+    if drive.default_mode == "free":
         speeds[~forward & ~backward] = np.nan
     return speeds
 
@@ -50,7 +50,7 @@ def place_targets(
     """
     low, high = limits or (-math.inf, math.inf)
     move = sign * drive.rate * time_step_s * (forward.astype(np.float64) - backward)
-    back = drive.rate * time_step_s if drive.idle == "return" else 0.0
+    back = drive.rate * time_step_s if drive.default_mode == "return" else 0.0
     targets = np.zeros(len(move))
     if not (forward.any() or backward.any()):
         return targets

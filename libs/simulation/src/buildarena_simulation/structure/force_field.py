@@ -148,6 +148,6 @@ class ForceField:
 def field_of(structure: Structure) -> ForceField | None:
     """What a structure's blocks exert by themselves; None where none does."""
     table = own_forces_of(structure)
-    grips = any(part.module.forces.grip for part in structure.parts)
+    grips = any(part.module.grip for part in structure.parts)
     exerted = len(table) or len(structure.ropes.springs) or grips
     return ForceField(table, structure.ropes) if exerted else None

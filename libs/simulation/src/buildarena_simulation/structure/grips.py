@@ -54,9 +54,9 @@ class Grips:
 def grips_of(structure: Structure) -> Grips:
     """The blocks of a structure that hold."""
     found = [
-        (i, part, part.module.forces.grip)
+        (i, part, part.module.grip)
         for i, part in enumerate(structure.parts)
-        if part.module.forces.grip is not None
+        if part.module.grip is not None
     ]
     places = np.array([_end_of(part) for _, part, _ in found]).reshape(-1, len(_GRID), 3)
     return Grips(

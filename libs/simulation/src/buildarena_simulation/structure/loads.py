@@ -129,7 +129,7 @@ class LoadModel:
         self._arm = structure.centers_of_mass - clusters.center_of_mass[clusters.cluster_of]
         self._compliance = np.asarray(np.linalg.inv(clusters.inertia), dtype=np.float64)
         self._sliding = np.array(
-            [s >= 0 and structure.parts[s].physics.seat == "slider" for s in clusters.seated]
+            [s >= 0 and structure.parts[s].physics.joint_type == "slider" for s in clusters.seated]
         )
         self._children = [
             np.flatnonzero(clusters.level == level)

@@ -109,7 +109,7 @@ class Part:
     @property
     def is_wheel(self) -> bool:
         """Whether it turns on an axle on the face it sits on."""
-        return self.physics.seat == "axle"
+        return self.physics.joint_type == "axle"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -64,7 +64,7 @@ class OwnForces:
 def own_forces_of(structure: Structure) -> OwnForces:
     """The forces that a structure's blocks exert by themselves."""
     parts = structure.parts
-    forces = [part.module.forces for part in parts]
+    forces = [part.module for part in parts]
     wings = [i for i, of in enumerate(forces) if of.wing]
     pushes = [i for i, of in enumerate(forces) if of.push]
     lifts = [i for i, of in enumerate(forces) if of.lift]
@@ -112,10 +112,10 @@ def _ids(blocks: list[int]) -> IntArray:
 
 
 def _pushed(part: Part) -> FloatArray:
-    push = part.module.forces.push
+    push = part.module.push
     return np.zeros(3) if push is None else part.rotation @ np.array(push.direction)
 
 
 def _impulse(part: Part) -> float:
-    decoupling = part.module.forces.decouple
+    decoupling = part.module.decouple
     return decoupling.impulse if decoupling else 0.0

@@ -16,7 +16,7 @@ from typing import Any
 from sqlalchemy import Connection, and_, func, literal, or_, select, update
 from sqlalchemy.dialects.postgresql import insert
 
-from buildarena_store.accounts.tables import budgets, reservations
+from buildarena_store.account_tables import budgets, reservations
 from buildarena_store.database import Database
 from buildarena_store.jobs.journal import MAX_USD, Usage
 from buildarena_store.jobs.leases import Lease

@@ -11,7 +11,7 @@ from datetime import datetime, timedelta
 from sqlalchemy import and_, any_, func, insert, or_, select, update
 
 from buildarena_store import events
-from buildarena_store.accounts.tables import api_keys
+from buildarena_store.account_tables import api_keys
 from buildarena_store.database import Database
 from buildarena_store.errors import EndedKeyError, UnknownIdError
 from buildarena_store.ids import new_id

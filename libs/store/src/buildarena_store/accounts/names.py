@@ -7,7 +7,7 @@ from typing import Final, Literal
 from sqlalchemy import Connection, func, select
 from sqlalchemy.dialects.postgresql import insert
 
-from buildarena_store.accounts.tables import names
+from buildarena_store.account_tables import names
 from buildarena_store.errors import NameTakenError
 
 NameKind = Literal["agent", "human", "task"]

@@ -188,9 +188,9 @@ class _Archive:
             mine = sums[rollout.job_id]
             _require_next("rollouts", rollout.job_id, rollout.number, mine.rollouts)
             mine.rollouts += 1
-            self._require_kept(rollout.machine_hash, rollout.trajectory_hash)
+            self._require_stored(rollout.machine_hash, rollout.trajectory_hash)
         for made in self._of_jobs("job_artifacts", JobArtifactRow):
-            self._require_kept(made.hash)
+            self._require_stored(made.hash)
         for id_, job in self._jobs.items():
             used = sums[id_].used
             wrong = [name for name in COUNTED if getattr(job, name) != used[name]]
@@ -330,7 +330,7 @@ class _Archive:
                 raise ArchiveError(f"{name} names job {row.job_id}, which is not in the archive")
             yield row
 
-    def _require_kept(self, *digests: str | None) -> None:
+    def _require_stored(self, *digests: str | None) -> None:
         for digest in digests:
             if digest is not None and digest not in self._hashes:
                 raise ArchiveError(f"artifact {digest} is not in the archive")

@@ -67,10 +67,9 @@ def referenced(connection: Connection, prefix: str = "") -> Iterator[str]:
         select(column.label("hash")).where(column.is_not(None), column.startswith(prefix))
         for column in REFERENCES
     ]
-    result = connection.execution_options(stream_results=True).execute(
-        union(*parts).order_by("hash")
-    )
-    for row in result.yield_per(BATCH):
+    # For this query alone: what the connection is asked later is not worth a cursor.
+    query = union(*parts).order_by("hash").execution_options(yield_per=BATCH)
+    for row in connection.execute(query):
         yield row.hash
 
 

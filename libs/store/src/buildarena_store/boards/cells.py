@@ -32,10 +32,10 @@ from sqlalchemy import (
 from sqlalchemy.dialects.postgresql import insert
 from sqlalchemy.types import UserDefinedType
 
-from buildarena_store.boards.tallying import CellRecord, kept_tallies, tallies_of, tally_jobs
+from buildarena_store.boards.tallying import CellRecord, stored_tallies, tallies_of, tally_jobs
 from buildarena_store.boards.trials import RANKED, CellId, TrialFilter
 from buildarena_store.database import Database
-from buildarena_store.made_tables import board_cells, board_state
+from buildarena_store.derived_tables import board_cells, board_state
 from buildarena_store.rows import bound_texts
 from buildarena_store.states import JobState
 from buildarena_store.tables import board_changes, jobs, tasks
@@ -43,7 +43,7 @@ from buildarena_store.tables import board_changes, jobs, tasks
 FORMAT: Final = 1
 """Of rows; programs of different formats may use one database at once."""
 FILL_LOCK: Final = 0x63656C6C73  # "cells": of processes that find none, one makes them
-MAX_KEPT_AT_ONCE: Final = 50
+MAX_STORED_AT_ONCE: Final = 50
 """Cells that are made or read before the next ones, so that memory stays small."""
 
 
@@ -118,9 +118,9 @@ class BoardCells:
     def read(self, ids: Collection[CellId]) -> Iterator[CellRecord]:
         """Cells with their tallies, as of the last feed or later."""
         ordered = sorted(ids)
-        for start in range(0, len(ordered), MAX_KEPT_AT_ONCE):
+        for start in range(0, len(ordered), MAX_STORED_AT_ONCE):
             with self._database.statement() as connection:
-                some = ordered[start : start + MAX_KEPT_AT_ONCE]
+                some = ordered[start : start + MAX_STORED_AT_ONCE]
                 found = _kept(connection, some, with_tallies=True, only_fresh=False)
             yield from found
 
@@ -269,8 +269,8 @@ def _kept(
 def _made(connection: Connection, ids: Sequence[CellId]) -> list[CellRecord]:
     """Cells made from their jobs; those that have none left are without jobs."""
     made: list[CellRecord] = []
-    for start in range(0, len(ids), MAX_KEPT_AT_ONCE):
-        some = ids[start : start + MAX_KEPT_AT_ONCE]
+    for start in range(0, len(ids), MAX_STORED_AT_ONCE):
+        some = ids[start : start + MAX_STORED_AT_ONCE]
         made += tally_jobs(connection, TrialFilter(cells=some))
     gone = set(ids) - {record.id for record in made}
     return made + [
@@ -294,7 +294,7 @@ def _server(connection: Connection) -> str:
 
 
 def _row(record: CellRecord, mark: Mark) -> dict[str, Any]:
-    tallies, figures = kept_tallies(record.tallies)
+    tallies, figures = stored_tallies(record.tallies)
     return {
         "format": FORMAT,
         **record.id._asdict(),

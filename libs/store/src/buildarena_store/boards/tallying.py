@@ -80,7 +80,7 @@ def tally_jobs(connection: Connection, wanted: TrialFilter) -> list[CellRecord]:
     return records
 
 
-def kept_tallies(tallies: Sequence[Tally]) -> tuple[list[dict[str, Any]], bytes]:
+def stored_tallies(tallies: Sequence[Tally]) -> tuple[list[dict[str, Any]], bytes]:
     """Tallies as a row keeps them: what is said once, and the figures of each trial."""
     said = [
         {

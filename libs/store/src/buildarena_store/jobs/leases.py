@@ -25,7 +25,7 @@ from sqlalchemy import (
 )
 
 from buildarena_store import events
-from buildarena_store.accounts.tables import budgets
+from buildarena_store.account_tables import budgets
 from buildarena_store.database import Database
 from buildarena_store.jobs.attempts import Ending, end_attempts, move_on
 from buildarena_store.jobs.claiming import CLAIM

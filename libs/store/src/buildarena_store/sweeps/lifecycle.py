@@ -21,7 +21,7 @@ from buildarena_store.errors import NotOwnedError, TransitionError, UnknownIdErr
 from buildarena_store.jobs.jobs import Jobs
 from buildarena_store.jobs.transitions import transition
 from buildarena_store.states import JobState, Stage, SweepState, sweep_states_before
-from buildarena_store.sweeps import wants
+from buildarena_store.sweeps import claims
 from buildarena_store.tables import jobs, sweep_jobs, sweeps
 
 LIFECYCLE_LOCK = 0x7377656570  # "sweep"
@@ -121,9 +121,9 @@ class SweepLifecycle:
             if sweep.state == SweepState.CANCELLED:
                 raise TransitionError("sweep", sweep_id, sweep.state, "retried")
             own = jobs.c.owner.is_not_distinct_from(sweep.owner)
-            own |= ~wants.wanted_by_others(sweep.owner)
+            own |= ~claims.claimed_by_others(sweep.owner)
             self._jobs.retry(
-                jobs.c.id.in_(wants.members(sweep_id)),
+                jobs.c.id.in_(claims.members(sweep_id)),
                 own,
                 connection=connection,
                 payer=sweep_id,
@@ -133,7 +133,7 @@ class SweepLifecycle:
                 self._hold(sweep_id, connection)
 
     def cancel_job(self, job_id: str, *, owner: str | None, force: bool = False) -> bool:
-        """Takes back a key's wants in a job, and ends the job if it is the key's alone.
+        """Takes back a key's claims on a job, and ends the job if it is the key's alone.
 
         Args:
             job_id: The job.
@@ -151,11 +151,11 @@ class SweepLifecycle:
             job = self._job(job_id, connection)
             if force:
                 return bool(self._jobs.cancel([job_id], connection=connection))
-            if job.owner != owner and not wants.is_wanted(job_id, owner, connection=connection):
+            if job.owner != owner and not claims.has_claim(job_id, owner, connection=connection):
                 raise NotOwnedError("job", job_id)
             if job.state == JobState.DONE:
                 return False
-            wants.withdraw(job_id, owner, connection=connection)
+            claims.withdraw(job_id, owner, connection=connection)
             if job.owner == owner:
                 self._drop(jobs.c.id == job_id, connection=connection, owner=owner)
         return True
@@ -192,7 +192,7 @@ class SweepLifecycle:
             payer = connection.execute(payers.limit(1)).scalar()
             retried = self._jobs.retry(jobs.c.id == job_id, connection=connection, payer=payer)
             if retried and payer is None:
-                wants.want(job_id, job.owner, connection=connection)
+                claims.add_claim(job_id, job.owner, connection=connection)
         return bool(retried)
 
     def exhaust(self, budget_id: str, detail: str, *, connection: Connection) -> list[str]:
@@ -219,7 +219,7 @@ class SweepLifecycle:
             or_(jobs.c.payer == budget_id, jobs.c.owner == budget_id),
             jobs.c.stage == Stage.CONSTRUCT,
         )
-        wants.hand_over(*paid, connection=connection, except_owner=budget_id)
+        claims.hand_over(*paid, connection=connection, except_owner=budget_id)
         transition(
             *paid,
             to=JobState.ON_HOLD,
@@ -242,13 +242,13 @@ class SweepLifecycle:
 
     def _hold(self, sweep_id: str, connection: Connection) -> None:
         own = jobs.c.payer == sweep_id
-        wants.hand_over(own, connection=connection)
+        claims.hand_over(own, connection=connection)
         transition(own, to=JobState.ON_HOLD, allowed_from={JobState.QUEUED}, connection=connection)
 
     def _release(self, sweep_id: str, owner: str | None, connection: Connection) -> None:
         """Whoever resumes pays, also for jobs that another paused sweep would have paid for."""
         transition(
-            jobs.c.id.in_(wants.members(sweep_id)),
+            jobs.c.id.in_(claims.members(sweep_id)),
             to=JobState.QUEUED,
             allowed_from={JobState.ON_HOLD},
             connection=connection,
@@ -266,7 +266,7 @@ class SweepLifecycle:
             connection: The transaction.
             still: Columns that are as they were when a job was not handed over.
         """
-        waiting = wants.hand_over(which, connection=connection, to_waiting=True)
+        waiting = claims.hand_over(which, connection=connection, to_waiting=True)
         self._jobs.hold(waiting, connection=connection)
         left = [jobs.c[name].is_not_distinct_from(value) for name, value in still.items()]
         ids = connection.execute(select(jobs.c.id).where(which, *left)).scalars().all()

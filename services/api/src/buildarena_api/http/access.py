@@ -19,7 +19,6 @@ from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
 from buildarena_api.http.key_checks import KeyChecks
 from buildarena_api.http.problems import ProblemError
 from buildarena_api.http.rate_limits import RateLimits
-from buildarena_pipeline.catalog.simulators import SIMULATORS
 from buildarena_pipeline.runtime.settings import Settings
 
 SCOPES = ("read", "submit", "admin")
@@ -37,11 +36,11 @@ class RunnerRights:
     """What a caller's runners may lease.
 
     Attributes:
-        simulators: The simulators whose jobs they may lease.
+        simulators: The simulators whose jobs they may lease; None for all.
         job_owners: The keys whose jobs they may lease; None for everybody's.
     """
 
-    simulators: Sequence[str]
+    simulators: Sequence[str] | None = None
     job_owners: Sequence[str] | None = None
 
 
@@ -191,7 +190,7 @@ async def _identify(
     if given is None:
         if settings.require_keys:
             raise _unauthorized("an API key is needed: send `Authorization: Bearer KEY`")
-        return Caller(key_id=None, scope="admin", runner=RunnerRights(simulators=SIMULATORS))
+        return Caller(key_id=None, scope="admin", runner=RunnerRights())
     secret = given.credentials
     if _is_operators(secret, settings):
         return Caller(key_id=None, scope="admin")

@@ -10,9 +10,9 @@ from buildarena_api.http.own_pool import OwnPool
 from buildarena_store import KeyCheck
 from buildarena_store.accounts.keys import secret_hash
 
-KEPT_S: Final = 0.5
+CACHED_S: Final = 0.5
 """How long an answer is used again: so long a key that was revoked elsewhere may still work."""
-MAX_KEPT: Final = 10_000
+MAX_CACHED: Final = 10_000
 
 
 class KeyChecks:
@@ -31,7 +31,7 @@ class KeyChecks:
         """The key that has this secret, and whether it is still good; None when nobody has it."""
         digest = secret_hash(secret)
         kept = self._kept.get(digest)
-        if kept is not None and asyncio.get_running_loop().time() - kept[0] < KEPT_S:
+        if kept is not None and asyncio.get_running_loop().time() - kept[0] < CACHED_S:
             return kept[1]
         asking = self._asking.get(digest)
         if asking is None:
@@ -49,6 +49,6 @@ class KeyChecks:
         asked_at = asyncio.get_running_loop().time()
         found = await self._pool.run(self._pool.context.store.keys.check, secret)
         self._kept[digest] = (asked_at, found)
-        while len(self._kept) > MAX_KEPT:
+        while len(self._kept) > MAX_CACHED:
             self._kept.popitem(last=False)
         return found

@@ -18,11 +18,11 @@ from prometheus_client.process_collector import ProcessCollector
 from prometheus_client.registry import Collector
 
 from buildarena_pipeline.runtime.context import Context
-from buildarena_store import STAGE_SECONDS, Outcome, ServiceFigures, Stage
-from buildarena_store.figures import StageTimes
+from buildarena_store import STAGE_SECONDS, MetricValues, Outcome, Stage
+from buildarena_store.metrics import StageTimes
 from buildarena_store.states import AttemptResult
 
-KEPT_FOR_S: Final = 10.0
+CACHED_FOR_S: Final = 10.0
 """Several scrapes within this time share one reading of the database."""
 
 
@@ -37,7 +37,7 @@ class ServiceMetrics(Collector):
         self._context = context
         self._lock = threading.Lock()
         self._read_at: float | None = None
-        self._figures: ServiceFigures | None = None
+        self._figures: MetricValues | None = None
         self.registry = CollectorRegistry()
         ProcessCollector(registry=self.registry)
         self.http_seconds = Histogram(
@@ -67,16 +67,16 @@ class ServiceMetrics(Collector):
             workers.add_metric([kind], alive.count(kind))
         yield workers
 
-    def _fresh(self) -> ServiceFigures:
+    def _fresh(self) -> MetricValues:
         with self._lock:
             now = time.monotonic()
-            if self._figures is None or now - (self._read_at or 0.0) > KEPT_FOR_S:
-                self._figures = self._context.store.figures.read()
+            if self._figures is None or now - (self._read_at or 0.0) > CACHED_FOR_S:
+                self._figures = self._context.store.metrics.read()
                 self._read_at = now
             return self._figures
 
 
-def _job_metrics(figures: ServiceFigures) -> Iterable[Metric]:
+def _job_metrics(figures: MetricValues) -> Iterable[Metric]:
     jobs = GaugeMetricFamily(
         "buildarena_jobs",
         "Jobs by state, stage and outcome.",
@@ -103,7 +103,7 @@ def _job_metrics(figures: ServiceFigures) -> Iterable[Metric]:
     return jobs, errors, sweeps
 
 
-def _queue_metrics(figures: ServiceFigures) -> Iterable[Metric]:
+def _queue_metrics(figures: MetricValues) -> Iterable[Metric]:
     depth = GaugeMetricFamily("buildarena_queue_jobs", "Jobs that wait.", labels=["queue"])
     oldest = GaugeMetricFamily(
         "buildarena_queue_oldest_seconds",
@@ -123,7 +123,7 @@ def _queue_metrics(figures: ServiceFigures) -> Iterable[Metric]:
     return depth, oldest, running
 
 
-def _model_metrics(figures: ServiceFigures) -> Iterable[Metric]:
+def _model_metrics(figures: MetricValues) -> Iterable[Metric]:
     requests = CounterMetricFamily(
         "buildarena_model_requests", "Model requests answered.", labels=["model"]
     )
@@ -141,7 +141,7 @@ def _model_metrics(figures: ServiceFigures) -> Iterable[Metric]:
     return requests, tokens, cost
 
 
-def _stage_metric(figures: ServiceFigures) -> Metric:
+def _stage_metric(figures: MetricValues) -> Metric:
     stages = HistogramMetricFamily(
         "buildarena_stage_seconds",
         "How long attempts took, by stage and how they ended.",

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import threading
-from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
+
+from cachetools import LRUCache
 
 from buildarena_api.http.etags import Answer
 from buildarena_api.leaderboard.cells import Cells, Shown
@@ -15,7 +16,7 @@ from buildarena_benchmark.leaderboard import Board, BoardQuery, EndedJob, Tally
 from buildarena_pipeline.catalog.tasks import TaskCatalog
 from buildarena_store import Boards, CellId, TrialFilter
 
-KEPT_ANSWERS: Final = 256
+MAX_CACHED_ANSWERS: Final = 256
 """Answers in memory at most; one of a full board is about 200 kB."""
 
 
@@ -70,7 +71,9 @@ class BoardCache:
         self._tasks: Mapping[str, Task] = {}
         self._lock = threading.Lock()
         self._cells = Cells(boards.cells)
-        self._answers: OrderedDict[tuple[Question, str], tuple[int, Answer]] = OrderedDict()
+        self._answers: LRUCache[tuple[Question, str], tuple[int, Answer]] = LRUCache(
+            MAX_CACHED_ANSWERS
+        )
 
     def tracks(self, sweeps: frozenset[str] | None = None) -> list[str]:
         """Tracks with ended jobs.
@@ -140,7 +143,6 @@ class BoardCache:
             generation = self._cells.generation(question.track)
             kept = self._answers.get(key)
             if kept is not None and kept[0] == generation:
-                self._answers.move_to_end(key)
                 return kept[1]
             shown = self._cells.shown(question)
             if not question.is_partial:
@@ -155,9 +157,6 @@ class BoardCache:
     def _keep(self, key: tuple[Question, str], generation: int, body: bytes) -> Answer:
         answer = Answer.of(body)
         self._answers[key] = (generation, answer)
-        self._answers.move_to_end(key)
-        while len(self._answers) > KEPT_ANSWERS:
-            self._answers.popitem(last=False)
         return answer
 
     def _shown(self, question: Question) -> Shown:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final, Protocol
 
-from buildarena_benchmark.flags import Reading
+from cachetools import LRUCache
+
+from buildarena_benchmark.flags import ScoringPolicy
 from buildarena_benchmark.leaderboard import (
     Board,
     BoardQuery,
@@ -16,15 +17,15 @@ from buildarena_benchmark.leaderboard import (
     CellKey,
     CellName,
     ChosenCells,
-    KeptTests,
     Tally,
+    TestCache,
     choose_cells,
     ranked_board,
     summarise_tallies,
 )
 from buildarena_store import BoardCells, CellId, CellRecord, Mark, TrialFilter
 
-KEPT_TALLIES: Final = 64
+MAX_CACHED_TALLIES: Final = 64
 """Cells that just changed, whose tallies need not be read again."""
 
 Weights = Mapping[str, Mapping[str, int]]
@@ -61,10 +62,10 @@ class Cells:
         self._versions: Mapping[str, str] = {}
         self._weights: Weights = {}
         self._heads: dict[str, dict[CellKey, CellRecord]] = {}
-        self._summaries: dict[tuple[CellId, Reading], Cell] = {}
-        self._changed: OrderedDict[CellId, Sequence[Tally]] = OrderedDict()
+        self._summaries: dict[tuple[CellId, ScoringPolicy], Cell] = {}
+        self._changed: LRUCache[CellId, Sequence[Tally]] = LRUCache(MAX_CACHED_TALLIES)
         self._generations: dict[str, int] = {}
-        self._tests = KeptTests()
+        self._tests = TestCache()
 
     def refresh(self) -> int:
         """Takes in what changed; returns how many versions of tasks were ever uploaded."""
@@ -116,30 +117,30 @@ class Cells:
             kept=self,
         )
 
-    def summaries(self, ids: Sequence[CellId], reading: Reading) -> dict[CellId, Cell]:
+    def summaries(self, ids: Sequence[CellId], policy: ScoringPolicy) -> dict[CellId, Cell]:
         """Summaries of whole cells; those that are not known are made."""
-        missing = [id_ for id_ in ids if (id_, reading) not in self._summaries]
+        missing = [id_ for id_ in ids if (id_, policy) not in self._summaries]
         unread = []
         for id_ in missing:
             tallies = self._changed.get(id_)
             if tallies is None:
                 unread.append(id_)
             else:
-                self._summaries[id_, reading] = self._summary(id_, tallies, reading)
+                self._summaries[id_, policy] = self._summary(id_, tallies, policy)
         for record in self._store.read(unread):
-            self._summaries[record.id, reading] = self._summary(record.id, record.tallies, reading)
+            self._summaries[record.id, policy] = self._summary(record.id, record.tallies, policy)
         return {
-            id_: self._summaries[id_, reading] for id_ in ids if (id_, reading) in self._summaries
+            id_: self._summaries[id_, policy] for id_ in ids if (id_, policy) in self._summaries
         }
 
-    def _summary(self, id_: CellId, tallies: Sequence[Tally], reading: Reading) -> Cell:
+    def _summary(self, id_: CellId, tallies: Sequence[Tally], policy: ScoringPolicy) -> Cell:
         head = self._heads[id_.track][id_[1:]]
-        return summarise_tallies(_name(head), tallies, reading=reading)
+        return summarise_tallies(_name(head), tallies, policy=policy)
 
     def _take(self, record: CellRecord) -> None:
         id_, heads = record.id, self._heads.setdefault(record.id.track, {})
-        for reading in Reading:
-            self._summaries.pop((id_, reading), None)
+        for policy in ScoringPolicy:
+            self._summaries.pop((id_, policy), None)
         self._changed.pop(id_, None)
         if record.jobs:
             heads[id_[1:]] = record.without_tallies()
@@ -147,8 +148,6 @@ class Cells:
             heads.pop(id_[1:], None)
         if record.tallies:
             self._changed[id_] = record.tallies
-            while len(self._changed) > KEPT_TALLIES:
-                self._changed.popitem(last=False)
 
 
 @dataclass(slots=True, kw_only=True)
@@ -159,7 +158,7 @@ class Shown:
     chosen: ChosenCells
     heads: Mapping[CellKey, CellRecord]
     weights: Weights
-    tests: KeptTests
+    tests: TestCache
     store: BoardCells
     kept: Cells
     _summaries: Mapping[CellId, Cell] = field(default_factory=dict)
@@ -170,7 +169,7 @@ class Shown:
         ids = [
             CellId(self.asked.track, *key) for keys in self.chosen.shown.values() for key in keys
         ]
-        self._summaries = self.kept.summaries(ids, self.asked.query.reading)
+        self._summaries = self.kept.summaries(ids, self.asked.query.policy)
 
     def board(self) -> Board:
         """Summarises and ranks what was asked for."""
@@ -181,7 +180,7 @@ class Shown:
         }
         return ranked_board(
             self.chosen,
-            lambda key: self._cell(CellId(track, *key), query.reading),
+            lambda key: self._cell(CellId(track, *key), query.policy),
             outdated,
             overall=query.overall,
             weights=self.weights,
@@ -215,13 +214,13 @@ class Shown:
         record = self._part().get(id_)
         return record.jobs if record else 0
 
-    def _cell(self, id_: CellId, reading: Reading) -> Cell | None:
+    def _cell(self, id_: CellId, policy: ScoringPolicy) -> Cell | None:
         if not self.asked.is_partial:
             return self._summaries.get(id_)
         record = self._part().get(id_)
         if record is None:
             return None
-        return summarise_tallies(_name(record), record.tallies, reading=reading)
+        return summarise_tallies(_name(record), record.tallies, policy=policy)
 
     def _part(self) -> Mapping[CellId, CellRecord]:
         """Cells of just the jobs that were asked for."""

@@ -12,7 +12,7 @@ from buildarena_api.dependencies import ContextDep
 from buildarena_api.http.problems import ProblemError
 from buildarena_api.leaderboard.cache import BoardCache, Question
 from buildarena_benchmark import ValidationIssue, builtin_tasks, paper_tasks
-from buildarena_benchmark.flags import Reading
+from buildarena_benchmark.flags import ScoringPolicy
 from buildarena_benchmark.leaderboard import BoardQuery
 
 MAX_SWEEPS = 50
@@ -65,13 +65,13 @@ def select_board(
     ] = None,
     since: Annotated[datetime | None, Query(description="Only jobs ended then or later")] = None,
     until: Annotated[datetime | None, Query(description="Only jobs ended before")] = None,
-    reading: Annotated[
-        Reading,
+    policy: Annotated[
+        ScoringPolicy,
         Query(
             description="How flags are read: ours counts disqualified trials as failures, "
             "published leaves out what the published evaluation calls hacked"
         ),
-    ] = Reading.OURS,
+    ] = ScoringPolicy.OURS,
 ) -> Selection:
     """What the parameters ask for.
 
@@ -111,7 +111,7 @@ def select_board(
         models=frozenset(model) if model else None,
         since=since,
         until=until,
-        reading=reading,
+        policy=policy,
         overall=_ranked_over(task, category),
     )
     track = track or (tracks[0] if tracks else None)

@@ -9,10 +9,12 @@ from urllib.parse import quote_plus
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from buildarena_api.leaderboard.policies import UnderPolicy
 from buildarena_benchmark import builtin_tasks
-from buildarena_benchmark.flags import DISQUALIFYING, INFORMATIVE, PUBLISHED, Reading, meaning
+from buildarena_benchmark.flags import ScoringPolicy
 from buildarena_benchmark.leaderboard import Board as RankedBoard
 from buildarena_benchmark.leaderboard import Cell, published_overall, published_rows
+from buildarena_benchmark.scorers.registry import known_flags
 from buildarena_benchmark.statistics import MIN_SUCCESSES
 from buildarena_pipeline.catalog.models import ModelRegistry
 from buildarena_pipeline.catalog.tasks import TaskCatalog
@@ -41,7 +43,7 @@ class Row(_View):
     errored: int = Field(description="Jobs that infrastructure faults ended: in no average")
     cancelled: int
     flagged: int = Field(
-        description="Scored jobs that a flag makes failures or, in the published reading, leaves "
+        description="Scored jobs that a flag makes failures or, under the published policy, leaves "
         "out"
     )
     flags: dict[str, int] = Field(description="Scored jobs by flag")
@@ -140,20 +142,12 @@ class FlagView(_View):
     """A flag that scores can have."""
 
     name: str
-    disqualifying: bool = Field(description="Whether our reading counts its trials as failures")
-    published: bool = Field(description="Whether the published reading leaves its trials out")
+    disqualifying: bool = Field(description="Whether our policy counts its trials as failures")
+    published: bool = Field(description="Whether the published policy leaves its trials out")
     meaning: str
 
 
-FLAGS = [
-    FlagView(
-        name=name,
-        disqualifying=name in DISQUALIFYING,
-        published=name in PUBLISHED,
-        meaning=meaning(name),
-    )
-    for name in (*DISQUALIFYING, *INFORMATIVE)
-]
+FLAGS = [FlagView.model_validate(flag, from_attributes=True) for flag in known_flags().values()]
 
 
 class PublishedOverall(_View):
@@ -166,16 +160,15 @@ class PublishedOverall(_View):
     rank_high: int
 
 
-class Board(_View):
+class Board(UnderPolicy):
     """The leaderboard of one track."""
 
     track: str | None = Field(description="null when no job has ended")
     tracks: list[str] = Field(description="Every track with ended jobs")
-    reading: Reading = Field(description="How flags were read")
     flags: list[FlagView] = Field(default_factory=lambda: FLAGS)
     tasks: list[TaskBoard]
-    overall: list[OverallView] = []
-    published: list[PublishedOverall] = []
+    overall: list[OverallView] = Field(default=[])
+    published: list[PublishedOverall] = Field(default=[])
 
 
 class ChangeView(_View):
@@ -205,7 +198,7 @@ def board_view(
     *,
     track: str,
     tracks: list[str],
-    reading: Reading,
+    policy: ScoringPolicy,
     registry: ModelRegistry,
     catalogue: TaskCatalog,
 ) -> Board:
@@ -247,7 +240,7 @@ def board_view(
     return Board(
         track=track,
         tracks=tracks,
-        reading=reading,
+        policy=policy,
         tasks=[
             TaskBoard(
                 task=found.task,

@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 from hashlib import sha256
 from typing import Any, Final
 
-from buildarena_api.http.answers import KeptAnswers
 from buildarena_api.http.etags import Answer
 from buildarena_api.http.problems import ProblemError
+from buildarena_api.http.response_cache import ResponseCache
 from buildarena_api.replays.views import replay_view
 from buildarena_geometry import DocumentError, Machine
 from buildarena_pipeline.catalog.tracks import EXTERNAL_WORKFLOW
@@ -20,7 +20,7 @@ from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.turns import Transcripts
 from buildarena_store import Job
 
-KEPT_BYTES: Final = 64 << 20
+MAX_CACHED_BYTES: Final = 64 << 20
 """Replays in memory; one of a usual session has 50 kB. They are not kept as artifacts: another
 version of the geometry library may tell more, and none takes longer to make than to fetch."""
 
@@ -38,7 +38,7 @@ class Replays:
         self._artifacts = context.artifacts
         self._jobs = context.store.jobs
         self._transcripts = Transcripts(context.store, context.artifacts)
-        self._answers = KeptAnswers(KEPT_BYTES)
+        self._answers = ResponseCache(MAX_CACHED_BYTES)
 
     def answer(self, job: Job) -> Answer:
         """How the job's machine came about.

@@ -1,14 +1,15 @@
-"""Routes of what can be named besides tasks: models and modules."""
+"""Routes of what can be named besides tasks: models, modules and scorers."""
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Query
 from pydantic import BaseModel, Field
 
 from buildarena_api.dependencies import ContextDep, RegistryDep
 from buildarena_api.http.problems import ProblemError, problem_responses
+from buildarena_benchmark.scorers.registry import known_scorers
 from buildarena_geometry import module_set
 
 router = APIRouter(prefix="/v1", tags=["catalogue"])
@@ -38,6 +39,25 @@ class ModuleView(BaseModel):
     actions: list[str] = Field(description="What keys can be bound to")
     categories: list[str] = Field(description="Groups it is looked up in; none for basic modules")
     simulated: bool = Field(description="Whether both engines have its physics")
+
+
+class ScorerFlag(BaseModel):
+    """A remark that a scorer may make on a trial."""
+
+    name: str
+    meaning: str
+    disqualifying: bool = Field(description="Whether its trials count as failures in our rankings")
+
+
+class ScorerView(BaseModel):
+    """A scorer that task files can name."""
+
+    name: str = Field(examples=["support"])
+    description: str = Field(description="What its indicator is")
+    parameters: dict[str, Any] = Field(
+        description="JSON schema of what a task file says under `scoring`"
+    )
+    flags: list[ScorerFlag]
 
 
 @router.get("/models")
@@ -79,8 +99,22 @@ def list_modules(
             size=m.size,
             faces=[face.label for face in m.faces],
             actions=list(m.actions),
-            categories=list(m.facts.categories),
-            simulated=m.facts.simulated,
+            categories=list(m.categories),
+            simulated=m.simulated,
         )
         for m in catalogue.values()
+    ]
+
+
+@router.get("/scorers")
+def list_scorers() -> list[ScorerView]:
+    """Lists the scorers that task files can name, with their parameters and flags."""
+    return [
+        ScorerView(
+            name=scorer.name,
+            description=scorer.description,
+            parameters=scorer.parameters.model_json_schema(),
+            flags=[ScorerFlag.model_validate(flag, from_attributes=True) for flag in scorer.flags],
+        )
+        for scorer in known_scorers().values()
     ]

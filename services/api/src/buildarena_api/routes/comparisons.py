@@ -11,8 +11,9 @@ from pydantic import BaseModel, Field
 from buildarena_api.dependencies import ExportingDep
 from buildarena_api.http.concurrency import limited
 from buildarena_api.http.problems import problem_responses
+from buildarena_api.leaderboard.policies import UnderPolicy
 from buildarena_api.routes.leaderboard import TaskDuelView
-from buildarena_benchmark.flags import Reading
+from buildarena_benchmark.flags import ScoringPolicy
 from buildarena_benchmark.leaderboard import EndedJob, compare_models, counted_trials
 from buildarena_store import Store
 
@@ -28,7 +29,7 @@ class SweepSide(BaseModel):
     ended: int = Field(description="Jobs that have ended")
 
 
-class JobFigures(BaseModel):
+class JobMetrics(BaseModel):
     """A job as a comparison counts it."""
 
     job: str
@@ -41,8 +42,8 @@ class DifferingPair(BaseModel):
 
     task: str
     seed: int
-    first: JobFigures
-    second: JobFigures
+    first: JobMetrics
+    second: JobMetrics
 
 
 class SweepPair(BaseModel):
@@ -62,12 +63,11 @@ class LeftOut(BaseModel):
     why: str
 
 
-class SweepComparison(BaseModel):
+class SweepComparison(UnderPolicy):
     """Two sweeps, model by model; p-values are adjusted over the tests of one model (Holm)."""
 
     first: SweepSide
     second: SweepSide
-    reading: Reading
     pairs: list[SweepPair]
     left_out: list[LeftOut]
 
@@ -78,13 +78,15 @@ async def compare_sweeps(
     other_id: str,
     exporting: ExportingDep,
     *,
-    reading: Annotated[Reading, Query(description="How flags are read")] = Reading.OURS,
+    policy: Annotated[
+        ScoringPolicy, Query(description="The scoring policy: how flags are read")
+    ] = ScoringPolicy.OURS,
 ) -> SweepComparison:
     """Compares two sweeps: what differs between their tracks or settings is what is measured."""
-    return await exporting.run(_compared, exporting.context.store, (sweep_id, other_id), reading)
+    return await exporting.run(_compared, exporting.context.store, (sweep_id, other_id), policy)
 
 
-def _compared(store: Store, ids: tuple[str, str], reading: Reading) -> SweepComparison:
+def _compared(store: Store, ids: tuple[str, str], policy: ScoringPolicy) -> SweepComparison:
     sides, trials = zip(*(_side(store, id_) for id_ in ids), strict=True)
     same, left_out = _same_tasks(*trials)
     models = [list(dict.fromkeys(trial.model for trial in side)) for side in same]
@@ -100,14 +102,14 @@ def _compared(store: Store, ids: tuple[str, str], reading: Reading) -> SweepComp
         _pair(
             [trial for trial in same[0] if trial.model == first],
             [trial for trial in same[1] if trial.model == second],
-            reading,
+            policy,
         )
         for first, second in named
     ]
     return SweepComparison(
         first=sides[0],
         second=sides[1],
-        reading=reading,
+        policy=policy,
         pairs=[pair for pair in pairs if pair is not None],
         left_out=left_out,
     )
@@ -144,25 +146,25 @@ def _same_tasks(
 
 
 def _pair(
-    first: Sequence[EndedJob], second: Sequence[EndedJob], reading: Reading
+    first: Sequence[EndedJob], second: Sequence[EndedJob], policy: ScoringPolicy
 ) -> SweepPair | None:
-    found = compare_models(first, second, reading=reading)
+    found = compare_models(first, second, policy=policy)
     if found is None:
         return None
     return SweepPair(
         first=found.first,
         second=found.second,
         tasks=[TaskDuelView.model_validate(task) for task in found.tasks],
-        differing=_differing(first, second, reading),
+        differing=_differing(first, second, policy),
     )
 
 
 def _differing(
-    first: Sequence[EndedJob], second: Sequence[EndedJob], reading: Reading
+    first: Sequence[EndedJob], second: Sequence[EndedJob], policy: ScoringPolicy
 ) -> list[DifferingPair]:
     """Pairs with one success, of the trials that the tests count."""
     sides = [
-        {(trial.task, trial.seed): trial for trial in counted_trials(side, reading=reading)}
+        {(trial.task, trial.seed): trial for trial in counted_trials(side, policy=policy)}
         for side in (first, second)
     ]
     return [
@@ -172,5 +174,5 @@ def _differing(
     ]
 
 
-def _figures(trial: EndedJob) -> JobFigures:
-    return JobFigures(job=trial.job_id, success=trial.success, indicator=trial.indicator)
+def _figures(trial: EndedJob) -> JobMetrics:
+    return JobMetrics(job=trial.job_id, success=trial.success, indicator=trial.indicator)

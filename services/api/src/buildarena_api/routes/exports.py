@@ -113,7 +113,7 @@ async def export(
                 ranked,
                 track=track or "",
                 tracks=tracks,
-                reading=selection.query.reading,
+                policy=selection.query.policy,
                 registry=registry,
                 catalogue=exporting.context.tasks,
             ),

@@ -14,8 +14,8 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from buildarena_api.dependencies import ContextDep
 from buildarena_api.http.concurrency import anybodys_turn
-from buildarena_pipeline.catalog.simulators import served
 from buildarena_pipeline.runtime.context import Context
+from buildarena_pipeline.runtime.simulators.known import configured_simulators
 from buildarena_store import ArtifactStore, ArtifactStoreError
 from buildarena_store.states import CONSTRUCT_QUEUE, simulate_queue
 
@@ -137,7 +137,7 @@ def _workers(context: Context, database: Check) -> list[Check]:
         return []
     alive = [worker for worker in context.store.workers.all() if worker.alive]
     checks = []
-    simulators = served(context.settings.besiege_version)
+    simulators = configured_simulators(context.settings)
     for queue in [CONSTRUCT_QUEUE, *map(simulate_queue, simulators)]:
         serving = [worker for worker in alive if queue in worker.queues]
         checks.append(
@@ -168,7 +168,7 @@ def _clocks(context: Context) -> Check:
 
 
 def _disk(context: Context) -> Check:
-    folder = context.settings.kept_folder
+    folder = context.settings.artifact_folder
     existing = next(path for path in (folder, *folder.parents) if path.exists())
     free = shutil.disk_usage(Path(existing)).free
     return Check(

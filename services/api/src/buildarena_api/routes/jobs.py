@@ -25,7 +25,7 @@ from buildarena_api.schemas import (
     JobView,
 )
 from buildarena_benchmark import ValidationIssue
-from buildarena_benchmark.flags import DISQUALIFYING, INFORMATIVE
+from buildarena_benchmark.scorers.registry import known_flags
 from buildarena_pipeline.catalog.models import ModelRegistry
 from buildarena_pipeline.catalog.specs import JobSpec
 from buildarena_pipeline.runtime.context import Context
@@ -163,7 +163,7 @@ def _require_known(
         if value in choices:
             continue
         if name == "flag":
-            used = context.store.jobs.used_flags([*DISQUALIFYING, *INFORMATIVE, value])
+            used = context.store.jobs.used_flags([*known_flags(), value])
         else:
             used = context.store.jobs.distinct(name)
         if value in used or not (choices or used):
@@ -191,8 +191,8 @@ def show_job(job_id: str, context: ContextDep) -> JobDetail:
 def cancel_job(job_id: str, context: ContextDep, caller: CallerDep) -> JobView:
     """Ends a job that has not ended; the model request that is open ends at once.
 
-    If another key wants the job too, it goes on at that key's expense, and the caller's wish for
-    it ends. An admin ends it whoever wants it.
+    If another key wants the job too, it goes on at that key's expense, and the caller's claim
+    ends. An admin ends it whoever wants it.
     """
     if not context.store.lifecycle.cancel_job(job_id, owner=caller.key_id, force=caller.is_admin):
         raise ProblemError(409, f"job {job_id} has ended already")

@@ -6,27 +6,23 @@ from datetime import datetime, timedelta
 from typing import Annotated, Literal, Self
 
 from fastapi import APIRouter, Depends, Request, Response
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from buildarena_api.dependencies import ContextDep
 from buildarena_api.http.access import admin_only
 from buildarena_api.http.key_checks import KeyChecks
 from buildarena_api.http.problems import problem_responses
 from buildarena_api.schemas import BudgetView
-from buildarena_pipeline.catalog.simulators import SIMULATORS
 from buildarena_pipeline.catalog.specs import Budget, Title
+from buildarena_pipeline.errors import SubmissionError
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.notify import notify_waiting
+from buildarena_pipeline.runtime.settings import SimulatorName
+from buildarena_pipeline.runtime.simulators.known import simulator_issues
 from buildarena_store import ApiKey
 from buildarena_store.states import CONSTRUCT_QUEUE
 
 router = APIRouter(prefix="/v1/keys", tags=["keys"], dependencies=[Depends(admin_only)])
-
-
-def _known_simulator(name: str) -> str:
-    if name not in SIMULATORS:
-        raise ValueError(f"there is no simulator {name!r}; choose from {', '.join(SIMULATORS)}")
-    return name
 
 
 class NewKey(BaseModel):
@@ -45,7 +41,7 @@ class NewKey(BaseModel):
         ),
     ]
     simulators: Annotated[
-        list[Annotated[str, AfterValidator(_known_simulator)]] | None,
+        list[SimulatorName] | None,
         Field(
             min_length=1,
             max_length=10,
@@ -73,7 +69,7 @@ class NewKey(BaseModel):
         elif set(self.scopes) != {"runner"}:
             raise ValueError("the scope runner stands alone: a runner's key may do nothing else")
         elif self.simulators is None:
-            raise ValueError(f"a runner key names its simulators: {', '.join(SIMULATORS)}")
+            raise ValueError("a runner key names its simulators; GET /v1/simulators lists them")
         elif self.budget is not None:
             raise ValueError("a runner key submits nothing, so it has no budget")
         return self
@@ -124,6 +120,9 @@ class KeyCreated(KeyView):
 @router.post("", status_code=201, responses=problem_responses(422, 503))
 def create_key(body: NewKey, response: Response, context: ContextDep) -> KeyCreated:
     """Makes a key. Its secret is in this answer only."""
+    issues = simulator_issues(context, *(body.simulators or ()), path="simulators")
+    if issues:
+        raise SubmissionError(issues)
     ttl = None if body.days is None else timedelta(days=body.days)
     key, secret = context.store.keys.create(
         name=body.name,

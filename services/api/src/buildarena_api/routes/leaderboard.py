@@ -16,11 +16,11 @@ from buildarena_api.http.etags import conditional
 from buildarena_api.http.problems import problem_responses
 from buildarena_api.leaderboard.agreement import AgreementTable, agreement_rows
 from buildarena_api.leaderboard.cache import Question
-from buildarena_api.leaderboard.figures import Figures, figures_view
 from buildarena_api.leaderboard.filters import BoardsDep, SelectionDep, unknown
+from buildarena_api.leaderboard.plot_data import Figures, figures_view
+from buildarena_api.leaderboard.policies import UnderPolicy
 from buildarena_api.leaderboard.views import Board, ChangePage, ChangeView, board_view
 from buildarena_api.routes.verifications import request_verifications
-from buildarena_benchmark.flags import Reading
 from buildarena_benchmark.leaderboard import BoardQuery, TaskComparison, compare_models
 from buildarena_store import CellId
 
@@ -59,11 +59,10 @@ class TaskDuelView(BaseModel):
     indicator_p: float | None
 
 
-class Comparison(BaseModel):
+class Comparison(UnderPolicy):
     """Two models on all tasks that both played."""
 
     track: str | None
-    reading: Reading
     first: str
     second: str
     tasks: list[TaskDuelView]
@@ -113,7 +112,7 @@ def leaderboard(
     """Ranks the models of one track, on each task and overall; tracks are never mixed."""
     track, tracks = selection.track, selection.tracks
     if track is None:
-        return Board(track=None, tracks=[], tasks=[], reading=selection.query.reading)
+        return Board(track=None, tracks=[], tasks=[], policy=selection.query.policy)
     answer = boards.answer(
         selection.question,
         "json " + " ".join(tracks),
@@ -122,7 +121,7 @@ def leaderboard(
                 board,
                 track=track,
                 tracks=tracks,
-                reading=selection.query.reading,
+                policy=selection.query.policy,
                 registry=registry,
                 catalogue=context.tasks,
             )
@@ -138,17 +137,15 @@ def leaderboard(
 )
 def figures(boards: BoardsDep, selection: SelectionDep, request: Request) -> Any:
     """What the figures of a board are drawn from; reports are drawn from the same."""
-    track, reading = selection.track, selection.query.reading
+    track, policy = selection.track, selection.query.policy
     if track is None:
-        return Figures(track=None, reading=reading, dimensions=[], failures=[], cost=[], front=[])
+        return Figures(track=None, policy=policy, dimensions=[], failures=[], cost=[], front=[])
     tasks = boards.tasks()
     answer = boards.answer_from_tallies(
         selection.question,
         "figures",
         lambda board, cells: (
-            figures_view(track, board, cells, reading=reading, tasks=tasks)
-            .model_dump_json()
-            .encode()
+            figures_view(track, board, cells, policy=policy, tasks=tasks).model_dump_json().encode()
         ),
     )
     return conditional(request, answer, "application/json")
@@ -169,11 +166,11 @@ def compare(
             boards.trials(selection.question, _usual(every, field, name))
             for field, name in (("first", first), ("second", second))
         ]
-        found = compare_models(*sides, reading=selection.query.reading)
+        found = compare_models(*sides, policy=selection.query.policy)
         tasks = list(found.tasks) if found else []
     return Comparison(
         track=selection.track,
-        reading=selection.query.reading,
+        policy=selection.query.policy,
         first=first,
         second=second,
         tasks=[TaskDuelView.model_validate(task) for task in tasks],

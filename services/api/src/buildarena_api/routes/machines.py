@@ -10,16 +10,16 @@ from pydantic import BaseModel, Field
 from buildarena_api.dependencies import ContextDep
 from buildarena_api.http.access import CallerDep
 from buildarena_api.http.problems import ProblemError, problem_responses
-from buildarena_api.machine_uploads import MAX_BYTES, not_kept, read_upload, refused, uploaded
+from buildarena_api.machine_uploads import MAX_BYTES, not_storable, read_upload, refused, uploaded
 from buildarena_api.replays.views import PressView
 from buildarena_api.scenes import MachineScene, Vector, machine_scene
 from buildarena_api.schemas import JobView
 from buildarena_benchmark import ValidationIssue, broken_constraint
 from buildarena_geometry import Machine
 from buildarena_pipeline.agents.machine_trials import TooManyTrialsError, try_machine
-from buildarena_pipeline.catalog.simulators import SIMULATORS
 from buildarena_pipeline.catalog.specs import MAX_SEED, Name
 from buildarena_pipeline.runtime.context import Context
+from buildarena_simulation import DEFAULT_ENGINE
 
 router = APIRouter(prefix="/v1/machines", tags=["machines"])
 
@@ -47,7 +47,7 @@ class TrialQuery(BaseModel):
     """Which trial."""
 
     task: Name
-    simulator: Name = SIMULATORS[0]
+    simulator: Name = DEFAULT_ENGINE
     seed: int = Field(default=0, ge=0, le=MAX_SEED)
 
 
@@ -80,7 +80,7 @@ def check_machine(data: FileDep, context: ContextDep, task: TaskName = None) -> 
     """
     found = read_upload(data)
     machine = found.machine
-    fault = not_kept(machine)
+    fault = not_storable(machine)
     return MachineCheckView(
         name=found.name,
         faults=[] if fault is None else [fault],
@@ -120,7 +120,7 @@ def try_file(
     are those of any job.
     """
     machine = read_upload(data).machine
-    fault = not_kept(machine)
+    fault = not_storable(machine)
     if fault is not None:
         raise refused(fault)
     try:

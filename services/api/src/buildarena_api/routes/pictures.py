@@ -10,9 +10,9 @@ from typing import Annotated, Final
 from fastapi import APIRouter, Depends, Request, Response
 
 from buildarena_api.dependencies import ContextDep
-from buildarena_api.http.answers import KeptAnswers
 from buildarena_api.http.etags import Answer, conditional
 from buildarena_api.http.problems import ProblemError, problem_responses
+from buildarena_api.http.response_cache import ResponseCache
 from buildarena_geometry import DocumentError, Machine, module_set
 from buildarena_geometry.export import machine_glb, module_glb
 from buildarena_pipeline.runtime.context import Context
@@ -25,16 +25,16 @@ router = APIRouter(prefix="/v1", tags=["pictures"])
 GLB: Final = "model/gltf-binary"
 PNG: Final = "image/png"
 THUMBNAIL: Final = "thumbnail"
-KEPT_PICTURES: Final = 64 << 20
+MAX_CACHED_PICTURES: Final = 64 << 20
 """Bytes of GLB files and pictures in memory."""
 
 
-async def _pictures(request: Request) -> KeptAnswers:
-    pictures: KeptAnswers = request.app.state.pictures
+async def _pictures(request: Request) -> ResponseCache:
+    pictures: ResponseCache = request.app.state.pictures
     return pictures
 
 
-PicturesDep = Annotated[KeptAnswers, Depends(_pictures)]
+PicturesDep = Annotated[ResponseCache, Depends(_pictures)]
 
 
 @router.get(

@@ -16,6 +16,7 @@ from buildarena_api.dependencies import ContextDep
 from buildarena_api.http.access import Caller, RunnerDep, RunnerRights, runner_of
 from buildarena_api.http.concurrency import limited
 from buildarena_api.http.problems import ProblemError, problem_responses
+from buildarena_api.runners.lease_queue import MAX_NAMES, Leased, LeaseQuery
 from buildarena_api.runners.outcomes import stale
 from buildarena_api.runners.service import RunnerService
 from buildarena_api.runners.views import (
@@ -24,18 +25,17 @@ from buildarena_api.runners.views import (
     Heartbeat,
     HeartbeatAnswer,
     LeasedTrial,
-    LeaseWish,
+    LeaseRequest,
     Outcome,
     Received,
     RunnerAbout,
     RunnerFacts,
 )
-from buildarena_api.runners.wishes import MAX_NAMES, Leased, Wish
 from buildarena_benchmark import ValidationIssue
-from buildarena_pipeline.catalog.simulators import served, simulation_version
 from buildarena_pipeline.errors import PermanentError
 from buildarena_pipeline.runtime.context import Context
-from buildarena_pipeline.runtime.trial_books import TrialBooks
+from buildarena_pipeline.runtime.simulators.known import known_simulators
+from buildarena_pipeline.runtime.trial_repository import TrialRepository
 from buildarena_store import StaleLeaseError, UploadedFile, UploadError
 from buildarena_store.jobs.runner_leases import JobToken, runner_prefix
 from buildarena_store.states import simulate_queue
@@ -80,11 +80,11 @@ ServiceDep = Annotated[RunnerService, Depends(_service)]
 @router.get("", dependencies=[_ORDINARY], responses=problem_responses(503))
 def show_runner(caller: RunnerDep, context: ContextDep) -> RunnerFacts:
     """What a runner should know before it begins: whose jobs it may lease, versions, limits."""
-    game = context.settings.besiege_version
-    allowed = list(_rights(caller).simulators)
+    known, rights = known_simulators(context), _rights(caller)
+    allowed = list(known if rights.simulators is None else rights.simulators)
     return RunnerFacts(
         simulators=allowed,
-        versions={name: simulation_version(name, game) for name in served(game) if name in allowed},
+        versions={name: known[name].version for name in allowed if name in known},
         lease_s=context.settings.lease_s,
         piece_bytes=PIECE_BYTES,
         max_file_bytes=MAX_FILE_BYTES,
@@ -103,7 +103,7 @@ def show_runner(caller: RunnerDep, context: ContextDep) -> RunnerFacts:
 )
 async def lease_trial(
     *,
-    wish: LeaseWish,
+    lease_request: LeaseRequest,
     caller: RunnerDep,
     service: ServiceDep,
     context: ContextDep,
@@ -114,16 +114,16 @@ async def lease_trial(
     A name has one lease at a time: whoever asks again under it gets the same lease.
     """
     rights = _rights(caller)
-    _require_allowed(wish, rights)
+    _require_allowed(lease_request, rights)
     prefix = runner_prefix(caller.key_id)
-    leased = await service.wishes.granted(
-        Wish(
-            simulators=tuple(sorted(wish.simulators.items())),
+    leased = await service.lease_queue.granted(
+        LeaseQuery(
+            simulators=tuple(sorted(lease_request.simulators.items())),
             job_owners=None if rights.job_owners is None else tuple(rights.job_owners),
         ),
-        owner=prefix + wish.name,
+        owner=prefix + lease_request.name,
         prefix=prefix,
-        wait_s=wish.wait_s,
+        wait_s=lease_request.wait_s,
         left=request.is_disconnected,
     )
     if leased is None:
@@ -177,7 +177,9 @@ def get_leased_trial(named: NamedDep, caller: RunnerDep, context: ContextDep) ->
     """The trial of a live lease, as the lease's own answer had it."""
     try:
         lease = context.store.runner_leases.live(*named, runner_prefix(caller.key_id))
-        return _view(Leased(lease, TrialBooks.of(context).due(lease.job)), context.settings.lease_s)
+        return _view(
+            Leased(lease, TrialRepository.of(context).due(lease.job)), context.settings.lease_s
+        )
     except (StaleLeaseError, PermanentError) as error:
         raise stale(named) from error
 
@@ -281,9 +283,9 @@ def _rights(caller: Caller) -> RunnerRights:
 
 
 def _require_allowed(about: RunnerAbout, rights: RunnerRights) -> None:
+    choices = tuple(about.simulators if rights.simulators is None else rights.simulators)
     for name in about.simulators:
-        if name not in rights.simulators:
-            choices = tuple(rights.simulators)
+        if name not in choices:
             message = f"the key may not lease jobs of {name}"
             issue = ValidationIssue(path="simulators", message=message, choices=choices)
             raise ProblemError(403, f"{message}; choose from {', '.join(choices)}", errors=[issue])

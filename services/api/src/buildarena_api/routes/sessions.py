@@ -17,9 +17,9 @@ from buildarena_environment import ASSEMBLY, MAIN, NothingToSubmitError
 from buildarena_environment.workbench import building_tools
 from buildarena_pipeline.agents.briefing import LIMITS
 from buildarena_pipeline.agents.sessions import SessionClosedError
-from buildarena_pipeline.catalog.simulators import SIMULATORS
 from buildarena_pipeline.catalog.specs import Name, Seed
 from buildarena_pipeline.runtime.context import Context
+from buildarena_simulation import DEFAULT_ENGINE
 from buildarena_store import UnknownIdError
 
 router = APIRouter(prefix="/v1/sessions", tags=["sessions"])
@@ -41,7 +41,7 @@ class OpenSession(BaseModel):
         ),
     ]
     seed: Seed = 0
-    simulator: Name = SIMULATORS[0]
+    simulator: Name = DEFAULT_ENGINE
     kind: Annotated[
         Literal["agent", "human"],
         Field(
@@ -157,7 +157,7 @@ def open_session(
         statement=opened.task.statement,
         limits=LimitsView.model_validate(LIMITS),
         calls=opened.job.actions,
-        tools=_tools(looked_up=opened.task.constraints.looked_up),
+        tools=_tools(on_demand=opened.task.constraints.on_demand),
     )
 
 
@@ -173,7 +173,7 @@ def show_session(session_id: str, sessions: ExternalDep) -> SessionView:
         job=JobView.of(state.job),
         open=state.open,
         machines=[machine_view(name, machine) for name, machine in state.machines.items()],
-        tools=_tools(looked_up=bool(state.job.track_config.get("looked_up"))),
+        tools=_tools(on_demand=bool(state.job.track_config.get("looked_up"))),
         limits=LimitsView.model_validate(LIMITS),
         calls=state.calls,
         bytes=state.size,
@@ -213,10 +213,10 @@ def submit_session(
     return JobView.of(job)
 
 
-def _tools(*, looked_up: bool) -> list[ToolView]:
+def _tools(*, on_demand: bool) -> list[ToolView]:
     return [
         ToolView(name=tool.name, description=tool.description, parameters=dict(tool.parameters))
-        for tool in building_tools(looked_up=looked_up)
+        for tool in building_tools(on_demand=on_demand)
     ]
 
 

@@ -9,11 +9,11 @@ from typing import Annotated, Any, Final
 from fastapi import APIRouter, Depends, Query, Request, Response
 
 from buildarena_api.dependencies import ContextDep
-from buildarena_api.http.answers import KeptAnswers
 from buildarena_api.http.concurrency import limited
 from buildarena_api.http.etags import conditional
 from buildarena_api.http.negotiation import prefers
 from buildarena_api.http.problems import ProblemError, problem_responses
+from buildarena_api.http.response_cache import ResponseCache
 from buildarena_api.scenes import SceneView, scene_view
 from buildarena_geometry import DocumentError, Machine
 from buildarena_pipeline.runtime.context import Context
@@ -27,14 +27,14 @@ router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
 PARQUET: Final = "application/vnd.apache.parquet"
 MAX_ARROW_BYTES: Final = 64 << 20
 """Larger trajectories are given only as the file that is kept: they fill a page's memory."""
-KEPT_SCENES: Final = 16 << 20
+MAX_CACHED_SCENES: Final = 16 << 20
 """Bytes of scenes in memory; one of a hundred blocks has 15 kB."""
 Number = Annotated[int, Query(ge=0, le=1000, description="Which rollout's")]
 _unpacking = Lock()
 
 
-async def _scenes(request: Request) -> KeptAnswers:
-    scenes: KeptAnswers = request.app.state.scenes
+async def _scenes(request: Request) -> ResponseCache:
+    scenes: ResponseCache = request.app.state.scenes
     return scenes
 
 
@@ -76,7 +76,7 @@ def get_trajectory(
 def show_scene(
     job_id: str,
     context: ContextDep,
-    scenes: Annotated[KeptAnswers, Depends(_scenes)],
+    scenes: Annotated[ResponseCache, Depends(_scenes)],
     request: Request,
     number: Number = 0,
 ) -> Any:

@@ -10,15 +10,15 @@ import structlog
 from buildarena_api.http.problems import ProblemError
 from buildarena_api.runners.checking import shared_checker
 from buildarena_api.runners.views import Fault, NamedFile, Outcome
-from buildarena_pipeline.catalog.simulators import BESIEGE
 from buildarena_pipeline.runtime.context import Context
-from buildarena_pipeline.runtime.trial_books import DueTrial, TrialBooks
+from buildarena_pipeline.runtime.simulators.simulator import BESIEGE
 from buildarena_pipeline.runtime.trial_checks import (
     OutcomeRefusedError,
     checked_versions,
     require_refusable,
 )
 from buildarena_pipeline.runtime.trial_outcomes import File, TrialOutcome
+from buildarena_pipeline.runtime.trial_repository import DueTrial, TrialRepository
 from buildarena_simulation import Trajectory
 from buildarena_store import Lease, StaleLeaseError, UploadedFile, UploadError, Uploads, clean
 from buildarena_store.artifacts.kinds import EVIDENCE
@@ -41,7 +41,7 @@ class Outcomes:
 
     def __init__(self, context: Context, uploads: Uploads) -> None:
         self._context = context
-        self._books = TrialBooks.of(context)
+        self._trials = TrialRepository.of(context)
         self._uploads = uploads
         self._checker = shared_checker()
 
@@ -53,14 +53,14 @@ class Outcomes:
         """
 
         def end(lease: Lease) -> None:
-            due = self._books.due(lease.job)
+            due = self._trials.due(lease.job)
             try:
                 outcome = self._checked(named, due, said)
             except (OutcomeRefusedError, UploadError) as error:
                 log.warning("outcome_refused", job=named[0], runner=lease.owner, error=str(error))
                 self._uploads.drop(named)
                 raise ProblemError(422, str(error)) from error
-            self._books.complete(lease, due, outcome)
+            self._trials.complete(lease, due, outcome)
 
         return self._ended(named, prefix, AttemptResult.DONE, end)
 
@@ -73,8 +73,8 @@ class Outcomes:
 
         def end(lease: Lease) -> None:
             try:
-                number = self._books.due(lease.job).request.number
-                self._books.keep_evidence(named[0], self._files(named, number, said.files))
+                number = self._trials.due(lease.job).request.number
+                self._trials.keep_evidence(named[0], self._files(named, number, said.files))
             except UploadError as error:
                 raise ProblemError(422, str(error)) from error
             detail = str(clean(said.detail))[:LONGEST_DETAIL]

@@ -8,8 +8,8 @@ import structlog
 from sqlalchemy.exc import SQLAlchemyError
 
 from buildarena_api.http.own_pool import OwnPool
+from buildarena_api.runners.lease_queue import LeaseQueue
 from buildarena_api.runners.outcomes import Outcomes, drop_dead_uploads
-from buildarena_api.runners.wishes import Wishes
 from buildarena_pipeline.periodic import Periodic
 from buildarena_pipeline.runtime.context import Context
 from buildarena_store import Uploads
@@ -31,7 +31,7 @@ class RunnerService:
     Attributes:
         pool: Where outcomes are scored.
         uploads: What runners have uploaded.
-        wishes: Finds trials.
+        lease_queue: Finds trials.
         outcomes: Ends leases.
     """
 
@@ -39,7 +39,7 @@ class RunnerService:
         self.pool = OwnPool(context, size=SCORERS, name="outcomes")
         settings = context.settings
         self.uploads = Uploads(settings.artifacts_location, settings.artifact_options)
-        self.wishes = Wishes(context)
+        self.lease_queue = LeaseQueue(context)
         self.outcomes = Outcomes(self.pool.context, self.uploads)
         self._cleaner = Periodic(self._clean, name="uploads", period_s=DROP_EVERY_S)
 

@@ -7,18 +7,13 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
-from buildarena_pipeline.catalog.simulators import ENGINE_SIMULATORS, SIMULATORS
+from buildarena_pipeline.runtime.settings import SimulatorName
+from buildarena_simulation import ENGINES
 from buildarena_store.artifacts.kinds import EVIDENCE_NAME
 from buildarena_store.uploads import MAX_FILE_BYTES, MAX_LEASE_FILES
 
 LONGEST_WAIT_S: Final = 25.0
 MAX_VERSIONS: Final = 32
-
-
-def _known(name: str) -> str:
-    if name not in SIMULATORS:
-        raise ValueError(f"there is no simulator {name!r}; choose from {', '.join(SIMULATORS)}")
-    return name
 
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -33,7 +28,6 @@ Fact = (
     | Annotated[dict[Short, Short | int | Finite | bool | None], Field(max_length=64)]
 )
 Facts = Annotated[dict[Annotated[str, Field(max_length=60)], Fact], Field(max_length=MAX_VERSIONS)]
-SimulatorName = Annotated[str, AfterValidator(_known)]
 Version = Annotated[str, Field(pattern=r"^[A-Za-z0-9._-]{1,80}$")]
 Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$", description="64 hex digits")]
 Size = Annotated[int, Field(ge=0, le=MAX_FILE_BYTES, description="Bytes")]
@@ -72,7 +66,7 @@ class RunnerAbout(_Document):
     )
 
 
-class LeaseWish(RunnerAbout):
+class LeaseRequest(RunnerAbout):
     """A request for a trial."""
 
     wait_s: Annotated[
@@ -171,7 +165,7 @@ class Annotation(_Document):
     engine_version: Annotated[str, Field(max_length=80)]
 
 
-EngineName = Annotated[str, AfterValidator(lambda name: _one_of(name, ENGINE_SIMULATORS))]
+EngineName = Annotated[str, AfterValidator(lambda name: _one_of(name, ENGINES))]
 
 
 class Outcome(_Document):

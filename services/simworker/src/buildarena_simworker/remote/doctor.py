@@ -8,9 +8,9 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Final
 
-from buildarena_pipeline.catalog.simulators import BESIEGE
 from buildarena_pipeline.errors import StartupError
 from buildarena_pipeline.runtime.settings import Settings
+from buildarena_pipeline.runtime.simulators.installed import installed_simulators
 from buildarena_simworker.remote.api import RunnerApi, check_url, tls_context
 from buildarena_simworker.remote.errors import RefusedError, RemoteError
 from buildarena_simworker.remote.process import KEY_VARIABLE, read_key
@@ -37,7 +37,13 @@ def examined(
         ca_file: Certificates to trust besides the system's.
         allow_http: Whether the key may go unencrypted to another machine.
     """
-    return [*_simulator(simulator), *_service(url, simulator, key_file, ca_file, allow_http)]
+    settings = Settings()
+    installed = installed_simulators()[simulator]
+    here = installed.version(settings)
+    return [
+        _check("simulator", *installed.examine(settings)),
+        *_service(url, simulator, here, key_file, ca_file, allow_http=allow_http),
+    ]
 
 
 def printed(checks: Sequence[Check], *, as_json: bool = False) -> str:
@@ -53,7 +59,13 @@ def printed(checks: Sequence[Check], *, as_json: bool = False) -> str:
 
 
 def _service(
-    url: str, simulator: str, key_file: Path | None, ca_file: Path | None, allow_http: bool
+    url: str,
+    simulator: str,
+    here: str | None,
+    key_file: Path | None,
+    ca_file: Path | None,
+    *,
+    allow_http: bool,
 ) -> Iterator[Check]:
     try:
         key = read_key(key_file)
@@ -82,34 +94,10 @@ def _service(
     allowed = facts["simulators"]
     detail = f"may lease jobs of {', '.join(allowed) or 'nothing'}"
     yield _check("key", detail, "" if simulator in allowed else f"it needs one for {simulator}")
-    wanted, here = facts["versions"].get(simulator), _version(simulator)
+    wanted = facts["versions"].get(simulator)
     if here is not None:
         advice = "" if wanted == here else "install the version that the service has"
         yield _check("version", f"{here} here, {wanted or 'none'} at the service", advice)
-
-
-def _simulator(name: str) -> Iterator[Check]:
-    if name == BESIEGE:
-        version = _version(name)
-        advice = "" if version else "see `python -m buildarena_simworker.simulators.besiege doctor`"
-        yield _check("simulator", f"{name} {version or 'is not set up'}", advice)
-        return
-    from buildarena_simworker.simulators.engines import EngineSimulator
-
-    try:
-        versions = EngineSimulator(name).versions
-    except Exception as error:  # noqa: BLE001 - whatever keeps it from being loaded
-        yield _check("simulator", f"{name}: {error}", f"install {name}")
-    else:
-        yield _check("simulator", f"{name} {versions['engine_version']}")
-
-
-def _version(name: str) -> str | None:
-    if name == BESIEGE:
-        return Settings().besiege_version
-    from buildarena_simulation import SIMULATION_VERSION
-
-    return SIMULATION_VERSION
 
 
 def _check(name: str, detail: str, advice: str = "") -> Check:

@@ -10,13 +10,13 @@ from buildarena_benchmark.tasks.document import TaskDocument
 from buildarena_benchmark.tasks.task import task_of
 from buildarena_environment.warm_process import ProcessEndedError, WarmProcess
 from buildarena_geometry import Machine
-from buildarena_simworker.simulators.engines import EngineSimulator
-from buildarena_simworker.simulators.simulator import (
+from buildarena_pipeline.runtime.simulators.simulator import (
     MachineRefusedError,
     Simulated,
     SimulatorFaultError,
     Trial,
 )
+from buildarena_simworker.engines import EngineSimulator
 
 
 class EngineProcess:

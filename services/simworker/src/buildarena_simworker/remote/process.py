@@ -11,7 +11,7 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final
@@ -22,10 +22,10 @@ from buildarena_environment.processes import end_with_parent, tree_memory_bytes
 from buildarena_geometry import __version__ as geometry_version
 from buildarena_pipeline.errors import StartupError
 from buildarena_pipeline.runtime.logs import set_up_logs
+from buildarena_pipeline.runtime.simulators.simulator import Simulator
 from buildarena_simworker.remote.api import RunnerApi, check_url, tls_context
 from buildarena_simworker.remote.errors import RemoteError, UnreachableError
 from buildarena_simworker.remote.slots import Heartbeats, Slot, hand_back
-from buildarena_simworker.simulators.simulator import Simulator
 
 KEY_VARIABLE: Final = "BUILDARENA_KEY"
 JOIN_S: Final = 3.0
@@ -45,6 +45,7 @@ class RunnerOptions:
         version: Its version: only jobs that were submitted for it are leased.
         make: Makes the simulator of one slot.
         at_once: Trials at once.
+        announced: What the service should know of the simulator besides its versions.
         ca_file: Certificates of authorities to trust besides the system's.
         allow_http: Whether the key may go unencrypted to another machine.
         log_level: As in the settings.
@@ -56,6 +57,7 @@ class RunnerOptions:
     version: str
     make: Callable[[], Simulator]
     at_once: int = 1
+    announced: Mapping[str, Any] = field(default_factory=dict)
     ca_file: Path | None = None
     allow_http: bool = False
     log_level: str = "info"
@@ -196,7 +198,7 @@ class Runner:
 
     def _versions(self) -> Mapping[str, Any]:
         own = self._simulators[0].versions if self._simulators else {}
-        return {"geometry": geometry_version, **own}
+        return {"geometry": geometry_version, **own, **self._options.announced}
 
 
 def serve(options: RunnerOptions) -> None:

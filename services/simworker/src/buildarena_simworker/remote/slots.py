@@ -16,6 +16,7 @@ from buildarena_benchmark.tasks.task import task_of
 from buildarena_geometry import KeyPress, Machine
 from buildarena_pipeline.errors import PermanentError, TransientError
 from buildarena_pipeline.periodic import Periodic
+from buildarena_pipeline.runtime.simulators.simulator import Simulator, Trial
 from buildarena_pipeline.runtime.trial_outcomes import File, TrialOutcome
 from buildarena_simulation import write_trajectory
 from buildarena_simworker.remote.api import HeldLease, RunnerApi
@@ -25,7 +26,6 @@ from buildarena_simworker.remote.errors import (
     RemoteError,
     UnreachableError,
 )
-from buildarena_simworker.simulators.simulator import Simulator, Trial
 from buildarena_simworker.trials import do_trial
 
 BEATS_PER_LEASE: Final = 4

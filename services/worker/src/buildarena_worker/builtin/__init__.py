@@ -11,8 +11,8 @@ from decimal import Decimal
 from buildarena_pipeline.errors import PermanentError
 from buildarena_store import Usage
 from buildarena_worker.builtin import expert, idle, random_builder
-from buildarena_worker.session.messages import Answer, Reply, Request
-from buildarena_worker.session.patience import ENDLESS, Patience
+from buildarena_worker.session.messages import Completion, Reply, Request
+from buildarena_worker.session.request_options import UNBOUNDED, RequestOptions
 
 MODELS = {"expert": expert.reply, "random": random_builder.reply, "idle": idle.reply}
 CHARACTERS_PER_TOKEN = 4
@@ -36,9 +36,9 @@ class BuiltinClient:
             )
         self._reply = MODELS[name]
 
-    def complete(self, request: Request, patience: Patience = ENDLESS) -> Answer:
+    def complete(self, request: Request, options: RequestOptions = UNBOUNDED) -> Completion:
         """The model's reply; tokens are estimated from the length of the texts, at no cost."""
-        del patience
+        del options
         reply = self._reply(request)
         usage = Usage(
             requests=1,
@@ -47,7 +47,7 @@ class BuiltinClient:
             output_tokens=max(1, _length(reply) // CHARACTERS_PER_TOKEN),
             cost_usd=Decimal(),
         )
-        return Answer(reply=reply, usage=usage, latency_s=0.0)
+        return Completion(reply=reply, usage=usage, latency_s=0.0)
 
 
 def _length(reply: Reply) -> int:

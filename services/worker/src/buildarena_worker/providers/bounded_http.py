@@ -11,9 +11,9 @@ from typing import Any
 import httpx2
 
 from buildarena_geometry.json_texts import is_too_deep, read_json
-from buildarena_worker.providers.answered import TokenCounts
 from buildarena_worker.providers.bounds import MAX_BODY
 from buildarena_worker.providers.failures import Failure, ProviderError, redirected
+from buildarena_worker.providers.response import TokenCounts
 
 USAGE = {
     "usage": ("input_tokens", "output_tokens", "cache_read_input_tokens"),

@@ -6,7 +6,7 @@ import threading
 from collections.abc import Mapping
 from typing import Any
 
-from buildarena_pipeline.catalog.models import ModelRegistry
+from buildarena_pipeline.catalog.models import BUILTIN_PROTOCOL, ModelRegistry
 from buildarena_pipeline.errors import PermanentError
 from buildarena_worker.builtin import BuiltinClient
 from buildarena_worker.session.messages import ModelClient
@@ -45,7 +45,7 @@ class ModelClients:
                 f"this worker's model registry lacks {name!r}", reason="unknown_model"
             )
         provider = self._registry.provider_of(entry)
-        if provider.wire == "builtin":
+        if provider.protocol == BUILTIN_PROTOCOL:
             return BuiltinClient(entry.model)
         from buildarena_worker.providers.provider import ProviderClient
         from buildarena_worker.providers.throttle import Throttle

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from enum import StrEnum
 
-from buildarena_worker.providers.answered import TokenCounts
+from buildarena_worker.providers.response import TokenCounts
 
 
 class Failure(StrEnum):

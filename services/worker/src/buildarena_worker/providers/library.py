@@ -1,11 +1,10 @@
-"""Anthropic's and Google's wires through pydantic-ai and the providers' own libraries."""
+"""Protocols that are spoken through pydantic-ai and the providers' own libraries."""
 
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 from pydantic_ai.direct import model_request
@@ -35,15 +34,14 @@ from pydantic_ai.models import Model, ModelRequestParameters
 from pydantic_ai.settings import ModelSettings
 from pydantic_ai.tools import ToolDefinition
 
-from buildarena_pipeline.catalog.models import ModelEntry, ProviderEntry
-from buildarena_worker.providers.answered import (
-    Answered,
+from buildarena_worker.providers.bounded_http import RECEIVED, Received
+from buildarena_worker.providers.bounds import MAX_CALLS, MAX_NAME, arguments_of, bounded
+from buildarena_worker.providers.failures import RETRIED_STATUS, Failure, ProviderError
+from buildarena_worker.providers.response import (
+    ProviderResponse,
     TokenCounts,
     arguments_text,
 )
-from buildarena_worker.providers.bounded_http import RECEIVED, BoundedClient, Received
-from buildarena_worker.providers.bounds import MAX_CALLS, MAX_NAME, arguments_of, bounded
-from buildarena_worker.providers.failures import RETRIED_STATUS, Failure, ProviderError
 from buildarena_worker.session.messages import Message, Reply, Request, Tool, ToolCall
 
 POOLS = 16
@@ -88,7 +86,7 @@ class LibrarySender:
         self._pools = [_Pool(connect())]
         self._takes_parallel_tool_calls = takes_parallel_tool_calls
 
-    async def send(self, request: Request) -> Answered:
+    async def send(self, request: Request) -> ProviderResponse:
         """The model's answer to a conversation.
 
         Raises:
@@ -100,11 +98,11 @@ class LibrarySender:
             with self._model() as model:
                 response = await model_request(
                     model,
-                    to_wire(request.messages),
+                    to_library(request.messages),
                     model_settings=self._settings(request),
                     model_request_parameters=request_parameters(request.tools),
                 )
-            return from_wire(response)
+            return from_library(response)
         except Exception as error:
             received.require_usable()
             raise _translated(error, received) from error
@@ -142,43 +140,6 @@ class LibrarySender:
         return settings
 
 
-def anthropic_sender(entry: ModelEntry, provider: ProviderEntry, key: str) -> LibrarySender:
-    """The sender of a model behind Anthropic's API."""
-    connect = partial(_anthropic, entry, provider, key)
-    return LibrarySender(connect, takes_parallel_tool_calls=True)
-
-
-def google_sender(entry: ModelEntry, provider: ProviderEntry, key: str) -> LibrarySender:
-    """The sender of a model behind Google's API."""
-    connect = partial(_google, entry, provider, key)
-    return LibrarySender(connect, takes_parallel_tool_calls=False)
-
-
-def _anthropic(entry: ModelEntry, provider: ProviderEntry, key: str) -> Connected:
-    from anthropic import AsyncAnthropic
-    from pydantic_ai.models.anthropic import AnthropicModel
-    from pydantic_ai.providers.anthropic import AnthropicProvider
-
-    client = AsyncAnthropic(
-        base_url=provider.base_url,
-        api_key=key,
-        max_retries=0,
-        http_client=BoundedClient(timeout=None),  # the retry policy's own timeout rules
-        timeout=None,
-    )
-    model = AnthropicModel(entry.model, provider=AnthropicProvider(anthropic_client=client))
-    return model, client.close
-
-
-def _google(entry: ModelEntry, provider: ProviderEntry, key: str) -> Connected:
-    from pydantic_ai.models.google import GoogleModel
-    from pydantic_ai.providers.google import GoogleProvider
-
-    http = BoundedClient(timeout=None)  # the retry policy's own timeout rules
-    google = GoogleProvider(api_key=key, base_url=provider.base_url, http_client=http)
-    return GoogleModel(entry.model, provider=google), http.aclose
-
-
 def _translated(error: Exception, received: Received) -> ProviderError:
     """A library's error in our words; where there was an answer, it could not be read."""
     if received.succeeded and not isinstance(error, tuple(kind for kind, _ in FAILURES)):
@@ -199,21 +160,21 @@ def _translated(error: Exception, received: Received) -> ProviderError:
     )
 
 
-def to_wire(messages: Sequence[Message]) -> list[ModelMessage]:
+def to_library(messages: Sequence[Message]) -> list[ModelMessage]:
     """The conversation in pydantic-ai's form; adjacent messages of one side become one."""
-    wire: list[ModelMessage] = []
+    messages_: list[ModelMessage] = []
     requests: list[ModelRequestPart] = []
     for message in messages:
         if message.role == "assistant":
             if requests:
-                wire.append(ModelRequest(parts=requests))
+                messages_.append(ModelRequest(parts=requests))
                 requests = []
-            wire.append(ModelResponse(parts=_response_parts(message)))
+            messages_.append(ModelResponse(parts=_response_parts(message)))
         else:
             requests.append(_request_part(message))
     if requests:
-        wire.append(ModelRequest(parts=requests))
-    return wire
+        messages_.append(ModelRequest(parts=requests))
+    return messages_
 
 
 def _request_part(message: Message) -> ModelRequestPart:
@@ -254,7 +215,7 @@ def request_parameters(tools: Sequence[Tool]) -> ModelRequestParameters:
     )
 
 
-def from_wire(response: ModelResponse) -> Answered:
+def from_library(response: ModelResponse) -> ProviderResponse:
     """An answer in our form."""
     text = "".join(part.content for part in response.parts if isinstance(part, TextPart))
     calls = tuple(
@@ -264,7 +225,7 @@ def from_wire(response: ModelResponse) -> Answered:
     )[:MAX_CALLS]
     finish, used = response.finish_reason, response.usage
     named = response.provider_response_id
-    return Answered(
+    return ProviderResponse(
         reply=bounded(Reply(text=text, calls=calls, finish=FINISH.get(finish, finish or "stop"))),
         tokens=TokenCounts.bounded(
             used.input_tokens,

@@ -20,14 +20,14 @@ from buildarena_pipeline.errors import PermanentError, TransientError
 from buildarena_pipeline.secret_files import SUFFIX, SecretFileError, read_secret
 from buildarena_store import Usage
 from buildarena_store.jobs.journal import GARBAGE, OUT_OF_TIME
-from buildarena_worker.providers.answered import Answered, TokenCounts
 from buildarena_worker.providers.failures import Failure, ProviderError
+from buildarena_worker.providers.registry import sender_for
 from buildarena_worker.providers.request_loop import RequestLoop
+from buildarena_worker.providers.response import ProviderResponse, TokenCounts
 from buildarena_worker.providers.retries import RetryPolicy
-from buildarena_worker.providers.senders import sender_for
 from buildarena_worker.providers.throttle import Throttle
-from buildarena_worker.session.messages import Answer, Reply, Request
-from buildarena_worker.session.patience import ENDLESS, Patience
+from buildarena_worker.session.messages import Completion, Reply, Request
+from buildarena_worker.session.request_options import UNBOUNDED, RequestOptions
 
 log = structlog.get_logger(__name__)
 
@@ -63,19 +63,19 @@ class ProviderClient:
         self._sender = sender_for(entry, provider, self._key)
         self._rng = random.Random()  # noqa: S311 - spreads retries, guards nothing
 
-    def complete(self, request: Request, patience: Patience = ENDLESS) -> Answer:
+    def complete(self, request: Request, options: RequestOptions = UNBOUNDED) -> Completion:
         """Asks the model, with the policy's retries.
 
         Args:
             request: What is asked.
-            patience: How long to wait, with all retries.
+            options: How long to wait, with all retries.
 
         Raises:
             CancelledError: The lease was lost.
-            TransientError: The provider failed through all tries.
+            TransientError: The provider failed through all attempts.
             PermanentError: The provider refuses the key, the model or the account.
         """
-        return REQUESTS.run(self._in_time(request, patience), patience.active)
+        return REQUESTS.run(self._in_time(request, options), options.active)
 
     def close(self) -> None:
         """Closes the connections to the provider."""
@@ -86,67 +86,67 @@ class ProviderClient:
 
         REQUESTS.run(close())
 
-    async def _in_time(self, request: Request, patience: Patience) -> Answer:
-        started, within_s = time.monotonic(), patience.within_s
+    async def _in_time(self, request: Request, options: RequestOptions) -> Completion:
+        started, within_s = time.monotonic(), options.within_s
         try:
             async with asyncio.timeout(within_s if math.isfinite(within_s) else None):
-                return await self._complete(request, patience)
+                return await self._complete(request, options)
         except TimeoutError:
             detail = f"the job's time was over after {within_s:.3g} s"
             return _empty(OUT_OF_TIME, detail, time.monotonic() - started, 1)
 
-    async def _complete(self, request: Request, patience: Patience) -> Answer:
+    async def _complete(self, request: Request, options: RequestOptions) -> Completion:
         started = time.monotonic()
-        for tries in range(1, self._policy.tries + 1):
+        for attempts in range(1, self._policy.attempts + 1):
             try:
-                answered = await self._send(request, patience)
+                answered = await self._send(request, options)
             except (ProviderError, TimeoutError) as error:
                 failure = error.failure if isinstance(error, ProviderError) else Failure.OUTAGE
                 detail = _first_line(error, self._key)
                 latency_s = time.monotonic() - started
                 if failure in OWN_FAILURES:
-                    return _empty(failure.value, "", latency_s, tries, detail=detail)
+                    return _empty(failure.value, "", latency_s, attempts, detail=detail)
                 if isinstance(error, ProviderError) and failure is Failure.GARBAGE:
                     usage = self._usage(error.tokens)
-                    return _empty(GARBAGE, detail, latency_s, tries, usage=usage)
+                    return _empty(GARBAGE, detail, latency_s, attempts, usage=usage)
                 if failure is not Failure.OUTAGE:
                     message = f"{self._entry.name}: {detail}"
                     raise PermanentError(message, reason=failure.value) from error
-                if tries == self._policy.tries:
+                if attempts == self._policy.attempts:
                     raise TransientError(
-                        f"{self._entry.name}: {tries} tries failed, the last: {detail}",
+                        f"{self._entry.name}: {attempts} attempts failed, the last: {detail}",
                         reason="provider_outage",
                         delay_s=OUTAGE_DELAY_S,
                     ) from error
                 headers = error.headers if isinstance(error, ProviderError) else None
-                wait_s = self._policy.wait_s(tries, headers, self._rng)
-                log.info("model_retry", model=self._entry.name, tries=tries, wait_s=wait_s)
+                wait_s = self._policy.wait_s(attempts, headers, self._rng)
+                log.info("model_retry", model=self._entry.name, attempts=attempts, wait_s=wait_s)
                 await asyncio.sleep(wait_s)
             else:
-                return self._answer(answered, time.monotonic() - started, tries)
-        raise AssertionError("the last try returns or raises")
+                return self._answer(answered, time.monotonic() - started, attempts)
+        raise AssertionError("the last attempt returns or raises")
 
-    async def _send(self, request: Request, patience: Patience) -> Answered:
+    async def _send(self, request: Request, options: RequestOptions) -> ProviderResponse:
         """Sends a request once, when the provider's shared limit lets it."""
-        async with self._throttle.slot(patience.owner) as slot:
-            patience.sent.set()
+        async with self._throttle.slot(options.owner) as slot:
+            options.sent.set()
             try:
                 async with asyncio.timeout(self._policy.timeout_s):
                     answered = await self._sender.send(request)
             except ProviderError as error:
-                patience.sent.clear()
+                options.sent.clear()
                 if error.overloaded:
                     slot.rejected()
                 raise
             slot.succeeded()
             return answered
 
-    def _answer(self, answered: Answered, latency_s: float, tries: int) -> Answer:
-        return Answer(
+    def _answer(self, answered: ProviderResponse, latency_s: float, attempts: int) -> Completion:
+        return Completion(
             reply=answered.reply,
             usage=self._usage(answered.tokens),
             latency_s=latency_s,
-            tries=tries,
+            attempts=attempts,
             provider_request_id=answered.response_id,
         )
 
@@ -187,15 +187,15 @@ def _empty(
     finish: str,
     text: str,
     latency_s: float,
-    tries: int,
+    attempts: int,
     *,
     usage: Usage = Usage(requests=1),  # noqa: B008 - frozen
     detail: str | None = None,
-) -> Answer:
+) -> Completion:
     """An answer without a reply that a session could go on with."""
     log.info("model_failure", finish=finish, detail=detail or text)
-    return Answer(
-        reply=Reply(text=text, finish=finish), usage=usage, latency_s=latency_s, tries=tries
+    return Completion(
+        reply=Reply(text=text, finish=finish), usage=usage, latency_s=latency_s, attempts=attempts
     )
 
 

@@ -12,13 +12,13 @@ class RetryPolicy:
     """How often and how long a request is tried.
 
     Attributes:
-        tries: Sendings at most.
+        attempts: Sendings at most.
         first_wait_s: Longest wait after the first failure; doubles with each.
         longest_wait_s: No wait is longer, whatever a provider asks for.
         timeout_s: Time for one sending, connection included.
     """
 
-    tries: int = 6
+    attempts: int = 6
     first_wait_s: float = 1.0
     longest_wait_s: float = 60.0
     timeout_s: float = 600.0

@@ -36,7 +36,7 @@ RETRY_S = 0.02, 0.1
 """A refused request tries again after a random time between these."""
 REFUSED_MS = 150
 """While one waits, which shows for this time, a new request waits its turn like it."""
-LIMIT_KEPT_S = 86400
+LIMIT_STORED_S = 86400
 
 _PARTS = ("open", "limit", "calm", "met", "refused")
 _TAKE = f"""
@@ -63,9 +63,9 @@ if ARGV[2] == 'grow' then
   limit = math.min({MAX_LIMIT}, limit + step)
 elseif ARGV[2] == 'shrink' and redis.call('SET', KEYS[3], 1, 'NX', 'EX', {CALM_S}) then
   limit = math.max({MIN_LIMIT}, limit / 2)
-  redis.call('SET', KEYS[4], 1, 'EX', {LIMIT_KEPT_S})
+  redis.call('SET', KEYS[4], 1, 'EX', {LIMIT_STORED_S})
 end
-redis.call('SET', KEYS[2], tostring(limit), 'EX', {LIMIT_KEPT_S})
+redis.call('SET', KEYS[2], tostring(limit), 'EX', {LIMIT_STORED_S})
 if redis.call('EXISTS', KEYS[5]) == 0 and redis.call('ZCARD', KEYS[1]) <= math.floor(limit) then
   return 1
 end

@@ -41,7 +41,7 @@ def terminates(reply: Reply) -> bool:
     return not reply.calls and _LAST_LINE.search(reply.text) is not None
 
 
-def is_aside(reply: Reply) -> bool:
+def is_lookup_only(reply: Reply) -> bool:
     """Whether a reply does nothing but look modules up: nobody else reads that."""
     return bool(reply.calls) and all(call.name in _LOOKUPS for call in reply.calls)
 
@@ -140,7 +140,7 @@ class Dialogue:
                 self._hear(messages, received)
                 messages += _own(said)
                 received = []
-            elif not (is_aside(said.reply) and all(action.ok for action in said.actions)):
+            elif not (is_lookup_only(said.reply) and all(action.ok for action in said.actions)):
                 received.append(_rendered(said))
         self._hear(messages, received)
         return messages

@@ -21,8 +21,8 @@ from buildarena_store import Journal, JournalEntry, RolloutRecord, StaleLeaseErr
 from buildarena_store.jobs.journal import OUT_OF_TIME
 from buildarena_worker.session.budget_guard import BudgetGuard
 from buildarena_worker.session.concurrency_gate import ConcurrencyGate
-from buildarena_worker.session.messages import Answer, ModelClient, Request
-from buildarena_worker.session.patience import Patience
+from buildarena_worker.session.messages import Completion, ModelClient, Request
+from buildarena_worker.session.request_options import RequestOptions
 from buildarena_worker.session.results import Diverged, SessionEnded, Superseded, Suspended
 from buildarena_worker.session.spending import Spending
 
@@ -252,7 +252,7 @@ class LiveHost:
                 reply=clean(answer.reply.to_json()),
                 usage=answer.usage,
                 latency_s=latency_s,
-                tries=answer.tries,
+                tries=answer.attempts,
                 provider_request_id=clean(answer.provider_request_id),
             )
             self._keep(entry)
@@ -269,17 +269,17 @@ class LiveHost:
         self._active.wait(wait_s)
         return wait_s
 
-    def _answer(self, request: Request, waited_s: float) -> Answer:
+    def _answer(self, request: Request, waited_s: float) -> Completion:
         left_s = self._kept.spending.seconds_left - waited_s
-        patience = Patience(within_s=left_s, active=self._active, owner=self._owner)
+        options = RequestOptions(within_s=left_s, active=self._active, owner=self._owner)
         try:
-            answer = self._client.complete(request, patience)
+            answer = self._client.complete(request, options)
         except CancelledError:
-            if self._active.lost and patience.sent.is_set():
+            if self._active.lost and options.sent.is_set():
                 self._budget.charge_lost(self._budget.sent(request))
             self._require_held()
             raise
-        if answer.reply.finish == OUT_OF_TIME and patience.sent.is_set():
+        if answer.reply.finish == OUT_OF_TIME and options.sent.is_set():
             return replace(answer, usage=self._budget.sent(request))
         return answer
 

@@ -12,7 +12,7 @@ from typing import Any, Protocol
 
 from buildarena_store import Usage
 from buildarena_store.ids import content_hash
-from buildarena_worker.session.patience import ENDLESS, Patience
+from buildarena_worker.session.request_options import UNBOUNDED, RequestOptions
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -127,33 +127,33 @@ class Reply:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Answer:
+class Completion:
     """A reply with what it took to get it.
 
     Attributes:
         reply: The reply.
         usage: What it cost.
         latency_s: Time until it was there, retries included.
-        tries: Requests that it took.
+        attempts: Requests that it took.
         provider_request_id: The provider's own id of it, if it gave one.
     """
 
     reply: Reply
     usage: Usage
     latency_s: float
-    tries: int = 1
+    attempts: int = 1
     provider_request_id: str | None = None
 
 
 class ModelClient(Protocol):
     """Something that answers requests: a provider, a built-in model, a fake."""
 
-    def complete(self, request: Request, patience: Patience = ENDLESS) -> Answer:
+    def complete(self, request: Request, options: RequestOptions = UNBOUNDED) -> Completion:
         """Asks the model.
 
         Args:
             request: What is asked.
-            patience: How long to wait for the answer. When its seconds are over, the answer is an
+            options: How long to wait for the answer. When its seconds are over, the answer is an
                 empty one with the finish word ``out_of_time``; one that can't be read is an empty
                 one with ``garbage``.
 

@@ -65,6 +65,16 @@ class Session:
         statement = self.pack.statements.get(self.task.name, self.task.statement)
         return "\n\n".join([statement.strip(), *self.additions])
 
+    def new_machine(self, available: Mapping[str, Machine] | None = None) -> Machine:
+        """An empty machine of the task's modules, which is what is being built from now on.
+
+        Args:
+            available: Finished machines by name; with some, the new one is their assembly.
+        """
+        catalogue = self.task.constraints.catalogue
+        self.machine = Machine(catalogue=catalogue, available=available)
+        return self.machine
+
     def ask(
         self, messages: Sequence[Message], tools: Sequence[Tool], *, phase: str, role: str
     ) -> tuple[Reply, JournalEntry]:

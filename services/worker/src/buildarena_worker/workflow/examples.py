@@ -2,34 +2,23 @@
 
 from __future__ import annotations
 
-from buildarena_benchmark import Task
+from buildarena_benchmark import Task, builtin_tasks
 from buildarena_pipeline.catalog.prompt_packs import PromptPack
 from buildarena_worker.builtin.designs import DESIGNS
 
 EXAMPLE_SEED = 0
-ALIKE = {
-    "transport": "transport-1",
-    "support": "support-1",
-    "thrust": "lift-1",
-    "height": "lift-2",
-    "road": "mechanisms-1",
-    "slalom": "mechanisms-1",
-    "winch": "mechanisms-3",
-    "place": "mechanisms-4",
-    "hover": "flight-1",
-    "glide": "flight-2",
-}
-"""By scorer: the built-in task with an example of the kind."""
 
 
 def example_for(task: Task, pack: PromptPack) -> str:
     """An example of the task's kind: the expert's design for the first level of its category.
 
-    A task of a category of its own gets the example of the category that is scored like it.
+    A task of a category of its own gets the example of the first task that is scored like it, and
+    the first example of all if none is.
     """
     name = f"{task.category}-1"
     if name not in DESIGNS:
-        name = ALIKE[task.scorer]
+        alike = [name for name in DESIGNS if builtin_tasks()[name].scorer == task.scorer]
+        name = next(iter(alike or DESIGNS))
     part = next(iter(DESIGNS[name](EXAMPLE_SEED).parts.values()))
     actions = "\n".join(
         f"{number}. {action}({', '.join(f'{key}={value!r}' for key, value in arguments.items())})"

@@ -100,7 +100,7 @@ def acting_on(machine: Machine) -> Act:
 
 def lookups(task: Task) -> list[Tool]:
     """The tools that modules are looked up with; none where they are told."""
-    return tools_named(LOOKUPS) if task.constraints.looked_up else []
+    return tools_named(LOOKUPS) if task.constraints.on_demand else []
 
 
 def modules_text(chosen: str | Sequence[str] | None = None) -> str:
@@ -122,7 +122,7 @@ def modules_of(task: Task) -> str:
 def parts_of(task: Task) -> str:
     """The same in short: sizes, masses and actions, without descriptions."""
     limits = task.constraints
-    if limits.looked_up:
+    if limits.on_demand:
         return lookup_text(limits.catalogue)
     return catalogue_in_short(limits.catalogue, modules_named(limits.modules))
 

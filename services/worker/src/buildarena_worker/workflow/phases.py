@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from buildarena_geometry import Machine
-from buildarena_worker.session.dialogue import OBJECTION, Dialogue, Role, is_aside, terminates
+from buildarena_worker.session.dialogue import OBJECTION, Dialogue, Role, is_lookup_only, terminates
 from buildarena_worker.session.messages import Reply
 from buildarena_worker.session.results import ConstructionFailedError
 from buildarena_worker.session.session import Session
@@ -128,8 +128,7 @@ def build_phase(
     Raises:
         ConstructionFailedError: An objection, or the turn limit.
     """
-    machine = Machine(catalogue=session.task.constraints.catalogue)
-    session.machine = machine
+    machine = session.new_machine()
     pack, task = session.pack, session.task
     opening = pack.say("build", task=task.name, name=part.name)
     brief = pack.say(
@@ -186,8 +185,7 @@ def refine_phase(session: Session, machine: Machine, part: SubStructure, bluepri
 
 def assemble_phase(session: Session, plan: Plan, machines: Mapping[str, Machine]) -> Machine:
     """Lets builder and guidance put the sub-structures together."""
-    assembly = Machine(catalogue=session.task.constraints.catalogue, available=machines)
-    session.machine = assembly
+    assembly = session.new_machine(machines)
     pack, task = session.pack, session.task
     parts = "\n\n".join(
         f"### {name}\n\n{machine.act('get_machine_summary', {}).text}"
@@ -213,8 +211,7 @@ def assemble_phase(session: Session, plan: Plan, machines: Mapping[str, Machine]
 def solo_phase(session: Session) -> Machine:
     """Lets one role design and build alone."""
     pack, task = session.pack, session.task
-    machine = Machine(catalogue=session.task.constraints.catalogue)
-    session.machine = machine
+    machine = session.new_machine()
     opening = pack.say(
         "build_solo",
         task=task.name,
@@ -261,7 +258,7 @@ def _speak(dialogue: Dialogue, role: Role) -> Reply:
     reply = dialogue.turn(role)
     may_look = any(tool.name in LOOKUPS for tool in role.tools)
     for _ in range(MAX_LOOKUPS if may_look else 0):
-        if not is_aside(reply):
+        if not is_lookup_only(reply):
             break
         reply = dialogue.turn(role)
     return reply

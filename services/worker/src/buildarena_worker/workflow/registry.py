@@ -11,11 +11,6 @@ from types import ModuleType
 from buildarena_pipeline.catalog.workflows import WorkflowSource, workflow_sources
 from buildarena_pipeline.errors import PermanentError, StartupError
 from buildarena_worker.workflow.base import Workflow
-from buildarena_worker.workflow.builder import Builder
-from buildarena_worker.workflow.five_role import FiveRole
-from buildarena_worker.workflow.guidance_builder import GuidanceBuilder
-
-BUILTIN: tuple[type[Workflow], ...] = (FiveRole, GuidanceBuilder, Builder)
 
 
 class Workflows:
@@ -29,10 +24,7 @@ class Workflows:
     """
 
     def __init__(self, custom: Mapping[str, str]) -> None:
-        self._makers: dict[str, Callable[[], Workflow]] = {kind.name: kind for kind in BUILTIN}
-        for source in workflow_sources(custom).values():
-            if source.place:
-                self._makers[source.name] = _load(source)
+        self._makers = {source.name: _load(source) for source in workflow_sources(custom).values()}
 
     def find(self, name: str) -> Workflow:
         """A workflow with this name.

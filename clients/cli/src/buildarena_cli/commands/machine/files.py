@@ -9,6 +9,7 @@ import typer
 
 from buildarena_cli.errors import DONE, FAILED, CommandError
 from buildarena_cli.machines import (
+    DialectOption,
     MachineFile,
     chosen_task,
     read_imported,
@@ -29,6 +30,7 @@ def check(
     task: Annotated[
         str | None, typer.Option("--task", help="Also compare with this task's constraints.")
     ] = None,
+    dialect: DialectOption = None,
     *,
     as_json: JsonOption = False,
 ) -> None:
@@ -36,7 +38,7 @@ def check(
     from buildarena_benchmark import broken_constraint
 
     with shown_errors():
-        machine = read_machine(file)
+        machine = read_machine(file, dialect)
         chosen = None if task is None else chosen_task(task)
         broken = None if chosen is None else broken_constraint(chosen, machine)
         problems = [f"block {block} is attached to nothing" for block in machine.detached]
@@ -84,6 +86,7 @@ def export(
         Path | None,
         typer.Option(help="For a .bsg: press these keys, a JSON list, in place of its own."),
     ] = None,
+    dialect: DialectOption = None,
 ) -> None:
     """Write a machine as a 3D model, a drawing, a machine document or the game's file.
 
@@ -99,7 +102,7 @@ def export(
         for option, value in given.items():
             if value is not None and out.suffix != ".bsg":
                 raise CommandError(f"{option} is for .bsg files, not for {out}")
-        machine = read_machine(file)
+        machine = read_machine(file, dialect)
         if out.suffix == ".glb":
             out.write_bytes(machine_glb(machine))
         elif out.suffix == ".svg":

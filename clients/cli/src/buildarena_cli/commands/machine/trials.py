@@ -10,6 +10,7 @@ import typer
 from buildarena_cli.commands.machine.robustness import show_robustness
 from buildarena_cli.errors import CommandError
 from buildarena_cli.machines import (
+    DialectOption,
     MachineFile,
     chosen_task,
     film,
@@ -17,7 +18,7 @@ from buildarena_cli.machines import (
     read_machine,
     shown_errors,
 )
-from buildarena_cli.near import did_you_mean
+from buildarena_cli.suggestions import did_you_mean
 from buildarena_cli.terminal.output import (
     columns,
     emphasised,
@@ -57,24 +58,30 @@ def simulate(  # noqa: PLR0917 - the command line passes options by name
     trajectory: Annotated[
         Path | None, typer.Option(help="Write the trajectory (.parquet), for `render`.")
     ] = None,
+    dialect: DialectOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the score as JSON.")] = False,
 ) -> None:
     """Simulate a machine in a task's trial and score it."""
     from buildarena_benchmark import broken_constraint, failed_score, score
-    from buildarena_simulation import ENGINES, write_trajectory
+    from buildarena_simulation import (
+        DEFAULT_ENGINE,
+        ENGINES,
+        UnknownEngineError,
+        require_engine,
+        write_trajectory,
+    )
 
     with shown_errors():
-        if engine is not None and engine not in ENGINES:
-            raise CommandError(
-                f"no engine {engine!r}; there are {', '.join(ENGINES)}"
-                f"{did_you_mean(engine, ENGINES)}"
-            )
+        engine = engine or DEFAULT_ENGINE
+        try:
+            require_engine(engine)
+        except UnknownEngineError as error:
+            raise CommandError(f"{error}{did_you_mean(engine, ENGINES)}") from error
         given = {"--seed": seed, "--video": video, "--trajectory": trajectory}
         single = [option for option, value in given.items() if value is not None]
         if seeds is not None and single:
             raise CommandError(f"--seeds makes many trials, {single[0]} is for one; give either")
-        chosen, machine = chosen_task(task), read_machine(file)
-        engine = engine or ENGINES[0]
+        chosen, machine = chosen_task(task), read_machine(file, dialect)
         broken = broken_constraint(chosen, machine)
         if broken is not None:
             warn(f"not simulated: {broken[0]}: {broken[1]}")

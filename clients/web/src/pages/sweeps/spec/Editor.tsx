@@ -1,4 +1,10 @@
-import { autocompletion, closeBrackets, completionKeymap, type CompletionContext, type CompletionResult } from "@codemirror/autocomplete";
+import {
+  autocompletion,
+  closeBrackets,
+  completionKeymap,
+  type CompletionContext,
+  type CompletionResult,
+} from "@codemirror/autocomplete";
 import { defaultKeymap, history, historyKeymap } from "@codemirror/commands";
 import { yaml } from "@codemirror/lang-yaml";
 import { bracketMatching, HighlightStyle, syntaxHighlighting } from "@codemirror/language";
@@ -19,11 +25,24 @@ interface Editing {
 }
 
 const LOOK = EditorView.theme({
-  "&": { border: "1px solid var(--mantine-color-default-border)", borderRadius: "8px", fontSize: "13.5px", background: "var(--mantine-color-body)" },
+  "&": {
+    border: "1px solid var(--mantine-color-default-border)",
+    borderRadius: "8px",
+    fontSize: "13.5px",
+    background: "var(--mantine-color-body)",
+  },
   "&.cm-focused": { outline: "2px solid var(--mantine-primary-color-filled)" },
-  ".cm-content": { fontFamily: "var(--mantine-font-family-monospace)", minHeight: "300px", caretColor: "var(--mantine-color-text)" },
+  ".cm-content": {
+    fontFamily: "var(--mantine-font-family-monospace)",
+    minHeight: "300px",
+    caretColor: "var(--mantine-color-text)",
+  },
   ".cm-gutters": { background: "transparent", color: "inherit", border: "none" },
-  ".cm-tooltip": { background: "var(--mantine-color-body)", color: "var(--mantine-color-text)", border: "1px solid var(--mantine-color-default-border)" },
+  ".cm-tooltip": {
+    background: "var(--mantine-color-body)",
+    color: "var(--mantine-color-text)",
+    border: "1px solid var(--mantine-color-default-border)",
+  },
 });
 
 const COLOURS = HighlightStyle.define([
@@ -51,10 +70,16 @@ export default function Editor({ text, onText, faults, known }: Editing) {
     if (place.current === null) return;
     const complete = (context: CompletionContext): CompletionResult | null => {
       const found = suggestionsAt(context.state.doc.toString(), context.pos, schema, latest.current.known);
-      if (found === null || found.suggestions.length === 0 || (!context.explicit && found.from === context.pos)) return null;
+      if (found === null || found.suggestions.length === 0 || (!context.explicit && found.from === context.pos))
+        return null;
       return {
         from: found.from,
-        options: found.suggestions.map(({ label, detail, isKey }) => ({ label, info: detail === "" ? undefined : detail, apply: isKey ? `${label}: ` : label, type: isKey ? "property" : "constant" })),
+        options: found.suggestions.map(({ label, detail, isKey }) => ({
+          label,
+          info: detail === "" ? undefined : detail,
+          apply: isKey ? `${label}: ` : label,
+          type: isKey ? "property" : "constant",
+        })),
         validFor: /^[\w./-]*$/,
       };
     };
@@ -63,7 +88,16 @@ export default function Editor({ text, onText, faults, known }: Editing) {
       state: EditorState.create({
         doc: latest.current.text,
         extensions: [
-          ...[lineNumbers(), lintGutter(), history(), bracketMatching(), closeBrackets(), yaml(), EditorView.lineWrapping, LOOK],
+          ...[
+            lineNumbers(),
+            lintGutter(),
+            history(),
+            bracketMatching(),
+            closeBrackets(),
+            yaml(),
+            EditorView.lineWrapping,
+            LOOK,
+          ],
           syntaxHighlighting(COLOURS),
           autocompletion({ override: [complete] }),
           keymap.of([...completionKeymap, ...defaultKeymap, ...historyKeymap]),
@@ -90,7 +124,12 @@ export default function Editor({ text, onText, faults, known }: Editing) {
   useEffect(() => {
     const editor = view.current;
     if (editor === null) return;
-    editor.dispatch(setDiagnostics(editor.state, faults.map((fault) => diagnostic(fault, editor.state.doc.length))));
+    editor.dispatch(
+      setDiagnostics(
+        editor.state,
+        faults.map((fault) => diagnostic(fault, editor.state.doc.length)),
+      ),
+    );
   }, [faults, text]);
 
   return <div ref={place} />;

@@ -32,7 +32,9 @@ export function Form({ text, value, onText, faults, known }: Filling) {
     if (found === undefined) return undefined;
     return found.choices.length > 0 ? `${found.message}: choose from ${found.choices.join(", ")}` : found.message;
   };
-  const choices = (field: string): string[] => [...new Set([...(known[field] ?? []), ...(faults.find((one) => one.message.startsWith(field))?.choices ?? [])])];
+  const choices = (field: string): string[] => [
+    ...new Set([...(known[field] ?? []), ...(faults.find((one) => one.message.startsWith(field))?.choices ?? [])]),
+  ];
   const plain = (field: string): string => (typeof value[field] === "string" ? value[field] : "");
   const number = (keys: readonly [string, string?], label: string, description: string) => {
     const [first, second] = keys;
@@ -53,15 +55,57 @@ export function Form({ text, value, onText, faults, known }: Filling) {
   };
   return (
     <SimpleGrid cols={{ base: 1, sm: 2 }}>
-      <TextInput label="Name" value={plain("name")} placeholder="sweep" error={fault("name")} onChange={(event) => { set(["name"], event.currentTarget.value || undefined); }} />
+      <TextInput
+        label="Name"
+        value={plain("name")}
+        placeholder="sweep"
+        error={fault("name")}
+        onChange={(event) => {
+          set(["name"], event.currentTarget.value || undefined);
+        }}
+      />
       {number(["samples"], "Samples", "Jobs of each model on each task: seeds 0, 1, …")}
-      <MultiSelect label="Tasks" data={[...new Set([...choices("tasks"), ...texts(value.tasks)])]} value={texts(value.tasks)} searchable error={fault("tasks")} onChange={(to) => { set(["tasks"], to); }} />
-      <TagsInput label="Models" data={choices("models")} value={texts(value.models)} error={fault("models")} onChange={(to) => { set(["models"], to); }} />
+      <MultiSelect
+        label="Tasks"
+        data={[...new Set([...choices("tasks"), ...texts(value.tasks)])]}
+        value={texts(value.tasks)}
+        searchable
+        error={fault("tasks")}
+        onChange={(to) => {
+          set(["tasks"], to);
+        }}
+      />
+      <TagsInput
+        label="Models"
+        data={choices("models")}
+        value={texts(value.models)}
+        error={fault("models")}
+        onChange={(to) => {
+          set(["models"], to);
+        }}
+      />
       {(["workflow", "simulator", "prompts"] as const).map((field) => (
-        <Autocomplete key={field} label={field.charAt(0).toUpperCase() + field.slice(1)} data={choices(field)} value={plain(field)} placeholder={known[`${field} default`]?.[0]} error={fault(field)} onChange={(to) => { set([field], to || undefined); }} />
+        <Autocomplete
+          key={field}
+          label={field.charAt(0).toUpperCase() + field.slice(1)}
+          data={choices(field)}
+          value={plain(field)}
+          placeholder={known[`${field} default`]?.[0]}
+          error={fault(field)}
+          onChange={(to) => {
+            set([field], to || undefined);
+          }}
+        />
       ))}
       {number(["budget", "max_cost_usd"], "Budget, dollars", "Nothing new starts when it is used up")}
-      <Switch label="Show models an example construction" checked={value.one_shot === true} mt="md" onChange={(event) => { set(["one_shot"], event.currentTarget.checked ? true : undefined); }} />
+      <Switch
+        label="Show models an example construction"
+        checked={value.one_shot === true}
+        mt="md"
+        onChange={(event) => {
+          set(["one_shot"], event.currentTarget.checked ? true : undefined);
+        }}
+      />
     </SimpleGrid>
   );
 }

@@ -61,7 +61,9 @@ export function suggestionsAt(text: string, place: number, schema: SchemaNode, k
   const line = before.at(-1) ?? "";
   const values = (field: string, word: string): Suggested => ({
     from: place - word.length,
-    suggestions: (known[field] ?? (resolved(schema.properties?.[field] ?? {}, schema).type === "boolean" ? ["true", "false"] : [])).map((label) => ({ label, detail: "", isKey: false })),
+    suggestions: (
+      known[field] ?? (resolved(schema.properties?.[field] ?? {}, schema).type === "boolean" ? ["true", "false"] : [])
+    ).map((label) => ({ label, detail: "", isKey: false })),
   });
   const inFlow = /([\w-]+):\s*\[(?:[^\]]*,)?\s*([\w./-]*)$/.exec(line);
   if (inFlow !== null) return values(inFlow[1] ?? "", inFlow[2] ?? "");
@@ -75,6 +77,10 @@ export function suggestionsAt(text: string, place: number, schema: SchemaNode, k
   const node = at(schema, depth === 0 ? [] : pathAbove(before.slice(0, -1), depth));
   return {
     from: place - (key[2] ?? "").length,
-    suggestions: Object.entries(node.properties ?? {}).map(([label, about]) => ({ label, detail: resolved(about, schema).description ?? about.description ?? "", isKey: true })),
+    suggestions: Object.entries(node.properties ?? {}).map(([label, about]) => ({
+      label,
+      detail: resolved(about, schema).description ?? about.description ?? "",
+      isKey: true,
+    })),
   };
 }

@@ -24,12 +24,23 @@ describe("a sweep as YAML", () => {
   });
 
   it("bounds how often aliases multiply", () => {
-    const bomb = `a: &a [x,x,x,x,x,x,x,x,x]\n${"bcdefghi".split("").map((name, i) => `${name}: &${name} [${Array(9).fill(`*${"abcdefgh"[i] ?? "a"}`).join(",")}]`).join("\n")}\n`;
+    const bomb = `a: &a [x,x,x,x,x,x,x,x,x]\n${"bcdefghi"
+      .split("")
+      .map(
+        (name, i) =>
+          `${name}: &${name} [${Array(9)
+            .fill(`*${"abcdefgh"[i] ?? "a"}`)
+            .join(",")}]`,
+      )
+      .join("\n")}\n`;
     expect(readSpec(bomb).value).toBeNull();
   });
 
   it("has the service's faults at their lines", () => {
-    const faults = faultsOf(problem("tasks[1]", "models[1]", "decoding.temperature", "samples", "decoding.nothing"), readSpec(TEXT));
+    const faults = faultsOf(
+      problem("tasks[1]", "models[1]", "decoding.temperature", "samples", "decoding.nothing"),
+      readSpec(TEXT),
+    );
     expect(faults.map((fault) => fault.line)).toEqual([2, 5, 7, 1, 6]);
     expect(TEXT.slice(faults[0]?.from, faults[0]?.to)).toBe("nope");
   });
@@ -38,7 +49,9 @@ describe("a sweep as YAML", () => {
     const changed = withField(TEXT, ["decoding", "temperature"], 0.5);
     expect(changed).toContain("# mine");
     expect(readSpec(changed).value).toMatchObject({ decoding: { temperature: 0.5 } });
-    expect(readSpec(withField(changed, ["budget", "max_cost_usd"], 3)).value).toMatchObject({ budget: { max_cost_usd: 3 } });
+    expect(readSpec(withField(changed, ["budget", "max_cost_usd"], 3)).value).toMatchObject({
+      budget: { max_cost_usd: 3 },
+    });
     expect(readSpec(withField(TEXT, ["decoding"], undefined)).value).not.toHaveProperty("decoding");
     expect(withField("tasks: [", ["name"], "b")).toBe("tasks: [");
   });
@@ -50,9 +63,12 @@ describe("a sweep as YAML", () => {
 });
 
 describe("completion", () => {
-  const schema = JSON.parse(readFileSync(new URL("../../../../../../docs/sweep.schema.json", import.meta.url), "utf8")) as SchemaNode;
+  const schema = JSON.parse(
+    readFileSync(new URL("../../../../../../docs/sweep.schema.json", import.meta.url), "utf8"),
+  ) as SchemaNode;
   const known = { tasks: ["lift-1", "lift-2"], models: ["builtin/idle"] };
-  const labels = (text: string): string[] => (suggestionsAt(text, text.length, schema, known)?.suggestions ?? []).map((one) => one.label);
+  const labels = (text: string): string[] =>
+    (suggestionsAt(text, text.length, schema, known)?.suggestions ?? []).map((one) => one.label);
 
   it("offers the schema's keys, and those of a part within it", () => {
     expect(labels("na")).toContain("name");

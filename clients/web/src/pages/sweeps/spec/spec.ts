@@ -37,18 +37,31 @@ export function readSpec(text: string): Read {
     return { value: null, faults: [faultAt(lines, 0, 0, message)], document, lines };
   }
   if (!isMap(document.contents)) {
-    return { value: null, faults: [faultAt(lines, 0, text.length, "a sweep is a mapping: name, tasks, models …")], document, lines };
+    return {
+      value: null,
+      faults: [faultAt(lines, 0, text.length, "a sweep is a mapping: name, tasks, models …")],
+      document,
+      lines,
+    };
   }
   return { value: value as Record<string, unknown>, faults: [], document, lines };
 }
 
-function faultAt(lines: LineCounter, from: number, to: number, message: string, choices: readonly string[] = []): Fault {
+function faultAt(
+  lines: LineCounter,
+  from: number,
+  to: number,
+  message: string,
+  choices: readonly string[] = [],
+): Fault {
   return { from, to: Math.max(from, to), line: Math.max(1, lines.linePos(from).line), message, choices };
 }
 
 /** "tasks[0].name" as the keys that lead there. */
 export function keysOf(field: string): (string | number)[] {
-  return [...field.matchAll(/\[(\d+)\]|([^.[\]]+)/g)].map((part) => (part[1] === undefined ? (part[2] ?? "") : Number(part[1])));
+  return [...field.matchAll(/\[(\d+)\]|([^.[\]]+)/g)].map((part) =>
+    part[1] === undefined ? (part[2] ?? "") : Number(part[1]),
+  );
 }
 
 /** The place of a field in the text; of the nearest there is around it when it is missing itself. */

@@ -15,7 +15,6 @@ from typing import Any
 from genai_prices.data_snapshot import get_snapshot
 
 from buildarena_geometry.json_texts import read_json
-from buildarena_worker.providers.answered import Answered, TokenCounts
 from buildarena_worker.providers.bounds import MAX_CALLS, MAX_NAME, arguments_of, bounded
 from buildarena_worker.providers.failures import (
     Failure,
@@ -23,6 +22,7 @@ from buildarena_worker.providers.failures import (
     failure_of_status,
     redirected,
 )
+from buildarena_worker.providers.response import ProviderResponse, TokenCounts
 from buildarena_worker.session.messages import Reply, ToolCall
 
 UNREADABLE = (ValueError, KeyError, IndexError, TypeError, AttributeError)
@@ -66,7 +66,7 @@ class AnswerReader:
         with suppress(LookupError):
             self._counters.insert(0, snapshot.find_provider(None, None, url))
 
-    def read(self, status: int, headers: Mapping[str, str], text: bytes) -> Answered:
+    def read(self, status: int, headers: Mapping[str, str], text: bytes) -> ProviderResponse:
         """What an answer means.
 
         Raises:
@@ -88,11 +88,11 @@ class AnswerReader:
                 tokens=self._used_in(answer),
             ) from error
 
-    def _answered(self, answer: Any) -> Answered:
+    def _answered(self, answer: Any) -> ProviderResponse:
         if "model" not in answer:
             raise KeyError("model")
         response_id = answer["id"]
-        return Answered(
+        return ProviderResponse(
             reply=bounded(_reply(answer["choices"][0])),
             tokens=self._used_in(answer),
             response_id=None if response_id is None else str(response_id)[:MAX_NAME],

@@ -14,11 +14,11 @@ from urllib.request import getproxies, proxy_bypass
 import aiohttp
 
 from buildarena_pipeline import __version__
-from buildarena_worker.providers.answered import Answered
 from buildarena_worker.providers.bounds import MAX_BODY
 from buildarena_worker.providers.failures import Failure, ProviderError
 from buildarena_worker.providers.openai.answer import AnswerReader
 from buildarena_worker.providers.openai.request import RequestWriter
+from buildarena_worker.providers.response import ProviderResponse
 from buildarena_worker.session.messages import Request
 
 OPENAI_URL = "https://api.openai.com/v1"
@@ -58,7 +58,7 @@ class OpenAIChat:
         }
         self._http: aiohttp.ClientSession | None = None
 
-    async def send(self, request: Request) -> Answered:
+    async def send(self, request: Request) -> ProviderResponse:
         """The model's answer to a conversation.
 
         Raises:

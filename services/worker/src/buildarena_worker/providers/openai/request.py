@@ -10,8 +10,8 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
-from buildarena_worker.providers.answered import arguments_text
 from buildarena_worker.providers.openai.schema import function_tool
+from buildarena_worker.providers.response import arguments_text
 from buildarena_worker.session.messages import Message, Request
 
 MAX_FRAMES = 256

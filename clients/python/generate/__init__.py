@@ -1,1 +1,0 @@
-"""Writes what of the Python client is not written by hand."""

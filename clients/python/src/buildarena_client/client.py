@@ -1,0 +1,206 @@
+"""The synchronous client: the endpoints of the API, over a transport that blocks."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import AsyncGenerator, Callable, Coroutine, Generator
+from types import TracebackType
+from typing import Any, Concatenate, ParamSpec, Self, TypeVar
+
+from buildarena_client.endpoints.api import Api
+from buildarena_client.endpoints.sending import TIMEOUT_S
+from buildarena_client.retries import RetryPolicy, chosen_policy
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+
+def run(coroutine: Coroutine[Any, Any, T]) -> T:
+    """What a coroutine returns that blocks and never suspends; needs no event loop.
+
+    Raises:
+        RuntimeError: It suspends: its transport is not a blocking one.
+    """
+    try:
+        coroutine.send(None)
+    except StopIteration as ended:
+        result: T = ended.value
+        return result
+    coroutine.close()
+    raise RuntimeError("the transport of a synchronous client must block")
+
+
+def _call(
+    method: Callable[Concatenate[Api, P], Coroutine[Any, Any, T]],
+) -> Callable[Concatenate[Client, P], T]:
+    """The synchronous form of a method."""
+
+    @functools.wraps(method)
+    def call(self: Client, /, *args: P.args, **kwargs: P.kwargs) -> T:
+        return self._run(method(self._api, *args, **kwargs))
+
+    return call
+
+
+def _iteration(
+    method: Callable[Concatenate[Api, P], AsyncGenerator[T, None]],
+) -> Callable[Concatenate[Client, P], Generator[T, None, None]]:
+    """The synchronous form of a method that gives one thing after another."""
+
+    @functools.wraps(method)
+    def iterate(self: Client, /, *args: P.args, **kwargs: P.kwargs) -> Generator[T, None, None]:
+        return self._iterate(method(self._api, *args, **kwargs))
+
+    return iterate
+
+
+class Client:
+    """The API of a service.
+
+    Any thread may use it. A request that changes something is sent once; it is sent again only
+    after the service refused it as one too many (429), or where sending it twice changes nothing
+    further. Answers are the API's documents, typed as in ``buildarena_client.schemas``; new fields
+    may come, so nothing checks them. What no method asks for, ``get``, ``post`` and ``put`` do.
+    All methods raise ``ClientError``.
+
+    Args:
+        url: Where it is, for example ``http://127.0.0.1:8321``; by default BUILDARENA_URL.
+        key: The API key; by default the one in BUILDARENA_KEY, or in the file that
+            BUILDARENA_KEY_FILE names, if any.
+        timeout_s: How long nothing may come before a request is given up.
+        retries: How long requests are sent again.
+        patience: The former name of ``retries``.
+
+    Raises:
+        BadArgumentError: That is not the URL of an API, or not a key.
+    """
+
+    def __init__(
+        self,
+        url: str | None = None,
+        key: str | None = None,
+        *,
+        timeout_s: float | None = TIMEOUT_S,
+        retries: RetryPolicy | None = None,
+        patience: RetryPolicy | None = None,
+    ) -> None:
+        # Help and completion of the command line load this module, and send nothing by it.
+        from buildarena_client.transports.blocking import BlockingTransport
+
+        self._api = Api(
+            url,
+            key,
+            timeout_s=timeout_s,
+            retries=chosen_policy(retries, patience),
+            transport=BlockingTransport,
+        )
+
+    @property
+    def url(self) -> str:
+        """Where the service is."""
+        return self._api.url
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.url!r})"
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def _run(self, coroutine: Coroutine[Any, Any, T]) -> T:
+        """Every method passes here, or through ``_iterate``."""
+        return run(coroutine)
+
+    def _iterate(self, answers: AsyncGenerator[T, None]) -> Generator[T, None, None]:
+        try:
+            while True:
+                try:
+                    answer = self._run(answers.__anext__())
+                except StopAsyncIteration:
+                    return
+                yield answer
+        finally:
+            self._run(answers.aclose())
+
+    close = _call(Api.close)
+    get = _call(Api.get)
+    get_bytes = _call(Api.get_bytes)
+    get_patiently = _call(Api.get_patiently)
+    post = _call(Api.post)
+    put = _call(Api.put)
+    upload = _call(Api.upload)
+    download = _call(Api.download)
+    pages = _iteration(Api.pages)
+
+    health = _call(Api.health)
+    caller = _call(Api.caller)
+    tasks = _call(Api.tasks)
+    task = _call(Api.task)
+    add_task = _call(Api.add_task)
+    models = _call(Api.models)
+    scorers = _call(Api.scorers)
+    simulators = _call(Api.simulators)
+    modules = _call(Api.modules)
+    module_model = _call(Api.module_model)
+    workers = _call(Api.workers)
+
+    leaderboard = _call(Api.leaderboard)
+    compare = _call(Api.compare)
+    figures = _call(Api.figures)
+    changes = _call(Api.changes)
+    verify_leaderboard = _call(Api.verify_leaderboard)
+    manifest = _call(Api.manifest)
+    agreement = _call(Api.agreement)
+    export_leaderboard = _call(Api.export_leaderboard)
+
+    jobs = _iteration(Api.jobs)
+    job = _call(Api.job)
+    submit_job = _call(Api.submit_job)
+    cancel_job = _call(Api.cancel_job)
+    retry_job = _call(Api.retry_job)
+    verify_job = _call(Api.verify_job)
+    verification = _call(Api.verification)
+    wait_for_job = _call(Api.wait_for_job)
+    wait_for_verification = _call(Api.wait_for_verification)
+    transcript = _call(Api.transcript)
+    machine = _call(Api.machine)
+    replay = _call(Api.replay)
+    machine_model = _call(Api.machine_model)
+    thumbnail = _call(Api.thumbnail)
+    scene = _call(Api.scene)
+    trajectory = _call(Api.trajectory)
+    artifacts = _call(Api.artifacts)
+    artifact = _call(Api.artifact)
+    download_artifact = _call(Api.download_artifact)
+    job_events = _iteration(Api.job_events)
+
+    sweeps = _iteration(Api.sweeps)
+    sweep = _call(Api.sweep)
+    submit_sweep = _call(Api.submit_sweep)
+    estimate_sweep = _call(Api.estimate_sweep)
+    pause_sweep = _call(Api.pause_sweep)
+    resume_sweep = _call(Api.resume_sweep)
+    cancel_sweep = _call(Api.cancel_sweep)
+    retry_sweep = _call(Api.retry_sweep)
+    sweep_results = _call(Api.sweep_results)
+    sweep_troubles = _call(Api.sweep_troubles)
+    compare_sweeps = _call(Api.compare_sweeps)
+    export_sweep = _call(Api.export_sweep)
+    import_sweep = _call(Api.import_sweep)
+    sweep_events = _iteration(Api.sweep_events)
+    watch_sweep = _iteration(Api.watch_sweep)
+    wait_for_sweep = _call(Api.wait_for_sweep)
+
+    open_session = _call(Api.open_session)
+    session = _call(Api.session)
+    call_tool = _call(Api.call_tool)
+    submit_session = _call(Api.submit_session)
+    check_machine = _call(Api.check_machine)
+    try_machine = _call(Api.try_machine)

@@ -1,0 +1,90 @@
+"""Where the service is and with which key it is asked, and what of both is refused."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Final
+from urllib.parse import urlsplit
+
+from buildarena_client.errors import BadArgumentError
+
+DEFAULT_URL: Final = "http://127.0.0.1:8321"
+URL_VARIABLE: Final = "BUILDARENA_URL"
+KEY_VARIABLE: Final = "BUILDARENA_KEY"
+"""The environment variable of the API key: on a command line, others could read it."""
+MAX_KEY_BYTES: Final = 64 * 1024
+"""More than any key has: a larger file was named by mistake."""
+
+
+def checked_url(url: str | None) -> str:
+    """The URL of an API without a slash at its end; None for BUILDARENA_URL, or the default.
+
+    Raises:
+        BadArgumentError: It is none. A password in it is not repeated.
+    """
+    url = url if url is not None else os.environ.get(URL_VARIABLE) or DEFAULT_URL
+    try:
+        parts = urlsplit(url)
+        fault = _fault(parts.scheme, parts.hostname, parts.port)
+    except ValueError as error:
+        raise BadArgumentError(f"{url!r} is not the URL of an API: {error}") from error
+    if "@" in parts.netloc:
+        raise BadArgumentError("the URL of an API has no user or password in it: give the key")
+    if fault is None and (parts.query or parts.fragment or not url.isprintable() or " " in url):
+        fault = "it must end with its path"
+    if fault is not None:
+        raise BadArgumentError(f"{url!r} is not the URL of an API: {fault}")
+    return url.rstrip("/")
+
+
+def checked_key(key: str | None) -> str | None:
+    """A key that can be sent; None for none.
+
+    Raises:
+        BadArgumentError: It can't be; it is not repeated.
+    """
+    if key and not (key.isascii() and key.isprintable()):
+        raise BadArgumentError(f"{KEY_VARIABLE} is not a key: keys are printable ASCII")
+    return key or None
+
+
+def stored_key(environment: Mapping[str, str] | None = None) -> str | None:
+    """The key of BUILDARENA_KEY, or of the file that BUILDARENA_KEY_FILE names; None for none.
+
+    Empty variables count as not set. Of a file, one line end is cut.
+
+    Args:
+        environment: All variables; those of the process by default.
+
+    Raises:
+        BadArgumentError: Both are set, or the file can't be read or holds no key.
+    """
+    environment = os.environ if environment is None else environment
+    variable = f"{KEY_VARIABLE}_FILE"
+    direct, file = environment.get(KEY_VARIABLE), environment.get(variable)
+    if direct and file:
+        raise BadArgumentError(f"{KEY_VARIABLE} and {variable} are both set: leave one of them out")
+    if not file:
+        return direct or None
+    try:
+        with Path(file).open("rb") as opened:
+            data = opened.read(MAX_KEY_BYTES + 1)
+        if len(data) > MAX_KEY_BYTES:
+            raise ValueError(f"it has more than {MAX_KEY_BYTES} bytes")  # noqa: TRY301 - one wording
+        secret = data.decode().removesuffix("\n").removesuffix("\r")
+    except UnicodeDecodeError:
+        raise BadArgumentError(f"{variable} names {file}, which is not UTF-8 text") from None
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise BadArgumentError(f"{variable} names {file}: {reason}") from error
+    if not secret.strip():
+        raise BadArgumentError(f"{variable} names {file}, which is empty")
+    return secret
+
+
+def _fault(scheme: str, host: str | None, port: int | None) -> str | None:
+    if scheme not in {"http", "https"} or not host:
+        return "it must begin with http:// or https:// and name a host"
+    return "0 is not a port" if port == 0 else None

@@ -1,0 +1,1 @@
+"""Every request of the API, written once: as coroutines over any transport."""

@@ -1,0 +1,103 @@
+"""Leaderboards and what stands beside them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal, Unpack, cast
+
+from buildarena_client.endpoints.sending import Sender
+
+if TYPE_CHECKING:
+    from buildarena_client.schemas import (
+        AgreementTable,
+        Board,
+        BoardFilters,
+        ChangePage,
+        Comparison,
+        Figures,
+        ManifestEntry,
+        VerifyAccepted,
+    )
+
+
+class Boards(Sender):
+    """Leaderboards and what stands beside them."""
+
+    async def leaderboard(self, **filters: Unpack[BoardFilters]) -> Board:
+        """One track's leaderboard, on each task and overall.
+
+        Args:
+            filters: Which jobs count; the first track with ended jobs by default.
+        """
+        return cast("Board", await self.get("/v1/leaderboard", **filters))
+
+    async def compare(self, first: str, second: str, **filters: Unpack[BoardFilters]) -> Comparison:
+        """Two models of a leaderboard side by side, with tests on the seeds that they share.
+
+        Args:
+            first: A model, or ``model@configuration``.
+            second: Another.
+            filters: Which jobs count.
+        """
+        answer = await self.get("/v1/leaderboard/compare", first=first, second=second, **filters)
+        return cast("Comparison", answer)
+
+    async def figures(self, **filters: Unpack[BoardFilters]) -> Figures:
+        """What a leaderboard's figures are drawn from."""
+        return cast("Figures", await self.get("/v1/leaderboard/figures", **filters))
+
+    async def changes(
+        self, *, before: int | None = None, limit: int = 100, **filters: Unpack[BoardFilters]
+    ) -> ChangePage:
+        """What entered a leaderboard, left it or was scored again, the newest first.
+
+        Args:
+            before: Only older ones than this, the ``next_before`` of the page before.
+            limit: Entries at most.
+            filters: Which leaderboard.
+        """
+        answer = await self.get("/v1/leaderboard/changes", before=before, limit=limit, **filters)
+        return cast("ChangePage", answer)
+
+    async def verify_leaderboard(
+        self,
+        model: str,
+        *,
+        track: str | None = None,
+        tasks: list[str] | None = None,
+        sample: int | None = None,
+        seed: int = 0,
+    ) -> VerifyAccepted:
+        """Asks for verifications of a model's results, of all or of a sample.
+
+        Args:
+            model: Whose.
+            track: On which track; the first by default.
+            tasks: On which tasks; all by default.
+            sample: How many; all by default.
+            seed: Of the sample.
+        """
+        body = {"model": model, "track": track, "tasks": tasks, "sample": sample, "seed": seed}
+        return cast("VerifyAccepted", await self.post("/v1/leaderboard/verify", body))
+
+    async def manifest(self, **filters: Unpack[BoardFilters]) -> list[ManifestEntry]:
+        """The versions behind an entry: what its jobs' manifests say.
+
+        Args:
+            filters: Which entry: name ``task`` and ``model``.
+        """
+        return cast("list[ManifestEntry]", await self.get("/v1/leaderboard/manifest", **filters))
+
+    async def agreement(self, **filters: Unpack[BoardFilters]) -> AgreementTable:
+        """How far the engines say the same as the game, of the machines that it tried."""
+        return cast("AgreementTable", await self.get("/v1/leaderboard/agreement", **filters))
+
+    async def export_leaderboard(
+        self, kind: Literal["csv", "parquet", "latex"], **filters: Unpack[BoardFilters]
+    ) -> bytes:
+        """A leaderboard as a file.
+
+        Args:
+            kind: Of file.
+            filters: Which jobs count.
+        """
+        return await self.get_bytes("/v1/leaderboard/export", format=kind, **filters)

@@ -1,0 +1,84 @@
+"""What the service has: tasks, models, modules, workers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, cast
+
+from buildarena_client.endpoints.sending import Sender
+from buildarena_client.paths import HEALTH, at
+
+if TYPE_CHECKING:
+    from buildarena_client.schemas import (
+        CallerView,
+        Health,
+        ModelView,
+        ModuleView,
+        ScorerView,
+        SimulatorView,
+        TaskDetail,
+        TaskView,
+        WorkerView,
+    )
+
+
+class Catalogue(Sender):
+    """What the service has: tasks, models, modules, workers."""
+
+    async def health(self) -> Health:
+        """How the service's parts are."""
+        return cast("Health", await self.get(HEALTH))
+
+    async def caller(self) -> CallerView:
+        """Whose key this is, and what it may do."""
+        return cast("CallerView", await self.get("/v1/caller"))
+
+    async def tasks(self) -> list[TaskView]:
+        """The tasks in their newest versions, the built-in ones first."""
+        return cast("list[TaskView]", await self.get("/v1/tasks"))
+
+    async def task(self, name: str, *, version: str | None = None) -> TaskDetail:
+        """A task with its whole document; the newest version by default."""
+        return cast("TaskDetail", await self.get(at("tasks", name), version=version))
+
+    async def add_task(self, source: Path | str) -> TaskDetail:
+        """Uploads a task.
+
+        Args:
+            source: A YAML file, or the YAML itself as text.
+        """
+        given = bytes(source, "utf-8") if isinstance(source, str) else source
+        return cast("TaskDetail", await self.upload("/v1/tasks", given, "application/yaml"))
+
+    async def models(self) -> list[ModelView]:
+        """The models that jobs can name."""
+        return cast("list[ModelView]", await self.get("/v1/models"))
+
+    async def modules(
+        self, *, of_set: str | None = None, task: str | None = None, version: str | None = None
+    ) -> list[ModuleView]:
+        """The kinds of parts that machines are made of: the basic ones by default.
+
+        Args:
+            of_set: Those of a set: "basic", "workshop" or "all".
+            task: Those that builders of a task may use.
+            version: The task's; the newest by default.
+        """
+        found = await self.get("/v1/modules", set=of_set, task=task, version=version)
+        return cast("list[ModuleView]", found)
+
+    async def simulators(self) -> list[SimulatorView]:
+        """What jobs can name as their simulator, and whether it is served at the moment."""
+        return cast("list[SimulatorView]", await self.get("/v1/simulators"))
+
+    async def scorers(self) -> list[ScorerView]:
+        """The scorers that task files can name, with their parameters and flags."""
+        return cast("list[ScorerView]", await self.get("/v1/scorers"))
+
+    async def workers(self) -> list[WorkerView]:
+        """The workers that were heard of lately."""
+        return cast("list[WorkerView]", await self.get("/v1/workers"))
+
+    async def module_model(self, name: str) -> bytes:
+        """The shape of a module, as GLB."""
+        return await self.get_bytes(at("modules", f"{name}.glb"))

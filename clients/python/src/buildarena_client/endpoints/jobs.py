@@ -1,0 +1,176 @@
+"""Jobs, and what they left."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import AsyncGenerator, Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, Unpack, cast
+
+from buildarena_client.endpoints.sending import Sender
+from buildarena_client.errors import BadArgumentError
+from buildarena_client.event_streams import Event
+from buildarena_client.files import require_hash
+from buildarena_client.paths import at
+from buildarena_client.waiting import POLL_S, require_time
+
+if TYPE_CHECKING:
+    from buildarena_client.schemas import (
+        JobDetail,
+        JobFileView,
+        JobFilters,
+        JobView,
+        ReplayView,
+        SceneView,
+        VerificationView,
+    )
+
+PAGE: Final = 1000
+"""Jobs that are asked for at once, as many as the service gives."""
+
+
+class Jobs(Sender):
+    """Jobs, and what they left."""
+
+    def jobs(
+        self, *, limit: int | None = None, page: int = PAGE, **filters: Unpack[JobFilters]
+    ) -> AsyncGenerator[JobView, None]:
+        """Jobs, the newest first by default, page after page as they are needed.
+
+        Args:
+            limit: How many at most; all by default.
+            page: How many are asked for at once, 1 to 1000.
+            filters: Which jobs, and in which order.
+        """
+        return self._listed("/v1/jobs", "jobs", limit, page, dict(filters))
+
+    async def job(self, job_id: str) -> JobDetail:
+        """A job with its manifest, attempts and artifacts."""
+        return cast("JobDetail", await self.get(at("jobs", job_id)))
+
+    async def submit_job(self, /, task: str, model: str, *, seed: int = 0, **more: Any) -> JobView:
+        """Submits one job; an equal one that is there already is the answer.
+
+        Args:
+            task: What is to be built.
+            model: Who builds.
+            seed: Which try it is.
+            more: Further fields of a job's specification, such as ``simulator``.
+        """
+        body = {"task": task, "model": model, "seed": seed, **more}
+        return cast("JobView", await self.post("/v1/jobs", body, repeatable=True))
+
+    async def cancel_job(self, job_id: str) -> JobView:
+        """Ends a job that has not ended."""
+        return cast("JobView", await self.post(at("jobs", job_id, "cancel")))
+
+    async def retry_job(self, job_id: str) -> JobView:
+        """Queues an errored job again where it failed."""
+        return cast("JobView", await self.post(at("jobs", job_id, "retry")))
+
+    async def verify_job(self, job_id: str) -> VerificationView:
+        """Asks for a job's verification: a replay and a simulation, compared figure by figure."""
+        return cast("VerificationView", await self.post(at("jobs", job_id, "verify")))
+
+    async def verification(self, verification_id: str) -> VerificationView:
+        """A verification and, once it is done, what it found."""
+        return cast("VerificationView", await self.get(at("verifications", verification_id)))
+
+    async def wait_for_job(self, job_id: str, *, timeout_s: float | None = None) -> JobDetail:
+        """A job when it has ended.
+
+        Raises:
+            TimedOutError: It has not within the time.
+        """
+        answer = await self._when(at("jobs", job_id), lambda job: job["state"] == "done", timeout_s)
+        return cast("JobDetail", answer)
+
+    async def wait_for_verification(
+        self, verification_id: str, *, timeout_s: float | None = None
+    ) -> VerificationView:
+        """A verification when it is done.
+
+        Raises:
+            TimedOutError: It is not within the time.
+        """
+        path = at("verifications", verification_id)
+        answer = await self._when(path, lambda found: found["state"] == "done", timeout_s)
+        return cast("VerificationView", answer)
+
+    async def transcript(self, job_id: str) -> Any:
+        """All turns of a job's session, of one under way those so far."""
+        return await self.get(at("jobs", job_id, "transcript"))
+
+    async def machine(self, job_id: str) -> Any:
+        """The machine document of a job."""
+        return await self.get(at("jobs", job_id, "machine"))
+
+    async def replay(self, job_id: str) -> ReplayView:
+        """How a job's machine came about, step by step."""
+        return cast("ReplayView", await self.get(at("jobs", job_id, "replay")))
+
+    async def machine_model(self, job_id: str) -> bytes:
+        """The shape of a job's machine, as GLB."""
+        return await self.get_bytes(at("jobs", job_id, "machine.glb"))
+
+    async def thumbnail(self, job_id: str) -> bytes:
+        """A picture of a job's machine, as PNG."""
+        return await self.get_bytes(at("jobs", job_id, "thumbnail.png"))
+
+    async def scene(self, job_id: str, *, number: int = 0) -> SceneView:
+        """All that is needed to draw a trial of a job, besides its trajectory."""
+        return cast("SceneView", await self.get(at("jobs", job_id, "scene"), number=number))
+
+    async def trajectory(self, job_id: str, *, number: int = 0) -> bytes:
+        """The trajectory of a trial of a job, as Parquet."""
+        return await self.get_bytes(at("jobs", job_id, "trajectory"), number=number)
+
+    async def artifacts(self, job_id: str) -> list[JobFileView]:
+        """A job's artifacts with their sizes and hashes."""
+        return cast("list[JobFileView]", await self.get(at("jobs", job_id, "artifacts")))
+
+    async def artifact(self, job_id: str, name: str) -> bytes:
+        """The bytes of a job's artifact, as they were kept.
+
+        Raises:
+            DamagedError: They arrived otherwise.
+        """
+        file = await self._file(job_id, name)
+        data = await self.get_bytes(at("jobs", job_id, "artifacts", name))
+        return require_hash(data, file["hash"], f"{name} of {job_id}")
+
+    async def download_artifact(self, job_id: str, name: str, target: Path) -> None:
+        """Writes a job's artifact into a file, which is there whole, as it was kept, or not at all.
+
+        Raises:
+            DamagedError: It arrived otherwise.
+        """
+        file = await self._file(job_id, name)
+        path = at("jobs", job_id, "artifacts", name)
+        await self.download(path, target, sha256=file["hash"])
+
+    def job_events(self, job_id: str, *, after: int = 0) -> AsyncGenerator[Event, None]:
+        """What happens to a job, from the beginning; waits for more, over any number of cuts.
+
+        Args:
+            job_id: The job.
+            after: The id of the last event that is known.
+        """
+        return self._events(at("jobs", job_id, "events"), after)
+
+    async def _file(self, job_id: str, name: str) -> JobFileView:
+        found = await self.artifacts(job_id)
+        known = {file["name"]: file for file in found}
+        if name not in known:
+            has = ", ".join(known) or "none yet"
+            raise BadArgumentError(f"{job_id} has no file {name!r}; it has {has}")
+        return known[name]
+
+    async def _when(self, path: str, ended: Callable[[Any], bool], timeout_s: float | None) -> Any:
+        started = time.monotonic()
+        while True:
+            found = await self.get_patiently(path)
+            if ended(found):
+                return found
+            require_time(found["id"], started, timeout_s)
+            await self._transport.pause(POLL_S)

@@ -1,0 +1,106 @@
+"""Sessions of external agents, and machines from files."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, cast
+
+from buildarena_client.endpoints.sending import Sender
+from buildarena_client.paths import at
+
+if TYPE_CHECKING:
+    from buildarena_client.schemas import (
+        JobView,
+        MachineCheckView,
+        SessionOpened,
+        SessionView,
+        ToolOutcome,
+    )
+
+MACHINE_FILE: Final = "application/octet-stream"
+
+
+class Sessions(Sender):
+    """Sessions of external agents, and machines from files."""
+
+    async def open_session(
+        self, /, task: str, agent: str, *, seed: int = 0, **more: Any
+    ) -> SessionOpened:
+        """Opens a session in which an agent of yours builds for one task.
+
+        The same arguments give the same session for as long as it is open.
+
+        Args:
+            task: What is to be built.
+            agent: Its name on the leaderboard.
+            seed: Which try it is.
+            more: ``simulator``, and ``kind`` for a person.
+        """
+        body = {"task": task, "agent": agent, "seed": seed, **more}
+        return cast("SessionOpened", await self.post("/v1/sessions", body, repeatable=True))
+
+    async def session(self, session_id: str) -> SessionView:
+        """A session: its machines, its tools, and how much is left."""
+        return cast("SessionView", await self.get(at("sessions", session_id)))
+
+    async def call_tool(
+        self,
+        session_id: str,
+        tool: str,
+        arguments: Mapping[str, Any] | None = None,
+        *,
+        machine: str = "main",
+    ) -> ToolOutcome:
+        """Carries out one action; a refused one changes nothing. Never sent twice.
+
+        Args:
+            session_id: The session.
+            tool: Which tool.
+            arguments: What its parameters ask for.
+            machine: The sub-structure it is meant for.
+        """
+        body = {"tool": tool, "arguments": dict(arguments or {}), "machine": machine}
+        return cast("ToolOutcome", await self.post(at("sessions", session_id, "calls"), body))
+
+    async def submit_session(self, session_id: str) -> JobView:
+        """Ends a session; the machine is simulated and scored."""
+        return cast("JobView", await self.post(at("sessions", session_id, "submit")))
+
+    async def check_machine(
+        self, source: Path | bytes, *, task: str | None = None
+    ) -> MachineCheckView:
+        """What a machine's file is and what is wrong with it.
+
+        Args:
+            source: A machine document or a machine file of the game, or its bytes.
+            task: Whose rules it must keep, if any.
+        """
+        answer = await self.upload(
+            "/v1/machines/check", source, MACHINE_FILE, repeatable=True, task=task
+        )
+        return cast("MachineCheckView", answer)
+
+    async def try_machine(
+        self, source: Path | bytes, *, task: str, simulator: str | None = None, seed: int = 0
+    ) -> JobView:
+        """Puts a machine from a file through a task's trial, on no leaderboard.
+
+        An equal one that was tried is the answer.
+
+        Args:
+            source: A machine document or a machine file of the game, or its bytes.
+            task: Whose trial.
+            simulator: What simulates it; the service's default by default.
+            seed: Of the trial.
+        """
+        answer = await self.upload(
+            "/v1/machines/trials",
+            source,
+            MACHINE_FILE,
+            repeatable=True,
+            task=task,
+            simulator=simulator,
+            seed=seed,
+        )
+        return cast("JobView", answer)

@@ -1,0 +1,181 @@
+"""Sweeps, from their submission to their end."""
+
+from __future__ import annotations
+
+import time
+import uuid
+from collections.abc import AsyncGenerator, Callable, Mapping
+from contextlib import aclosing
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, cast
+
+from buildarena_client.endpoints.sending import Sender
+from buildarena_client.event_streams import Event
+from buildarena_client.paths import at
+from buildarena_client.specs import spec_of
+from buildarena_client.waiting import POLL_S, require_time, sweep_has_stopped
+
+if TYPE_CHECKING:
+    from buildarena_client.schemas import (
+        Budget,
+        ImportedView,
+        Result,
+        SweepAccepted,
+        SweepComparison,
+        SweepEstimate,
+        SweepView,
+        TroubleView,
+    )
+
+PAGE: Final = 100
+"""Sweeps that are asked for at once, as many as the service gives."""
+
+
+class Sweeps(Sender):
+    """Sweeps, from their submission to their end."""
+
+    def sweeps(
+        self, *, limit: int | None = None, page: int = PAGE
+    ) -> AsyncGenerator[SweepView, None]:
+        """Sweeps, the newest first, page after page as they are needed.
+
+        Args:
+            limit: How many at most; all by default.
+            page: How many are asked for at once, 1 to 100.
+        """
+        return self._listed("/v1/sweeps", "sweeps", limit, page, {})
+
+    async def sweep(self, sweep_id: str) -> SweepView:
+        """A sweep and its progress."""
+        return cast("SweepView", await self.get(at("sweeps", sweep_id)))
+
+    async def submit_sweep(
+        self,
+        spec: Mapping[str, Any] | Path,
+        *,
+        resume: bool = False,
+        request_key: str | None = None,
+    ) -> SweepAccepted:
+        """Submits every task with every model and every seed; all of it is stored, or nothing.
+
+        Args:
+            spec: Fields of a sweep, or the YAML file that has them.
+            resume: Whether an earlier sweep of just these jobs goes on instead.
+            request_key: The same key with the same sweep gives the first submission's answer; a
+                key of its own by default, so that a submission whose answer was lost is sent again
+                and still stored once.
+        """
+        headers = {"Idempotency-Key": request_key or uuid.uuid4().hex}
+        answer = await self.post(
+            "/v1/sweeps",
+            spec_of(spec),
+            repeatable=True,
+            headers=headers,
+            resume=resume or None,
+        )
+        return cast("SweepAccepted", answer)
+
+    async def estimate_sweep(self, spec: Mapping[str, Any] | Path) -> SweepEstimate:
+        """A sweep's jobs and what they may cost; stores nothing.
+
+        Args:
+            spec: Fields of a sweep, or the YAML file that has them.
+        """
+        answer = await self.post("/v1/sweeps/estimate", spec_of(spec), repeatable=True)
+        return cast("SweepEstimate", answer)
+
+    async def pause_sweep(self, sweep_id: str) -> SweepView:
+        """Puts a sweep's waiting jobs on hold; running jobs continue."""
+        return cast("SweepView", await self.post(at("sweeps", sweep_id, "pause")))
+
+    async def resume_sweep(self, sweep_id: str, *, budget: Budget | None = None) -> SweepView:
+        """Resumes a paused sweep, or one whose budget is used up, with a larger one if given."""
+        body = {} if budget is None else {"budget": budget}
+        return cast("SweepView", await self.post(at("sweeps", sweep_id, "resume"), body))
+
+    async def cancel_sweep(self, sweep_id: str) -> SweepView:
+        """Ends a sweep's jobs that have not ended and that nobody else wants."""
+        return cast("SweepView", await self.post(at("sweeps", sweep_id, "cancel")))
+
+    async def retry_sweep(self, sweep_id: str) -> SweepView:
+        """Queues a sweep's errored jobs again where they failed."""
+        return cast("SweepView", await self.post(at("sweeps", sweep_id, "retry")))
+
+    async def sweep_results(self, sweep_id: str) -> list[Result]:
+        """The scored jobs of a sweep."""
+        return cast("list[Result]", await self.get(at("sweeps", sweep_id, "results")))
+
+    async def sweep_troubles(self, sweep_id: str) -> list[TroubleView]:
+        """Attempts at a sweep's jobs that faults ended, the newest kinds first."""
+        return cast("list[TroubleView]", await self.get(at("sweeps", sweep_id, "troubles")))
+
+    async def compare_sweeps(self, sweep_id: str, other_id: str) -> SweepComparison:
+        """Two sweeps side by side, in pairs where they share seeds."""
+        path = at("sweeps", sweep_id, "compare", other_id)
+        return cast("SweepComparison", await self.get(path))
+
+    async def export_sweep(self, sweep_id: str, target: Path) -> None:
+        """Writes a sweep with its jobs, journals and artifacts into one ZIP file, or nothing."""
+        await self.download(at("sweeps", sweep_id, "archive"), target)
+
+    async def import_sweep(self, source: Path) -> ImportedView:
+        """Imports an exported sweep, whose scores count when they were found again. For admins."""
+        return cast("ImportedView", await self.upload("/v1/archives", source, "application/zip"))
+
+    def sweep_events(self, sweep_id: str, *, after: int = 0) -> AsyncGenerator[Event, None]:
+        """What happens to a sweep and its jobs, from the beginning; waits for more.
+
+        A stream that is cut goes on where it was.
+
+        Args:
+            sweep_id: The sweep.
+            after: The id of the last event that is known, such as a sweep's ``last_event``.
+        """
+        return self._events(at("sweeps", sweep_id, "events"), after)
+
+    async def watch_sweep(
+        self, sweep_id: str, *, poll_s: float = POLL_S
+    ) -> AsyncGenerator[SweepView, None]:
+        """A sweep again and again, until nothing more will happen to it.
+
+        The last one is how it ended: every job has, or all others are on hold. A service that is
+        being restarted is waited for.
+
+        Args:
+            sweep_id: The sweep.
+            poll_s: Seconds between two looks.
+        """
+        while True:
+            sweep = cast("SweepView", await self.get_patiently(at("sweeps", sweep_id)))
+            yield sweep
+            if sweep_has_stopped(sweep):
+                return
+            await self._transport.pause(poll_s)
+
+    async def wait_for_sweep(
+        self,
+        sweep_id: str,
+        *,
+        progress: Callable[[SweepView], object] | None = None,
+        poll_s: float = POLL_S,
+        timeout_s: float | None = None,
+    ) -> SweepView:
+        """A sweep when nothing more will happen to it.
+
+        Args:
+            sweep_id: The sweep.
+            progress: Called with the sweep after each look at it.
+            poll_s: Seconds between two looks.
+            timeout_s: How long to wait; forever by default.
+
+        Raises:
+            TimedOutError: It has not stopped within the time.
+        """
+        started = time.monotonic()
+        async with aclosing(self.watch_sweep(sweep_id, poll_s=poll_s)) as looks:
+            async for sweep in looks:
+                if progress is not None:
+                    progress(sweep)
+                if not sweep_has_stopped(sweep):
+                    require_time(sweep_id, started, timeout_s)
+        return sweep

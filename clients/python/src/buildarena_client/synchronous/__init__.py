@@ -1,1 +1,0 @@
-"""The client on the standard library, which waits for each answer."""

@@ -1,0 +1,44 @@
+export type Figure = "success" | "indicator" | "cost";
+
+/** What the address of the board says; everything else follows from it. */
+export interface BoardSearch {
+  track?: string;
+  task?: string[];
+  policy?: "ours" | "published";
+  since?: string;
+  until?: string;
+  figure?: Figure;
+  baselines?: "no";
+  paper?: "yes";
+}
+
+const DAY = /^\d{4}-\d{2}-\d{2}$/;
+
+function text(value: unknown): string | undefined {
+  return typeof value === "string" && value !== "" ? value : undefined;
+}
+
+function list(value: unknown): string[] | undefined {
+  const entries = (Array.isArray(value) ? value : [value]).map(text).filter((one) => one !== undefined);
+  return entries.length > 0 ? entries : undefined;
+}
+
+function oneOf<Choice extends string>(value: unknown, ...choices: Choice[]): Choice | undefined {
+  return choices.find((choice) => choice === value);
+}
+
+/** Reads an address as far as it makes sense; strangers' addresses are input too. */
+export function readSearch(raw: Record<string, unknown>): BoardSearch {
+  const since = text(raw.since);
+  const until = text(raw.until);
+  return {
+    track: text(raw.track),
+    task: list(raw.task),
+    policy: oneOf(raw.policy ?? raw.reading, "ours", "published"),
+    since: since !== undefined && DAY.test(since) ? since : undefined,
+    until: until !== undefined && DAY.test(until) ? until : undefined,
+    figure: oneOf(raw.figure, "success", "indicator", "cost"),
+    baselines: oneOf(raw.baselines, "no"),
+    paper: oneOf(raw.paper, "yes"),
+  };
+}

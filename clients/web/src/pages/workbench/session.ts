@@ -1,0 +1,160 @@
+import { queryOptions, useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
+import { useMemo, useState } from "react";
+import { client, jsonOf, taken, type Schema } from "../../api/client";
+
+export type SessionView = Schema<"SessionView">;
+export type Bench = Schema<"BenchMachineView">;
+export type BenchPart = Schema<"BenchPartView">;
+export type Face = Schema<"FaceView">;
+export type Tool = Schema<"ToolView">;
+export type Outcome = Schema<"ToolOutcome">;
+export type ModuleView = Schema<"ModuleView">;
+
+export const MAIN = "main";
+export const ASSEMBLY = "assembly";
+
+export const session = (id: string) =>
+  queryOptions({
+    queryKey: ["session", id],
+    queryFn: () => jsonOf<SessionView>(`/v1/sessions/${encodeURIComponent(id)}`),
+  });
+
+/** The modules that a task offers. */
+export const modules = (task: string, version: string) =>
+  queryOptions({
+    queryKey: ["modules", task, version],
+    staleTime: Infinity,
+    queryFn: () => jsonOf<ModuleView[]>(`/v1/modules?${new URLSearchParams({ task, version }).toString()}`),
+  });
+
+const EMPTY: Bench = {
+  name: MAIN,
+  parts: [],
+  control_sequence: [],
+  sub_structures: [],
+  available: [],
+  mass: 0,
+  detached: [],
+};
+
+/** A machine of the workbench; one that nobody began is empty. */
+export function benchOf(view: SessionView, name: string): Bench {
+  return (
+    view.machines.find((machine) => machine.name === name) ?? {
+      ...EMPTY,
+      name,
+      available: name === ASSEMBLY ? view.machines.map((one) => one.name) : [],
+    }
+  );
+}
+
+export interface Call {
+  tool: string;
+  arguments: Record<string, unknown>;
+}
+
+export interface Told extends Call {
+  outcome: Outcome;
+}
+
+/** The first part that was not there before: what an action has made. */
+export function newPart(before: readonly BenchPart[], after: readonly BenchPart[]): string | undefined {
+  const known = new Set(before.map((part) => part.id));
+  return after.find((part) => !known.has(part.id))?.id;
+}
+
+export interface Place {
+  part: string;
+  face: string;
+}
+
+export interface Hand {
+  bench: Bench;
+  machine: string;
+  setMachine: (name: string) => void;
+  part: BenchPart | undefined;
+  face: Face | undefined;
+  from: Place | undefined;
+  fromFace: Face | undefined;
+  setFrom: (place: Place | undefined) => void;
+  choose: (part: string | undefined, face?: string) => void;
+  act: (...calls: Call[]) => void;
+  busy: boolean;
+  told: Told | undefined;
+  error: Error | null;
+}
+
+/** What a person has in hand: the machine, the chosen part and face, and what came of the last action. */
+export function useHand(view: SessionView): Hand {
+  const id = view.job.id;
+  const queries = useQueryClient();
+  const [machine, setMachine] = useState(() =>
+    view.machines.some((one) => one.name === ASSEMBLY) ? ASSEMBLY : (view.machines.at(-1)?.name ?? MAIN),
+  );
+  const [chosen, setChosen] = useState<{ part?: string; face?: string }>({});
+  const [from, setFrom] = useState<Place>();
+  const bench = useMemo(() => benchOf(view, machine), [view, machine]);
+  const doing = useMutation({
+    mutationFn: async (calls: Call[]): Promise<Told | undefined> => {
+      let told: Told | undefined;
+      for (const call of calls) {
+        const body = { tool: call.tool, arguments: call.arguments, machine };
+        const outcome = await taken(
+          client.POST("/v1/sessions/{session_id}/calls", { params: { path: { session_id: id } }, body }),
+        );
+        told = { ...call, outcome };
+        if (!outcome.ok) break;
+      }
+      return told;
+    },
+    // Whatever came of it, also where no answer came: the service knows what stands there.
+    onSettled: async () => {
+      const after = await queries.query({ ...session(id), staleTime: 0 });
+      await queries.invalidateQueries({ queryKey: ["job", id, "transcript"] });
+      const made = newPart(bench.parts, benchOf(after, machine).parts);
+      if (made !== undefined) setChosen({ part: made });
+    },
+  });
+  const part = bench.parts.find((one) => one.id === chosen.part);
+  return {
+    bench,
+    machine,
+    setMachine: (name) => {
+      setMachine(name);
+      setChosen({});
+      setFrom(undefined);
+    },
+    part,
+    face: part?.faces.find((one) => one.label === chosen.face),
+    from,
+    fromFace: bench.parts.find((one) => one.id === from?.part)?.faces.find((one) => one.label === from?.face),
+    setFrom,
+    choose: (next, face) => {
+      setChosen({ part: next, face });
+    },
+    act: (...calls) => {
+      if (!doing.isPending) doing.mutate(calls);
+    },
+    busy: doing.isPending,
+    told: doing.data,
+    error: doing.error,
+  };
+}
+
+const LAST = "buildarena-session";
+
+/** The session that was built in last: on this device only, and no secret. */
+export function lastSession(): string | null {
+  return localStorage.getItem(LAST);
+}
+
+export function rememberSession(id: string): void {
+  localStorage.setItem(LAST, id);
+}
+
+/** The session that can be gone on with, if it is still open. */
+export function useLastSession(): SessionView | undefined {
+  const id = lastSession();
+  const query = useQuery({ ...session(id ?? ""), enabled: id !== null && /^job_[0-9a-f]+$/.test(id), retry: false });
+  return query.data?.open === true ? query.data : undefined;
+}

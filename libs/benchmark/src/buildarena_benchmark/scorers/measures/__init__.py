@@ -1,0 +1,1 @@
+"""What several scorers measure on a trial: who bears what, what is joined, what wheels drive."""

@@ -1,0 +1,1 @@
+"""Simulators: what one is, which are installed here, and which jobs can name."""

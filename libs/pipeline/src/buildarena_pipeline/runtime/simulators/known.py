@@ -1,0 +1,128 @@
+"""The simulators that jobs can name: our engines, the game, and what workers announce.
+
+A service knows its simulators without having them: the engines' names come with the physics, the
+game's version from the settings, and any other simulator from the workers that bring it.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Final
+
+from buildarena_benchmark import ValidationIssue
+from buildarena_pipeline.runtime.context import Context
+from buildarena_pipeline.runtime.settings import Settings
+from buildarena_pipeline.runtime.simulators.simulator import BESIEGE, SimulatorKind
+from buildarena_simulation import (
+    DEFAULT_ENGINE,
+    ENGINES,
+    SIMULATION_VERSION,
+    UnknownEngineError,
+    require_engine,
+)
+from buildarena_store import WorkerInfo
+from buildarena_store.states import simulate_queue
+
+NO_GAME: Final = (
+    "this service has no game to play: its operator names one by BUILDARENA_BESIEGE_GAME and "
+    "BUILDARENA_BESIEGE_MOD, the versions of Besiege and of its Lua Scripting Mod"
+)
+"""Why a job for the game is refused."""
+PREFIX: Final = simulate_queue("")
+VERSION: Final = re.compile(r"[A-Za-z0-9._-]{1,80}")
+"""What a simulator may be called, and its version: tracks and queues have both in their names."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SimulatorInfo:
+    """What a service must know of a simulator to take jobs for it.
+
+    Attributes:
+        name: The name that jobs give it.
+        version: The version in a track's name: only trials of one version are compared.
+        kind: Whether it is an engine, which calculates, or a game, which is played.
+        repeatable: Whether the same input gives the same bytes.
+    """
+
+    name: str
+    version: str
+    kind: SimulatorKind = "engine"
+    repeatable: bool = True
+
+
+def configured_simulators(settings: Settings) -> dict[str, SimulatorInfo]:
+    """The simulators that a service takes jobs for whether or not a worker is there, by name."""
+    known = {name: SimulatorInfo(name=name, version=SIMULATION_VERSION) for name in ENGINES}
+    game = settings.besiege_version
+    if game is not None:
+        known[BESIEGE] = SimulatorInfo(name=BESIEGE, version=game, kind="game", repeatable=False)
+    for name, version in settings.further_simulators.items():
+        known.setdefault(name, SimulatorInfo(name=name, version=version, repeatable=False))
+    return known
+
+
+def known_simulators(context: Context) -> dict[str, SimulatorInfo]:
+    """Those, and the simulators of all workers that reported within the last hour, by name."""
+    known = configured_simulators(context.settings)
+    for worker in context.store.workers.all():
+        for name, simulator in announced_simulators(worker).items():
+            known.setdefault(name, simulator)
+    return known
+
+
+def find_simulator(context: Context, name: str) -> SimulatorInfo | None:
+    """A simulator by its name; None where nobody knows it."""
+    configured = configured_simulators(context.settings).get(name)
+    return configured or known_simulators(context).get(name)
+
+
+def simulation_version(context: Context, name: str) -> str:
+    """The version in a track's name.
+
+    Raises:
+        ValueError: There is no such simulator.
+    """
+    simulator = find_simulator(context, name)
+    if simulator is None:
+        raise ValueError(_refusal(name))
+    return simulator.version
+
+
+def simulator_issues(
+    context: Context, *names: str, path: str = "simulator"
+) -> list[ValidationIssue]:
+    """What is wrong with simulators that somebody names: an issue for each that is unknown."""
+    unknown = [name for name in names if find_simulator(context, name) is None]
+    choices = tuple(known_simulators(context)) if unknown else ()
+    return [ValidationIssue(path=path, message=_refusal(n), choices=choices) for n in unknown]
+
+
+def announced_simulators(worker: WorkerInfo) -> dict[str, SimulatorInfo]:
+    """The simulators whose jobs a worker does, as it says, by name."""
+    said = worker.versions
+    version = said.get("simulation")
+    if not isinstance(version, str) or not VERSION.fullmatch(version):
+        return {}
+    names = [queue.removeprefix(PREFIX) for queue in worker.queues if queue.startswith(PREFIX)]
+    return {
+        name: SimulatorInfo(
+            name=name,
+            version=version,
+            kind="game" if said.get("kind") == "game" else "engine",
+            repeatable=said.get("repeatable") is True,
+        )
+        for name in names
+        if VERSION.fullmatch(name)
+    }
+
+
+def _refusal(name: str) -> str:
+    if name == BESIEGE:
+        return NO_GAME
+    if name == DEFAULT_ENGINE:
+        try:
+            require_engine(name)
+        except UnknownEngineError as error:
+            return str(error)
+    return f"there is no simulator {name!r}"

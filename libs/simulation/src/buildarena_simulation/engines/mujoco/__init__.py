@@ -1,0 +1,3 @@
+"""The MuJoCo engine."""
+
+LIBRARY = "mujoco"

@@ -1,0 +1,90 @@
+"""Where a compiled MuJoCo model keeps what belongs to clusters, blocks, joints and ropes."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from buildarena_simulation.engines.base import World
+from buildarena_simulation.engines.mujoco.joints import JointAddresses, joint_addresses
+from buildarena_simulation.structure.clusters import Clusters
+from buildarena_simulation.structure.contacts import CARGO, WORLD
+from buildarena_simulation.structure.model import BoolArray, IntArray
+from buildarena_simulation.structure.solids import Solid
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Addresses:
+    """Where a compiled model keeps what belongs to clusters, blocks, wheels and ropes.
+
+    Attributes:
+        bodies: (C,) body of each cluster.
+        body_of_geom: Cluster of each geom, `CARGO` or `WORLD`.
+        block_of_geom: Block of each geom that stands for one only, else -1.
+        surface_of_geom: Fixed body of each geom as in `ContactForces.surface`.
+        joints: The driven joints.
+        thrust_actuators: (K,) actuator of each cannon.
+        free_dofs: (F, 3) linear velocities of the free bodies, the cargo first.
+        spin_dofs: (P, 3) angular velocities of the pieces.
+        tendons: Tendon of each rope that holds.
+    """
+
+    bodies: IntArray
+    body_of_geom: IntArray
+    block_of_geom: IntArray
+    surface_of_geom: IntArray
+    joints: JointAddresses
+    thrust_actuators: IntArray
+    free_dofs: IntArray
+    spin_dofs: IntArray
+    tendons: Mapping[int, int]
+
+
+def addresses_in(
+    model: "mujoco.MjModel",
+    world: World,
+    clusters: Clusters,
+    solids: Sequence[Sequence[Solid]],
+    rope_alive: BoolArray,
+) -> Addresses:
+    """Where a model that was compiled from MJCF of ours keeps what.
+
+    Args:
+        model: The model.
+        world: The world it was made of.
+        clusters: Its clusters.
+        solids: Per cluster, its collision shapes.
+        rope_alive: (R,) which ropes and springs hold.
+    """
+    structure = world.structure
+    body_of_geom = np.full(model.ngeom, CARGO, dtype=np.int64)
+    block_of_geom, surface_of_geom = (np.full(model.ngeom, -1, dtype=np.int64) for _ in range(2))
+    for c, of_cluster in enumerate(solids):
+        for k, solid in enumerate(of_cluster):
+            geom = model.geom(f"solid {c} {k}").id
+            body_of_geom[geom] = c
+            if len(solid.blocks) == 1:
+                block_of_geom[geom] = solid.blocks[0]
+    fixed = [(f"terrain {k}", k + 1) for k in range(len(world.terrain))]
+    for name, surface in [("ground", 0)] * world.ground + fixed:
+        geom = model.geom(name).id
+        body_of_geom[geom], surface_of_geom[geom] = WORLD, surface
+    pieces = [model.joint(f"free {piece[0]}").dofadr[0] for piece in clusters.pieces]
+    # Only the cargo can stand before the pieces; its free joint comes first.
+    free = pieces if pieces[0] == 0 else [0, *pieces]
+    return Addresses(
+        bodies=_ids(model.body(f"cluster {c}").id for c in range(len(clusters))),
+        body_of_geom=body_of_geom,
+        block_of_geom=block_of_geom,
+        surface_of_geom=surface_of_geom,
+        joints=joint_addresses(model, structure, clusters),
+        thrust_actuators=_ids(model.actuator(f"cannon {i}").id for i in structure.cannons),
+        free_dofs=_ids(free)[:, None] + np.arange(3),
+        spin_dofs=_ids(pieces)[:, None] + np.arange(3, 6),
+        tendons={int(r): model.tendon(f"rope {r}").id for r in np.flatnonzero(rope_alive)},
+    )
+
+
+def _ids(numbers: Iterable[int]) -> IntArray:
+    return np.array([int(number) for number in numbers], dtype=np.int64)

@@ -1,0 +1,338 @@
+"""MuJoCo behind the engine seam: one body per cluster, one geom per block, hinges for axles."""
+
+from collections.abc import Mapping, Sequence
+
+import mujoco
+import numpy as np
+
+from buildarena_simulation.constants import FORCES_EVERY_S, MAX_SPIN
+from buildarena_simulation.engines.base import CargoPose, World, principal_frames
+from buildarena_simulation.engines.mujoco.addresses import addresses_in
+from buildarena_simulation.engines.mujoco.joints import (
+    drag_apart,
+    enter_joint,
+)
+from buildarena_simulation.engines.mujoco.model import MjcfSettings, MjcfState, mjcf_of
+from buildarena_simulation.engines.mujoco.tendons import Tendons, weld_wrenches
+from buildarena_simulation.engines.shared.closest_points import ShapeTable, shape_table
+from buildarena_simulation.engines.shared.impacts import ImpactWatch
+from buildarena_simulation.engines.shared.joint_frames import is_simple_piece
+from buildarena_simulation.structure.clusters import Clusters
+from buildarena_simulation.structure.contacts import ContactForces
+from buildarena_simulation.structure.grips import Hold
+from buildarena_simulation.structure.model import FloatArray, IntArray
+from buildarena_simulation.structure.motion import Motion
+from buildarena_simulation.structure.solids import Solids
+from buildarena_simulation.structure.vectors import cross, turned, turned_wrenches
+
+_TIME_STEP_S = 1 / 500
+_STEPS_PER_EVALUATION = 20
+_SOLREF = (0.02, 1.0)
+_FRICTION_S = 0.03
+_SOLIMP = (0.95, 0.995, 0.005, 0.5, 2.0)
+_IMPRATIO = 10.0
+_ITERATIONS = 50
+_SERVO_SLIP = 2.0
+"""A wheel's motor reaches its torque limit this far off its target, rad/s: stiff, calm at rest."""
+
+
+def _ignore(message: str) -> None:
+    """MuJoCo writes its warnings to a file in the working directory; a blow-up is seen anyway."""
+
+
+mujoco.set_mju_user_warning(_ignore)
+
+
+def version() -> str:
+    """Version of the MuJoCo library."""
+    return str(mujoco.__version__)
+
+
+def create(world: World) -> "MujocoEngine":
+    """A MuJoCo world with everything but the machine in it."""
+    return MujocoEngine(world)
+
+
+class MujocoEngine:
+    """A MuJoCo world; see `Engine` for what its methods mean."""
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self._structure = world.structure
+        self._mjcf = MjcfSettings(
+            time_step_s=self.time_step_s,
+            solref=_SOLREF,
+            friction_s=_FRICTION_S,
+            solimp=_SOLIMP,
+            impratio=_IMPRATIO,
+            iterations=_ITERATIONS,
+            servo_slip=_SERVO_SLIP,
+        )
+        self._solids = Solids(world.structure)
+        self._holds: tuple[Hold, ...] = ()
+        self._rope_alive = np.ones(len(world.structure.ropes), dtype=bool)
+        self._cargo_mass = world.cargo.mass if world.cargo else 0.0
+        self._cargo_state: tuple[FloatArray, FloatArray] | None = None
+        self._targets: FloatArray | None = None
+
+    @property
+    def time_step_s(self) -> float:
+        """See `Engine`."""
+        return _TIME_STEP_S / self._world.substeps
+
+    @property
+    def steps_per_evaluation(self) -> int:
+        """See `Engine`."""
+        return _STEPS_PER_EVALUATION * self._world.substeps
+
+    @property
+    def settings(self) -> Mapping[str, float | int | str]:
+        """See `Engine`."""
+        return {
+            "time_step_s": self.time_step_s,
+            "steps_per_evaluation": self.steps_per_evaluation,
+            "integrator": "implicitfast",
+            "cone": "elliptic",
+            "impratio": _IMPRATIO,
+            "iterations": _ITERATIONS,
+            "solref": str(_SOLREF),
+            "friction_s": _FRICTION_S,
+            "solimp": str(_SOLIMP),
+        }
+
+    def enter(self, clusters: Clusters, motion: Motion) -> None:
+        """See `Engine`."""
+        self._clusters = clusters
+        self._axes, moments = principal_frames(clusters)
+        solids = [self._solids.of(blocks) for blocks in clusters.blocks]
+        state = MjcfState(
+            clusters=clusters,
+            motion=motion,
+            solids=solids,
+            axes=self._axes,
+            moments=moments,
+            cargo_mass=self._cargo_mass,
+            ropes=np.flatnonzero(self._rope_alive).tolist(),
+            holds=self._holds,
+        )
+        self._model = mujoco.MjModel.from_xml_string(mjcf_of(self._world, state, self._mjcf))
+        self._data = mujoco.MjData(self._model)
+        self._addresses = addresses_in(self._model, self._world, clusters, solids, self._rope_alive)
+        self._tendons = Tendons(
+            model=self._model,
+            data=self._data,
+            ropes=self._structure.ropes,
+            of=self._addresses.tendons,
+        )
+        self._shapes: dict[int, ShapeTable] = {}
+        if self._world.cargo is not None:
+            self._cargo_body = self._model.body("cargo").id
+            self._scale_cargo_by_mass()
+        self._set_drag(moments)
+        self._set_velocities(motion)
+        mujoco.mj_forward(self._model, self._data)
+
+    def set_cargo_mass(self, mass: float) -> None:
+        """See `Engine`."""
+        body, model = self._cargo_body, self._model
+        model.body_mass[body] = mass
+        model.body_subtreemass[body] = mass
+        model.body_inertia[body] = self._inertia_per_mass * mass
+        # A free body by itself takes its inertia from here, computed once and never again.
+        model.dof_M0[:3] = mass
+        model.dof_M0[3:6] = model.body_inertia[body]
+        # The solver scales contact softness by these; for a free body they go with 1 / mass.
+        model.body_invweight0[body] = self._invweight_times_mass / mass
+        model.dof_invweight0[:6] = self._dof_invweight_times_mass / mass
+        self._cargo_mass = mass
+
+    def drop_rope(self, index: int) -> None:
+        """See `Engine`."""
+        self._rope_alive[index] = False
+        self._tendons.drop(index)
+
+    def advance(self, targets: FloatArray, thrusts: FloatArray) -> None:
+        """See `Engine`."""
+        model, data, at = self._model, self._data, self._addresses
+        self._targets = targets[-1]
+        if self._apart:
+            drag_apart(model, data, (self._clusters, at.bodies), self.motion(), self._apart)
+        data.ctrl[at.thrust_actuators] = thrusts
+        impacts = ImpactWatch(
+            len(targets), gravity=self._world.gravity, time_step_s=self.time_step_s
+        )
+        velocity = data.qvel[at.free_dofs]
+        if self._world.field is not None:
+            self._tendons.set_lengths(self._world.field.rest_lengths())
+        for step, row in enumerate(targets):
+            self._apply_own_forces(step)
+            at.joints.follow(model, data, row)
+            mujoco.mj_step(model, data)
+            before, velocity = velocity, data.qvel[at.free_dofs]
+            if impacts.is_impact(velocity - before):
+                impacts.take(self._read_contacts())
+        self._limit_spin()
+        self._keep_cargo_state()
+        self._impacts = impacts
+        self._tensions = self._tendons.tensions()
+        self._bring_up()
+
+    def contacts(self) -> ContactForces:
+        """See `Engine`."""
+        return self._impacts.mean(self._read_contacts)
+
+    @property
+    def struck(self) -> bool:
+        """See `Engine`."""
+        return self._impacts.struck
+
+    def hold(self, holds: Sequence[Hold]) -> None:
+        """See `Engine`."""
+        self._holds = tuple(holds)
+
+    def grip_wrenches(self) -> FloatArray:
+        """See `Engine`."""
+        return weld_wrenches(self._model, self._data, self._holds)
+
+    def rope_tensions(self) -> FloatArray:
+        """See `Engine`."""
+        return self._tensions
+
+    def motion(self) -> Motion:
+        """See `Engine`."""
+        data, bodies = self._data, self._addresses.bodies
+        rotation = data.xmat[bodies].reshape(-1, 3, 3) @ self._axes.transpose(0, 2, 1)
+        center, spin = data.xipos[bodies], data.cvel[bodies, :3]
+        anchor = data.subtree_com[self._model.body_rootid[bodies]]
+        return Motion(
+            position=center - turned(rotation, self._clusters.center_of_mass),
+            rotation=rotation,
+            velocity=data.cvel[bodies, 3:] + cross(spin, center - anchor),
+            spin=spin,
+        )
+
+    def cargo(self) -> CargoPose:
+        """See `Engine`."""
+        position, velocity = self._data.qpos[:7].copy(), self._data.qvel[:3].copy()
+        return CargoPose(position=position[:3], quaternion=position[3:], velocity=velocity)
+
+    def close(self) -> None:
+        """See `Engine`."""
+        del self._tendons, self._data, self._model
+
+    def _apply_own_forces(self, step: int) -> None:
+        field, every = self._world.field, round(FORCES_EVERY_S / self.time_step_s)
+        if field is None or step % every:
+            return
+        if step:
+            self._bring_up()
+        motion, data = self.motion(), self._data
+        wrenches = field.wrenches(self._clusters, motion)
+        data.xfrc_applied[self._addresses.bodies] = turned_wrenches(motion.rotation, wrenches)
+
+    def _bring_up(self) -> None:
+        """Brings the kinematics up to the end of the last step, which leaves its start's behind."""
+        mujoco.mj_kinematics(self._model, self._data)
+        mujoco.mj_comPos(self._model, self._data)
+        mujoco.mj_comVel(self._model, self._data)
+
+    def _keep_cargo_state(self) -> None:
+        if self._world.cargo is not None:
+            self._cargo_state = (self._data.qpos[:7].copy(), self._data.qvel[:6].copy())
+
+    def _scale_cargo_by_mass(self) -> None:
+        body, model, mass = self._cargo_body, self._model, self._cargo_mass
+        self._inertia_per_mass = model.body_inertia[body] / mass
+        self._invweight_times_mass = model.body_invweight0[body] * mass
+        self._dof_invweight_times_mass = model.dof_invweight0[:6] * mass
+
+    def _set_drag(self, moments: FloatArray) -> None:
+        """Damping of each piece's free joint: Unity's v *= 1 - drag·dt, as a force.
+
+        The clusters of a piece with other joints than wheels' axles have each its own drag.
+        """
+        model, clusters = self._model, self._clusters
+        self._apart: list[tuple[int, ...]] = []
+        for piece in clusters.pieces:
+            if not is_simple_piece(self._structure, clusters, piece):
+                self._apart.append(piece)
+                continue
+            root, inside = piece[0], list(piece)
+            dof = model.joint(f"free {root}").dofadr[0]
+            drag = clusters.linear_drag[inside] @ clusters.mass[inside]
+            model.dof_damping[dof : dof + 3] = drag
+            model.dof_damping[dof + 3 : dof + 6] = clusters.angular_drag[root] * moments[root]
+
+    def _set_velocities(self, motion: Motion) -> None:
+        model, data, clusters = self._model, self._data, self._clusters
+        if self._cargo_state is not None:
+            data.qpos[:7], data.qvel[:6] = self._cargo_state
+        bodies = (self._structure, clusters, self._axes)
+        for c, parent in enumerate(clusters.parent):
+            if parent < 0:
+                dof = model.joint(f"free {c}").dofadr[0]
+                data.qvel[dof : dof + 3] = motion.velocity[c]
+                world_from_body = motion.rotation[c] @ self._axes[c]
+                data.qvel[dof + 3 : dof + 6] = world_from_body.T @ motion.spin[c]
+            else:
+                enter_joint(model, data, bodies, motion, c=c, targets=self._targets)
+
+    def _limit_spin(self) -> None:
+        """Slows pieces that spin faster than any part of the game may."""
+        dofs = self._addresses.spin_dofs
+        spins = self._data.qvel[dofs]
+        if np.abs(spins).max() > MAX_SPIN / 2:
+            speeds = np.sqrt((spins * spins).sum(axis=1))
+            scale = np.minimum(1.0, MAX_SPIN / np.maximum(speeds, 1e-9))
+            self._data.qvel[dofs] = spins * scale[:, None]
+
+    def _read_contacts(self) -> ContactForces:
+        data, at = self._data, self._addresses
+        contact, count = data.contact, data.ncon
+        address = contact.efc_address[:count]
+        active = (address >= 0).nonzero()[0]
+        geoms = contact.geom[active]
+        components = data.efc_force[address[active][:, None] + np.arange(3)]
+        frames = contact.frame[active].reshape(-1, 3, 3)
+        # MuJoCo's contact force acts on the second geom; its frame's rows are normal and tangents.
+        force = (components[:, None] @ frames)[:, 0]
+        clusters = at.body_of_geom[geoms]
+        sides = [((clusters[:, k] >= 0).nonzero()[0], k, sign) for k, sign in ((0, -1.0), (1, 1.0))]
+        row = np.concatenate([rows for rows, _, _ in sides])
+        own = np.concatenate([geoms[rows, k] for rows, k, _ in sides])
+        facing = np.concatenate([geoms[rows, 1 - k] for rows, k, _ in sides])
+        sign = np.concatenate([np.full((len(rows), 1), sign) for rows, _, sign in sides])
+        point = contact.pos[active][row]
+        index, block, weight = self._blocks_at(own, point)
+        return ContactForces(
+            block=block,
+            other=at.body_of_geom[facing][index],
+            surface=at.surface_of_geom[facing][index],
+            weight=weight,
+            area=np.zeros(len(block)),
+            normal=(sign * frames[row, 0])[index],
+            point=point[index],
+            force=(sign * force[row])[index] * weight[:, None],
+        )
+
+    def _blocks_at(
+        self, geoms: IntArray, points: FloatArray
+    ) -> tuple[IntArray, IntArray, FloatArray]:
+        """Rows of one contact and one block each: the contact's index, the block, its share."""
+        at = self._addresses
+        block = at.block_of_geom[geoms]
+        lone = (block >= 0).nonzero()[0]
+        rows, blocks, weights = [lone], [block[lone]], [np.ones(len(lone))]
+        if len(lone) < len(geoms):
+            motion = self.motion()
+            cluster = np.where(block >= 0, -1, at.body_of_geom[geoms])
+            for c in sorted(set(cluster[cluster >= 0].tolist())):
+                if c not in self._shapes:
+                    self._shapes[c] = shape_table(self._structure, self._clusters.blocks[c])
+                among = (cluster == c).nonzero()[0]
+                local = (points[among] - motion.position[c]) @ motion.rotation[c]
+                row, found, weight = self._shapes[c].share(local)
+                rows.append(among[row])
+                blocks.append(found)
+                weights.append(weight)
+        return np.concatenate(rows), np.concatenate(blocks), np.concatenate(weights)

@@ -1,0 +1,172 @@
+"""MJCF text of moving joints, their drives and their gears.
+
+A simple axle is written at the angle at which it stands, as angle 0. Any other joint is written at
+its place 0, where the machine was built, as its limits, spring and drive count from there; the
+engine then puts it where it stands.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from buildarena_simulation.engines.mujoco.xml_text import tag
+from buildarena_simulation.engines.shared.joint_frames import (
+    driven_clusters,
+    engaged,
+    is_simple,
+    limits_of,
+    seat_of,
+    swing_axes,
+)
+from buildarena_simulation.structure.clusters import Clusters
+from buildarena_simulation.structure.model import FloatArray, Structure
+
+_STOP_SOLREF = (0.008, 1.0)
+"""Time constant, seconds, and damping ratio of a joint's stops."""
+
+_TIE_SOLREF = (0.004, 1.0)
+"""The same of what ties joints together: teeth, and the halves of a constant-velocity joint."""
+
+_TIE_SOLIMP = (0.9999, 0.9999, 0.001)
+"""Impedance of such a tie: hard."""
+
+_SERVO_SLACK = 0.01
+"""A drive exerts all its force this far off its place, rad or units."""
+
+_SERVO_TIME_S = 0.02
+"""Time constant with which a drive reaches its place, seconds."""
+
+_SERVO_SLIP = 0.2
+"""A joint's drive exerts all its force this far off its speed, rad/s or units/s."""
+
+_ARMATURE = 1e-3
+"""Inertia added to each hinge of a constant-velocity joint: two of them share an axis when it is
+straight, mass·unit²."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointText:
+    """What the text of joints is written from.
+
+    Attributes:
+        structure: The machine.
+        clusters: Its clusters.
+        axes: (C, 3, 3) machine_from_principal.
+        gravity: Downward acceleration, units/s².
+        servo_slip: How far off its target a wheel's motor reaches its torque limit, rad/s.
+    """
+
+    structure: Structure
+    clusters: Clusters
+    axes: FloatArray
+    gravity: float
+    servo_slip: float
+
+    def joints(self, c: int) -> Iterator[str]:
+        """The joints by which a cluster hangs on its parent."""
+        structure, clusters = self.structure, self.clusters
+        pivot = structure.joints.points[clusters.seated[c]]
+        pos = self.axes[c].T @ (pivot - clusters.center_of_mass[c])
+        axis = self.axes[c].T @ structure.joints.axes[clusters.seated[c]]
+        if is_simple(structure, clusters, c):
+            yield tag("joint", name=f"hinge {c}", type="hinge", pos=pos, axis=axis, armature=0.01)
+            return
+        seat = seat_of(structure, clusters, c)
+        if seat == "constant_velocity":
+            yield from self._halves(c, pos)
+            return
+        kind = {"slider": "slide", "ball": "ball"}.get(seat, "hinge")
+        more: dict[str, object] = {} if kind == "ball" else {"axis": axis}
+        yield tag(
+            "joint",
+            name=f"hinge {c}",
+            type=kind,
+            pos=pos,
+            **more,
+            **self._stops(c),
+            **self._rest(c),
+        )
+
+    def equalities(self) -> Iterator[str]:
+        """What ties joints to each other: the halves of constant-velocity joints, and teeth."""
+        structure, clusters = self.structure, self.clusters
+        for c in np.flatnonzero(clusters.parent >= 0).tolist():
+            if seat_of(structure, clusters, c) == "constant_velocity":
+                yield self._tied(f"hinge {c} 2", f"hinge {c}", 1.0)
+        for first, second, ratio in engaged(structure, clusters):
+            yield self._tied(f"hinge {second}", f"hinge {first}", ratio)
+
+    def drives(self) -> Iterator[str]:
+        """The motors of wheels and the drives of joints."""
+        structure, clusters = self.structure, self.clusters
+        for c in driven_clusters(structure, clusters):
+            part = structure.parts[clusters.seated[c]]
+            drive = None if part.module.joint is None else part.module.joint.drive
+            name, most = f"hinge {c}", structure.torques[clusters.seated[c]] * self.gravity
+            if drive is None:
+                kv = most / self.servo_slip
+                yield tag("velocity", name=name, joint=name, kv=kv, forcerange=(-most, most))
+                continue
+            most = drive.force * self.gravity
+            if drive.kind == "speed":
+                kv = most / _SERVO_SLIP
+                yield tag("velocity", name=name, joint=name, kv=kv, forcerange=(-most, most))
+            else:
+                kp = most / _SERVO_SLACK
+                yield tag(
+                    "general",
+                    name=name,
+                    joint=name,
+                    biastype="affine",
+                    gainprm=kp,
+                    biasprm=(0.0, -kp, -kp * _SERVO_TIME_S),
+                    forcerange=(-most, most),
+                )
+
+    def _halves(self, c: int, pos: FloatArray) -> Iterator[str]:
+        """Three hinges of which the outer ones turn alike: two universal joints, back to back."""
+        axes = self.axes[c].T @ swing_axes(self.structure, self.clusters, c)
+        limits = limits_of(self.structure, self.clusters, c)
+        for k, name in enumerate((f"hinge {c}", f"hinge {c} 1", f"hinge {c} 2")):
+            # The outer hinges turn by half of what the shaft bends.
+            share = 1.0 if k == 1 else 0.5
+            stops = {} if limits is None else self._stop_at(share * np.array(limits))
+            yield tag(
+                "joint",
+                name=name,
+                type="hinge",
+                pos=pos,
+                axis=axes[:, k],
+                armature=_ARMATURE,
+                **stops,
+            )
+
+    def _stops(self, c: int) -> dict[str, object]:
+        limits = limits_of(self.structure, self.clusters, c)
+        return {} if limits is None else self._stop_at(np.array(limits))
+
+    def _stop_at(self, limits: FloatArray) -> dict[str, object]:
+        return {"range": limits, "solreflimit": _STOP_SOLREF}
+
+    def _rest(self, c: int) -> dict[str, object]:
+        """Friction, spring and damper."""
+        joint = self.structure.parts[self.clusters.seated[c]].module.joint
+        if joint is None:
+            return {}
+        amounts = {
+            "frictionloss": joint.friction,
+            "stiffness": joint.stiffness,
+            "damping": joint.damping,
+        }
+        return {name: amount * self.gravity for name, amount in amounts.items() if amount}
+
+    def _tied(self, name: str, other: str, ratio: float) -> str:
+        return tag(
+            "joint",
+            joint1=name,
+            joint2=other,
+            polycoef=(0.0, ratio, 0.0, 0.0, 0.0),
+            solref=_TIE_SOLREF,
+            solimp=_TIE_SOLIMP,
+        )

@@ -1,0 +1,3 @@
+"""The PyBullet engine."""
+
+LIBRARY = "pybullet"

@@ -1,0 +1,92 @@
+"""PyBullet's contact points as contact forces on blocks.
+
+PyBullet names body and link of a contact, not the shape, so each goes to the nearest blocks.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+import numpy as np
+
+from buildarena_simulation.engines.shared.closest_points import ShapeTable
+from buildarena_simulation.structure.contacts import WORLD, ContactForces
+from buildarena_simulation.structure.model import FloatArray
+from buildarena_simulation.structure.motion import Motion
+
+_TOUCHING: Final = 0.005
+"""Points nearer than this touch, though the solver may have given them no force, units."""
+
+
+def read_contacts(
+    contacts: Sequence[tuple[Any, ...]],
+    cluster_of_link: Mapping[tuple[int, int], int],
+    shapes: Sequence[ShapeTable],
+    motion: Motion,
+    *,
+    outsiders: Mapping[int, int],
+    surfaces: Mapping[int, int],
+) -> ContactForces:
+    """The contact forces on all blocks.
+
+    Args:
+        contacts: What `getContactPoints` returns; each contact is there once.
+        cluster_of_link: Cluster of each body and link.
+        shapes: (C,) shapes of each cluster.
+        motion: Where the clusters are.
+        outsiders: What `ContactForces.other` calls each moving body that is not a cluster.
+        surfaces: What `ContactForces.surface` calls each fixed body.
+    """
+    rows: dict[int, list[tuple[float, ...]]] = {}
+    for contact in contacts:
+        push = contact[9]
+        if push == 0.0 and contact[8] > _TOUCHING:
+            continue
+        (nx, ny, nz), f1, (ux, uy, uz), f2, (vx, vy, vz) = contact[7], *contact[10:14]
+        # The normal points from the second body to the first.
+        x = nx * push + ux * f1 + vx * f2
+        y = ny * push + uy * f1 + vy * f2
+        z = nz * push + uz * f1 + vz * f2
+        first = cluster_of_link.get((contact[1], contact[3]))
+        second = cluster_of_link.get((contact[2], contact[4]))
+        if first is not None:
+            other = outsiders.get(contact[2], WORLD) if second is None else second
+            fixed = surfaces.get(contact[2], -1)
+            rows.setdefault(first, []).append((*contact[5], x, y, z, nx, ny, nz, other, fixed))
+        if second is not None:
+            other = outsiders.get(contact[1], WORLD) if first is None else first
+            fixed = surfaces.get(contact[1], -1)
+            rows.setdefault(second, []).append(
+                (*contact[6], -x, -y, -z, -nx, -ny, -nz, other, fixed)
+            )
+    return _gathered(
+        [_to_blocks(np.array(table), c, shapes[c], motion) for c, table in sorted(rows.items())]
+    )
+
+
+def _to_blocks(table: FloatArray, c: int, shapes: ShapeTable, motion: Motion) -> ContactForces:
+    local = (table[:, :3] - motion.position[c]) @ motion.rotation[c]
+    row, block, weight = shapes.share(local)
+    return ContactForces(
+        block=block,
+        other=table[row, 9].astype(np.int64),
+        surface=table[row, 10].astype(np.int64),
+        weight=weight,
+        area=np.zeros(len(block)),
+        normal=table[row, 6:9],
+        point=table[row, :3],
+        force=table[row, 3:6] * weight[:, None],
+    )
+
+
+def _gathered(found: Sequence[ContactForces]) -> ContactForces:
+    none = np.zeros(0, dtype=np.int64)
+    return ContactForces(
+        block=np.concatenate([none, *(f.block for f in found)]),
+        other=np.concatenate([none, *(f.other for f in found)]),
+        surface=np.concatenate([none, *(f.surface for f in found)]),
+        weight=np.concatenate([np.zeros(0), *(f.weight for f in found)]),
+        area=np.concatenate([np.zeros(0), *(f.area for f in found)]),
+        normal=np.concatenate([np.zeros((0, 3)), *(f.normal for f in found)]),
+        point=np.concatenate([np.zeros((0, 3)), *(f.point for f in found)]),
+        force=np.concatenate([np.zeros((0, 3)), *(f.force for f in found)]),
+    )

@@ -1,0 +1,404 @@
+"""PyBullet behind the engine seam: one multibody per articulated piece, read from URDF text.
+
+Why: multibodies keep heavy cargo quiet; `createCollisionShapeArray` drops shapes beyond 16; inertia
+computed by PyBullet is wrong; URDFs are cached by file name; its damping grows with the speed's
+square, so drag is a force of ours.
+"""
+
+import itertools
+import math
+import shutil
+import tempfile
+from collections.abc import Mapping, Sequence
+from importlib.metadata import PackageNotFoundError
+from importlib.metadata import version as distribution_version
+from pathlib import Path
+
+import numpy as np
+
+from buildarena_simulation.constants import FORCES_EVERY_S
+from buildarena_simulation.engines.base import (
+    CargoPose,
+    World,
+    principal_frames,
+    quaternion_of,
+    rotation_of,
+)
+from buildarena_simulation.engines.pybullet.bodies import (
+    add_box,
+    free_of_damping,
+    friction_of,
+    limit_spin,
+    pose_of,
+    set_friction,
+    set_up,
+)
+from buildarena_simulation.engines.pybullet.contacts import read_contacts
+from buildarena_simulation.engines.pybullet.external_forces import (
+    Force,
+    body_wrenches,
+    drag_forces,
+    thrust_forces,
+)
+from buildarena_simulation.engines.pybullet.friction import follow_friction, mixed_clusters
+from buildarena_simulation.engines.pybullet.grips import BulletGrips
+from buildarena_simulation.engines.pybullet.hinges import HingedPiece, hinge_frames
+from buildarena_simulation.engines.pybullet.joints import articulated
+from buildarena_simulation.engines.pybullet.quiet_output import quiet_output
+from buildarena_simulation.engines.pybullet.ropes import rope_forces
+from buildarena_simulation.engines.pybullet.urdf import urdf_of
+from buildarena_simulation.engines.shared.closest_points import shape_table
+from buildarena_simulation.engines.shared.impacts import ImpactWatch
+from buildarena_simulation.engines.shared.joint_frames import (
+    has_joints,
+    is_simple_piece,
+    joint_rate,
+)
+from buildarena_simulation.structure.clusters import Clusters
+from buildarena_simulation.structure.contacts import CARGO, ContactForces
+from buildarena_simulation.structure.grips import Hold
+from buildarena_simulation.structure.model import FloatArray
+from buildarena_simulation.structure.motion import Motion
+from buildarena_simulation.structure.solids import Solids
+
+# It greets when it is imported, on streams where our own output may be JSON.
+with quiet_output():
+    import pybullet
+
+_TIME_STEP_S = 1 / 500
+_STEPS_PER_EVALUATION = 20
+_ITERATIONS, _ITERATIONS_OF_JOINTS = 100, 60
+_RESIDUAL = 1e-9
+_ORIGIN, _GROUND_REACH = (0.0, 0.0, 0.0), 2000.0
+
+
+def version() -> str:
+    """Version of the PyBullet library."""
+    try:
+        return distribution_version("pybullet")
+    except PackageNotFoundError:
+        return distribution_version("pybullet-arm64")  # the same library with more wheels
+
+
+def create(world: World) -> "PyBulletEngine":
+    """A PyBullet world with everything but the machine in it."""
+    return PyBulletEngine(world)
+
+
+class PyBulletEngine:
+    """A PyBullet world; see `Engine` for what its methods mean."""
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self._structure = world.structure
+        self._rope_alive = np.ones(len(world.structure.ropes), dtype=bool)
+        self._tensions = np.zeros(len(world.structure.ropes))
+        self._place_of_wheel = {int(i): w for w, i in enumerate(world.structure.wheels)}
+        self._targets: FloatArray | None = None
+        self._iterations = _ITERATIONS_OF_JOINTS if has_joints(world.structure) else _ITERATIONS
+        self._client = {"physicsClientId": pybullet.connect(pybullet.DIRECT)}
+        self._folder = Path(tempfile.mkdtemp(prefix="buildarena-"))
+        self._serial = itertools.count()
+        self._pieces: list[HingedPiece] = []
+        self._solids = Solids(world.structure)
+        self._surfaces: dict[int, int] = {}
+        self._cargo: int | None = None
+        self._grips = BulletGrips(self._client)
+        self._fresh: Motion | None = None
+        self._own: list[tuple[int, Force]] = []
+        self._start_world()
+
+    @property
+    def time_step_s(self) -> float:
+        """See `Engine`."""
+        return _TIME_STEP_S / self._world.substeps
+
+    @property
+    def steps_per_evaluation(self) -> int:
+        """See `Engine`."""
+        return _STEPS_PER_EVALUATION * self._world.substeps
+
+    @property
+    def settings(self) -> Mapping[str, float | int | str]:
+        """See `Engine`."""
+        return {
+            "time_step_s": self.time_step_s,
+            "steps_per_evaluation": self.steps_per_evaluation,
+            "iterations": self._iterations,
+            "residual": _RESIDUAL,
+            "cone_friction": 1,
+        }
+
+    def enter(self, clusters: Clusters, motion: Motion) -> None:
+        """See `Engine`."""
+        self._clusters, self._motion = clusters, motion
+        self._axes, self._moments = principal_frames(clusters)
+        self._compliance = np.asarray(np.linalg.inv(clusters.inertia))
+        self._hinges = hinge_frames(self._structure, clusters, motion)
+        self._grips.leave()
+        for piece in self._pieces:
+            if piece.articulation is not None:
+                piece.articulation.release()
+            pybullet.removeBody(piece.body, **self._client)
+        self._pieces = [self._add_piece(piece, motion) for piece in clusters.pieces]
+        self._cluster_of_link = {
+            (piece.body, link): c for piece in self._pieces for c, link in piece.links.items()
+        }
+        self._address = {c: key for key, c in self._cluster_of_link.items()}
+        self._shapes = [shape_table(self._structure, blocks) for blocks in clusters.blocks]
+        self._free_bodies = [piece.body for piece in self._pieces]
+        if self._cargo is not None:
+            self._free_bodies.append(self._cargo)
+        mixed = mixed_clusters(self._structure, clusters)
+        self._mixed = {c: self._address[c] for c in mixed}
+        self._grips.enter(clusters, motion, self._axes, self._address, self._cargo)
+
+    def set_cargo_mass(self, mass: float) -> None:
+        """See `Engine`."""
+        pybullet.changeDynamics(self._cargo, -1, mass=mass, **self._client)
+
+    def drop_rope(self, index: int) -> None:
+        """See `Engine`."""
+        self._rope_alive[index] = False
+        self._tensions[index] = 0.0
+
+    def advance(self, targets: FloatArray, thrusts: FloatArray) -> None:
+        """See `Engine`."""
+        external_forces = thrust_forces(self._structure, self._clusters, self._axes, thrusts)
+        drags = drag_forces(
+            self._structure, self._clusters, self._motion, self._axes, self._moments
+        )
+        impacts = ImpactWatch(
+            len(targets), gravity=self._world.gravity, time_step_s=self.time_step_s
+        )
+        velocity = self._free_velocities()
+        driven: FloatArray | None = None
+        for step, row in enumerate(targets):
+            if len(row) and (driven is None or (row != driven).any()):
+                self._drive(row)
+                driven = row
+            self._apply_forces(external_forces, [*drags, *self._own_forces(step)])
+            pybullet.stepSimulation(**self._client)
+            before, velocity = velocity, self._free_velocities()
+            if impacts.is_impact(velocity - before):
+                self._motion = self._read_motion()
+                impacts.take(self._read_contacts())
+        self._targets = targets[-1]
+        self._motion = self._read_motion()
+        limit_spin(self._client, self._pieces, self._motion)
+        if self._mixed:
+            follow_friction(self._client, self._structure, self._mixed, self._shapes, self._motion)
+        self._impacts = impacts
+
+    def contacts(self) -> ContactForces:
+        """See `Engine`."""
+        return self._impacts.mean(self._read_contacts)
+
+    @property
+    def struck(self) -> bool:
+        """See `Engine`."""
+        return self._impacts.struck
+
+    def hold(self, holds: Sequence[Hold]) -> None:
+        """See `Engine`."""
+        self._grips.holds = tuple(holds)
+
+    def grip_wrenches(self) -> FloatArray:
+        """See `Engine`."""
+        return self._grips.wrenches()
+
+    def rope_tensions(self) -> FloatArray:
+        """See `Engine`."""
+        return self._tensions
+
+    def motion(self) -> Motion:
+        """See `Engine`."""
+        return self._motion
+
+    def cargo(self) -> CargoPose:
+        """See `Engine`."""
+        return pose_of(self._client, self._cargo)
+
+    def close(self) -> None:
+        """See `Engine`."""
+        pybullet.disconnect(**self._client)
+        shutil.rmtree(self._folder, ignore_errors=True)
+
+    def _start_world(self) -> None:
+        world = self._world
+        set_up(
+            self._client,
+            gravity=world.gravity,
+            time_step_s=self.time_step_s,
+            iterations=self._iterations,
+            residual=_RESIDUAL,
+        )
+        if world.ground:
+            ground = add_box(
+                self._client, (_GROUND_REACH, _GROUND_REACH, 1.0), (0.0, 0.0, -1.0), mass=0.0
+            )
+            self._surfaces[ground] = 0
+        for k, box in enumerate(world.terrain, 1):
+            turn = pybullet.getQuaternionFromEuler((math.radians(box.slope_deg), 0.0, 0.0))
+            half = [v / 2 for v in box.size]
+            self._surfaces[add_box(self._client, half, box.center, mass=0.0, turn=turn)] = k
+        if world.cargo is not None:
+            cargo = world.cargo
+            self._cargo = add_box(self._client, cargo.size / 2, cargo.position, mass=cargo.mass)
+
+    def _add_piece(self, inside: tuple[int, ...], motion: Motion) -> HingedPiece:
+        clusters, structure, root = self._clusters, self._structure, inside[0]
+        body = self._load(inside, motion)
+        free_of_damping(self._client, body)
+        velocity, spin = motion.velocity[root].tolist(), motion.spin[root].tolist()
+        pybullet.resetBaseVelocity(body, velocity, spin, **self._client)
+        articulation = articulated(
+            self._world,
+            clusters,
+            self._axes,
+            body=body,
+            inside=inside,
+            time_step_s=self.time_step_s,
+            client=self._client,
+        )
+        for c, link in articulation.links.items():
+            set_friction(self._client, body, link, friction_of(structure, clusters.blocks[c]))
+        simple = is_simple_piece(structure, clusters, inside)
+        if simple:
+            for link, c in enumerate(inside[1:]):
+                rate = joint_rate(structure, clusters, motion, c)
+                pybullet.resetJointState(body, link, 0.0, rate, **self._client)
+        else:
+            articulation.start(motion, self._targets)
+        articulation.add_gears()
+        hinged = list(inside[1:]) if simple else []
+        places = [self._place_of_wheel[int(wheel)] for wheel in clusters.seated[hinged]]
+        return HingedPiece(
+            body=body,
+            inside=inside,
+            links=articulation.links,
+            articulation=None if simple else articulation,
+            wheel_signs=np.where(clusters.seated_is_outer[hinged], 1.0, -1.0),
+            wheel_places=np.array(places, dtype=np.int64),
+            wheel_torques=structure.torques[clusters.seated[hinged]] * self._world.gravity,
+        )
+
+    def _load(self, inside: tuple[int, ...], motion: Motion) -> int:
+        """The body of a piece, put where its root is."""
+        clusters, root = self._clusters, inside[0]
+        solids = {c: self._solids.of(clusters.blocks[c]) for c in inside}
+        text = urdf_of(self._structure, clusters, solids, axes=self._axes, moments=self._moments)
+        file = self._folder / f"{next(self._serial)}.urdf"
+        file.write_text(text, encoding="ascii")
+        turn = quaternion_of(motion.rotation[root] @ self._axes[root])
+        body = pybullet.loadURDF(
+            str(file),
+            motion.centers_of_mass(clusters)[root].tolist(),
+            turn[[1, 2, 3, 0]].tolist(),
+            flags=pybullet.URDF_USE_INERTIA_FROM_FILE
+            | pybullet.URDF_MAINTAIN_LINK_ORDER
+            | pybullet.URDF_USE_IMPLICIT_CYLINDER,
+            useMaximalCoordinates=0,
+            **self._client,
+        )
+        file.unlink()
+        return int(body)
+
+    def _drive(self, speeds: FloatArray) -> None:
+        for piece in self._pieces:
+            if piece.articulation is not None:
+                piece.articulation.follow(speeds)
+                continue
+            count = len(piece.wheel_signs)
+            if count:
+                pybullet.setJointMotorControlArray(
+                    piece.body,
+                    range(count),
+                    pybullet.VELOCITY_CONTROL,
+                    targetVelocities=(speeds[piece.wheel_places] * piece.wheel_signs).tolist(),
+                    forces=piece.wheel_torques.tolist(),
+                    **self._client,
+                )
+
+    def _apply_forces(
+        self, thrusts: list[tuple[int, Force]], drags: list[tuple[int, Force]]
+    ) -> None:
+        frame, client, address = pybullet.LINK_FRAME, self._client, self._address
+        for c, (force, point) in thrusts:
+            pybullet.applyExternalForce(*address[c], force, point, frame, **client)
+        for c, (force, torque) in drags:
+            pybullet.applyExternalForce(*address[c], force, _ORIGIN, frame, **client)
+            pybullet.applyExternalTorque(*address[c], torque, frame, **client)
+        if self._rope_alive.any():
+            self._pull_ropes()
+
+    def _own_forces(self, step: int) -> list[tuple[int, Force]]:
+        field = self._world.field
+        if field is not None and step % round(FORCES_EVERY_S / self.time_step_s) == 0:
+            # Ropes ask for the same motion in this step.
+            self._fresh = motion = self._read_motion()
+            self._own = body_wrenches(field.wrenches(self._clusters, motion), self._axes)
+        return self._own
+
+    def _pull_ropes(self) -> None:
+        structure, clusters = self._structure, self._clusters
+        motion, field = self._fresh or self._read_motion(), self._world.field
+        self._fresh = None
+        pulls = rope_forces(
+            structure,
+            clusters,
+            motion,
+            compliance=self._compliance,
+            alive=self._rope_alive,
+            rest=structure.ropes.length if field is None else field.rest_lengths(),
+            time_step_s=self.time_step_s,
+        )
+        self._tensions = pulls.tension
+        ends = pulls.forces
+        for block, point, force in zip(ends.block, ends.point, ends.force, strict=True):
+            body, link = self._address[int(clusters.cluster_of[block])]
+            pybullet.applyExternalForce(
+                body, link, force.tolist(), point.tolist(), pybullet.WORLD_FRAME, **self._client
+            )
+
+    def _free_velocities(self) -> FloatArray:
+        """Velocity of every piece and of the cargo, (K, 3), units/s."""
+        client = self._client
+        return np.array([pybullet.getBaseVelocity(body, **client)[0] for body in self._free_bodies])
+
+    def _read_motion(self) -> Motion:
+        """Poses and velocities of all clusters, children by way of their hinges' angles."""
+        clusters, client = self._clusters, self._client
+        count = len(clusters)
+        motion = Motion(
+            position=np.empty((count, 3)),
+            rotation=np.empty((count, 3, 3)),
+            velocity=np.empty((count, 3)),
+            spin=np.empty((count, 3)),
+        )
+        for piece in self._pieces:
+            root, body = piece.inside[0], piece.body
+            center, turn = pybullet.getBasePositionAndOrientation(body, **client)
+            motion.velocity[root], motion.spin[root] = pybullet.getBaseVelocity(body, **client)
+            rotation = rotation_of(np.array(turn)[[3, 0, 1, 2]]) @ self._axes[root].T
+            motion.rotation[root] = rotation
+            motion.position[root] = center - rotation @ clusters.center_of_mass[root]
+            hinged = piece.inside[1:]
+            if piece.articulation is not None:
+                piece.articulation.read(motion)
+            elif hinged:
+                states = pybullet.getJointStates(body, range(len(hinged)), **client)
+                for c, state in zip(hinged, states, strict=True):
+                    self._hinges.follow(motion, c, state[0], state[1])
+        return motion
+
+    def _read_contacts(self) -> ContactForces:
+        contacts = pybullet.getContactPoints(**self._client)
+        return read_contacts(
+            contacts,
+            self._cluster_of_link,
+            self._shapes,
+            self._motion,
+            outsiders={} if self._cargo is None else {self._cargo: CARGO},
+            surfaces=self._surfaces,
+        )

@@ -1,0 +1,188 @@
+"""Where clusters stand on their joints, and how fast they move there.
+
+All of it is of a cluster against its parent, whichever of them the seated block belongs to. In the
+machine frame every joint stands at 0.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from buildarena_geometry.modules.joints import MOVING_JOINTS
+from buildarena_simulation.engines.base import quaternion_of
+from buildarena_simulation.structure.clusters import Clusters
+from buildarena_simulation.structure.model import FloatArray, Structure
+from buildarena_simulation.structure.motion import Motion
+from buildarena_simulation.structure.vectors import axis_frame, cross, turn_about
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointPlace:
+    """A cluster's place on its joint and its rate.
+
+    Attributes:
+        place: One number for an axle, hinge (rad) or slider (units); a quaternion (w, x, y, z) for
+            a ball; three angles for a constant-velocity joint, the last as large as the first.
+        rate: One number, rad/s or units/s; a ball's spin (3,) in the cluster's machine axes; three
+            rates.
+    """
+
+    place: FloatArray
+    rate: FloatArray
+
+
+def seat_of(structure: Structure, clusters: Clusters, c: int) -> str:
+    """The seat by which a cluster hangs on its parent."""
+    seated = int(clusters.seated[c])
+    return structure.parts[seated].physics.joint_type
+
+
+def is_simple(structure: Structure, clusters: Clusters, c: int) -> bool:
+    """Whether a cluster hangs on an axle whose angle does not matter."""
+    return bool(structure.joints.simple[clusters.seated[c]])
+
+
+def has_joints(structure: Structure) -> bool:
+    """Whether a machine has joints other than simple axles."""
+    moving = np.array([part.physics.joint_type in MOVING_JOINTS for part in structure.parts])
+    return bool((moving & ~structure.joints.simple).any())
+
+
+def is_simple_piece(structure: Structure, clusters: Clusters, piece: Sequence[int]) -> bool:
+    """Whether all joints of a piece, given root first, are axles whose angles do not matter."""
+    return all(is_simple(structure, clusters, c) for c in piece[1:])
+
+
+def sign_of(clusters: Clusters, c: int) -> float:
+    """1 where the seated block moves with the cluster, -1 where it is the parent's."""
+    return 1.0 if clusters.seated_is_outer[c] else -1.0
+
+
+def limits_of(structure: Structure, clusters: Clusters, c: int) -> tuple[float, float] | None:
+    """The smallest and largest place of a cluster on its joint; None if nothing stops it."""
+    joint = structure.parts[clusters.seated[c]].module.joint
+    if joint is None or joint.limits is None:
+        return None
+    low, high = joint.limits
+    return (low, high) if clusters.seated_is_outer[c] else (-high, -low)
+
+
+def swing_axes(structure: Structure, clusters: Clusters, c: int) -> FloatArray:
+    """The axes of a constant-velocity joint's three hinges, columns, machine frame, (3, 3).
+
+    Turned by a, c and a about the first, second and first axis across its shaft, a body swings
+    without twist: the third component of that quaternion along the shaft vanishes.
+    """
+    across = axis_frame(structure.joints.axes[clusters.seated[c]])[:, 1:]
+    return np.column_stack([across[:, 0], across[:, 1], across[:, 0]])
+
+
+def joint_rate(structure: Structure, clusters: Clusters, motion: Motion, c: int) -> float:
+    """Speed at which a cluster turns on its axle or hinge, rad/s."""
+    axis = motion.rotation[c] @ structure.joints.axes[clusters.seated[c]]
+    return float((motion.spin[c] - motion.spin[clusters.parent[c]]) @ axis)
+
+
+def joint_place(structure: Structure, clusters: Clusters, motion: Motion, c: int) -> JointPlace:
+    """The place of a cluster on its joint and its rate.
+
+    Args:
+        structure: The machine.
+        clusters: Its clusters.
+        motion: Their motion.
+        c: A cluster that hangs on another.
+    """
+    seat, parent = seat_of(structure, clusters, c), int(clusters.parent[c])
+    axis = structure.joints.axes[clusters.seated[c]]
+    turn = motion.rotation[parent].T @ motion.rotation[c]
+    spin = motion.rotation[c].T @ (motion.spin[c] - motion.spin[parent])
+    if seat == "slider":
+        return _slide(clusters, motion, c, axis)
+    quaternion = quaternion_of(turn)
+    if seat == "ball":
+        return JointPlace(place=quaternion, rate=spin)
+    if seat == "constant_velocity":
+        return _swing(quaternion, spin, swing_axes(structure, clusters, c))
+    angle = 2.0 * np.arctan2(quaternion[1:] @ axis, quaternion[0])
+    return JointPlace(place=np.array([angle]), rate=np.array([spin @ axis]))
+
+
+def entered_place(
+    structure: Structure,
+    clusters: Clusters,
+    motion: Motion,
+    c: int,
+    targets: FloatArray | None,
+) -> JointPlace:
+    """The place of a cluster on its joint as an engine starts from it.
+
+    Poses do not tell how often a joint has turned; where its drive holds a place without limits, it
+    is taken to be at the turn nearest to that.
+
+    Args:
+        structure: The machine.
+        clusters: Its clusters.
+        motion: Their motion.
+        c: A cluster that hangs on another.
+        targets: (D,) what the driven joints aimed at last; None at the start.
+    """
+    found = joint_place(structure, clusters, motion, c)
+    block = clusters.seated[c]
+    joint = structure.parts[block].module.joint
+    if targets is None or joint is None or joint.drive is None or joint.limits is not None:
+        return found
+    if joint.drive.kind == "position" and seat_of(structure, clusters, c) != "slider":
+        target = targets[structure.joints.driven == block][0] * sign_of(clusters, c)
+        turns = np.round((target - found.place) / (2.0 * np.pi))
+        return JointPlace(place=found.place + 2.0 * np.pi * turns, rate=found.rate)
+    return found
+
+
+def driven_clusters(structure: Structure, clusters: Clusters) -> list[int]:
+    """Clusters that hang on their parents by a joint that follows a target."""
+    found = []
+    for c in np.flatnonzero(clusters.parent >= 0).tolist():
+        module = structure.parts[clusters.seated[c]].module
+        if module.motor is not None or (module.joint is not None and module.joint.drive):
+            found.append(c)
+    return found
+
+
+def engaged(structure: Structure, clusters: Clusters) -> list[tuple[int, int, float]]:
+    """Clusters that hang by cogs whose teeth engage now, and the speed of the second per the first.
+
+    Cogs engage as long as both turn on the same cluster. The speeds are those of the clusters
+    against their parents.
+    """
+    place = {int(block): c for c, block in enumerate(clusters.seated) if block >= 0}
+    base = clusters.cluster_of[structure.members.first]
+    found = []
+    for mesh in structure.joints.meshes:
+        c, d = place.get(mesh.first), place.get(mesh.second)
+        if c is None or d is None or base[clusters.joint[c]] != base[clusters.joint[d]]:
+            continue
+        found.append((c, d, mesh.ratio * sign_of(clusters, c) * sign_of(clusters, d)))
+    return found
+
+
+def _slide(clusters: Clusters, motion: Motion, c: int, axis: FloatArray) -> JointPlace:
+    parent = int(clusters.parent[c])
+    along = motion.rotation[parent] @ axis
+    centers = motion.centers_of_mass(clusters)
+    carried = cross(motion.spin[parent], centers[c] - centers[parent])
+    speed = (motion.velocity[c] - motion.velocity[parent] - carried) @ along
+    shift = (motion.position[c] - motion.position[parent]) @ along
+    return JointPlace(place=np.array([shift]), rate=np.array([speed]))
+
+
+def _swing(quaternion: FloatArray, spin: FloatArray, axes: FloatArray) -> JointPlace:
+    first, second = axes[:, 0], axes[:, 1]
+    w, x, y = quaternion[0], quaternion[1:] @ first, quaternion[1:] @ second
+    a, c = float(np.arctan2(x, w)), 2.0 * math.asin(min(max(float(y), -1.0), 1.0))
+    # The axes as the swung body sees them: each is turned back by the hinges after it.
+    back = turn_about(first, -a)
+    seen = np.column_stack([back @ turn_about(second, -c) @ first + first, back @ second])
+    (of_first, of_second), *_ = np.linalg.lstsq(seen, spin, rcond=None)
+    return JointPlace(place=np.array([a, c, a]), rate=np.array([of_first, of_second, of_first]))

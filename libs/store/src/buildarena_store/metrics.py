@@ -1,0 +1,217 @@
+"""Metrics of the whole service, for monitoring: read from what the jobs say, so never lost."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+from sqlalchemy import Connection, func, select, text
+
+from buildarena_store import events
+from buildarena_store.database import Database
+from buildarena_store.states import JobState
+from buildarena_store.tables import jobs, sweeps
+
+GATHER_LOCK: Final = 0x636F756E74  # "count": one process at a time adds changes to the counts
+STAGE_SECONDS = (0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 30, 60, 120, 300, 600, 1800, 3600)
+"""Bounds of the classes of stage durations, in seconds; each class has its lower bound in it."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JobCount:
+    """How many jobs are in one place; fields are those of a job, empty where they are null."""
+
+    state: str
+    stage: str
+    outcome: str
+    reason: str
+    jobs: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class QueueDepth:
+    """What waits in a queue, and for how long the oldest has."""
+
+    queue: str
+    jobs: int
+    oldest_s: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ModelUse:
+    """What a model's sessions used so far."""
+
+    model: str
+    requests: int
+    input_tokens: int
+    output_tokens: int
+    cost_usd: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StageTimes:
+    """How long attempts at jobs took.
+
+    Attributes:
+        stage: ``construct`` or ``simulate``.
+        result: How they ended.
+        counts: Attempts in each class of STAGE_SECONDS, and in the last those above all.
+        total_s: Sum of their durations.
+    """
+
+    stage: str
+    result: str
+    counts: Sequence[int]
+    total_s: float
+
+    @classmethod
+    def none(cls, stage: str, result: str) -> StageTimes:
+        """No attempt of this stage that ended so."""
+        return cls(stage=stage, result=result, counts=[0] * (len(STAGE_SECONDS) + 1), total_s=0.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MetricValues:
+    """All of them, from one moment."""
+
+    jobs: Sequence[JobCount]
+    queues: Sequence[QueueDepth]
+    models: Sequence[ModelUse]
+    stages: Sequence[StageTimes]
+    sweeps: dict[str, int]
+    running: dict[str, int]
+
+
+class Metrics:
+    """Reads the service's figures, which triggers keep: nothing is counted over all jobs."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def read(self) -> MetricValues:
+        """All figures."""
+        self.gather()
+        with self._database.transaction() as connection:
+            connection.execute(text("SET TRANSACTION ISOLATION LEVEL REPEATABLE READ READ ONLY"))
+            kept = _Stored.read(connection)
+            return MetricValues(
+                jobs=_jobs(kept),
+                queues=_queues(connection, kept),
+                models=_models(kept),
+                stages=_stages(kept),
+                sweeps=_sweeps(connection),
+                running=_running(connection),
+            )
+
+    def gather(self) -> None:
+        """Adds what changed to the counts; when another process is about it, that one does."""
+        with self._database.transaction() as connection:
+            if connection.execute(select(func.pg_try_advisory_xact_lock(GATHER_LOCK))).scalar():
+                connection.execute(_GATHER)
+
+
+_GATHER: Final = text(
+    """
+    WITH gone AS (DELETE FROM figure_changes RETURNING *)
+    INSERT INTO figures (kind, key, a, b, c, d)
+    SELECT kind, key, sum(a), sum(b), sum(c), sum(d) FROM gone GROUP BY kind, key
+    ON CONFLICT (kind, key) DO UPDATE SET a = figures.a + excluded.a, b = figures.b + excluded.b,
+        c = figures.c + excluded.c, d = figures.d + excluded.d
+    """
+)
+_STORED: Final = text(
+    """
+    SELECT kind, key, sum(a) AS a, sum(b) AS b, sum(c) AS c, sum(d) AS d
+    FROM (SELECT * FROM figures UNION ALL SELECT * FROM figure_changes) AS both_kinds
+    GROUP BY kind, key ORDER BY kind, key
+    """
+)
+
+Amounts = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class _Stored:
+    """Kept figures by what they are of."""
+
+    by_kind: Mapping[str, Sequence[tuple[Sequence[Any], Amounts]]]
+
+    @staticmethod
+    def read(connection: Connection) -> _Stored:
+        found: dict[str, list[tuple[Sequence[Any], Amounts]]] = {}
+        for row in connection.execute(_STORED):
+            amounts = float(row.a), float(row.b), float(row.c), float(row.d)
+            found.setdefault(row.kind, []).append((row.key, amounts))
+        return _Stored(found)
+
+    def of(self, kind: str) -> Sequence[tuple[Sequence[Any], Amounts]]:
+        return self.by_kind.get(kind, ())
+
+
+def _jobs(kept: _Stored) -> list[JobCount]:
+    counts: Counter[tuple[str, str, str, str]] = Counter()
+    for (state, stage, outcome, reason, _), amounts in kept.of("jobs"):
+        counts[state, stage, outcome, reason] += int(amounts[0])
+    return [
+        JobCount(state=state, stage=stage, outcome=outcome, reason=reason, jobs=number)
+        for (state, stage, outcome, reason), number in counts.items()
+        if number
+    ]
+
+
+def _queues(connection: Connection, kept: _Stored) -> list[QueueDepth]:
+    depths: Counter[str] = Counter()
+    for (state, _, _, _, queue), amounts in kept.of("jobs"):
+        if state == JobState.QUEUED:
+            depths[queue] += int(amounts[0])
+    found = []
+    for queue, number in sorted(depths.items()):
+        oldest = select(func.min(jobs.c.available_at)).where(
+            jobs.c.state == JobState.QUEUED, jobs.c.queue == queue
+        )
+        waited = func.greatest(func.extract("epoch", events.now - oldest.scalar_subquery()), 0)
+        oldest_s = connection.execute(select(waited)).scalar()
+        if number:
+            found.append(QueueDepth(queue=queue, jobs=number, oldest_s=float(oldest_s or 0.0)))
+    return found
+
+
+def _models(kept: _Stored) -> list[ModelUse]:
+    return [
+        ModelUse(
+            model=model,
+            requests=int(requests),
+            input_tokens=int(input_tokens),
+            output_tokens=int(output_tokens),
+            cost_usd=cost_usd,
+        )
+        for (model,), (requests, input_tokens, output_tokens, cost_usd) in kept.of("models")
+    ]
+
+
+def _stages(kept: _Stored) -> list[StageTimes]:
+    found: dict[tuple[str, str], tuple[list[int], float]] = {}
+    for (stage, result, number), (attempts, seconds, _, _) in kept.of("stages"):
+        counts, total = found.get((stage, result), ([0] * (len(STAGE_SECONDS) + 1), 0.0))
+        counts[number] += int(attempts)
+        found[stage, result] = (counts, total + seconds)
+    return [
+        StageTimes(stage=stage, result=result, counts=counts, total_s=total)
+        for (stage, result), (counts, total) in sorted(found.items())
+    ]
+
+
+def _sweeps(connection: Connection) -> dict[str, int]:
+    query = select(sweeps.c.state, func.count().label("sweeps")).group_by(sweeps.c.state)
+    return {row.state: row.sweeps for row in connection.execute(query)}
+
+
+def _running(connection: Connection) -> dict[str, int]:
+    query = (
+        select(jobs.c.queue, func.count().label("jobs"))
+        .where(jobs.c.state == JobState.RUNNING)
+        .group_by(jobs.c.queue)
+    )
+    return {row.queue: row.jobs for row in connection.execute(query)}

@@ -1,0 +1,162 @@
+"""Where attacks take place: a whole service with keys, two tenants, and a hostile provider."""
+
+from __future__ import annotations
+
+import statistics
+import threading
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import httpx
+import psutil
+import yaml
+from support.clients.tenants import WITH_KEYS, Tenant, new_tenant, operator
+from support.providers.stand_in import ProviderStandIn
+from support.servers.stacks import running_stack
+
+from buildarena_cli.local.stack import Stack
+from buildarena_environment.processes import memory_bytes
+from buildarena_store import Database
+
+HOSTILE = "hostile/model"
+MEBI = 1 << 20
+ASK_EVERY_S = 0.02
+
+
+@dataclass
+class Arena:
+    """What scenarios work on.
+
+    Attributes:
+        provider: What the hostile model's requests reach.
+        sizes: How much of everything, by name.
+    """
+
+    stack: Stack
+    database: Database
+    operator: Tenant
+    attacker: Tenant
+    innocent: Tenant
+    provider: ProviderStandIn
+    sizes: Mapping[str, float]
+    folder: Path
+    bystander: Bystander = field(init=False)
+
+    def process(self, name: str) -> psutil.Process:
+        """A managed process by its name."""
+        (managed,) = [m for m in self.stack.supervisor.managed if m.name == name]
+        assert managed.process is not None
+        return psutil.Process(managed.process.pid)
+
+    def memory(self) -> dict[str, float]:
+        """MiB of each process, the largest of those that fork."""
+        found = {}
+        for managed in self.stack.supervisor.managed:
+            with suppress(psutil.Error, AttributeError):
+                process = psutil.Process(managed.process.pid)  # type: ignore[union-attr]
+                family = [process, *process.children(recursive=True)]
+                found[managed.name] = max(map(memory_bytes, family)) / MEBI
+        return found
+
+
+@dataclass
+class Tried:
+    """What came of a scenario.
+
+    Attributes:
+        tried: What was tried, in words.
+        refused: What came of it, in words.
+        wrong: What should not be.
+    """
+
+    tried: str
+    refused: str = ""
+    wrong: list[str] = field(default_factory=list)
+
+    def require(self, condition: object, what: str) -> None:
+        """Notes something that is wrong."""
+        if not condition:
+            self.wrong.append(what)
+
+
+class Bystander(threading.Thread):
+    """An innocent caller: lists jobs all the time, and notes how long it took."""
+
+    def __init__(self, tenant: Tenant) -> None:
+        super().__init__(name="bystander")
+        self._tenant, self._stopped, self._lock = tenant, threading.Event(), threading.Lock()
+        self._times: list[float] = []
+        self._failed = 0
+
+    def run(self) -> None:
+        while not self._stopped.wait(ASK_EVERY_S):
+            started = time.monotonic()
+            try:
+                good = self._tenant.ask("GET", "/v1/jobs?limit=20").status_code == 200
+            except httpx.TransportError:
+                good = False
+            with self._lock:
+                self._times.append(time.monotonic() - started)
+                self._failed += not good
+
+    def take(self) -> tuple[float, int, int]:
+        """99th percentile in seconds, requests, and failures since it was last asked."""
+        with self._lock:
+            times, failed = self._times, self._failed
+            self._times, self._failed = [], 0
+        high = statistics.quantiles(times, n=100)[98] if len(times) > 1 else 0.0
+        return high, len(times), failed
+
+    def stop(self) -> None:
+        self._stopped.set()
+        self.join()
+
+
+@contextmanager
+def arena(folder: Path, sizes: Mapping[str, float], **settings: Any) -> Iterator[Arena]:
+    """A running service with all of it.
+
+    Args:
+        folder: Where its data lies.
+        sizes: How much of everything, by name.
+        settings: Further settings of the service.
+    """
+    with ExitStack() as running:
+        provider = running.enter_context(ProviderStandIn())
+        models = folder / "models.yaml"
+        entry = {"name": HOSTILE, "provider": "hostile", "model": "m"}
+        wire = {"wire": "openai", "base_url": f"{provider.url}/v1"}
+        models.write_text(yaml.safe_dump({"models": [entry], "providers": {"hostile": wire}}))
+        stack = running.enter_context(
+            running_stack(
+                folder,
+                **WITH_KEYS,
+                models_file=models,
+                sessions_per_worker=40,
+                **settings,
+            )
+        )
+
+        def client() -> httpx.Client:
+            return running.enter_context(httpx.Client(base_url=stack.url, timeout=60))
+
+        database = Database(stack.environment["BUILDARENA_DATABASE_URL"])
+        running.callback(database.close)
+        found = Arena(
+            stack=stack,
+            database=database,
+            operator=operator(client()),
+            attacker=new_tenant(client(), "attacker"),
+            innocent=new_tenant(client(), "innocent"),
+            provider=provider,
+            sizes=sizes,
+            folder=folder,
+        )
+        found.bystander = Bystander(replace(found.innocent, client=client()))
+        found.bystander.start()
+        running.callback(found.bystander.stop)
+        yield found

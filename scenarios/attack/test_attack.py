@@ -1,0 +1,50 @@
+"""The attack at a small size; `make attack` does it at full size."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from scenarios.attack.arena import Arena, arena
+from scenarios.attack.run import small_disk
+from scenarios.attack.scenarios import SCENARIOS
+from support.long_tests import long
+
+SMALL = {
+    "jobs": 60,
+    "streams": 60,
+    "archives": 6,
+    "exports": 12,
+    "boards": 20,
+    "verifications": 60,
+    "flood_s": 1.0,
+    "bomb_mib": 64,
+    "broker_s": 3,
+}
+
+
+@pytest.fixture(scope="module")
+def place() -> Iterator[Arena]:
+    # Postgres must reach it as another user: a folder of pytest's is closed to others.
+    with (
+        tempfile.TemporaryDirectory(prefix="buildarena-attack-") as name,
+        small_disk(Path(name) / "disk") as disk,
+        arena(Path(name), SMALL, artifacts_url=str(disk)) as found,
+    ):
+        yield found
+
+
+@pytest.mark.xdist_group("attack")
+@pytest.mark.timeout(180)
+@pytest.mark.parametrize(
+    "name", [long(name) if name.startswith("killed") else name for name in SCENARIOS]
+)
+def test_nothing_goes_wrong(place, name) -> None:
+    place.bystander.take()
+    tried = SCENARIOS[name](place)
+    _, asked, failed = place.bystander.take()
+    assert tried.wrong == [], tried
+    assert asked > 0
+    assert failed == 0

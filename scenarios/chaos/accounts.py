@@ -1,0 +1,113 @@
+"""What the database must say after a fire, in queries: each returns what is wrong."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from scenarios.chaos.faults import WORKERS, Strike
+from sqlalchemy import text
+
+from buildarena_store import Database
+
+WRONG = {
+    "jobs that have not ended": "SELECT id FROM jobs WHERE state <> 'done'",
+    "jobs that ended without a score": (
+        "SELECT id FROM jobs WHERE outcome IN ('errored', 'cancelled') OR success IS NULL"
+    ),
+    "jobs that ended more than once": (
+        "SELECT job_id FROM events WHERE kind = 'done' GROUP BY job_id HAVING count(*) > 1"
+    ),
+    "jobs that entered the leaderboard more than once, or changed there": (
+        "SELECT job_id FROM board_changes GROUP BY job_id "
+        "HAVING count(*) > 1 OR min(kind) <> 'entered'"
+    ),
+    "journal entries written without a hold": (
+        "SELECT j.job_id FROM journal j LEFT JOIN attempts a USING (job_id, token) "
+        "WHERE a.job_id IS NULL OR j.created_at < a.started_at "
+        "OR j.created_at > COALESCE(a.ended_at, 'infinity')"
+    ),
+    "holds of one job at the same time": (
+        "SELECT a.job_id FROM attempts a JOIN attempts b USING (job_id) "
+        "WHERE a.token < b.token AND COALESCE(a.ended_at, 'infinity') > b.started_at"
+    ),
+    "journals with a gap or a double entry": (
+        "SELECT job_id FROM journal GROUP BY job_id "
+        "HAVING count(*) <> max(sequence) + 1 OR count(*) <> count(DISTINCT sequence)"
+    ),
+    "jobs whose account is not their journal's": (
+        "SELECT id FROM jobs WHERE requests <> "
+        "(SELECT count(*) FROM journal WHERE journal.job_id = jobs.id)"
+    ),
+    "finished rollouts that are not those asked for": (
+        "SELECT job_id FROM rollouts WHERE finished_at IS NULL OR success IS NULL"
+    ),
+    "reservations left over": "SELECT job_id FROM reservations",
+}
+
+
+def wrongs(database: Database) -> dict[str, list[str]]:
+    """Jobs with which something is wrong, by what is."""
+    found = {}
+    with database.transaction() as connection:
+        for name, query in WRONG.items():
+            ids = [str(id_) for id_ in connection.execute(text(query)).scalars()]
+            if ids:
+                found[name] = ids[:10]
+    return found
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PickUp:
+    """How a dead worker's job was recovered.
+
+    Attributes:
+        seconds: From the death to the next attempt.
+        waited_s: The part of them from when the hold was found to be over.
+        stage: The job's stage.
+        meanwhile: What else was struck in these seconds.
+    """
+
+    seconds: float
+    waited_s: float
+    stage: str
+    meanwhile: Sequence[str]
+
+
+def pick_ups(database: Database, strikes: Sequence[Strike]) -> list[PickUp]:
+    """How the jobs that dead workers had were recovered, the slowest last."""
+    # A prefork worker's jobs are held by its children.
+    query = text(
+        "SELECT a.worker, a.stage, a.started_at, a.ended_at, (SELECT min(b.started_at) "
+        "FROM attempts b WHERE b.job_id = a.job_id AND b.token > a.token) AS next "
+        "FROM attempts a WHERE a.result = 'lost'"
+    )
+    deaths = [
+        (pid, strike.at) for strike in strikes if strike.name in WORKERS for pid in strike.pids
+    ]
+    found = []
+    with database.transaction() as connection:
+        for row in connection.execute(query):
+            pid = _pid(row.worker)
+            died = [
+                at for dead, at in deaths if dead == pid and row.started_at <= at <= row.ended_at
+            ]
+            if died and row.next is not None:
+                death = min(died)
+                found.append(
+                    PickUp(
+                        seconds=(row.next - death).total_seconds(),
+                        waited_s=(row.next - row.ended_at).total_seconds(),
+                        stage=row.stage,
+                        meanwhile=[s.name for s in strikes if death < s.at < row.next],
+                    )
+                )
+    return sorted(found, key=lambda pick_up: pick_up.seconds)
+
+
+def _pid(worker: str) -> int:
+    """The process of a worker: its id ends with it, a runner's with the slot behind it."""
+    found = re.search(r"([0-9]+)(?:\.[0-9]+)?$", worker)
+    assert found is not None, worker
+    return int(found[1])

@@ -1,0 +1,110 @@
+"""Fire: processes are killed and restarted at random, and messages come twice."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import os
+import random
+import signal
+import threading
+import time
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from typing import Self
+
+import psutil
+import structlog
+from redis import Redis
+from redis.exceptions import RedisError
+
+from buildarena_cli.local.stack import Stack
+
+VICTIMS = ("construct worker", "mujoco worker", "api", "valkey", "postgres")
+WORKERS = ("construct worker", "mujoco worker")
+QUEUES = ("construct", "simulate.mujoco")
+
+log = structlog.get_logger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class Strike:
+    """A process that was ended with its children, and when."""
+
+    name: str
+    pids: frozenset[int]
+    at: datetime
+
+
+@dataclass
+class Fire:
+    """Strikes a running stack every now and then, from a thread; use as a context manager.
+
+    Attributes:
+        stack: What is struck.
+        rng: Chooses victims.
+        every_s: Mean time between strikes.
+        most: After how many strikes it goes out by itself.
+        strikes: Those that were made.
+    """
+
+    stack: Stack
+    rng: random.Random
+    every_s: float
+    most: float = math.inf
+    strikes: list[Strike] = field(default_factory=list)
+    duplicates: int = 0
+    _stop: threading.Event = field(default_factory=threading.Event)
+    _thread: threading.Thread | None = None
+
+    def __enter__(self) -> Self:
+        self._thread = threading.Thread(target=self._burn)
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
+
+    def stop(self) -> None:
+        """Puts the fire out."""
+        self._stop.set()
+        if self._thread is not None:
+            self._thread.join()
+
+    def _burn(self) -> None:
+        # Every kind of victim in turn, in an order of chance: none is left out.
+        turn: list[str] = []
+        while len(self.strikes) < self.most:
+            if self._stop.wait(self.rng.uniform(0.5, 1.5) * self.every_s):
+                return
+            self._duplicate()
+            if not turn:
+                turn = self.rng.sample(VICTIMS, len(VICTIMS))
+            self._strike(turn.pop())
+
+    def _strike(self, name: str) -> None:
+        (managed,) = [m for m in self.stack.supervisor.managed if m.name == name]
+        victim = managed.process
+        if victim is None or victim.poll() is not None:
+            return
+        # SIGTERM makes Postgres wait until all who are connected have left.
+        gently = signal.SIGINT if name == "postgres" else signal.SIGTERM
+        how = signal.SIGKILL if self.rng.random() < 0.75 else gently
+        with contextlib.suppress(ProcessLookupError, psutil.NoSuchProcess):
+            children = psutil.Process(victim.pid).children(recursive=True)
+            pids = frozenset({victim.pid, *(child.pid for child in children)})
+            os.kill(victim.pid, how)
+            self.strikes.append(Strike(name, pids, datetime.now(UTC)))
+            log.info("struck", name=name, how=how.name)
+
+    def _duplicate(self) -> None:
+        """Sends waiting messages again."""
+        environment = self.stack.environment
+        try:
+            with Redis.from_url(environment["BUILDARENA_BROKER_URL"], socket_timeout=2) as valkey:
+                for queue in QUEUES:
+                    for message in valkey.lrange(queue, 0, 19):
+                        valkey.rpush(queue, message)
+                        self.duplicates += 1
+        except (RedisError, OSError):
+            time.sleep(0.1)

@@ -1,0 +1,58 @@
+"""What containers may do, and where no secret may stand."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from scenarios.containers.engine import TARGETS, Project
+from scenarios.containers.service import Service
+
+SHORT = 12
+"""Secrets that are shorter could stand somewhere by chance."""
+
+
+def check_confinement(project: Project, services: Sequence[str]) -> dict[str, str]:
+    """Every container runs as an ordinary user, with a read-only root and no capability."""
+    found = {}
+    for name in services:
+        container = project.containers(name)[0]
+        config: dict[str, Any] = project.engine.json("inspect", container)[0]
+        host = config["HostConfig"]
+        assert host["ReadonlyRootfs"], name
+        assert host["CapDrop"] == ["ALL"], (name, host["CapDrop"])
+        assert not host["CapAdd"], (name, host["CapAdd"])
+        assert not host["Privileged"], name
+        assert "no-new-privileges:true" in host["SecurityOpt"], name
+        status = project.engine.run("exec", container, "cat", "/proc/1/status")
+        facts = dict(line.split(":\t", 1) for line in status.splitlines() if ":\t" in line)
+        assert set(facts["Uid"].split()) == {facts["Uid"].split()[0]} != {"0"}, (name, facts["Uid"])
+        assert int(facts["CapEff"], 16) == int(facts["CapBnd"], 16) == 0, (name, facts["CapEff"])
+        written = project.engine.run("exec", container, "touch", "/opt/x", check=False)
+        listed = project.engine.run("exec", container, "ls", "/opt", check=False)
+        assert "x" not in listed.split(), (name, written)
+        found[name] = f"uid {facts['Uid'].split()[0]}, no capabilities, read-only root"
+    return found
+
+
+def check_no_secrets(project: Project, secrets: Mapping[str, str], service: Service) -> None:
+    """No secret stands in an image, a container's environment or command, a log or an answer."""
+    values = {name: text.strip() for name, text in secrets.items() if len(text.strip()) >= SHORT}
+    engine = project.engine
+    places = {
+        f"image {target}": engine.run("history", "--no-trunc", f"buildarena/{target}:current")
+        + engine.run("image", "inspect", f"buildarena/{target}:current")
+        for target in TARGETS
+    }
+    for container in project.containers(running=False):
+        places[f"container {container}"] = engine.run("inspect", container)
+        places[f"processes of {container}"] = engine.run(
+            "top", container, "-eo", "args", check=False
+        )
+    places["logs"] = project.compose("logs", "--no-color")
+    for path in ("/v1/health", "/v1/metrics", "/v1/models", "/v1/tasks"):
+        places[path] = service.ask("GET", path).text
+    assert "GET" in places["logs"] or "stage_done" in places["logs"], "there are no logs to look at"
+    for place, text in places.items():
+        for name, value in values.items():
+            assert value not in text, f"the secret {name} stands in {place}"

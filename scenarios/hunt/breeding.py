@@ -1,0 +1,44 @@
+"""Children of genomes: made and tried in worker processes, which need not load the archive."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scenarios.hunt.genome import Genome
+from scenarios.hunt.mutation import crossed, mutated
+from scenarios.hunt.trial import Finding, Scorer, tried
+from threadpoolctl import threadpool_limits
+
+from buildarena_benchmark import builtin_tasks
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Child:
+    """A genome to make and try, as a worker process gets it.
+
+    Attributes:
+        task: Name of the task.
+        parents: One to mutate, or two to cross and mutate.
+        seed: Of everything that is drawn.
+        scorer: Judges it.
+        changed: Whether it is mutated at all; seeds are not.
+    """
+
+    task: str
+    parents: tuple[Genome, ...]
+    seed: tuple[int, ...]
+    scorer: Scorer
+    changed: bool = True
+
+
+def made(child: Child) -> Finding | None:
+    """Makes a child and tries it; equal children give equal findings in every process."""
+    draw = np.random.default_rng(child.seed)
+    genome = child.parents[0]
+    if len(child.parents) > 1:
+        genome = crossed(genome, child.parents[1], draw)
+    if child.changed:
+        genome = mutated(genome, builtin_tasks()[child.task].category, draw)
+    with threadpool_limits(limits=1):
+        return tried(child.task, genome, child.scorer)

@@ -1,0 +1,151 @@
+"""The gallery: a folder with the archives, the confirmed machines and an index of them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from scenarios.hunt.confirming import Confirmed
+from scenarios.hunt.genome import Genome
+from scenarios.hunt.trial import FULL_MARKS, Finding
+
+from buildarena_benchmark import builtin_tasks
+from buildarena_simulation import SIMULATION_VERSION
+
+BEST: Final = 10
+"""Machines of a category in the index."""
+
+_HEAD: Final = "| machine | task | parts | MuJoCo | PyBullet | seeds | flags | checks |\n|" + (
+    "---|" * 8
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Gallery:
+    """A gallery's folder.
+
+    Attributes:
+        folder: Where it is.
+    """
+
+    folder: Path
+
+    def elites(self, task: str) -> list[Genome]:
+        """The genomes of an earlier search; they are tried anew, as rules may have changed."""
+        path = self._archive(task)
+        if not path.is_file():
+            return []
+        found = json.loads(path.read_text(encoding="utf-8"))["elites"]
+        return [Genome.from_json(elite["genome"]) for elite in found]
+
+    def write_elites(self, task: str, elites: Sequence[Finding], *, trials: int) -> None:
+        """Keeps the best of every kind."""
+        content = {"task": task, "trials": trials, "elites": [e.as_json() for e in elites]}
+        path = self._archive(task)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        spare = path.with_suffix(".new")
+        spare.write_text(json.dumps(content) + "\n", encoding="utf-8")
+        spare.replace(path)
+
+    def picture(self, task: str, key: str) -> Path:
+        """Where a machine's picture is."""
+        folder = self.folder / "machines"
+        folder.mkdir(parents=True, exist_ok=True)
+        return folder / f"{task}-{key}.png"
+
+    def known(self, task: str, key: str) -> Confirmed | None:
+        """A machine that was confirmed before under the rules and physics of today."""
+        path = self.picture(task, key).with_suffix(".json")
+        if not path.is_file():
+            return None
+        content = json.loads(path.read_text(encoding="utf-8"))
+        if content["versions"] != _versions(task):
+            return None
+        machine = path.with_name(f"{path.stem}.machine.json")
+        return Confirmed(
+            task=task,
+            key=key,
+            genome=Genome.from_json(content),
+            document=json.loads(machine.read_text(encoding="utf-8")),
+            scores=content["scores"],
+            parts=content["parts"],
+            robust_share=content["robust_share"],
+            suspicions=tuple(content["suspicions"]),
+        )
+
+    def write_confirmed(self, found: Confirmed) -> None:
+        """Keeps a confirmed machine: its scores with its actions, and its document."""
+        path = self.picture(found.task, found.key).with_suffix(".json")
+        content = {
+            "task": found.task,
+            "versions": _versions(found.task),
+            "scores": found.scores,
+            "parts": found.parts,
+            "robust_share": found.robust_share,
+            "suspicions": found.suspicions,
+            **found.genome.as_json(),
+        }
+        path.with_name(f"{path.stem}.machine.json").write_text(
+            json.dumps(found.document) + "\n", encoding="utf-8"
+        )
+        path.write_text(json.dumps(content) + "\n", encoding="utf-8")
+
+    def write_index(self, confirmed: Iterable[Confirmed]) -> Path:
+        """Writes the index: first what is suspicious, then the best of each category."""
+        good = [found for found in confirmed if found.success]
+        lines = ["# What the hunt found", "", "## Suspects", ""]
+        lines += _table(ranked([f for f in good if f.suspicions])) or ["None.", ""]
+        for category in ("support", "transport", "lift", "mechanisms", "flight"):
+            best = best_of(good, category)
+            lines += [f"## Best of {category}", "", *(_table(best) or ["None.", ""])]
+            lines += [f"![{f.task} {f.key}](machines/{f.task}-{f.key}.png)\n" for f in best]
+        path = self.folder / "index.md"
+        path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        return path
+
+    def _archive(self, task: str) -> Path:
+        return self.folder / "archives" / f"{task}.json"
+
+
+def best_of(confirmed: Iterable[Confirmed], category: str) -> list[Confirmed]:
+    """The best successes of a category, each by its task's full marks."""
+    tasks = builtin_tasks()
+    return ranked([f for f in confirmed if tasks[f.task].category == category])[:BEST]
+
+
+def ranked(confirmed: Iterable[Confirmed]) -> list[Confirmed]:
+    """Best first; among equals, that of fewer parts."""
+    tasks = builtin_tasks()
+
+    def worth(found: Confirmed) -> tuple[float, int, str]:
+        marks = FULL_MARKS[tasks[found.task].scorer]
+        return -round(found.indicator / marks, 3), found.parts, found.key
+
+    return sorted(confirmed, key=worth)
+
+
+def line_of(found: Confirmed) -> str:
+    """A machine as a row of a table."""
+    name = f"{found.task}-{found.key}"
+    figures = [_figure(found.scores[engine]) for engine in ("mujoco", "pybullet")]
+    flags = sorted({flag for told in found.scores.values() for flag in told["flags"]})
+    return (
+        f"| [{name}](machines/{name}.machine.json) | {found.task} | {found.parts} | "
+        f"{figures[0]} | {figures[1]} | {found.robust_share:.0%} | {', '.join(flags)} | "
+        f"{', '.join(found.suspicions)} |"
+    )
+
+
+def _table(rows: Sequence[Confirmed]) -> list[str]:
+    return [_HEAD, *map(line_of, rows), ""] if rows else []
+
+
+def _figure(told: Mapping[str, Any]) -> str:
+    return f"{told['indicator']:.1f}" if told["success"] else "fails"
+
+
+def _versions(task: str) -> list[str]:
+    return [builtin_tasks()[task].version, SIMULATION_VERSION]

@@ -1,0 +1,100 @@
+"""What the search starts from: the reference machines and the past exploits of a category."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from scenarios.hunt.genome import Genome, grown
+
+from buildarena_benchmark import builtin_tasks
+from buildarena_geometry import Machine
+
+DATA: Final = Path(__file__).parents[2] / "tests" / "data"
+EXPLOITS: Final = DATA / "exploits"
+_REFERENCES: Final = DATA / "simulation"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Exploit:
+    """A machine that once earned points without building what is asked for.
+
+    Attributes:
+        name: The file's.
+        task: The task it is for.
+        once: What it was once worth.
+        why: Why that is an exploit.
+        seconds: How long a trial must be to show that it is closed.
+        most: What it may be worth now, on every engine; 0 for what must fail.
+        genome: What builds it.
+    """
+
+    name: str
+    task: str
+    once: str
+    why: str
+    seconds: float
+    most: float
+    genome: Genome
+
+    @property
+    def machine(self) -> Machine:
+        """The machine, with every action that its file has.
+
+        Raises:
+            ValueError: An action is refused.
+        """
+        machine, kept = grown(self.genome, most=sys.maxsize)
+        if kept.as_json() != self.genome.as_json():
+            raise ValueError(f"{self.name}: not all of its actions are accepted")
+        return machine
+
+
+def exploits(folder: Path = EXPLOITS) -> list[Exploit]:
+    """The stored exploits by name."""
+    return [_exploit(path, _content(path)) for path in sorted(folder.glob("*.json"))]
+
+
+def seeds_of(task_name: str) -> list[Genome]:
+    """Genomes to start from: all that suit the task's category and number of sub-structures."""
+    tasks = builtin_tasks()
+    task = tasks[task_name]
+    whole = task.constraints.min_sub_structures < 2
+    found = [Genome(actions=[{"op": "start", "params": {}, "makes": "1"}])] if whole else []
+    for other, genome in _stored():
+        if tasks[other].category == task.category and bool(genome.sub_structures) != whole:
+            found.append(genome)
+    return found
+
+
+def _stored() -> Iterator[tuple[str, Genome]]:
+    for path in [*sorted(_REFERENCES.glob("*.json")), *sorted(EXPLOITS.glob("*.json"))]:
+        content = _content(path)
+        if "task" in content:
+            yield content["task"], Genome.from_json(content)
+
+
+def _content(path: Path) -> dict[str, Any]:
+    return dict(json.loads(path.read_text(encoding="utf-8")))
+
+
+def _exploit(path: Path, content: dict[str, Any]) -> Exploit:
+    missing = {"task", "once", "why", "seconds", "most", "actions"} - content.keys()
+    if missing or content.get("task") not in builtin_tasks():
+        raise ValueError(
+            f"{path}: an exploit has a built-in task, once, why, seconds, most and actions; "
+            f"missing or wrong: {', '.join(sorted(missing)) or 'task'}"
+        )
+    return Exploit(
+        name=path.stem,
+        task=content["task"],
+        once=content["once"],
+        why=content["why"],
+        seconds=float(content["seconds"]),
+        most=float(content["most"]),
+        genome=Genome.from_json(content),
+    )

@@ -1,0 +1,260 @@
+"""Soak: a service under steady load and steady kills; nothing lost, and no process that grows.
+
+Beside the processes that are killed run some that never are, in which a leak would show.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import random
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import asdict
+from pathlib import Path
+
+import httpx
+import psutil
+from scenarios.chaos.accounts import wrongs
+from scenarios.chaos.faults import Fire
+from scenarios.soak.memory import MEBI, Watch, growth
+from support.servers.stacks import running_stack, wait_until
+
+from buildarena_cli.local import free_port
+from buildarena_cli.local.stack import Stack
+from buildarena_store import Database
+
+BATCH = 100
+MIX = (("builtin/random", 0.6), ("builtin/idle", 0.3), ("builtin/expert", 0.1))
+"""Models and their shares: most sessions end early, a tenth is simulated."""
+MAX_MIB = 400
+SAMPLE_S = 5.0
+READ_EVERY_S = 0.5
+STEADY = {
+    "api, never killed": ("buildarena_api",),
+    "construct worker, never killed": ("buildarena_worker",),
+    "simulation worker, never killed": ("buildarena_simworker", "--simulator", "mujoco"),
+}
+
+
+@contextmanager
+def steady_processes(stack: Stack, port: int) -> Iterator[dict[str, psutil.Process]]:
+    """A further process of each kind, which nobody kills."""
+    environment = {**stack.environment, "BUILDARENA_PORT": str(port)}
+    with ExitStack() as ended:
+        found = {}
+        for name, words in STEADY.items():
+            log = ended.enter_context((stack.logs / f"{words[0]}-steady.log").open("ab"))
+            process = subprocess.Popen(
+                [sys.executable, "-m", *words], env=environment, stdout=log, stderr=log
+            )
+            ended.callback(process.wait, timeout=60)
+            ended.callback(process.terminate)
+            found[name] = psutil.Process(process.pid)
+        yield found
+
+
+def processes_of(stack: Stack, steady: Mapping[str, psutil.Process]) -> dict[str, psutil.Process]:
+    """Every process by name: steady ones and their children, and those that are killed."""
+    parents = dict(steady)
+    for managed in stack.supervisor.managed:
+        if managed.process is not None:
+            with suppress(psutil.Error):
+                parents[f"{managed.name}, killed"] = psutil.Process(managed.process.pid)
+    found = dict(parents)
+    for name, process in parents.items():
+        with suppress(psutil.Error):
+            for number, child in enumerate(sorted(process.children(), key=lambda c: c.pid), 1):
+                found[f"{name}: child {number}"] = child
+    return found
+
+
+class Reader(threading.Thread):
+    """Reads lists, sweeps and streams of the API that is never killed, as dashboards do."""
+
+    def __init__(self, url: str, sweeps: list[str]) -> None:
+        super().__init__(name="reader")
+        self.answers: Counter[int] = Counter()
+        self._url, self._sweeps, self._stop_now = url, sweeps, threading.Event()
+
+    def run(self) -> None:
+        rng = random.Random(0)
+        with httpx.Client(base_url=self._url, timeout=60) as client:
+            while not self._stop_now.wait(READ_EVERY_S):
+                paths = ["/v1/jobs?limit=50", "/v1/sweeps?limit=5", "/v1/health"]
+                if self._sweeps:
+                    sweep = rng.choice(self._sweeps[-20:])
+                    paths += [f"/v1/sweeps/{sweep}", f"/v1/jobs?sweep={sweep}"]
+                    if rng.random() < 0.1:
+                        self._listen(client, sweep)
+                with suppress(httpx.TransportError):
+                    self.answers[client.get(rng.choice(paths)).status_code] += 1
+
+    def _listen(self, client: httpx.Client, sweep: str) -> None:
+        with (
+            suppress(httpx.TransportError),
+            client.stream("GET", f"/v1/sweeps/{sweep}/events") as stream,
+        ):
+            for _, _line in zip(range(20), stream.iter_lines(), strict=False):
+                pass
+
+    def stop(self) -> None:
+        self._stop_now.set()
+        self.join()
+
+
+def submit(url: str, number: int, rng: random.Random) -> str:
+    """Submits a batch of jobs to either API, again until it is accepted."""
+    model = rng.choices([name for name, _ in MIX], [share for _, share in MIX])[0]
+    payload = {
+        "name": f"soak {number}",
+        "tasks": ["lift-1"],
+        "models": [model],
+        "seeds": list(range(number * BATCH, (number + 1) * BATCH)),
+        "simulator": "mujoco",
+        "budget": {"max_requests": 1_000_000},
+    }
+
+    def ask() -> str | None:
+        with suppress(httpx.TransportError):
+            headers = {"Idempotency-Key": f"soak-{number}"}
+            answer = httpx.post(f"{url}/v1/sweeps", json=payload, headers=headers, timeout=30)
+            return answer.json()["id"] if answer.status_code == 202 else None
+        return None
+
+    return str(wait_until(ask, 120, f"batch {number} is accepted"))
+
+
+def ended_jobs(database: Database) -> int:
+    with database.statement() as connection:
+        query = "SELECT count(*) FROM jobs WHERE state = 'done'"
+        return int(connection.exec_driver_sql(query).scalar_one())
+
+
+BOOKS = {
+    "sweeps that spent less than was journalled at their expense": (
+        "SELECT id FROM budgets WHERE spent_requests < "
+        "(SELECT count(*) FROM journal WHERE payer = budgets.id)"
+    ),
+    "jobs whose tokens are not their journal's": (
+        "SELECT id FROM jobs WHERE (requests, input_tokens, output_tokens, cost_usd) <> "
+        "(SELECT count(*), COALESCE(sum(input_tokens), 0), COALESCE(sum(output_tokens), 0), "
+        "COALESCE(sum(cost_usd), 0) FROM journal WHERE job_id = jobs.id)"
+    ),
+}
+
+
+def main() -> int:
+    """Runs the soak; 0 when every bar was met."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seconds", type=float, default=3600)
+    parser.add_argument("--jobs", type=int, default=20_000)
+    parser.add_argument("--every", type=float, default=10, help="seconds between kills")
+    parser.add_argument("--json", type=Path)
+    given = parser.parse_args()
+    rng = random.Random(1)
+    batches = max(1, given.jobs // BATCH)
+    with tempfile.TemporaryDirectory(prefix="buildarena-soak-") as name, ExitStack() as running:
+        stack = running.enter_context(running_stack(Path(name), lease_s=5.0))
+        database = Database(stack.environment["BUILDARENA_DATABASE_URL"])
+        port = free_port()
+        steady = running.enter_context(steady_processes(stack, port))
+        url = f"http://127.0.0.1:{port}"
+        wait_until(lambda: _answers(url), 60, "the steady API answers")
+        sweeps: list[str] = []
+        reader = Reader(url, sweeps)
+        reader.start()
+        running.callback(reader.stop)
+        watch = running.enter_context(Watch(lambda: processes_of(stack, steady), every_s=SAMPLE_S))
+        fire = running.enter_context(Fire(stack=stack, rng=rng, every_s=given.every))
+        started = time.monotonic()
+        for number in range(batches):
+            due = started + given.seconds * number / batches
+            time.sleep(max(0.0, due - time.monotonic()))
+            sweeps.append(submit((stack.url, url)[number % 2], number, rng))
+            if number % 10 == 0:
+                _tell(f"{number * BATCH} submitted, {len(fire.strikes)} kills")
+        time.sleep(max(0.0, started + given.seconds - time.monotonic()))
+        fire.stop()
+        wait_until(lambda: _reachable(database), 60, "the last kill is over")
+        wait_until(lambda: ended_jobs(database) == batches * BATCH, 1800, "every job has ended")
+        seconds = time.monotonic() - started
+        figures = _figures(database, watch, fire, reader)
+        figures |= {"jobs": batches * BATCH, "seconds": round(seconds)}
+        database.close()
+    if given.json:
+        given.json.parent.mkdir(parents=True, exist_ok=True)
+        given.json.write_text(json.dumps(figures, indent=1))
+    _tell(json.dumps(figures, indent=1))
+    return int(bool(figures["failures"]))
+
+
+def _figures(database: Database, watch: Watch, fire: Fire, reader: Reader) -> dict[str, object]:
+    wrong = wrongs(database)
+    with database.transaction() as connection:
+        for name, query in BOOKS.items():
+            ids = list(connection.exec_driver_sql(query).scalars())
+            if ids:
+                wrong[name] = ids[:10]
+    memory = {
+        name: growth(samples)
+        for name, samples in sorted(watch.samples.items())
+        if len(samples) >= 8
+    }
+    failures = [f"books: {name}" for name in wrong]
+    failures += [
+        f"{name} had {found.peak_mib:.0f} MiB"
+        for name, found in memory.items()
+        if found.peak_mib > MAX_MIB
+    ]
+    failures += [
+        f"{name} grew by {found.growth_mib:.1f} MiB, noise {found.noise_mib:.1f}"
+        for name, found in memory.items()
+        if found.grows and "never killed" in name
+    ]
+    return {
+        "kills": dict(sorted(Counter(strike.name for strike in fire.strikes).items())),
+        "messages_duplicated": fire.duplicates,
+        "answers_of_the_steady_api": dict(reader.answers),
+        "wrong": wrong,
+        "memory": {
+            name: {key: round(value, 1) for key, value in asdict(found).items()}
+            for name, found in memory.items()
+        },
+        "bars": {"most_mib": MAX_MIB, "grows": "beyond noise, where never killed"},
+        "failures": failures,
+        "machine": {
+            "processors": os.cpu_count(),
+            "memory_mib": psutil.virtual_memory().total // MEBI,
+        },
+    }
+
+
+def _answers(url: str) -> bool:
+    with suppress(httpx.TransportError):
+        return httpx.get(f"{url}/v1/health").status_code == 200
+    return False
+
+
+def _reachable(database: Database) -> bool:
+    try:
+        database.require_schema()
+    except Exception:  # noqa: BLE001 - whatever is wrong, it is tried again
+        return False
+    return True
+
+
+def _tell(text: str) -> None:
+    sys.stdout.write(f"{text}\n")
+    sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

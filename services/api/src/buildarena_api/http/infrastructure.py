@@ -1,0 +1,130 @@
+"""Metrics of what the service stands on: workers, stores, disk and database connections.
+
+Workers have no port: what they know of themselves they report to the database, and is read there.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Final
+
+from prometheus_client.core import GaugeMetricFamily, Metric
+from prometheus_client.registry import Collector
+from sqlalchemy import Engine
+from sqlalchemy.pool import QueuePool
+
+from buildarena_pipeline.runtime.context import Context
+from buildarena_pipeline.runtime.simulators.known import configured_simulators
+from buildarena_store import WorkerInfo
+from buildarena_store.states import CONSTRUCT_QUEUE, simulate_queue
+
+PREFIX: Final = "buildarena_"
+
+
+class InfrastructureMetrics(Collector):
+    """Figures of workers, artifact store, broker, disk and connections.
+
+    Args:
+        context: The process' connections.
+        artifacts_work: Whether artifacts can be written and read.
+        pools: The process' pools of database connections, by what they are for.
+    """
+
+    def __init__(
+        self,
+        context: Context,
+        artifacts_work: Callable[[], bool],
+        pools: Mapping[str, Engine],
+    ) -> None:
+        self._context = context
+        self._artifacts_work = artifacts_work
+        self._pools = pools
+
+    def describe(self) -> Iterable[Metric]:
+        """Nothing in advance: registering must not try the stores."""
+        return ()
+
+    def collect(self) -> Iterable[Metric]:
+        """The figures of this moment."""
+        known = self._context.store.workers.all()
+        yield from self._workers(known)
+        yield self._one(
+            "artifact_store_up",
+            "1 when artifacts can be written and read, else 0.",
+            float(self._artifacts_work()),
+        )
+        broker = self._context.queues.waiting(CONSTRUCT_QUEUE)
+        yield self._one(
+            "broker_up", "1 when the broker answers, else 0.", float(broker is not None)
+        )
+        folder = self._context.settings.artifact_folder
+        disk = shutil.disk_usage(next(at for at in (folder, *folder.parents) if at.exists()))
+        yield self._one(
+            "data_free_bytes",
+            "Free space where artifacts lie, or the data folder where those are in a bucket.",
+            disk.free,
+        )
+        yield self._one("data_size_bytes", "Size of that disk.", disk.total)
+        yield from self._connections()
+
+    def _workers(self, known: Sequence[WorkerInfo]) -> Iterable[Metric]:
+        queues = [
+            CONSTRUCT_QUEUE,
+            *map(simulate_queue, configured_simulators(self._context.settings)),
+        ]
+        alive = [worker for worker in known if worker.alive]
+        serving = Counter(queue for worker in alive for queue in worker.queues)
+        yield self._each(
+            "queue_workers",
+            "Worker processes alive, by the queue they serve.",
+            "queue",
+            {queue: serving[queue] for queue in {*queues, *serving}},
+        )
+        lost = Counter(worker.kind for worker in known if not worker.alive)
+        yield self._each(
+            "workers_lost",
+            "Worker processes that went silent within the last hour and did not sign off.",
+            "kind",
+            {kind: lost[kind] for kind in ("construct", "simulate")},
+        )
+        wrong = [abs(worker.clock_ahead_s) for worker in alive if worker.clock_ahead_s is not None]
+        yield self._one(
+            "worker_clock_error_seconds",
+            "The most that a worker's clock differs from the database's.",
+            max(wrong, default=0.0),
+        )
+        memory = [worker for worker in alive if worker.peak_memory_bytes is not None]
+        peaks: dict[str, float] = {}
+        for worker in memory:
+            peaks[worker.kind] = max(peaks.get(worker.kind, 0.0), worker.peak_memory_bytes or 0.0)
+        yield self._each(
+            "worker_peak_memory_bytes", "The most memory that a worker ever had.", "kind", peaks
+        )
+
+    def _connections(self) -> Iterable[Metric]:
+        used, most = {}, {}
+        for name, engine in self._pools.items():
+            pool = engine.pool
+            if isinstance(pool, QueuePool):
+                used[name] = pool.checkedout()
+                # Pools may grow to twice their size (`buildarena_store.Database`).
+                most[name] = 2 * pool.size()
+        yield self._each(
+            "database_connections_used", "Connections of this process in use.", "pool", used
+        )
+        yield self._each(
+            "database_connections_limit", "Connections that a pool may open.", "pool", most
+        )
+
+    @staticmethod
+    def _one(name: str, what: str, value: float) -> Metric:
+        return GaugeMetricFamily(PREFIX + name, what, value=value)
+
+    @staticmethod
+    def _each(name: str, what: str, label: str, values: Mapping[str, float]) -> Metric:
+        metric = GaugeMetricFamily(PREFIX + name, what, labels=[label])
+        for key, value in sorted(values.items()):
+            metric.add_metric([key], value)
+        return metric

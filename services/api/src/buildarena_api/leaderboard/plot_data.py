@@ -1,0 +1,122 @@
+"""What a board's figures are answered with: the same that reports are drawn from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from buildarena_api.leaderboard.policies import UnderPolicy
+from buildarena_benchmark import Task
+from buildarena_benchmark.flags import ScoringPolicy
+from buildarena_benchmark.leaderboard import Board, OverallRow, Tally, cost_bins_of, failure_row
+from buildarena_store import CellId
+
+
+class _View(BaseModel):
+    model_config = ConfigDict(from_attributes=True)
+
+
+class FailureView(_View):
+    """How the jobs of one model configuration ended."""
+
+    model: str
+    configuration: str
+    outcomes: dict[str, int] = Field(
+        description="Ended jobs by outcome, with its reason where there is one",
+        examples=[{"success": 4, "construction_failed: objection": 1}],
+    )
+    refusals: dict[str, int] = Field(description="Refused actions by class")
+    actions: int
+    refused_actions: int
+
+
+class BinView(_View):
+    """Jobs whose sessions wrote about as much."""
+
+    low: float = Field(description="Fewest output tokens")
+    high: float = Field(description="Most output tokens")
+    trials: int
+    mean: float | None = Field(description="Of the performance; the task's best job has 1")
+    median: float | None
+
+
+class CostView(BaseModel):
+    """Performance in bins of output tokens, over the tasks of a category."""
+
+    category: str
+    bins: list[BinView]
+
+
+class FrontView(_View):
+    """One model configuration's cost and performance over all tasks."""
+
+    model: str
+    configuration: str
+    mean_rank: float | None = Field(
+        description="The smaller, the better; null if a task is missing"
+    )
+    success_rate_mean: float | None
+    cost_usd_mean: float | None
+    output_tokens_mean: float | None
+    pareto: bool = Field(description="No other model is both better and cheaper")
+
+
+class DimensionsView(_View):
+    """Scores along the difficulty dimensions, from 0 (last on every task) to 1 (first)."""
+
+    model: str
+    configuration: str
+    dimensions: dict[str, float]
+
+
+class Figures(UnderPolicy):
+    """What a board's figures are drawn from."""
+
+    track: str | None
+    dimensions: list[DimensionsView] = Field(description="Ranked configurations, the best first")
+    failures: list[FailureView]
+    cost: list[CostView]
+    front: list[FrontView] = Field(description="Cost against performance, the best first")
+
+
+def figures_view(
+    track: str,
+    board: Board,
+    cells: Mapping[CellId, tuple[str, Sequence[Tally]]],
+    *,
+    policy: ScoringPolicy,
+    tasks: Mapping[str, Task],
+) -> Figures:
+    """The figures of a ranked board.
+
+    Args:
+        track: Its track.
+        board: The board.
+        cells: Its cells: model and tallies of each.
+        policy: The scoring policy: how flags were read.
+        tasks: Every task by name.
+    """
+    by_task: dict[str, list[Tally]] = {}
+    by_row: dict[tuple[str, str], list[Tally]] = {}
+    for id_, (model, tallies) in sorted(cells.items()):
+        by_task.setdefault(id_.task, []).extend(tallies)
+        by_row.setdefault((model, id_.configuration), []).extend(tallies)
+    categories = {name: task.category for name, task in tasks.items()}
+    found = cost_bins_of(by_task, policy=policy, categories=categories)
+    failures = [failure_row(*row, tallies) for row, tallies in sorted(by_row.items())]
+    return Figures(
+        track=track,
+        policy=policy,
+        dimensions=[DimensionsView.model_validate(row) for row in _with_dimensions(board)],
+        failures=[FailureView.model_validate(row) for row in failures],
+        cost=[
+            CostView(category=name, bins=[BinView.model_validate(one) for one in bins])
+            for name, bins in sorted(found.items())
+        ],
+        front=[FrontView.model_validate(row) for row in board.overall],
+    )
+
+
+def _with_dimensions(board: Board) -> list[OverallRow]:
+    return [row for row in board.overall if row.dimensions]

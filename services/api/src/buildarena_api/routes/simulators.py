@@ -1,0 +1,51 @@
+"""Routes of simulators: what runs machines here."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+from fastapi import APIRouter
+from pydantic import BaseModel, Field
+
+from buildarena_api.dependencies import ContextDep
+from buildarena_api.http.problems import problem_responses
+from buildarena_pipeline.runtime.simulators.known import known_simulators
+from buildarena_pipeline.runtime.simulators.simulator import SimulatorKind
+from buildarena_simulation import DEFAULT_ENGINE
+from buildarena_store.states import simulate_queue
+
+router = APIRouter(prefix="/v1/simulators", tags=["simulators"])
+
+
+class SimulatorView(BaseModel):
+    """A simulator that jobs can name."""
+
+    name: str = Field(examples=["pybullet"])
+    version: str = Field(
+        description="As tracks have it in their names: trials of two versions are never compared",
+        examples=["3"],
+    )
+    kind: SimulatorKind = Field(description="An engine calculates; a game is played")
+    repeatable: bool = Field(description="Whether the same machine has the same trial again")
+    default: bool = Field(description="Whether jobs that name none are run by it")
+    workers: int = Field(description="Workers that reported within the last 15 seconds")
+    served: bool = Field(description="Whether there is such a worker, so that jobs don't wait")
+
+
+@router.get("", responses=problem_responses(503))
+def list_simulators(context: ContextDep) -> list[SimulatorView]:
+    """Lists what jobs can name as `simulator`, and whether it is served at the moment."""
+    alive = (worker for worker in context.store.workers.all() if worker.alive)
+    serving = Counter(queue for worker in alive for queue in worker.queues)
+    return [
+        SimulatorView(
+            name=simulator.name,
+            version=simulator.version,
+            kind=simulator.kind,
+            repeatable=simulator.repeatable,
+            default=simulator.name == DEFAULT_ENGINE,
+            workers=serving[simulate_queue(simulator.name)],
+            served=serving[simulate_queue(simulator.name)] > 0,
+        )
+        for simulator in known_simulators(context).values()
+    ]

@@ -1,0 +1,177 @@
+"""Waiting for a trial: the database is asked for a runner until there is one."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass, field
+from typing import Final
+
+from fastapi.concurrency import run_in_threadpool
+
+from buildarena_api.http.problems import ProblemError
+from buildarena_pipeline.errors import PermanentError
+from buildarena_pipeline.runtime.context import Context
+from buildarena_pipeline.runtime.simulators.known import find_simulator
+from buildarena_pipeline.runtime.trial_repository import DueTrial, TrialRepository
+from buildarena_store import Lease, StaleLeaseError
+from buildarena_store.states import simulate_queue
+
+LOOK_EVERY_S: Final = 0.3
+"""How often the queues are looked at for all runners of one process that ask for the same."""
+MAX_LEASES: Final = 64
+"""Leases that one key's runners may have at once."""
+MAX_NAMES: Final = 128
+"""Names that one key's runners may have within a minute."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LeaseQuery:
+    """What a runner would do.
+
+    Attributes:
+        simulators: The simulators that it has, each with its version.
+        job_owners: The keys whose jobs it may lease; None for everybody's.
+    """
+
+    simulators: tuple[tuple[str, str], ...]
+    job_owners: tuple[str, ...] | None
+
+
+@dataclass(frozen=True, slots=True)
+class Leased:
+    """A lease, and the trial that is to be run under it."""
+
+    lease: Lease
+    due: DueTrial
+
+
+@dataclass(slots=True)
+class _Turn:
+    """Those who ask for the same take turns: one looks at a time, and none too often."""
+
+    lock: asyncio.Lock = field(default_factory=asyncio.Lock)
+    waiting: int = 0
+    nothing_at: float = -1e9
+    last: str | None = None
+
+
+class LeaseQueue:
+    """Finds trials for runners.
+
+    Args:
+        context: The process' connections.
+    """
+
+    def __init__(self, context: Context) -> None:
+        self._context = context
+        self._trials = TrialRepository.of(context)
+        self._turns: dict[LeaseQuery, _Turn] = {}
+
+    async def granted(
+        self,
+        lease_request: LeaseQuery,
+        *,
+        owner: str,
+        prefix: str,
+        wait_s: float,
+        left: Callable[[], Awaitable[bool]],
+    ) -> Leased | None:
+        """The next trial that fits a lease request, as soon as there is one; None when none came.
+
+        Args:
+            lease_request: What it asks for.
+            owner: The runner, as leases and attempts name it.
+            prefix: That of its key's runners.
+            wait_s: How long to wait for one.
+            left: Whether the runner has left meanwhile: nothing is leased to it then.
+
+        Raises:
+            ProblemError: 429, when the key's runners have as many leases as they may.
+        """
+        again = await run_in_threadpool(self._again, owner, prefix)
+        if again is not None:
+            return again
+        loop = asyncio.get_running_loop()
+        deadline = loop.time() + wait_s
+        turn = self._turns.setdefault(lease_request, _Turn())
+        turn.waiting += 1
+        try:
+            while True:
+                async with turn.lock:
+                    if wait_s and await left():
+                        return None
+                    if loop.time() - turn.nothing_at >= LOOK_EVERY_S or not wait_s:
+                        found = await run_in_threadpool(self._next, lease_request, turn, owner)
+                        if found is not None:
+                            return found
+                        turn.nothing_at = loop.time()
+                if loop.time() >= deadline:
+                    return None
+                await asyncio.sleep(min(LOOK_EVERY_S, max(0.01, deadline - loop.time())))
+        finally:
+            turn.waiting -= 1
+            if not turn.waiting:
+                self._turns.pop(lease_request, None)
+
+    def _again(self, owner: str, prefix: str) -> Leased | None:
+        """The lease that this runner has already: the answer that told of it was lost."""
+        leases = self._context.store.runner_leases
+        held = leases.of(owner)
+        if held is not None:
+            return self._due(held)
+        counts = leases.counts(prefix, besides=owner)
+        if counts["leases"] >= MAX_LEASES or counts["names"] >= MAX_NAMES:
+            raise ProblemError(
+                429,
+                f"the key's runners have {counts['leases']} leases and {counts['names']} names, "
+                f"of {MAX_LEASES} and {MAX_NAMES} that they may have",
+                headers={"Retry-After": "5"},
+            )
+        return None
+
+    def _next(self, lease_request: LeaseQuery, turn: _Turn, owner: str) -> Leased | None:
+        for simulator, version in lease_request.simulators:
+            while (
+                lease := self._claim(lease_request, turn, owner, simulator, version)
+            ) is not None:
+                found = self._due(lease)
+                if found is not None:
+                    return found
+        return None
+
+    def _claim(
+        self, lease_request: LeaseQuery, turn: _Turn, owner: str, simulator: str, version: str
+    ) -> Lease | None:
+        lease = self._context.store.leases.claim(
+            simulate_queue(simulator),
+            owner=owner,
+            last=turn.last,
+            only=lease_request.job_owners,
+            version=version,
+        )
+        if lease is not None:
+            turn.last = lease.job.owner or ""
+        return lease
+
+    def _due(self, lease: Lease) -> Leased | None:
+        """The trial of a lease; None when it needs none, as the job could be moved on at once."""
+        try:
+            due = self._trials.due(lease.job)
+            simulator = find_simulator(self._context, due.request.engine)
+            repeatable = simulator is not None and simulator.repeatable
+            if repeatable and self._trials.repeat(lease, due):
+                return None
+        except StaleLeaseError:
+            return None
+        except PermanentError as error:
+            self._give_up(lease, error)
+            return None
+        except Exception:
+            # Whoever asked gets an error: the job must not wait for this lease's end.
+            self._context.store.leases.hand_back(lease)
+            raise
+        return Leased(lease, due)
+
+    def _give_up(self, lease: Lease, error: PermanentError) -> None:
+        self._context.store.leases.give_up(lease, str(error), reason=error.reason)

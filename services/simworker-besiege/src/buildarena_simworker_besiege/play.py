@@ -1,0 +1,185 @@
+"""Plays one run: load, start, read the log until it ends, stop, clean up; again if need be."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Final
+
+import structlog
+
+from buildarena_besiege import GameRun, LogIncompleteError
+from buildarena_simulation import Trajectory
+from buildarena_simworker_besiege.desktop import Desktop, RunLog
+from buildarena_simworker_besiege.errors import (
+    DesktopError,
+    GameGoneError,
+    StepFailedError,
+)
+from buildarena_simworker_besiege.time_limits import TimeLimits
+
+log = structlog.get_logger(__name__)
+
+ATTEMPTS: Final = 3
+SLOWEST: Final = 10.0
+"""A run may take so many times its own duration by the wall clock."""
+POLL_S: Final = 0.1
+LAGGING: Final = 0.9
+"""A game whose own time passes more slowly than this share of the wall clock's lags."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Played:
+    """A run that was played to its end.
+
+    Attributes:
+        run: What was played.
+        log: What the game said.
+        trajectory: What that tells.
+        pace: Seconds of the game's time that passed in a second of the wall clock's.
+        faults: What went wrong in earlier attempts.
+    """
+
+    run: GameRun
+    log: RunLog
+    trajectory: Trajectory
+    pace: float
+    faults: tuple[str, ...]
+
+
+class RunFailedError(Exception):
+    """No attempt came to a trustworthy end.
+
+    Attributes:
+        screenshots: What the screen showed at each failure, PNG.
+        waits_for_person: Whether only a person can help.
+    """
+
+    def __init__(
+        self, message: str, screenshots: list[bytes], *, waits_for_person: bool = False
+    ) -> None:
+        super().__init__(message)
+        self.screenshots = screenshots
+        self.waits_for_person = waits_for_person
+
+
+def play(
+    desktop: Desktop,
+    make_run: Callable[[int], GameRun],
+    read: Callable[[GameRun, RunLog], Trajectory],
+    *,
+    require_held: Callable[[], None],
+    limits: TimeLimits,
+) -> Played:
+    """Plays a run, from a clean game to a clean game, until its log can be trusted.
+
+    Args:
+        desktop: The game.
+        make_run: Prepares the run for an attempt, each with a run id of its own: lines of an
+            attempt that failed are never taken for another's.
+        read: Makes the trajectory of a log; raises `LogIncompleteError` if it cannot be trusted.
+        require_held: Raises when the job is somebody else's; the game is cleaned up then, too.
+        limits: How long to wait.
+
+    Raises:
+        RunFailedError: No attempt came to an end.
+    """
+    faults: list[str] = []
+    screenshots: list[bytes] = []
+    for attempt in range(ATTEMPTS):
+        run = make_run(attempt)
+        desktop.require_able(run)
+        try:
+            found, pace = _attempt(desktop, run, require_held, limits)
+            trajectory = read(run, found)
+        except (DesktopError, LogIncompleteError) as error:
+            log.warning("run_failed", attempt=attempt, error=str(error))
+            faults.append(str(error))
+            screenshots += _pictures(desktop)
+            _start_clean(desktop, faults)
+            continue
+        except BaseException:
+            _start_clean(desktop, faults)
+            raise
+        return Played(run=run, log=found, trajectory=trajectory, pace=pace, faults=tuple(faults))
+    raise RunFailedError("; ".join(dict.fromkeys(faults)), screenshots)
+
+
+def _attempt(
+    desktop: Desktop, run: GameRun, require_held: Callable[[], None], limits: TimeLimits
+) -> tuple[RunLog, float]:
+    desktop.prepare(run)
+    require_held()
+    desktop.load(run)
+    require_held()
+    desktop.start(run)
+    found = desktop.new_log(run)
+    started = time.monotonic()
+    _follow(desktop, run, found, require_held, limits)
+    elapsed = time.monotonic() - started
+    desktop.stop()
+    found.read(desktop.read_log())
+    desktop.clear()
+    return found, run.duration_s / max(elapsed, 1e-3)
+
+
+def _follow(
+    desktop: Desktop,
+    run: GameRun,
+    found: RunLog,
+    require_held: Callable[[], None],
+    limits: TimeLimits,
+) -> None:
+    """Reads the log until the run is over.
+
+    Raises:
+        DesktopError: It does not begin, or stands still, or its script fails.
+    """
+    started = heard = time.monotonic()
+    newest = 0.0
+    while not _is_over(found, run):
+        require_held()
+        found.read(desktop.read_log())
+        now = time.monotonic()
+        if found.complaints:
+            raise StepFailedError("run the script", f"the game says {found.complaints[0]!r}")
+        if found.time_s > newest:
+            newest, heard = found.time_s, now
+        if not desktop.is_alive():
+            raise GameGoneError("the game ended while the machine ran")
+        if not found.begun and now - started > limits.begin_s:
+            raise StepFailedError("start the simulation", "its first line did not appear")
+        if now - heard > limits.stall_s:
+            raise StepFailedError(
+                "follow the log", f"nothing new for {limits.stall_s:.0f} s after {newest:.1f} s"
+            )
+        if now - started > limits.begin_s + SLOWEST * run.duration_s:
+            raise StepFailedError("follow the log", f"the game is too slow: {newest:.1f} s so far")
+        time.sleep(POLL_S)
+
+
+def _is_over(found: RunLog, run: GameRun) -> bool:
+    return found.ended or found.time_s >= run.duration_s
+
+
+def _pictures(desktop: Desktop) -> list[bytes]:
+    try:
+        picture = desktop.screenshot()
+    except OSError:
+        return []
+    return [] if picture is None else [picture]
+
+
+def _start_clean(desktop: Desktop, faults: list[str]) -> None:
+    """Leaves no machine and no key behind: by a restart, or by hand where that is impossible."""
+    try:
+        desktop.restart()
+    except DesktopError as error:
+        log.warning("restart_failed", error=str(error))
+        if str(error) not in faults:
+            faults.append(str(error))
+        with suppress(DesktopError):
+            desktop.recover()
+            desktop.clear()

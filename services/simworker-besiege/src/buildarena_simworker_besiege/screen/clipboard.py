@@ -1,0 +1,94 @@
+"""The clipboard, also when the program that owns it is frozen."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from typing import Any, Final, Protocol
+
+from buildarena_simworker_besiege.errors import NotSetUpError
+
+HAND_OVER_S: Final = 2.0
+"""How long another program may take to hand over what it copied."""
+
+
+class Clipboard(Protocol):
+    """Text that programs hand to each other."""
+
+    def put(self, text: str) -> None:
+        """Puts a text there."""
+
+    def get(self) -> str | None:
+        """The text that is there; None if its owner does not hand it over."""
+
+    def close(self) -> None:
+        """Lets go of what was put there."""
+
+
+def open_clipboard() -> Clipboard:
+    """This machine's clipboard.
+
+    Raises:
+        NotSetUpError: There is no program to reach it.
+    """
+    return _SystemClipboard() if sys.platform in {"win32", "darwin"} else _X11Clipboard()
+
+
+class _SystemClipboard:
+    """On Windows and macOS the system keeps the text itself."""
+
+    def __init__(self) -> None:
+        import pyperclip
+
+        self._clip: Any = pyperclip
+
+    def put(self, text: str) -> None:
+        try:
+            self._clip.copy(text)
+        except self._clip.PyperclipException as error:
+            raise NotSetUpError(f"the clipboard cannot be used: {error}") from error
+
+    def get(self) -> str | None:
+        return str(self._clip.paste())
+
+    def close(self) -> None:
+        pass
+
+
+class _X11Clipboard:
+    """On X11 a program that copied something hands it over itself, while it lives and answers."""
+
+    def __init__(self) -> None:
+        found = shutil.which("xclip")
+        if found is None:
+            raise NotSetUpError("the clipboard needs the program xclip: install it")
+        self._words = [found, "-selection", "clipboard"]
+        self._owner: subprocess.Popen[bytes] | None = None
+
+    def put(self, text: str) -> None:
+        self.close()
+        self._owner = subprocess.Popen(
+            [*self._words, "-quiet", "-in"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        assert self._owner.stdin is not None  # noqa: S101 - it was asked for
+        self._owner.stdin.write(text.encode())
+        self._owner.stdin.close()
+
+    def get(self) -> str | None:
+        try:
+            done = subprocess.run(
+                [*self._words, "-out"], capture_output=True, timeout=HAND_OVER_S, check=False
+            )
+        except subprocess.TimeoutExpired:
+            return None
+        return done.stdout.decode("utf-8", "replace") if done.returncode == 0 else None
+
+    def close(self) -> None:
+        if self._owner is not None:
+            self._owner.terminate()
+            self._owner.wait()
+            self._owner = None

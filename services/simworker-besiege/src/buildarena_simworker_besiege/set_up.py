@@ -1,0 +1,43 @@
+"""Hands on the game of this machine, as its settings say."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from buildarena_simworker_besiege.desktop import Desktop
+from buildarena_simworker_besiege.errors import NotSetUpError
+from buildarena_simworker_besiege.screen.calibration import load_calibration
+from buildarena_simworker_besiege.settings import BesiegeSettings
+
+
+def make_desktop(settings: BesiegeSettings) -> tuple[Desktop, Mapping[str, Any]]:
+    """The game, and what a manifest should say of how it is driven.
+
+    Raises:
+        NotSetUpError: Something is missing; the message says what to do.
+    """
+    folder = settings.machines_folder
+    if folder is None or not folder.is_dir():
+        raise NotSetUpError(
+            f"there is no folder of machine files {folder}: set BUILDARENA_BESIEGE_FOLDER to the "
+            "game's folder, or BUILDARENA_BESIEGE_MACHINES to the folder itself"
+        )
+    if settings.desktop == "headless":
+        from buildarena_simworker_besiege.headless import HeadlessDesktop
+
+        return HeadlessDesktop(settings), {"desktop": "headless"}
+    from buildarena_simworker_besiege.screen.hands import Hands
+    from buildarena_simworker_besiege.screen.window import WindowDesktop
+    from buildarena_simworker_besiege.screen.windows import open_windows
+
+    calibration = load_calibration(settings.calibration_file)
+    hands = Hands(settings.pace)
+    desktop = WindowDesktop(settings, calibration, hands, open_windows())
+    facts = {
+        "desktop": "window",
+        "calibration": calibration.digest,
+        "screen": "x".join(map(str, hands.screen_size())),
+        "log": "window" if settings.log_file is None else "file",
+    }
+    return desktop, facts

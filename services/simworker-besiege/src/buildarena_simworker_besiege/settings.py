@@ -1,0 +1,112 @@
+"""What the runner must know of the game on its machine, read from ``BUILDARENA_BESIEGE_*``."""
+
+from __future__ import annotations
+
+import hashlib
+import shlex
+import sys
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field
+from pydantic_settings import BaseSettings, SettingsConfigDict
+
+from buildarena_simworker_besiege.time_limits import TimeLimits
+
+LEVEL_FIELD = "{level}"
+"""Stands in the game's command for the level file to open; "" for the sandbox."""
+
+
+class BesiegeSettings(BaseSettings):
+    """What the owner of a machine with the game can set."""
+
+    model_config = SettingsConfigDict(env_prefix="BUILDARENA_BESIEGE_", extra="ignore")
+
+    game: Annotated[str, Field(description="Version of the game, for example 1.75-23370")] = ""
+    mod: Annotated[str, Field(description="Version of its Lua Scripting Mod")] = ""
+    folder: Annotated[Path | None, Field(description="Folder of the game")] = None
+    machines: Annotated[
+        Path | None, Field(description="Folder of machine files; default FOLDER/SavedMachines")
+    ] = None
+    command: Annotated[
+        str,
+        Field(
+            description="Command that starts the game, so that the runner can restart it; "
+            "{level} in it is replaced by the level file to open"
+        ),
+    ] = ""
+    level: Annotated[
+        str,
+        Field(
+            description="Task whose level is open, for example support-1, where the command "
+            "cannot open levels; default: the flat sandbox"
+        ),
+    ] = ""
+    desktop: Annotated[
+        Literal["window", "headless"],
+        Field(description="window: by mouse and keyboard; headless: over TCP"),
+    ] = "window"
+    title: Annotated[str, Field(description="Part of the window's title")] = "besiege"
+    calibration: Annotated[
+        Path | None, Field(description="Calibration file; default STATE/calibration.json")
+    ] = None
+    log_file: Annotated[
+        Path | None,
+        Field(description="File to which the game writes its log; default: the log window"),
+    ] = None
+    port: Annotated[int, Field(description="First TCP port of a headless game", ge=1)] = 6890
+    state: Annotated[
+        Path, Field(description="Folder of the runner's own files: calibration, pid, screenshots")
+    ] = Path.home() / ".buildarena" / "besiege"
+    pace: Annotated[
+        float,
+        Field(description="How much shorter than usual the waits between clicks are", gt=0, le=20),
+    ] = 1.0
+
+    patience: Annotated[
+        float,
+        Field(description="How many times as long as usual the game may take", gt=0, le=100),
+    ] = 1.0
+
+    @property
+    def time_limits(self) -> TimeLimits:
+        """How long to wait for the game."""
+        return TimeLimits().scaled(self.patience)
+
+    @property
+    def version(self) -> str | None:
+        """The game and mod as tracks name them; None while one of them is not set."""
+        return f"{self.game}-{self.mod}" if self.game and self.mod else None
+
+    @property
+    def machines_folder(self) -> Path | None:
+        """Where the game looks for machine files; None while no folder is set."""
+        if self.machines is not None:
+            return self.machines
+        if self.folder is None:
+            return None
+        # Source: the published projects; the game's builds differ in where they look.
+        places = ("SavedMachines", "Besiege_Data/SavedMachines", "Contents/SavedMachines")
+        found = [self.folder / place for place in places if (self.folder / place).is_dir()]
+        return found[0] if found else self.folder / places[0]
+
+    @property
+    def calibration_file(self) -> Path:
+        """Where the calibration is kept."""
+        return self.calibration or self.state / "calibration.json"
+
+    def words(self, level: Path | None) -> list[str]:
+        """The command that starts the game with a level; empty where none is set."""
+        text = "" if level is None else str(level)
+        words = shlex.split(self.command, posix=sys.platform != "win32")
+        return [word.replace(LEVEL_FIELD, text) for word in words]
+
+    @property
+    def opens_levels(self) -> bool:
+        """Whether the game can be started with a level."""
+        return LEVEL_FIELD in self.command
+
+
+def level_digest(level: bytes | None) -> str:
+    """A short name of a level, "sandbox" for none: equal levels have equal names."""
+    return "sandbox" if level is None else hashlib.sha256(level).hexdigest()[:12]

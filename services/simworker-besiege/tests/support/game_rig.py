@@ -1,0 +1,136 @@
+"""A runner of the game and the stand-in that it plays, in a folder and on a screen of their own."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from support.player import Player
+
+from buildarena_benchmark import Task, builtin_tasks
+from buildarena_geometry import Machine
+from buildarena_pipeline.runtime.simulators.simulator import Trial
+from buildarena_simulation import Scenario
+from buildarena_simworker_besiege.calibrate import TRIAL_S
+
+HERE = Path(__file__).parent
+SUPPORT = os.pathsep.join([str(HERE), str(HERE.parents[3] / "tests")])
+"""What programs of these tests import from."""
+GAMES = HERE.parent / "games"
+"""What the stand-in says of each run; `record_games` writes it."""
+TRIALS = {
+    "transport-1": {"duration_s": 5.0},
+    "transport-2": {"duration_s": 6.0},
+    "support-1": {"duration_s": 7.0, "ramp_s": 5.0},
+    "lift-2": {"duration_s": 6.0},
+}
+"""The trials that are played in a few seconds."""
+GAME, MOD = "1.75-23370", "1.4"
+VERSION = f"{GAME}-{MOD}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rig:
+    """Where a runner and its game keep their files.
+
+    Attributes:
+        folder: Everything is below it.
+        speed: Game time over wall clock.
+        pace: How much shorter than usual the runner's waits are.
+        patience: How many times as long as usual the runner waits for the game.
+    """
+
+    folder: Path
+    speed: float = 12.0
+    pace: float = 8.0
+    patience: float = 0.4
+
+    def __post_init__(self) -> None:
+        self.machines.mkdir(parents=True, exist_ok=True)
+
+    @property
+    def machines(self) -> Path:
+        return self.folder / "SavedMachines"
+
+    @property
+    def faults(self) -> Path:
+        """Faults of the game that is started next; later ones have none."""
+        return self.folder / "faults.json"
+
+    def report(self) -> dict[str, Any]:
+        """What the game says of itself."""
+        return json.loads((self.folder / "report.json").read_text())
+
+    def environment(self) -> dict[str, str]:
+        words = [
+            *(sys.executable, "-m", "stand_in_game", "--machines", str(self.machines)),
+            *("--games", str(GAMES)),
+            *("--speed", str(self.speed), "--report", str(self.folder / "report.json")),
+            *("--level={level}", "--faults-once", str(self.faults)),
+        ]
+        return {
+            "BUILDARENA_BESIEGE_GAME": GAME,
+            "BUILDARENA_BESIEGE_MOD": MOD,
+            "BUILDARENA_BESIEGE_MACHINES": str(self.machines),
+            "BUILDARENA_BESIEGE_STATE": str(self.folder / "state"),
+            "BUILDARENA_BESIEGE_COMMAND": " ".join(words),
+            "BUILDARENA_BESIEGE_PACE": str(self.pace),
+            "BUILDARENA_BESIEGE_PATIENCE": str(self.patience),
+            "PYTHONPATH": os.pathsep.join([SUPPORT, os.environ.get("PYTHONPATH", "")]),
+        }
+
+    def calibrate(self) -> None:
+        """Saves the positions at which the stand-in has its buttons."""
+        from buildarena_simworker_besiege.screen.calibration import Calibration
+
+        Calibration().save(self.folder / "state" / "calibration.json")
+
+
+def experts_machine(task: str) -> Machine:
+    """What the expert builds, with its key presses."""
+    asked = Player()("builtin/expert", task=task).suspended
+    assert asked is not None
+    document = asked.machine.to_document()
+    if asked.controls is not None:
+        document["control_sequence"] = [
+            {"time_s": press.time_s, "key": press.key, "hold_for_s": press.hold_for_s}
+            for press in asked.controls
+        ]
+    return Machine.from_document(document)
+
+
+def tried_machine() -> tuple[Machine, Scenario]:
+    """What `calibrate` plays to see whether the positions are right."""
+    machine = Machine()
+    machine.act("start", {})
+    block = {"base_block": "1", "face": "A", "new_block": "Small Wooden Block", "note": ""}
+    machine.act("attach_block_to", block)
+    scenario = {"duration_s": TRIAL_S, "control": {"mode": "agent"}}
+    return machine, Scenario.model_validate(scenario)
+
+
+def short_trial(name: str) -> tuple[Task, Machine]:
+    """A built-in task that lasts a few seconds, see `TRIALS`, and the expert's machine."""
+    task, changes = builtin_tasks()[name], dict[str, Any](TRIALS[name])
+    duration_s = changes.pop("duration_s")
+    cargo = task.scenario.cargo and task.scenario.cargo.model_copy(update=changes)
+    scenario = task.scenario.model_copy(update={"duration_s": duration_s, "cargo": cargo})
+    return replace(task, scenario=scenario), experts_machine(name)
+
+
+def trial_of(task: Task, machine: Machine, *, job_id: str = "job_0001") -> Trial:
+    """One run of a machine, as the simulate stage asks a simulator for it."""
+    return Trial(
+        job_id=job_id,
+        number=0,
+        token=1,
+        version=VERSION,
+        task=task,
+        machine=machine,
+        controls=None,
+        require_held=lambda: None,
+    )

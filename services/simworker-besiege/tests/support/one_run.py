@@ -1,0 +1,36 @@
+"""Plays one short trial in the game, prints its score; a program, so that it can be killed."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from pathlib import Path
+
+import structlog
+from game_rig import Rig, short_trial, trial_of
+
+from buildarena_benchmark import score
+from buildarena_simworker_besiege.set_up import make_desktop
+from buildarena_simworker_besiege.settings import BesiegeSettings
+from buildarena_simworker_besiege.simulator import BesiegeSimulator
+
+
+def main() -> None:
+    """Plays the car for a few seconds in the folder that is named."""
+    # What the runner had to do again goes to its log: standard output is the score's.
+    structlog.configure(logger_factory=structlog.PrintLoggerFactory(sys.stderr))
+    rig = Rig(folder=Path(sys.argv[1]))
+    for name, value in rig.environment().items():
+        os.environ.setdefault(name, value)
+    settings = BesiegeSettings()
+    desktop, facts = make_desktop(settings)
+    task, machine = short_trial("transport-1")
+    done = BesiegeSimulator(settings, desktop, facts).run(
+        trial_of(task, machine, job_id="job_killed")
+    )
+    found = score(task, machine, done.trajectory)
+    sys.stdout.write(json.dumps([found.success, found.indicator]) + "\n")
+
+
+main()

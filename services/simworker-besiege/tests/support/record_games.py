@@ -1,0 +1,160 @@
+"""Writes tests/games: what the game says of the runs that tests play, after our engine.
+
+`make besiege-games`, after an intended change of tasks, exports or physics.
+The run's own script is run in a real Lua, its blocks moved by the engine's trajectory; the stand-in
+game says these lines again under the id of the run that it plays.
+"""
+
+from __future__ import annotations
+
+import gzip
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from game_rig import GAMES, TRIALS, experts_machine, short_trial, tried_machine
+from support.lua_game import LuaGame
+
+from buildarena_benchmark import builtin_tasks, paper_tasks
+from buildarena_besiege import GameLog, game_start
+from buildarena_besiege.logs.state_log import INTERVAL_S
+from buildarena_besiege.names import CARGO_ID
+from buildarena_besiege.run import PreparedMachine, marked, prepared_machine
+from buildarena_geometry import Machine
+from buildarena_geometry.besiege_components import besiege_point, besiege_turn
+from buildarena_geometry.rotations import multiply
+from buildarena_simulation import Scenario, Trajectory, simulate
+from buildarena_simulation.constants import SAMPLE_RATE_HZ
+
+RUN = "golden"
+UPDATES_PER_SAMPLE = 4
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Recorded:
+    """A run as the engine has it, in the game's terms."""
+
+    prepared: PreparedMachine
+    trajectory: Trajectory
+    rotation: np.ndarray
+    position: np.ndarray
+    cargo_height: float
+
+    def root(self, number: int, sample: int) -> tuple[float, float, float]:
+        """Where the file's block of this number is, Besiege's components."""
+        record, told = self.prepared.records[number], self.trajectory
+        if record.part == CARGO_ID:
+            lifted = _matrix(told.cargo_quaternion[sample]) @ [0.0, 0.0, self.cargo_height / 2]
+            return besiege_point(told.cargo_position[sample] - lifted)
+        column = self._column(record.part)
+        built = self.rotation @ np.array(besiege_point(record.position)) + self.position
+        turned = _matrix(told.quaternions[sample, column]) @ self._began(column)
+        moved = turned @ (built - told.positions[0, column])
+        return besiege_point(told.positions[sample, column] + moved)
+
+    def turn(self, number: int, sample: int) -> tuple[float, ...]:
+        """How that block is turned, (w, x, y, z) in Besiege's components."""
+        column = self._column(self.prepared.records[number].part)
+        turned = _matrix(self.trajectory.quaternions[sample, column]) @ self._began(column)
+        return multiply(
+            besiege_turn(_quaternion(turned @ self.rotation)),
+            self.prepared.records[number].rotation,
+        )
+
+    def burns(self, number: int, sample: int) -> bool:
+        """Whether that block is a cannon that burns."""
+        part, hot = self.prepared.records[number].part, self.trajectory.cannon_ids
+        return part in hot and bool(self.trajectory.heated[sample, hot.index(part)])
+
+    def _column(self, part: str) -> int:
+        # A connector moves with the starting block: nobody reads where it is.
+        ids = self.trajectory.block_ids
+        return ids.index(part) if part in ids else 0
+
+    def _began(self, column: int) -> np.ndarray:
+        return _matrix(self.trajectory.quaternions[0, column]).T
+
+
+def recorded(machine: Machine, scenario: Scenario) -> Recorded:
+    """Simulates a run from the place where the game puts the machine."""
+    start = game_start(machine, scenario)
+    return Recorded(
+        prepared=prepared_machine(machine, scenario, run_id=RUN),
+        trajectory=simulate(machine, scenario, "mujoco", start=start),
+        rotation=np.array(start.rotation),
+        position=np.array(start.position),
+        cargo_height=0.0 if scenario.cargo is None else scenario.cargo.size[2],
+    )
+
+
+def log_lines(run: Recorded, scenario: Scenario) -> Iterator[str]:
+    """What the run's script prints, each line once, without the run's mark and the check sum."""
+    records = run.prepared.records
+    references: dict[Any, int] = {r.reference_key: i for i, r in enumerate(records)}
+    references[0] = references.pop(records[0].reference_key)
+    game = LuaGame(
+        references,
+        version="lua52",
+        path=lambda number, update: run.root(number, update // UPDATES_PER_SAMPLE),
+        burning=lambda number, update: run.burns(number, update // UPDATES_PER_SAMPLE),
+    ).play(run.prepared.script, round(scenario.duration_s * 100))
+    log = GameLog(RUN)
+    log.read("\n".join(game.lines))
+    for line in log.lines:
+        yield line.text.removeprefix(f"{marked(RUN)},").rpartition(",")[0]
+
+
+def state_lines(run: Recorded, scenario: Scenario) -> Iterator[str]:
+    """What a game without a window says of the run every 0.2 s: all blocks in the file's order."""
+    step = round(INTERVAL_S * SAMPLE_RATE_HZ)
+    for sample in range(0, round(scenario.duration_s * SAMPLE_RATE_HZ) + 1, step):
+        words = []
+        for number in range(len(run.prepared.records)):
+            w, x, y, z = run.turn(number, sample)
+            figures = (*run.root(number, sample), x, y, z, w, 0.0)
+            words.append(f"Block{number}:" + ",".join(f"{value:.4f}" for value in figures) + "|")
+        yield "GameStat:" + "".join(words)
+
+
+def _matrix(quaternion: Any) -> np.ndarray:
+    w, x, y, z = quaternion
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def _quaternion(matrix: np.ndarray) -> tuple[float, float, float, float]:
+    from scipy.spatial.transform import Rotation
+
+    x, y, z, w = Rotation.from_matrix(matrix).as_quat()
+    return (float(w), float(x), float(y), float(z))
+
+
+def played_runs() -> dict[str, tuple[Machine, Scenario]]:
+    """Every run that tests play, by the name of its file."""
+    runs = {name: (experts_machine(name), builtin_tasks()[name].scenario) for name in paper_tasks()}
+    for name in TRIALS:
+        task, machine = short_trial(name)
+        runs[f"{name}-short"] = (machine, task.scenario)
+    return {**runs, "calibration": tried_machine()}
+
+
+def main() -> None:
+    """Records every run."""
+    for name, (machine, scenario) in played_runs().items():
+        run = recorded(machine, scenario)
+        said = list(log_lines(run, scenario))
+        if name == "transport-1-short":
+            said += state_lines(run, scenario)
+        text = "\n".join(said) + "\n"
+        # Without a time in it, so that the same run gives the same bytes.
+        (GAMES / f"{name}.log.gz").write_bytes(gzip.compress(text.encode(), mtime=0))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,58 @@
+"""Starts the stand-in game: `python -m stand_in_game --machines DIR --games DIR`."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from stand_in_game.faults import FaultError, Faults, read_faults
+from stand_in_game.game import Game, Settings
+from stand_in_game.report import Report
+
+
+def main() -> int:
+    """Starts the game with the options of the command line."""
+    # A game without a window is given options of its own, which it passes over.
+    options, _ = _parser().parse_known_args()
+    faults = []
+    try:
+        if options.faults_once is not None and options.faults_once.exists():
+            faults = read_faults(options.faults_once)
+            options.faults_once.unlink()
+        if options.level:
+            Path(options.level).read_bytes()
+    except (FaultError, ValueError, OSError) as error:
+        sys.stderr.write(f"stand_in_game: {error}\n")
+        return 2
+    settings = Settings(games=options.games, speed=options.speed, log_file=options.log_file)
+    game, report = Game(settings, Faults(faults)), Report(options.report)
+    # Each imported where it is used: a headless game runs where there is no toolkit.
+    if options.headless:
+        from stand_in_game.headless import Headless
+
+        return Headless(game, report, ip=options.ip, port=options.port).run()
+    from stand_in_game.window import Window
+
+    Window(game, options.machines, report).run()
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="stand_in_game", description=__doc__)
+    add = parser.add_argument
+    add("--machines", type=Path, default=Path(), metavar="DIR", help="the SavedMachines folder")
+    add("--games", type=Path, required=True, metavar="DIR", help="the golden logs")
+    add("--level", metavar="FILE", help="a level (.blv); else the flat sandbox")
+    add("--speed", type=float, default=1.0, help="game time over the wall clock")
+    add("--faults-once", type=Path, metavar="FILE", help="faults of this start; then deleted")
+    add("--report", type=Path, metavar="FILE", help="kept up to date with what the game does")
+    add("--log-file", type=Path, metavar="FILE", help="write the log there as well")
+    add("--headless", action="store_true", help="no window: the protocol of BesiegeField")
+    add("--ip", default="127.0.0.1", help="headless: where it listens")
+    add("--port", type=int, default=6890, help="headless: where it listens")
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main())

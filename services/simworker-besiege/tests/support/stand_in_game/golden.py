@@ -1,0 +1,93 @@
+"""What is known of the runs that the stand-in can play: golden logs, found by the run's script.
+
+A golden log has each line once, without the run's mark in front and the check sum behind; lines of
+a game without a window stand below them.
+"""
+
+from __future__ import annotations
+
+import gzip
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+from xml.etree import ElementTree as ET
+
+UPDATES_PER_S: Final = 100
+BEGIN_EVERY: Final = 50
+END_EVERY: Final = 25
+"""Updates after which the script prints its begin line, or its end line, once more."""
+
+_TEXT: Final = 'local {} = "([^"]*)"'
+
+
+class GameFileError(ValueError):
+    """A file that the game does not load; the message says why."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Run:
+    """A run that is known.
+
+    Attributes:
+        mark: what every line of this run begins with.
+        lines: by update, what is printed then.
+        last: the run's last update; its end is told again and again from then on.
+        states: what a game without a window says every 0.2 s.
+    """
+
+    mark: str
+    lines: dict[int, list[str]]
+    last: int
+    states: tuple[str, ...]
+
+    def printed(self, update: int) -> list[str]:
+        """What the script prints at an update."""
+        lines = self.lines.get(update, [])
+        if update and update % BEGIN_EVERY == 0:
+            lines = [*self.lines[0], *lines]
+        if update > self.last and (update - self.last) % END_EVERY == 0:
+            lines = [f"e,{self.last}"]
+        return [self._whole(line) for line in lines]
+
+    def _whole(self, line: str) -> str:
+        text, total = f"{self.mark},{line}", 0
+        for byte in text.encode():
+            total = (total * 257 + byte + 1) % 2_147_483_647
+        return f"{text},{total}"
+
+
+def read_run(path: Path, games: Path) -> Run:
+    """The run of a machine file.
+
+    Raises:
+        GameFileError: It is no machine file, has no script, or none that was recorded.
+    """
+    try:
+        root = ET.fromstring(path.read_bytes())
+    except (OSError, ET.ParseError) as error:
+        raise GameFileError(f"could not load {path.stem}: {error}") from error
+    script = next((e.text for e in root.iter() if e.text and "local prefix" in e.text), "")
+    mark, begin = _text(script, "prefix"), _text(script, "begin")
+    for file in sorted(games.glob("*.log.gz")):
+        first, *rest = gzip.decompress(file.read_bytes()).decode().splitlines()
+        if first == f"b,{begin}":
+            states = tuple(line for line in rest if line.startswith("GameStat:"))
+            lines = [line for line in rest if not line.startswith("GameStat:")]
+            return _run(mark, [first, *lines], states)
+    raise GameFileError(f"no game was recorded of {path.stem}, whose log begins with {begin!r}")
+
+
+def _run(mark: str, lines: list[str], states: tuple[str, ...]) -> Run:
+    by_update: dict[int, list[str]] = {}
+    for line in lines:
+        kind, update, *_ = line.split(",")
+        by_update.setdefault(0 if kind == "b" else int(update), []).append(line)
+    return Run(mark=mark, lines=by_update, last=max(by_update), states=states)
+
+
+def _text(script: str, name: str) -> str:
+    found = re.search(_TEXT.format(name), script)
+    if found is None:
+        raise GameFileError("the machine has no script that reports a run")
+    return re.sub(r"\\([0-9]{3})", lambda code: chr(int(code[1])), found[1])

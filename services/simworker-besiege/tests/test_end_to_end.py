@@ -1,0 +1,161 @@
+"""From a submission over the queue and the window of the game to a score that can be verified."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+
+import pytest
+from game_rig import Rig
+from support.long_tests import LONG
+from support.stages import work
+
+from buildarena_api.leaderboard.agreement import agreement_rows
+from buildarena_benchmark import builtin_tasks, paper_tasks, score
+from buildarena_besiege import game_start, read_machine_file
+from buildarena_geometry import KeyPress, Machine
+from buildarena_pipeline.catalog.models import load_registry
+from buildarena_pipeline.catalog.specs import JobSpec
+from buildarena_pipeline.runtime.context import Context, open_context
+from buildarena_pipeline.runtime.scoring import best_rollout
+from buildarena_pipeline.submission.submission import Submissions
+from buildarena_simulation import simulate
+from buildarena_store import Job
+from buildarena_worker.wiring import verifier
+
+ALL = os.environ.get("BESIEGE_TASKS") == "all"
+pytestmark = pytest.mark.timeout(1200 if ALL else 400)
+CATEGORIES = ("transport-2", "support-1", "lift-2")
+TASKS = tuple(paper_tasks()) if ALL else CATEGORIES if LONG else CATEGORIES[:1]
+NEAR = 0.01
+"""What a log's four decimals and 25 samples a second leave open, as a share of an indicator."""
+
+
+@pytest.fixture
+def playing(context: Context, rig: Rig, screen: dict[str, str]) -> Iterator[Context]:
+    """A service whose queue of the game is served by a runner in a process of its own."""
+    own = replace(rig, patience=2.0).environment()
+    settings = context.settings.model_copy(
+        update={"besiege_game": "1.75-23370", "besiege_mod": "1.4"}
+    )
+    environment = {
+        **os.environ,
+        **own,
+        **screen,
+        "BUILDARENA_DATABASE_URL": settings.required_database_url(),
+        "BUILDARENA_BROKER_URL": settings.required_broker_url(),
+        "BUILDARENA_DATA": str(settings.data),
+    }
+    with (rig.folder / "worker.log").open("wb") as log:
+        runner = subprocess.Popen(
+            [sys.executable, "-m", "buildarena_simworker", "--simulator", "besiege"],
+            env=environment,
+            stdout=log,
+            stderr=log,
+        )
+    service = open_context(settings)
+    yield service
+    runner.terminate()
+    assert runner.wait(timeout=30) == 0, (rig.folder / "worker.log").read_text()
+    service.close()
+
+
+@pytest.mark.sized
+def test_each_category_is_played_scored_verified_and_compared(playing: Context, rig: Rig) -> None:
+    submissions = Submissions(playing, load_registry())
+    for task in TASKS:
+        submissions.submit_job(JobSpec(task=task, model="builtin/expert", simulator="besiege"))
+    jobs = _ended(playing, rig)
+    assert {job.task: job.outcome for job in jobs} == dict.fromkeys(TASKS, "success")
+    for job in jobs:
+        _check(playing, job)
+    found = playing.store.results.boards.annotated(jobs[0].track)
+    rows = agreement_rows(found)
+    assert {row.task for row in rows} == set(TASKS)
+    assert all(row.same_verdict == 1.0 for row in rows)
+    assert not list(rig.machines.iterdir())
+    report = rig.report()
+    assert (report["machine"], report["modifiers"]) == (None, [])
+
+
+def _ended(context: Context, rig: Rig) -> list[Job]:
+    ends = time.monotonic() + (1100 if ALL else 350)
+    while time.monotonic() < ends:
+        work(context, queues=("construct",))
+        jobs = context.store.jobs.page(limit=100)
+        if all(job.state == "done" for job in jobs):
+            return jobs
+        time.sleep(0.2)
+    raise AssertionError((rig.folder / "worker.log").read_text())
+
+
+def _check(context: Context, job: Job) -> None:
+    """The score is the engine's of the same start; the kept files tell the whole story."""
+    record = best_rollout(context.store.rollouts.read(job.id))
+    machine = _machine(context, record.machine_hash)
+    task = builtin_tasks()[job.task]
+    presses = None if record.controls is None else [KeyPress(**one) for one in record.controls]
+    trajectory = simulate(
+        machine,
+        task.scenario,
+        "mujoco",
+        controls=presses,
+        start=game_start(machine, task.scenario),
+    )
+    ours = score(task, machine, trajectory)
+    assert job.success == ours.success
+    assert job.indicator == pytest.approx(ours.indicator, rel=NEAR)
+    assert job.manifest is not None
+    simulator = job.manifest["simulator"]
+    assert simulator["simulation"] == "1.75-23370-1.4"
+    assert simulator["calibration"]
+    assert "/besiege-1.75-23370-1.4/" in job.track
+    files = {file.name: file.hash for file in context.store.jobs.files(job.id)}
+    number = record.number
+    kept = {f"machine-{number}.bsg", f"script-{number}.lua", f"log-{number}.txt"}
+    assert {*kept, f"trajectory-{number}"} <= set(files)
+    read = read_machine_file(context.artifacts.get(files[f"machine-{number}.bsg"])).machine
+    assert read.part_count == machine.part_count
+    report = verifier(context).verify(job.id)
+    assert any(check["name"].endswith("what mujoco says") for check in report["checks"])
+    assert report["ok"], [check for check in report["checks"] if not check["ok"]]
+    _spoil_log(context, job, f"log-{number}.txt", files[f"log-{number}.txt"])
+
+
+def _machine(context: Context, digest: str) -> Machine:
+    import json
+
+    return Machine.from_document(json.loads(context.artifacts.get(digest)))
+
+
+def _spoil_log(context: Context, job: Job, name: str, digest: str) -> None:
+    """A log with a figure changed by hand is found out."""
+    lines = context.artifacts.get(digest).decode().splitlines(keepends=True)
+    middle = next(i for i, line in enumerate(lines) if ",s,800," in line)
+    fields = lines[middle].split(",")
+    fields[-2] = f"{float(fields[-2]) + 1:.4f}"
+    lines[middle] = ",".join(fields)
+    made = {name: context.artifacts.put("".join(lines).encode(), "text/plain")}
+    with context.store.database.transaction() as connection:
+        context.store.results.attach(job.id, made, connection=connection)
+    report = verifier(context).verify(job.id)
+    failed = [check["name"] for check in report["checks"] if not check["ok"]]
+    assert failed, "a changed log passed"
+
+
+def test_a_job_of_another_version_of_the_game_ends_with_what_to_do(
+    playing: Context, rig: Rig
+) -> None:
+    other = open_context(playing.settings.model_copy(update={"besiege_mod": "1.5"}))
+    Submissions(other, load_registry()).submit_job(
+        JobSpec(task="lift-1", model="builtin/expert", simulator="besiege")
+    )
+    (job,) = _ended(other, rig)
+    other.close()
+    assert (job.outcome, job.reason) == ("errored", "game_version")
+    assert "1.75-23370-1.5" in str(job.detail)
+    assert "submit it again" in str(job.detail)

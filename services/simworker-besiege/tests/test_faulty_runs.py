@@ -1,0 +1,29 @@
+"""A few runs in a game that misbehaves; `make besiege-faults` plays 200."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import pytest
+from game_rig import SUPPORT
+
+pytestmark = pytest.mark.timeout(240)
+SEEDS = (4, 7, 10)
+"""A dialog in the way three times; a crash and a stolen clipboard; lines lost and cut off."""
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_fault_ends_in_a_right_score_or_in_a_sentence_with_a_picture(
+    tmp_path, screen, seed
+) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "faulty_runs", str(tmp_path), "--first", str(seed), "--runs", "1"],
+        env={**os.environ, **screen, "PYTHONPATH": SUPPORT},
+        capture_output=True,
+        text=True,
+        timeout=200,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr

@@ -1,0 +1,35 @@
+"""Our engines as simulators that are installed: what this distribution's entry points name."""
+
+from __future__ import annotations
+
+from buildarena_pipeline.runtime.simulators.installed import InstalledSimulator
+from buildarena_pipeline.runtime.simulators.simulator import Simulator
+from buildarena_simulation import ENGINES, SIMULATION_VERSION, engine_version
+from buildarena_simworker.engines import EngineSimulator
+from buildarena_simworker.remote.engine_process import EngineProcess
+
+
+def engine_simulator(name: str) -> InstalledSimulator:
+    """Describes an engine of ours."""
+    return InstalledSimulator(
+        name=name,
+        kind="engine",
+        make=lambda _: EngineSimulator(name),
+        make_isolated=lambda _: _warm_process(name),
+        version=lambda _: SIMULATION_VERSION,
+        examine=lambda _: _found(name),
+        available=name in ENGINES,
+    )
+
+
+def _warm_process(name: str) -> Simulator:
+    engine = EngineProcess(name)
+    engine.start()
+    return engine
+
+
+def _found(name: str) -> tuple[str, str]:
+    try:
+        return f"{name} {engine_version(name)}", ""
+    except Exception as error:  # noqa: BLE001 - whatever keeps it from being loaded
+        return f"{name}: {error}", f"install {name}"

@@ -1,1 +1,0 @@
-"""Simulators: whatever runs a machine in a task's trial, behind one protocol."""

@@ -1,0 +1,28 @@
+"""Sends over Anthropic's protocol."""
+
+from __future__ import annotations
+
+from anthropic import AsyncAnthropic
+from pydantic_ai.models.anthropic import AnthropicModel
+from pydantic_ai.providers.anthropic import AnthropicProvider
+
+from buildarena_pipeline.catalog.models import ModelEntry, ProviderEntry
+from buildarena_worker.providers.bounded_http import BoundedClient
+from buildarena_worker.providers.library import Connected, LibrarySender
+
+
+def create_sender(entry: ModelEntry, provider: ProviderEntry, key: str) -> LibrarySender:
+    """The sender of a model."""
+
+    def connect() -> Connected:
+        client = AsyncAnthropic(
+            base_url=provider.base_url,
+            api_key=key,
+            max_retries=0,
+            http_client=BoundedClient(timeout=None),  # the retry policy's own timeout rules
+            timeout=None,
+        )
+        model = AnthropicModel(entry.model, provider=AnthropicProvider(anthropic_client=client))
+        return model, client.close
+
+    return LibrarySender(connect, takes_parallel_tool_calls=True)

@@ -1,0 +1,21 @@
+"""Sends over Google's protocol."""
+
+from __future__ import annotations
+
+from pydantic_ai.models.google import GoogleModel
+from pydantic_ai.providers.google import GoogleProvider
+
+from buildarena_pipeline.catalog.models import ModelEntry, ProviderEntry
+from buildarena_worker.providers.bounded_http import BoundedClient
+from buildarena_worker.providers.library import Connected, LibrarySender
+
+
+def create_sender(entry: ModelEntry, provider: ProviderEntry, key: str) -> LibrarySender:
+    """The sender of a model."""
+
+    def connect() -> Connected:
+        http = BoundedClient(timeout=None)  # the retry policy's own timeout rules
+        google = GoogleProvider(api_key=key, base_url=provider.base_url, http_client=http)
+        return GoogleModel(entry.model, provider=google), http.aclose
+
+    return LibrarySender(connect, takes_parallel_tool_calls=False)

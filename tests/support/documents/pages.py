@@ -1,0 +1,61 @@
+"""The dashboard's pages in a real browser: what they need, and how their tests are run."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from buildarena_api.dashboard.files import FOLDER
+
+WEB = Path(__file__).resolve().parents[3] / "clients" / "web"
+NODE = WEB.parents[1] / "mk" / "node.sh"
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+BUILDARENA = str(Path(sys.executable).with_name("buildarena"))
+MAX_S = 420
+
+needs_pages = [
+    pytest.mark.skipif(
+        CHROMIUM is None, reason="pages need a browser: install the Debian packages chromium"
+    ),
+    pytest.mark.skipif(
+        not (FOLDER / "index.html").is_file() or not (WEB / "node_modules").is_dir(),
+        reason="the dashboard has not been built: make web",
+    ),
+    pytest.mark.timeout(MAX_S + 120),
+]
+
+
+def in_browser(url: str, files: list[str], **environment: str) -> str:
+    """Runs the browser's tests of some files.
+
+    Args:
+        url: The service's.
+        files: Of `clients/web/e2e`, by how their paths begin.
+        environment: What these files ask for.
+
+    Returns:
+        What they printed.
+    """
+    command = ["bash", str(NODE), "npm", "--prefix", str(WEB), "run", "--silent", "test:pages"]
+    done = subprocess.run(
+        [*command, "--", *files, "--disable-console-intercept"],
+        cwd=NODE.parents[1],
+        env={
+            **os.environ,
+            **environment,
+            "BUILDARENA_WEB_URL": url,
+            "BUILDARENA_CHROMIUM": str(CHROMIUM),
+            "NO_COLOR": "1",
+        },
+        capture_output=True,
+        text=True,
+        timeout=MAX_S,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout[-6000:] + done.stderr[-2000:]
+    return done.stdout

@@ -1,0 +1,96 @@
+"""Machines kept as data: references with a quality, and those that break a rule.
+
+Run as a module (`python -m support.machines.references` in tests/), it writes the goldens of
+tests/data/simulation again; see the README there.
+"""
+
+import json
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Final
+
+from buildarena_benchmark import builtin_tasks, score
+from buildarena_geometry import Machine
+from buildarena_simulation import ENGINES, simulate
+
+DATA: Final = Path(__file__).parents[2] / "data" / "simulation"
+GOLDENS: Final = DATA / "goldens.json"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reference:
+    """A reference machine.
+
+    Attributes:
+        task: The task it is for.
+        quality: "good", "mediocre" or "bad".
+    """
+
+    task: str
+    quality: str
+
+
+def actions_of(name: str) -> list[dict[str, Any]]:
+    """The action log in a machine's file."""
+    return list(_content(name)["actions"])
+
+
+def load_machine(name: str) -> Machine:
+    """A machine from its file, whose name has a folder where it breaks a rule."""
+    content = _content(name)
+    parts = {key: _replayed(log, {}) for key, log in content.get("sub_structures", {}).items()}
+    return _replayed(content["actions"], parts)
+
+
+def outcome(name: str, engine: str) -> dict[str, Any]:
+    """What a trial of a reference machine gives: the golden's fields."""
+    machine, task = load_machine(name), builtin_tasks()[REFERENCES[name].task]
+    trajectory = simulate(machine, task.scenario, engine)
+    result = score(task, machine, trajectory)
+    first = trajectory.breaks[0] if trajectory.breaks else None
+    return {
+        "success": result.success,
+        "indicator": round(result.indicator, 2),
+        "flags": list(result.flags),
+        "first_break_s": first.time_s if first else None,
+    }
+
+
+def _content(name: str) -> dict[str, Any]:
+    return dict(json.loads((DATA / f"{name}.json").read_text(encoding="utf-8")))
+
+
+def _replayed(actions: list[dict[str, Any]], parts: Mapping[str, Machine]) -> Machine:
+    machine = Machine(available=parts) if parts else Machine()
+    for action in actions:
+        result = machine.act(action["op"], action["params"])
+        if not result.ok:
+            raise ValueError(f"{action}: {result.text}")
+    return machine
+
+
+def _references() -> dict[str, Reference]:
+    names = sorted(file.stem for file in DATA.glob("*.json") if file != GOLDENS)
+    contents = {name: _content(name) for name in names}
+    return {
+        name: Reference(task=content["task"], quality=content["quality"])
+        for name, content in contents.items()
+    }
+
+
+REFERENCES: Final[Mapping[str, Reference]] = MappingProxyType(_references())
+
+
+def _write() -> None:
+    goldens = {}
+    for name in REFERENCES:
+        goldens[name] = {engine: outcome(name, engine) for engine in ENGINES}
+        sys.stderr.write(f"{name}: {goldens[name]}\n")
+    GOLDENS.write_text(json.dumps(goldens, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    _write()

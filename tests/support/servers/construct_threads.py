@@ -1,0 +1,107 @@
+"""A construct worker's threads in the test's process, against stand-ins for providers."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from support.providers.stand_in import ProviderStandIn
+from support.servers.stacks import wait_until
+
+from buildarena_pipeline.catalog.models import ModelRegistry, load_registry
+from buildarena_pipeline.catalog.specs import JobSpec
+from buildarena_pipeline.runtime.active_lease import LeaseKeeper
+from buildarena_pipeline.runtime.context import Context
+from buildarena_pipeline.runtime.job_runner import JobRunner
+from buildarena_pipeline.runtime.owner_slots import OwnerSlots
+from buildarena_pipeline.submission.submission import Submissions
+from buildarena_store import Job
+from buildarena_store.states import CONSTRUCT_QUEUE
+from buildarena_worker.providers.provider import ProviderClient
+from buildarena_worker.wiring import construct_handler
+
+PRICE = "{input: 2.0, output: 8.0, cached: 0.5}"
+
+
+def models_file(folder: Path, standins: Mapping[str, ProviderStandIn]) -> Path:
+    """A registry with a model ``NAME/expert`` for each stand-in."""
+    file = folder / "models.yaml"
+    providers = [
+        f"  {n}: {{protocol: openai, base_url: '{s.url}/v1'}}\n" for n, s in standins.items()
+    ]
+    models = [
+        f"  - {{name: {n}/expert, provider: {n}, model: expert, price: {PRICE}}}\n"
+        for n in standins
+    ]
+    file.write_text(f"providers:\n{''.join(providers)}models:\n{''.join(models)}")
+    return file
+
+
+@dataclass
+class Crew:
+    """Threads that do construct stages, and how to give them work."""
+
+    context: Context
+    registry: ModelRegistry
+    runner: JobRunner
+    keeper: LeaseKeeper
+    slots: OwnerSlots
+
+    def submit(self, provider: str, *, owner: str | None = None, **payload: object) -> str:
+        """Submits a job; returns its id."""
+        spec = {"task": "lift-1", "model": f"{provider}/expert", "simulator": "mujoco", **payload}
+        submissions = Submissions(self.context, self.registry)
+        return submissions.submit_job(JobSpec.model_validate(spec), owner=owner)[0].id
+
+    def job(self, job_id: str) -> Job:
+        """The job as it is now."""
+        return self.context.store.jobs.get(job_id)
+
+    def ended(self, job_id: str, within_s: float = 20) -> Job:
+        """The job, once it has ended."""
+        wait_until(lambda: self.job(job_id).state == "done", within_s, f"{job_id} ended")
+        return self.job(job_id)
+
+    def requests(self, job_id: str) -> list[dict[str, object]]:
+        """The job's journal, in short."""
+        return [
+            {"finish": entry.reply["finish"], "usage": entry.usage, "latency_s": entry.latency_s}
+            for entry in self.context.store.journal.read(job_id)
+        ]
+
+
+@contextmanager
+def crew(
+    context: Context, folder: Path, slots: int = 2, **standins: ProviderStandIn
+) -> Iterator[Crew]:
+    """Works on construct stages until the block is left; then all requests end at once."""
+    registry = load_registry(models_file(folder, standins))
+    keeper = LeaseKeeper(context.store.leases, lambda: None)
+    keeper.start()
+    shared = OwnerSlots(slots)
+    handler = construct_handler(context, registry)
+    runner = JobRunner(context.store.leases, handler, keeper, "w", shared)
+    over = threading.Event()
+
+    def work() -> None:
+        while not over.wait(0.05):
+            runner.process_all(CONSTRUCT_QUEUE, "any")
+
+    threads = [threading.Thread(target=work) for _ in range(shared.total)]
+    for thread in threads:
+        thread.start()
+    try:
+        yield Crew(context, registry, runner, keeper, shared)
+    finally:
+        over.set()
+        runner.stop()
+        keeper.stop()
+        for thread in threads:
+            thread.join(timeout=10)
+        assert not any(thread.is_alive() for thread in threads)
+        for client in handler._clients._clients.values():
+            if isinstance(client, ProviderClient):
+                client.close()

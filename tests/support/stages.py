@@ -1,0 +1,58 @@
+"""Does what waits, with the real stage handlers, in the test's process."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+
+from buildarena_pipeline.catalog.models import load_registry
+from buildarena_pipeline.runtime.active_lease import LeaseKeeper
+from buildarena_pipeline.runtime.context import Context
+from buildarena_pipeline.runtime.job_runner import JobRunner
+from buildarena_pipeline.runtime.simulators.installed import installed_simulators
+from buildarena_simworker.simulate import simulate_handler
+from buildarena_store.states import simulate_queue
+from buildarena_worker.wiring import construct_handler
+
+
+def work(
+    context: Context,
+    *,
+    steps: int = 1000,
+    threads: int = 1,
+    queues: tuple[str, ...] | None = None,
+) -> None:
+    """Works until nothing waits.
+
+    Args:
+        context: Where the jobs are.
+        steps: Stages at most.
+        threads: Stages at once.
+        queues: Only jobs of these queues; others are left to their own workers.
+    """
+    keeper = LeaseKeeper(context.store.leases, lambda: None)
+    keeper.start()
+    handlers = {
+        "construct": construct_handler(context, load_registry()),
+        **{
+            simulate_queue(found.name): simulate_handler(context, found.make(context.settings))
+            for found in installed_simulators().values()
+            if found.kind == "engine"
+        },
+    }
+    runners = {
+        queue: JobRunner(context.store.leases, made, keeper, "w")
+        for queue, made in handlers.items()
+    }
+    with ThreadPoolExecutor(threads) as pool:
+        while steps > 0:
+            waiting = [
+                job
+                for job in context.store.jobs.page(limit=100, state="queued")
+                if queues is None or job.queue in queues
+            ]
+            if not waiting:
+                break
+            waiting = waiting[:steps]
+            steps -= len(waiting)
+            list(pool.map(lambda job: runners[job.queue].process_next(job.queue, job.id), waiting))
+    keeper.stop()
