@@ -11,9 +11,9 @@ export default tseslint.config(
     extends: [tseslint.configs.strictTypeChecked],
     plugins: { "react-hooks": hooks, import: imports },
     settings: {
-        "import/resolver": { node: { extensions: [".ts", ".tsx"] } },
-        "import/parsers": { "@typescript-eslint/parser": [".ts", ".tsx"] },
-      },
+      "import/resolver": { node: { extensions: [".ts", ".tsx"] } },
+      "import/parsers": { "@typescript-eslint/parser": [".ts", ".tsx"] },
+    },
     languageOptions: { parserOptions: { projectService: true } },
     rules: {
       ...hooks.configs.recommended.rules,
