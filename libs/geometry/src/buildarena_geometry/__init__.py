@@ -23,7 +23,7 @@ from buildarena_geometry.poses import Pose
 from buildarena_geometry.steps import Difference, Step, step
 from buildarena_geometry.tools import GROUPS, LOOKUP, ToolDefinition, tool_definitions
 
-__version__ = "0.1.0"
+__version__ = "1.0.0rc1"
 
 __all__ = [
     "DOCUMENT_VERSION",
