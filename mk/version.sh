@@ -17,4 +17,4 @@ for package in "$@"; do
     fi
     rm -f "$package"/openenv.yaml.before "$package"/pyproject.toml.before "$package"/src/*/__init__.py.before
 done
-echo "every distribution is now $version; run make install, and say in CHANGELOG.md what changed"
+echo "every distribution is now $version; say in CHANGELOG.md what changed"
