@@ -85,7 +85,7 @@ class Service:
         )
         stack.callback(self.worker.wait)
         stack.callback(self.worker.terminate)
-        while not [w for w in self.context.store.workers.all() if w.alive]:
+        while not [w for w in self.context.store.workers.page(limit=100) if w.alive]:
             time.sleep(POLL_S)
         self._submissions = Submissions(self.context, load_registry(registry_file))
 

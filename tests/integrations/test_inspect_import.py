@@ -17,6 +17,7 @@ from support.servers.live_api import live_api
 from support.stages import work
 
 from buildarena_pipeline.runtime.context import open_context
+from buildarena_simulation import DEFAULT_ENGINE
 
 ROOT = Path(__file__).parents[2]
 ADAPTER = ROOT / "integrations/inspect"
@@ -69,14 +70,17 @@ def test_a_log_becomes_jobs_that_the_service_simulates_and_scores_itself(logs, c
         ]
         jobs = jobs_of(client)
         assert len(jobs) == 4
-        assert {job["track"].split("-")[0] for job in jobs.values()} == {"external/mujoco"}
+        assert {job["track"].split("-")[0] for job in jobs.values()} == {
+            f"external/{DEFAULT_ENGINE}"
+        }
         assert [jobs[name]["outcome"] for name in ("support-1", "support-3")] == ["success"] * 2
         for name in ("lift-2", "support-2"):
             assert jobs[name]["outcome"] == "construction_failed"
             assert jobs[name]["reason"] == "empty_machine"
         code, lying = bring(url, logs / "lying.eval")
         assert code == 1
-        assert "  indicator: 999 in the log, 1214.95 in the service" in lying
+        carried = f"{jobs['support-1']['indicator']:.6g}"
+        assert f"  indicator: 999 in the log, {carried} in the service" in lying
         assert "  success: True in the log, False in the service" in lying
         assert jobs_of(client) == jobs
 

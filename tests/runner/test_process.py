@@ -66,7 +66,9 @@ def test_a_runner_does_what_waits_and_hands_back_what_it_can_not_end(
         for job in jobs:
             kept = context.store.jobs.artifacts(ended(context, job).id)
             assert kept["trajectory-0"] == digest
-        (worker,) = [w for w in context.store.workers.all() if w.id.startswith("runner@key_")]
+        (worker,) = [
+            w for w in context.store.workers.page(limit=100) if w.id.startswith("runner@key_")
+        ]
         assert (worker.alive, worker.pid) == (True, process.pid)
         assert worker.peak_memory_bytes > 20_000_000
         long = waiting(context, LONG)
@@ -85,7 +87,7 @@ def test_a_runner_does_what_waits_and_hands_back_what_it_can_not_end(
         # The other slot may have been given it once more.
         assert results[0] == "fault"
         assert set(results[1:]) == {"handed_back"}
-        assert not [w for w in context.store.workers.all() if w.id == worker.id]
+        assert not [w for w in context.store.workers.page(limit=100) if w.id == worker.id]
 
 
 def test_a_killed_runner_costs_a_lease_and_leaves_no_process(context, url, tmp_path) -> None:

@@ -231,10 +231,10 @@ def test_runners_are_workers_like_others(context, url) -> None:
     caller = Caller(url, runner_key(context)[1])
     versions = {"engine": "mujoco", "simulation": "3"}
     caller.ask("POST", "/heartbeat", json=caller.about(versions=versions, pid=7))
-    (listed,) = as_admin(url).ask("GET", "/../workers").json()
+    (listed,) = as_admin(url).ask("GET", "/../workers").json()["workers"]
     assert (listed["queues"], listed["pid"], listed["alive"]) == (["simulate.mujoco"], 7, True)
     assert listed["id"].startswith("runner@key_")
     checks = as_admin(url).ask("GET", "/../health").json()["checks"]
     assert {c["name"]: c["ok"] for c in checks}["workers of simulate.mujoco"]
     caller.ask("POST", "/goodbye", json=caller.about())
-    assert as_admin(url).ask("GET", "/../workers").json() == []
+    assert as_admin(url).ask("GET", "/../workers").json()["workers"] == []

@@ -149,7 +149,7 @@ class Client:
     simulators = _call(Api.simulators)
     modules = _call(Api.modules)
     module_model = _call(Api.module_model)
-    workers = _call(Api.workers)
+    workers = _iteration(Api.workers)
 
     leaderboard = _call(Api.leaderboard)
     compare = _call(Api.compare)

@@ -55,10 +55,11 @@ from buildarena_store.sweeps.sweeps import NewSweep, Sweep, SweepProgress, Sweep
 from buildarena_store.tasks import StoredTask, Tasks
 from buildarena_store.text import clean
 from buildarena_store.uploads import UploadedFile, Uploads
-from buildarena_store.workers import WorkerInfo, Workers
+from buildarena_store.workers import Announcement, WorkerCounts, WorkerInfo, Workers
 
 __all__ = [
     "STAGE_SECONDS",
+    "Announcement",
     "ApiKey",
     "ApiKeys",
     "ArtifactDamagedError",
@@ -129,6 +130,7 @@ __all__ = [
     "Usage",
     "Verification",
     "Verifications",
+    "WorkerCounts",
     "WorkerInfo",
     "Workers",
     "clean",

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
-from typing import Any
+from typing import Any, Final
 
-from sqlalchemy import ColumnElement, cast, delete, func, select
+from sqlalchemy import ColumnElement, cast, delete, func, not_, select, tuple_
 from sqlalchemy.dialects.postgresql import insert
 from sqlalchemy.types import DateTime, Double
 
@@ -17,6 +17,9 @@ from buildarena_store.rows import value_of
 from buildarena_store.tables import workers
 
 FORGOTTEN_AFTER = timedelta(hours=1)
+WORST_CLOCKS: Final = 10
+ANNOUNCED: Final = ("simulation", "kind", "repeatable")
+MAX_ANNOUNCEMENTS: Final = 1000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,6 +51,39 @@ class WorkerInfo:
     alive: bool
     peak_memory_bytes: int | None
     clock_ahead_s: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WorkerCounts:
+    """The register of workers in a few numbers, however many there are.
+
+    Attributes:
+        serving: Workers alive, by the queue they serve.
+        alive: Workers alive, by kind.
+        lost: Workers that went silent without signing off and are not forgotten, by kind.
+        peak_memory_bytes: The most memory that one alive ever had, by kind.
+        clocks: Ids of workers alive whose clocks differ most from the database's, and by how many
+            seconds they are ahead; the worst first.
+    """
+
+    serving: Mapping[str, int]
+    alive: Mapping[str, int]
+    lost: Mapping[str, int]
+    peak_memory_bytes: Mapping[str, int]
+    clocks: Sequence[tuple[str, float]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Announcement:
+    """What workers of one sort say of the simulators that they have.
+
+    Attributes:
+        queues: Queues they serve.
+        versions: Of what they say: ``simulation``, ``kind`` and ``repeatable``, null if missing.
+    """
+
+    queues: Sequence[str]
+    versions: Mapping[str, Any]
 
 
 class Workers:
@@ -95,12 +131,77 @@ class Workers:
         with self._database.transaction() as connection:
             connection.execute(delete(workers).where(workers.c.id == worker_id))
 
-    def all(self) -> list[WorkerInfo]:
-        """Every known worker, the most recently seen first."""
-        alive = (workers.c.seen_at > events.now - self._alive_for).label("alive")
-        query = select(workers, alive).order_by(workers.c.seen_at.desc())
+    def trim(self, prefix: str, *, most: int) -> None:
+        """Forgets all but the workers whose ids begin so that reported last.
+
+        Args:
+            prefix: Of the ids.
+            most: How many stay.
+        """
+        ours = select(workers.c.id).where(func.starts_with(workers.c.id, prefix))
+        old = ours.order_by(workers.c.seen_at.desc()).offset(most)
         with self._database.transaction() as connection:
-            return [value_of(WorkerInfo, row) for row in connection.execute(query)]
+            connection.execute(delete(workers).where(workers.c.id.in_(old)))
+
+    def page(self, *, limit: int, after: tuple[datetime, str] | None = None) -> list[WorkerInfo]:
+        """Known workers, the last started first: an order that reports do not change.
+
+        Args:
+            limit: How many at most.
+            after: Start and id of the worker behind which the page begins.
+        """
+        alive = (workers.c.seen_at > events.now - self._alive_for).label("alive")
+        query = select(workers, alive).order_by(workers.c.started_at.desc(), workers.c.id.desc())
+        if after is not None:
+            query = query.where(tuple_(workers.c.started_at, workers.c.id) < tuple_(*after))
+        with self._database.transaction() as connection:
+            return [value_of(WorkerInfo, row) for row in connection.execute(query.limit(limit))]
+
+    def counts(self) -> WorkerCounts:
+        """The register in a few numbers; no worker's versions are read."""
+        alive = workers.c.seen_at > events.now - self._alive_for
+        kinds = select(
+            workers.c.kind,
+            func.count().filter(alive).label("alive"),
+            func.count().filter(not_(alive)).label("lost"),
+            func.max(workers.c.peak_memory_bytes).filter(alive).label("peak"),
+        ).group_by(workers.c.kind)
+        queues = select(func.jsonb_array_elements_text(workers.c.queues).label("queue"))
+        queue = queues.where(alive).subquery().c.queue
+        serving = select(queue, func.count().label("alive")).group_by(queue)
+        clocks = (
+            select(workers.c.id, workers.c.clock_ahead_s)
+            .where(alive, workers.c.clock_ahead_s.is_not(None))
+            .order_by(func.abs(workers.c.clock_ahead_s).desc())
+            .limit(WORST_CLOCKS)
+        )
+        with self._database.transaction() as connection:
+            by_kind = list(connection.execute(kinds))
+            return WorkerCounts(
+                serving={row.queue: row.alive for row in connection.execute(serving)},
+                alive={row.kind: row.alive for row in by_kind if row.alive},
+                lost={row.kind: row.lost for row in by_kind},
+                peak_memory_bytes={row.kind: row.peak for row in by_kind if row.peak is not None},
+                clocks=[(row.id, row.clock_ahead_s) for row in connection.execute(clocks)],
+            )
+
+    def announcements(self) -> list[Announcement]:
+        """What the known workers say of their simulators, each saying once."""
+        said = workers.c.versions
+        query = (
+            select(workers.c.queues, *(said[name].label(name) for name in ANNOUNCED))
+            .where(workers.c.kind == "simulate")
+            .distinct()
+            .limit(MAX_ANNOUNCEMENTS)
+        )
+        with self._database.transaction() as connection:
+            return [
+                Announcement(
+                    queues=row.queues,
+                    versions={name: getattr(row, name) for name in ANNOUNCED},
+                )
+                for row in connection.execute(query)
+            ]
 
 
 def _ahead(own_time: datetime) -> ColumnElement[float]:

@@ -13,7 +13,8 @@ from uvicorn.middleware.proxy_headers import ProxyHeadersMiddleware
 from buildarena_api.dashboard.files import read_pages
 from buildarena_api.dashboard.serving import Dashboard, is_page
 from buildarena_api.events.hub import EventHub
-from buildarena_api.http.access import caller_of
+from buildarena_api.http.access import admission, caller_of, known_key
+from buildarena_api.http.admission import BodyBuffers
 from buildarena_api.http.concurrency import limited, usual_limits
 from buildarena_api.http.former_names import FormerNamesMiddleware
 from buildarena_api.http.infrastructure import InfrastructureMetrics
@@ -155,6 +156,7 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
     app.state.runners = runners
     app.state.key_checks = KeyChecks(watching)
     app.state.concurrency = usual_limits()
+    app.state.body_buffers = BodyBuffers()
     app.state.registry = registry
     app.state.boards = BoardCache(context.store.results.boards, context.tasks)
     app.state.scenes = ResponseCache(trials.MAX_CACHED_SCENES)
@@ -194,6 +196,9 @@ def _add_middleware(app: FastAPI) -> None:
         unlimited={archives.IMPORT_PATH},
         documents={tasks.PATH, machines.CHECK_PATH, machines.TRIAL_PATH},
         pieces=runner.is_piece,
+        most=runner.max_request_bytes,
+        admit=admission(app),
+        buffers=app.state.body_buffers,
     )
     routes = [
         (found.path, found.methods or ())
@@ -206,7 +211,7 @@ def _add_middleware(app: FastAPI) -> None:
     if not settings.require_keys:
         app.add_middleware(LocalOnlyMiddleware, is_page=is_page)
     app.add_middleware(RequestLog, metrics=app.state.metrics)
-    app.add_middleware(OverloadMiddleware)
+    app.add_middleware(OverloadMiddleware, known=known_key(app))
     if settings.base_path:
         app.add_middleware(BasePathMiddleware, base=settings.base_path)
     if settings.trusted_proxies:

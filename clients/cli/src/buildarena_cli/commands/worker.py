@@ -20,6 +20,7 @@ app = new_group("Run workers by themselves.")
 
 SIMULATE: Final = "simulate."
 MEBIBYTE: Final = 1024 * 1024
+MAX_LISTED: Final = 500
 COLUMNS = columns(
     *("worker", "queues", "state", "version", "MiB", "since"),
     figures=("MiB",),
@@ -75,11 +76,12 @@ def list_workers(*, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) -
     """List the workers that a service heard of within the last hour, runners included."""
     from buildarena_cli.client import Client
 
-    found = Client(url).get("/v1/workers")
+    pages = Client(url).pages("/v1/workers", limit=MAX_LISTED)
+    workers = [worker for page in pages for worker in page["workers"]]
     if as_json:
-        print_json(found)
+        print_json(workers)
         return
-    print_table(COLUMNS, [_row(worker) for worker in found])
+    print_table(COLUMNS, [_row(worker) for worker in workers])
 
 
 @app.command("doctor")

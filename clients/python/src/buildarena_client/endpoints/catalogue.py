@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import AsyncGenerator
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
@@ -75,9 +76,16 @@ class Catalogue(Sender):
         """The scorers that task files can name, with their parameters and flags."""
         return cast("list[ScorerView]", await self.get("/v1/scorers"))
 
-    async def workers(self) -> list[WorkerView]:
-        """The workers that were heard of lately."""
-        return cast("list[WorkerView]", await self.get("/v1/workers"))
+    def workers(
+        self, *, limit: int | None = None, page: int = 100
+    ) -> AsyncGenerator[WorkerView, None]:
+        """The workers that were heard of lately, the last started first.
+
+        Args:
+            limit: How many at most; all by default.
+            page: How many are asked for at once, 1 to 500.
+        """
+        return self._listed("/v1/workers", "workers", limit, page, {})
 
     async def module_model(self, name: str) -> bytes:
         """The shape of a module, as GLB."""

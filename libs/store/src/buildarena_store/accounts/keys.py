@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import hashlib
+import re
 import secrets
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 
-from sqlalchemy import and_, any_, func, insert, or_, select, update
+from sqlalchemy import any_, func, insert, or_, select, update
 
 from buildarena_store import events
 from buildarena_store.account_tables import api_keys
@@ -113,34 +114,32 @@ class ApiKeys:
 
     def check(self, secret: str) -> KeyCheck | None:
         """The key that has this secret, and whether it is still valid; None when nobody has it."""
+        digest = secret_hash(secret)
+        return self.check_hashes([digest]).get(digest)
+
+    def check_hashes(self, digests: Sequence[str]) -> dict[str, KeyCheck]:
+        """The keys that have the secrets of these hashes, by hash; what nobody has is left out."""
         expired = (api_keys.c.expires_at <= events.now).label("expired")
-        replaced = and_(
-            api_keys.c.secret_hash != secret_hash(secret), api_keys.c.previous_until <= events.now
-        ).label("replaced")
+        replaced = (api_keys.c.previous_until <= events.now).label("replaced")
         stale = func.coalesce(api_keys.c.used_at < events.now - NOTED_EVERY, True).label("stale")
+        wanted = any_(bound_texts(digests))
+        query = select(
+            *_COLUMNS, api_keys.c.secret_hash, api_keys.c.previous_hash, expired, replaced, stale
+        ).where(or_(api_keys.c.secret_hash == wanted, api_keys.c.previous_hash == wanted))
+        asked, checks, used = set(digests), {}, []
         with self._database.transaction() as connection:
-            row = connection.execute(
-                select(*_COLUMNS, expired, replaced, stale).where(
-                    or_(
-                        api_keys.c.secret_hash == secret_hash(secret),
-                        api_keys.c.previous_hash == secret_hash(secret),
-                    )
-                )
-            ).first()
-            if row is None:
-                return None
-            key = value_of(ApiKey, row)
-            if key.revoked_at is not None:
-                return KeyCheck(key=key, refusal="revoked")
-            if row.expired:
-                return KeyCheck(key=key, refusal="expired")
-            if row.replaced:
-                return KeyCheck(key=key, refusal="replaced")
-            if row.stale:
-                connection.execute(
-                    update(api_keys).where(api_keys.c.id == key.id).values(used_at=events.now)
-                )
-        return KeyCheck(key=key, refusal=None)
+            for row in connection.execute(query):
+                key = value_of(ApiKey, row)
+                for digest in asked & {row.secret_hash, row.previous_hash}:
+                    replaced_one = digest != row.secret_hash and row.replaced
+                    refusal = _refusal(key, expired=row.expired, replaced=replaced_one)
+                    checks[digest] = KeyCheck(key=key, refusal=refusal)
+                    if refusal is None and row.stale:
+                        used.append(key.id)
+            if used:
+                noted = api_keys.c.id == any_(bound_texts(used))
+                connection.execute(update(api_keys).where(noted).values(used_at=events.now))
+        return checks
 
     def ended(self, key_ids: Sequence[str]) -> set[str]:
         """Those of the keys that were revoked or have expired."""
@@ -225,6 +224,19 @@ class ApiKeys:
         return value_of(ApiKey, row)
 
 
+def _refusal(key: ApiKey, *, expired: bool | None, replaced: bool | None) -> str | None:
+    if key.revoked_at is not None:
+        return "revoked"
+    if expired:
+        return "expired"
+    return "replaced" if replaced else None
+
+
+def is_secret(text: str) -> bool:
+    """Whether a text has the form of a secret; one that has not is nobody's."""
+    return _SECRET.fullmatch(text) is not None
+
+
 def new_secret() -> str:
     """256 random bits in letters."""
     return SECRET_PREFIX + secrets.token_urlsafe(32)
@@ -239,4 +251,5 @@ def secret_hash(secret: str) -> str:
     return hashlib.sha256(secret.encode()).hexdigest()
 
 
+_SECRET = re.compile(SECRET_PREFIX + "[A-Za-z0-9_-]{43}")
 _COLUMNS = columns_of(ApiKey, api_keys)

@@ -9,13 +9,17 @@ the operator asks for no keys, which is allowed on loopback only, whoever asks i
 from __future__ import annotations
 
 import hmac
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
-from fastapi import Depends, Request
+from fastapi import Depends, FastAPI, Request
 from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
+from fastapi.security.utils import get_authorization_scheme_param
+from starlette.datastructures import Headers
+from starlette.types import Scope
 
+from buildarena_api.http.admission import PLACE, Admit, Place, address_of
 from buildarena_api.http.key_checks import KeyChecks
 from buildarena_api.http.problems import ProblemError
 from buildarena_api.http.rate_limits import RateLimits
@@ -27,6 +31,8 @@ RUNNER = "runner"
 """The scope of runner keys, beside the others."""
 LOOPBACK = ("127.0.0.1", "::1", "localhost")
 METRICS_PATH = "/v1/metrics"
+OPERATOR = "operator"
+"""For whom the operator's open requests count."""
 READING = ("GET", "HEAD", "OPTIONS")
 _bearer = HTTPBearer(auto_error=False, description="An API key, as `buildarena key create` made it")
 
@@ -146,23 +152,58 @@ async def _admitted(request: Request, given: HTTPAuthorizationCredentials | None
         caller = caller or await _identify(settings, checks, given)
     except ProblemError:
         # Guessing keys is limited too.
-        await _count(limits, f"refused:{_address(request)}")
+        await _count(limits, f"refused:{address_of(request.scope)}")
         raise
     request.state.caller = caller
+    _move(request.scope, caller)
     await _count(limits, who_asks(request))
     return caller
+
+
+def admission(app: FastAPI) -> Admit:
+    """What refuses requests that have a body before it is read, from their headers alone."""
+
+    async def admit(scope: Scope) -> None:
+        settings: Settings = app.state.context.settings
+        headers = Headers(scope=scope)
+        scheme, secret = get_authorization_scheme_param(headers.get("authorization"))
+        bearer = scheme.lower() == "bearer" and bool(secret)
+        given = HTTPAuthorizationCredentials(scheme=scheme, credentials=secret) if bearer else None
+        try:
+            caller = await _identify(settings, app.state.key_checks, given)
+        except ProblemError:
+            await _count(app.state.rate_limits, f"refused:{address_of(scope)}")
+            raise
+        _move(scope, caller)
+
+    return admit
+
+
+def known_key(app: FastAPI) -> Callable[[str], str | None]:
+    """Whose key a secret is, if it was seen to be good lately; nothing is asked."""
+
+    def known(secret: str) -> str | None:
+        if _is_operators(secret, app.state.context.settings):
+            return OPERATOR
+        checks: KeyChecks = app.state.key_checks
+        return checks.known(secret)
+
+    return known
+
+
+def _move(scope: Scope, caller: Caller) -> None:
+    """Counts an open request for the key that sent it."""
+    place: Place | None = scope.get(PLACE)
+    if place is not None and caller.key_id is not None and place.who != caller.key_id:
+        place.move(caller.key_id)
 
 
 def who_asks(request: Request) -> str:
     """Whose share a request is taken from: the key's, or the address' where there is none."""
     caller: Caller | None = getattr(request.state, "caller", None)
     if caller is None or caller.key_id is None:
-        return f"address:{_address(request)}"
+        return address_of(request.scope)
     return caller.key_id
-
-
-def _address(request: Request) -> str:
-    return "unknown" if request.client is None else request.client.host
 
 
 CallerDep = Annotated[Caller, Depends(caller_of)]

@@ -6,8 +6,7 @@ Workers have no port: what they know of themselves they report to the database, 
 from __future__ import annotations
 
 import shutil
-from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from typing import Final
 
 from prometheus_client.core import GaugeMetricFamily, Metric
@@ -17,7 +16,7 @@ from sqlalchemy.pool import QueuePool
 
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.simulators.known import configured_simulators
-from buildarena_store import WorkerInfo
+from buildarena_store import WorkerCounts
 from buildarena_store.states import CONSTRUCT_QUEUE, simulate_queue
 
 PREFIX: Final = "buildarena_"
@@ -48,8 +47,7 @@ class InfrastructureMetrics(Collector):
 
     def collect(self) -> Iterable[Metric]:
         """The figures of this moment."""
-        known = self._context.store.workers.all()
-        yield from self._workers(known)
+        yield from self._workers(self._context.store.workers.counts())
         yield self._one(
             "artifact_store_up",
             "1 when artifacts can be written and read, else 0.",
@@ -69,38 +67,33 @@ class InfrastructureMetrics(Collector):
         yield self._one("data_size_bytes", "Size of that disk.", disk.total)
         yield from self._connections()
 
-    def _workers(self, known: Sequence[WorkerInfo]) -> Iterable[Metric]:
+    def _workers(self, counts: WorkerCounts) -> Iterable[Metric]:
         queues = [
             CONSTRUCT_QUEUE,
             *map(simulate_queue, configured_simulators(self._context.settings)),
         ]
-        alive = [worker for worker in known if worker.alive]
-        serving = Counter(queue for worker in alive for queue in worker.queues)
         yield self._each(
             "queue_workers",
             "Worker processes alive, by the queue they serve.",
             "queue",
-            {queue: serving[queue] for queue in {*queues, *serving}},
+            {queue: counts.serving.get(queue, 0) for queue in {*queues, *counts.serving}},
         )
-        lost = Counter(worker.kind for worker in known if not worker.alive)
         yield self._each(
             "workers_lost",
             "Worker processes that went silent within the last hour and did not sign off.",
             "kind",
-            {kind: lost[kind] for kind in ("construct", "simulate")},
+            {kind: counts.lost.get(kind, 0) for kind in ("construct", "simulate")},
         )
-        wrong = [abs(worker.clock_ahead_s) for worker in alive if worker.clock_ahead_s is not None]
         yield self._one(
             "worker_clock_error_seconds",
             "The most that a worker's clock differs from the database's.",
-            max(wrong, default=0.0),
+            abs(counts.clocks[0][1]) if counts.clocks else 0.0,
         )
-        memory = [worker for worker in alive if worker.peak_memory_bytes is not None]
-        peaks: dict[str, float] = {}
-        for worker in memory:
-            peaks[worker.kind] = max(peaks.get(worker.kind, 0.0), worker.peak_memory_bytes or 0.0)
         yield self._each(
-            "worker_peak_memory_bytes", "The most memory that a worker ever had.", "kind", peaks
+            "worker_peak_memory_bytes",
+            "The most memory that a worker ever had.",
+            "kind",
+            counts.peak_memory_bytes,
         )
 
     def _connections(self) -> Iterable[Metric]:

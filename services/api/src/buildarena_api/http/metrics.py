@@ -62,9 +62,8 @@ class ServiceMetrics(Collector):
         workers = GaugeMetricFamily(
             "buildarena_workers", "Worker processes alive, by kind.", labels=["kind"]
         )
-        alive = [worker.kind for worker in self._context.store.workers.all() if worker.alive]
-        for kind in sorted(set(alive)):
-            workers.add_metric([kind], alive.count(kind))
+        for kind, alive in sorted(self._context.store.workers.counts().alive.items()):
+            workers.add_metric([kind], alive)
         yield workers
 
     def _fresh(self) -> MetricValues:

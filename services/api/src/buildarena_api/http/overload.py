@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import time
 from collections import Counter
+from collections.abc import Callable
 from typing import Final
 
 import structlog
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from buildarena_api.http.admission import PLACE, Place, address_of
 from buildarena_api.http.problems import send_problem
 
 MAX_IN_FLIGHT: Final = 96
@@ -33,10 +35,12 @@ class OverloadMiddleware:
 
     Args:
         app: The application.
+        known: Whose key a secret is, if it was seen to be good lately: nothing is asked.
     """
 
-    def __init__(self, app: ASGIApp) -> None:
+    def __init__(self, app: ASGIApp, *, known: Callable[[str], str | None]) -> None:
         self._app = app
+        self._known = known
         self._in_flight: Counter[str] = Counter()
         self._not_before: dict[tuple[str, str], float] = {}
         self._refused = 0
@@ -47,25 +51,34 @@ class OverloadMiddleware:
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
-        who = _who(scope)
-        what = (who, f"{scope['method']} {scope['path'].rpartition('/')[2]}")
-        wait_s = self._not_before.get(what, 0.0) - time.monotonic()
+        who = self._who(scope)
+        what = f"{scope['method']} {scope['path'].rpartition('/')[2]}"
+        wait_s = self._not_before.get((who, what), 0.0) - time.monotonic()
         if wait_s > 0 or self._in_flight[who] >= MAX_IN_FLIGHT:
             await self._refuse(send, max(1, round(wait_s)))
             return
 
         async def noting_send(message: Message) -> None:
             if message["type"] == "http.response.start" and message["status"] == 429:  # noqa: PLR2004 - Too Many Requests
-                self._remember(what, message)
+                self._remember((place.who, what), message)
             await send(message)
 
-        self._in_flight[who] += 1
+        place = Place(who, self._in_flight)
+        place.enter()
         try:
-            await self._app(scope, receive, noting_send)
+            await self._app({**scope, PLACE: place}, receive, noting_send)
         finally:
-            self._in_flight[who] -= 1
-            if not self._in_flight[who]:
-                del self._in_flight[who]
+            place.leave()
+
+    def _who(self, scope: Scope) -> str:
+        """Whose request it is: that of a key known to be good, or of its address.
+
+        A key that nobody checked yet proves nothing: whoever invents one for each request has one
+        address.
+        """
+        scheme, _, secret = Headers(scope=scope).get("authorization", "").partition(" ")
+        key_id = self._known(secret.strip()) if scheme.lower() == "bearer" else None
+        return key_id or address_of(scope)
 
     def _remember(self, what: tuple[str, str], refusal: Message) -> None:
         asked = Headers(raw=refusal["headers"]).get("retry-after", "")
@@ -86,12 +99,3 @@ class OverloadMiddleware:
             self._logged_at, self._refused = now, 0
         detail = "too many requests of yours are open or came too early: wait as Retry-After says"
         await send_problem(send, 429, detail, headers={"Retry-After": str(wait_s)})
-
-
-def _who(scope: Scope) -> str:
-    """Whose request it may be: what it presents as its key, or its address."""
-    for name, value in scope["headers"]:
-        if name == b"authorization":
-            return str(value, "latin-1")
-    client = scope.get("client")
-    return "unknown" if client is None else f"address:{client[0]}"

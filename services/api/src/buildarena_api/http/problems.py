@@ -18,6 +18,7 @@ from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 from starlette.types import Send
 
+from buildarena_api.http.admission import SlowBodyError
 from buildarena_benchmark import ValidationIssue
 from buildarena_pipeline.errors import SubmissionError
 from buildarena_store import (
@@ -121,6 +122,10 @@ def add_problem_handlers(app: FastAPI) -> None:
     @app.exception_handler(ProblemError)
     async def on_problem(_: Request, error: ProblemError) -> JSONResponse:
         return _answer(error.status, error.detail, error.errors, error.headers)
+
+    @app.exception_handler(SlowBodyError)
+    async def on_slow_body(_: Request, error: SlowBodyError) -> JSONResponse:
+        return _answer(408, str(error), headers={"Connection": "close"})
 
     @app.exception_handler(SubmissionError)
     async def on_submission(_: Request, error: SubmissionError) -> JSONResponse:

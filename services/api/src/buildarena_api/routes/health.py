@@ -16,7 +16,7 @@ from buildarena_api.dependencies import ContextDep
 from buildarena_api.http.concurrency import anybodys_turn
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.simulators.known import configured_simulators
-from buildarena_store import ArtifactStore, ArtifactStoreError
+from buildarena_store import ArtifactStore, ArtifactStoreError, WorkerCounts
 from buildarena_store.states import CONSTRUCT_QUEUE, simulate_queue
 
 router = APIRouter(
@@ -55,15 +55,10 @@ def health(context: ContextDep, request: Request, response: Response) -> Health:
     """
     database = _database(context)
     artifacts: ArtifactProbe = request.app.state.artifact_probe
-    checks = [
-        database,
-        _broker(context),
-        artifacts.check(),
-        *_workers(context, database),
-        _disk(context),
-    ]
+    checks = [database, _broker(context), artifacts.check(), _disk(context)]
     if database.ok:
-        checks.append(_clocks(context))
+        counts = context.store.workers.counts()
+        checks += [*_workers(context, counts), _clocks(counts)]
     if not database.ok:
         response.status_code = 503
         return Health(status="down", checks=checks)
@@ -132,32 +127,28 @@ def _broker(context: Context) -> Check:
     return Check(name="broker", ok=True, detail=f"reachable, {waiting} messages for construct")
 
 
-def _workers(context: Context, database: Check) -> list[Check]:
-    if not database.ok:
-        return []
-    alive = [worker for worker in context.store.workers.all() if worker.alive]
+def _workers(context: Context, counts: WorkerCounts) -> list[Check]:
     checks = []
     simulators = configured_simulators(context.settings)
     for queue in [CONSTRUCT_QUEUE, *map(simulate_queue, simulators)]:
-        serving = [worker for worker in alive if queue in worker.queues]
+        serving = counts.serving.get(queue, 0)
         checks.append(
             Check(
                 name=f"workers of {queue}",
-                ok=bool(serving),
-                detail=f"{len(serving)} alive",
+                ok=serving > 0,
+                detail=f"{serving} alive",
                 advice="" if serving else f"start a worker for the queue {queue}",
             )
         )
     return checks
 
 
-def _clocks(context: Context) -> Check:
+def _clocks(counts: WorkerCounts) -> Check:
     """Leases go by the database's clock; but limits in seconds and logs go by each process' own."""
     wrong = [
-        f"{worker.id} is {abs(worker.clock_ahead_s):.0f} s "
-        + ("ahead" if worker.clock_ahead_s > 0 else "behind")
-        for worker in context.store.workers.all()
-        if worker.alive and worker.clock_ahead_s and abs(worker.clock_ahead_s) > CLOCK_TOLERANCE_S
+        f"{worker} is {abs(ahead_s):.0f} s {'ahead' if ahead_s > 0 else 'behind'}"
+        for worker, ahead_s in counts.clocks
+        if abs(ahead_s) > CLOCK_TOLERANCE_S
     ]
     return Check(
         name="clocks",

@@ -48,9 +48,19 @@ router = APIRouter(prefix=PREFIX, tags=["runner"])
 _ORDINARY = limited("ordinary", caller=runner_of)
 
 
+MAX_REQUEST_BYTES: Final = 64 * 1024
+"""The largest request of a runner that is no piece of a file."""
+
+
 def is_piece(path: str) -> bool:
     """Whether a path is that of a piece of a file."""
     return path.startswith(f"{PREFIX}/leases/") and "/uploads/" in path
+
+
+def max_request_bytes(path: str) -> int | None:
+    """The largest request that a path takes, if it is a runner's."""
+    is_runners = path == PREFIX or path.startswith(PREFIX + "/")
+    return MAX_REQUEST_BYTES if is_runners and not is_piece(path) else None
 
 
 def _named(
@@ -153,6 +163,8 @@ def send_heartbeat(body: Heartbeat, caller: RunnerDep, context: ContextDep) -> H
         peak_memory_bytes=body.peak_memory_bytes,
         own_time=body.own_time,
     )
+    # Old names of the key leave the register long before they would be forgotten.
+    store.workers.trim(prefix, most=MAX_NAMES)
     live = store.runner_leases.heartbeat([(one.job_id, one.token) for one in body.leases], prefix)
     answer = HeartbeatAnswer(live=[], lost=[])
     for one in body.leases:

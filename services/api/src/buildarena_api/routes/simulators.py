@@ -35,8 +35,7 @@ class SimulatorView(BaseModel):
 @router.get("", responses=problem_responses(503))
 def list_simulators(context: ContextDep) -> list[SimulatorView]:
     """Lists what jobs can name as `simulator`, and whether it is served at the moment."""
-    alive = (worker for worker in context.store.workers.all() if worker.alive)
-    serving = Counter(queue for worker in alive for queue in worker.queues)
+    serving = Counter(context.store.workers.counts().serving)
     return [
         SimulatorView(
             name=simulator.name,

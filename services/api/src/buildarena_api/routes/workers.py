@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Any
+from typing import Annotated, Any
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Query
 from pydantic import BaseModel, ConfigDict, Field
 
 from buildarena_api.dependencies import ContextDep
+from buildarena_api.http import cursors
 from buildarena_api.http.problems import problem_responses
 
 router = APIRouter(prefix="/v1/workers", tags=["workers"])
@@ -36,7 +37,24 @@ class WorkerView(BaseModel):
     clock_ahead_s: float | None = Field(description="How far its clock is ahead of the database's")
 
 
-@router.get("", responses=problem_responses(503))
-def list_workers(context: ContextDep) -> list[WorkerView]:
-    """Lists the workers that reported within the last hour, the latest first."""
-    return [WorkerView.model_validate(worker) for worker in context.store.workers.all()]
+class WorkerPage(BaseModel):
+    """Some workers, the last started first."""
+
+    workers: list[WorkerView]
+    next_cursor: str | None = Field(description="Give it as `cursor` to get the next page")
+
+
+@router.get("", responses=problem_responses(422, 503))
+def list_workers(
+    context: ContextDep,
+    limit: Annotated[int, Query(ge=1, le=500)] = 100,
+    cursor: str | None = None,
+) -> WorkerPage:
+    """Lists the workers that reported within the last hour, the last started first."""
+    after = None if cursor is None else cursors.decode(cursor)
+    page = context.store.workers.page(limit=limit + 1, after=after)
+    shown, more = page[:limit], len(page) > limit
+    return WorkerPage(
+        workers=[WorkerView.model_validate(worker) for worker in shown],
+        next_cursor=cursors.encode(shown[-1].started_at, shown[-1].id) if more else None,
+    )

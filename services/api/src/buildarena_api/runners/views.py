@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from datetime import datetime
 from typing import Annotated, Any, Final, Literal
 
@@ -14,6 +15,14 @@ from buildarena_store.uploads import MAX_FILE_BYTES, MAX_LEASE_FILES
 
 LONGEST_WAIT_S: Final = 25.0
 MAX_VERSIONS: Final = 32
+MAX_VERSIONS_BYTES: Final = 4096
+
+
+def _small(facts: dict[str, Any]) -> dict[str, Any]:
+    size = len(json.dumps(facts).encode())
+    if size > MAX_VERSIONS_BYTES:
+        raise ValueError(f"it has {size:,} bytes of JSON, of {MAX_VERSIONS_BYTES:,} at most")
+    return facts
 
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -27,7 +36,14 @@ Fact = (
     | Annotated[list[Short | int | Finite | bool | None], Field(max_length=64)]
     | Annotated[dict[Short, Short | int | Finite | bool | None], Field(max_length=64)]
 )
-Facts = Annotated[dict[Annotated[str, Field(max_length=60)], Fact], Field(max_length=MAX_VERSIONS)]
+Facts = Annotated[
+    dict[Annotated[str, Field(max_length=60)], Fact],
+    Field(
+        max_length=MAX_VERSIONS,
+        description=f"At most {MAX_VERSIONS_BYTES:,} bytes of JSON",
+    ),
+    AfterValidator(_small),
+]
 Version = Annotated[str, Field(pattern=r"^[A-Za-z0-9._-]{1,80}$")]
 Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$", description="64 hex digits")]
 Size = Annotated[int, Field(ge=0, le=MAX_FILE_BYTES, description="Bytes")]

@@ -21,7 +21,7 @@ from buildarena_simulation import (
     UnknownEngineError,
     require_engine,
 )
-from buildarena_store import WorkerInfo
+from buildarena_store import Announcement
 from buildarena_store.states import simulate_queue
 
 NO_GAME: Final = (
@@ -65,8 +65,8 @@ def configured_simulators(settings: Settings) -> dict[str, SimulatorInfo]:
 def known_simulators(context: Context) -> dict[str, SimulatorInfo]:
     """Those, and the simulators of all workers that reported within the last hour, by name."""
     known = configured_simulators(context.settings)
-    for worker in context.store.workers.all():
-        for name, simulator in announced_simulators(worker).items():
+    for announcement in context.store.workers.announcements():
+        for name, simulator in announced_simulators(announcement).items():
             known.setdefault(name, simulator)
     return known
 
@@ -98,8 +98,8 @@ def simulator_issues(
     return [ValidationIssue(path=path, message=_refusal(n), choices=choices) for n in unknown]
 
 
-def announced_simulators(worker: WorkerInfo) -> dict[str, SimulatorInfo]:
-    """The simulators whose jobs a worker does, as it says, by name."""
+def announced_simulators(worker: Announcement) -> dict[str, SimulatorInfo]:
+    """The simulators whose jobs workers do, as they say, by name."""
     said = worker.versions
     version = said.get("simulation")
     if not isinstance(version, str) or not VERSION.fullmatch(version):
