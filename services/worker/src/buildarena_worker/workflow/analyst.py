@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from buildarena_geometry import Machine
-from buildarena_pipeline.transcript import ActionResult, Turn
+from buildarena_geometry import Accepted, Cause, Machine, Outcome, Refused
+from buildarena_pipeline.transcript import Turn
 from buildarena_simulation import Trajectory
 from buildarena_store import RolloutRecord
 from buildarena_worker.session.dialogue import Act, Dialogue, Role
-from buildarena_worker.session.messages import Tool, ToolCall
+from buildarena_worker.session.messages import Tool
 from buildarena_worker.session.session import Session
-from buildarena_worker.workflow.machine_tools import QUERIES, acting_on, tools_named
+from buildarena_worker.workflow.machine_tools import QUERIES, tools_named
 
 ANALYST_TURNS = 20
 ROWS = 60
@@ -95,30 +95,21 @@ def analyse(
 def _reading(session: Session, machine: Machine, record: RolloutRecord) -> Act:
     trajectory = session.host.trajectory(record)
     turns = list(session.transcript.turns)
-    on_machine = acting_on(machine)
     readers: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
         TRANSCRIPT.name: lambda given: _turns(turns, given),
         TRAJECTORY.name: lambda given: _positions(trajectory, given),
         BREAKS.name: lambda _: _breaks(trajectory),
     }
 
-    def act(call: ToolCall) -> ActionResult:
-        reader = readers.get(call.name)
+    def act(name: str, arguments: Any) -> Outcome:
+        reader = readers.get(name)
         if reader is None:
-            return on_machine(call)
-        reason = None
+            return machine.act(name, arguments)
         try:
-            given = call.arguments if isinstance(call.arguments, dict) else {}
-            text = reader(given)
+            text = reader(arguments if isinstance(arguments, dict) else {})
         except (KeyError, TypeError, ValueError, OverflowError) as error:
-            reason, text = "malformed_arguments", f"That can't be read: {error}."
-        return ActionResult(
-            name=call.name,
-            arguments=call.arguments,
-            ok=reason is None,
-            reason=reason,
-            feedback=text,
-        )
+            return Refused(cause=Cause.MALFORMED_ARGUMENTS, text=f"That can't be read: {error}.")
+        return Accepted(changed=(), render=lambda: text)
 
     return act
 

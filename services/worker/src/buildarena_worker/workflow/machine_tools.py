@@ -10,8 +10,6 @@ from buildarena_environment.briefing import modules_told
 from buildarena_geometry import (
     GROUPS,
     LOOKUP,
-    Machine,
-    Refused,
     catalogue_of,
     modules_named,
     tool_definitions,
@@ -19,9 +17,7 @@ from buildarena_geometry import (
 from buildarena_geometry.feedback.modules import lookup_text
 from buildarena_geometry.feedback.modules import modules_in_short as catalogue_in_short
 from buildarena_geometry.feedback.modules import modules_text as catalogue_text
-from buildarena_pipeline.transcript import ActionResult
-from buildarena_worker.session.dialogue import Act
-from buildarena_worker.session.messages import Tool, ToolCall
+from buildarena_worker.session.messages import Tool
 
 LOOKUPS = tuple(tool.name for tool in tool_definitions([LOOKUP]))
 QUERIES = ("get_machine_summary", "get_block_details")
@@ -80,22 +76,6 @@ def _in_short(schema: Mapping[str, Any]) -> dict[str, Any]:
         for name, told in schema["properties"].items()
     }
     return {"type": "object", "properties": properties, "required": schema["required"]}
-
-
-def acting_on(machine: Machine) -> Act:
-    """Carries out tool calls on a machine."""
-
-    def act(call: ToolCall) -> ActionResult:
-        outcome = machine.act(call.name, call.arguments)
-        return ActionResult(
-            name=call.name,
-            arguments=call.arguments,
-            ok=outcome.ok,
-            reason=outcome.reason.value if isinstance(outcome, Refused) else None,
-            feedback=outcome.text,
-        )
-
-    return act
 
 
 def lookups(task: Task) -> list[Tool]:
