@@ -18,8 +18,9 @@ from dataclasses import dataclass, field
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any, Self
 
+from buildarena_geometry import ToolDefinition
 from buildarena_worker.builtin import MODELS
-from buildarena_worker.session.messages import Completion, Message, Request, Tool, ToolCall
+from buildarena_worker.session.messages import Completion, Message, Request, ToolCall
 
 Fault = Callable[[int], str | bytes | None]
 """From the number of a request to what goes wrong: '429', '500', 'drop', 'slow', 'hang', 'drip',
@@ -235,7 +236,7 @@ class OpenAIWire:
                 )
             )
         tools = [
-            Tool(
+            ToolDefinition(
                 name=t["function"]["name"],
                 description=t["function"].get("description", ""),
                 parameters=t["function"]["parameters"],
@@ -300,7 +301,9 @@ class _Anthropic:
             if said or calls:
                 messages.append(Message(role=m["role"], text=said, calls=calls))
         tools = [
-            Tool(name=t["name"], description=t.get("description", ""), parameters=t["input_schema"])
+            ToolDefinition(
+                name=t["name"], description=t.get("description", ""), parameters=t["input_schema"]
+            )
             for t in body.get("tools") or ()
         ]
         return Request(model_config={}, messages=messages, tools=tools)
@@ -355,7 +358,7 @@ class _Google:
                 role = "assistant" if content.get("role") == "model" else "user"
                 messages.append(Message(role=role, text=said, calls=calls))
         tools = [
-            Tool(
+            ToolDefinition(
                 name=f["name"],
                 description=f.get("description", ""),
                 parameters=f.get("parametersJsonSchema") or f.get("parameters") or {},

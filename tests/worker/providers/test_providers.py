@@ -7,12 +7,13 @@ from dataclasses import replace
 import pytest
 from support.providers.stand_in import ProviderStandIn
 
+from buildarena_geometry import ToolDefinition
 from buildarena_pipeline.catalog.models import ModelEntry, ProviderEntry
 from buildarena_pipeline.errors import PermanentError, TransientError
 from buildarena_store import Usage
 from buildarena_worker.providers.provider import ProviderClient
 from buildarena_worker.providers.retries import RetryPolicy
-from buildarena_worker.session.messages import Completion, Message, Request, Tool, ToolCall
+from buildarena_worker.session.messages import Completion, Message, Request, ToolCall
 from buildarena_worker.session.results import Failed
 
 PROTOCOLS = ["openai", "anthropic", "google"]
@@ -109,9 +110,9 @@ def test_decoding_and_seed_go_over_the_wire(client) -> None:
 
 
 def test_every_request_carries_its_own_tools(client) -> None:
-    def tool(name: str, unit: str) -> Tool:
+    def tool(name: str, unit: str) -> ToolDefinition:
         parameters = {"type": "object", "properties": {unit: {"type": "number"}}}
-        return Tool(name=name, description=f"Moves by {unit}.", parameters=parameters)
+        return ToolDefinition(name=name, description=f"Moves by {unit}.", parameters=parameters)
 
     asked = [[tool("move", "metres")], [tool("move", "feet")], [tool("move", "metres")], []]
     with ProviderStandIn("idle") as standin:

@@ -111,14 +111,7 @@ class BuildEnv(gymnasium.Env[str, str]):
         if "state" in chosen:
             self.environment.restore(chosen["state"])
         self._begun = True
-        tools = [
-            {
-                "name": tool.name,
-                "description": tool.description,
-                "parameters": dict(tool.parameters),
-            }
-            for tool in seen.tools
-        ]
+        tools = [tool.as_document() for tool in seen.tools]
         return observed(seen.briefing), {"tools": json.dumps(tools)}
 
     def step(self, action: str) -> tuple[str, float, bool, bool, dict[str, Any]]:

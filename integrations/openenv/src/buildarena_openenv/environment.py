@@ -87,14 +87,7 @@ class BuildEnvironment(ServedEnvironment[BuildAction, BuildObservation, BuildSta
         self._environment = self._made(seed, settings)
         self._episode_id = episode_id
         seen = self._environment.observation
-        tools = [
-            {
-                "name": tool.name,
-                "description": tool.description,
-                "parameters": dict(tool.parameters),
-            }
-            for tool in seen.tools
-        ]
+        tools = [tool.as_document() for tool in seen.tools]
         return BuildObservation(text=seen.briefing, tools=tools, reward=0.0)
 
     def step(

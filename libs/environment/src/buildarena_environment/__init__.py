@@ -23,9 +23,10 @@ from buildarena_environment.errors import (
 from buildarena_environment.evaluating import Evaluator
 from buildarena_environment.rewards import REWARDS, Progress
 from buildarena_environment.snapshots import Snapshot
+from buildarena_environment.tools import ASSEMBLY, MAIN, tools_of_models
 from buildarena_environment.trial_pool import Evaluation, TrialPool
 from buildarena_environment.trials import Trial, best_trial, try_machine
-from buildarena_environment.workbench import ASSEMBLY, MAIN, Workbench, tools_of_models
+from buildarena_environment.workbench import Workbench
 
 __all__ = [
     "ASSEMBLY",

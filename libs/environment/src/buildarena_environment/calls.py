@@ -7,8 +7,8 @@ from typing import Any, Final
 
 from buildarena_environment.environment import Environment, Submission
 from buildarena_environment.errors import CallError, NothingToSubmitError
+from buildarena_environment.tools import MAIN, SUBMIT
 from buildarena_environment.trials import Trial
-from buildarena_environment.workbench import MAIN, SUBMIT
 from buildarena_geometry.json_texts import read_json
 
 EXAMPLE: Final = '{"tool": "start", "arguments": {}}'

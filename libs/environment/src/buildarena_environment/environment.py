@@ -24,8 +24,9 @@ from buildarena_environment.rewards import (
     weighed,
 )
 from buildarena_environment.snapshots import Snapshot
+from buildarena_environment.tools import MAIN, tools_of_models
 from buildarena_environment.trials import Trial, Tries, best_trial, told, try_machine
-from buildarena_environment.workbench import MAIN, Workbench, tools_of_models
+from buildarena_environment.workbench import Workbench
 from buildarena_geometry import Accepted, Cause, Machine, Refused, ToolDefinition
 from buildarena_simulation import DEFAULT_ENGINE
 

@@ -9,8 +9,10 @@ import json
 import random
 from typing import Any
 
+from buildarena_environment.tools import OBJECTION
+from buildarena_geometry import ToolDefinition
 from buildarena_worker.builtin.reading import Situation, read_situation
-from buildarena_worker.session.messages import Completion, Request, Tool, ToolCall
+from buildarena_worker.session.messages import Completion, Request, ToolCall
 
 BLOCKS = ("Small Wooden Block", "Powered Wheel", "Water Cannon", "Torch", "Steel Beam")
 CONNECTORS = ("Brace", "Winch", "Torch")
@@ -65,7 +67,7 @@ def _guide(situation: Situation, request: Request) -> Completion:
 
 
 def _act(situation: Situation, request: Request, rng: random.Random) -> Completion:
-    tools = {tool.name: tool for tool in request.tools if tool.name != "raise_objection"}
+    tools = {tool.name: tool for tool in request.tools if tool.name != OBJECTION.name}
     if not tools or (
         situation.role == "engineer" and situation.own_turns >= _length(request, situation)
     ):
@@ -84,7 +86,7 @@ def _act(situation: Situation, request: Request, rng: random.Random) -> Completi
     return Completion(text="", calls=(call,), finish="stop")
 
 
-def _arguments(tool: Tool, situation: Situation, rng: random.Random) -> dict[str, Any]:
+def _arguments(tool: ToolDefinition, situation: Situation, rng: random.Random) -> dict[str, Any]:
     properties = tool.parameters.get("properties", {})
     required = tool.parameters.get("required", [])
     return {name: _value(name, properties[name], situation, rng) for name in required}

@@ -32,12 +32,13 @@ from pydantic_ai.messages import (
 )
 from pydantic_ai.models import Model, ModelRequestParameters
 from pydantic_ai.settings import ModelSettings
-from pydantic_ai.tools import ToolDefinition
+from pydantic_ai.tools import ToolDefinition as LibraryTool
 
+from buildarena_geometry import ToolDefinition
 from buildarena_worker.providers.bounded_http import RECEIVED, Received
 from buildarena_worker.providers.bounds import MAX_CALLS, arguments_of, bounded, usage_of
 from buildarena_worker.providers.failures import RETRIED_STATUS, Failure, ProviderError
-from buildarena_worker.session.messages import Completion, Message, Request, Tool, ToolCall
+from buildarena_worker.session.messages import Completion, Message, Request, ToolCall
 
 POOLS = 16
 """Connection pools per model over httpx at most: it looks at all connections of a pool for each
@@ -195,11 +196,11 @@ def _response_parts(message: Message) -> list[ModelResponsePart]:
     return parts
 
 
-def request_parameters(tools: Sequence[Tool]) -> ModelRequestParameters:
+def request_parameters(tools: Sequence[ToolDefinition]) -> ModelRequestParameters:
     """The tools in pydantic-ai's form."""
     return ModelRequestParameters(
         function_tools=[
-            ToolDefinition(
+            LibraryTool(
                 name=tool.name,
                 description=tool.description,
                 parameters_json_schema=dict(tool.parameters),

@@ -11,28 +11,18 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from buildarena_geometry import LOOKUP, Outcome, Refused, tool_definitions
+from buildarena_environment.tools import LOOKUPS, OBJECTION
+from buildarena_geometry import Outcome, Refused, ToolDefinition
 from buildarena_pipeline.transcript import ActionResult
-from buildarena_worker.session.messages import Completion, Message, Tool, ToolCall
+from buildarena_worker.session.messages import Completion, Message, ToolCall
 from buildarena_worker.session.results import ConstructionFailedError
 from buildarena_worker.session.session import Session
 
 _LAST_LINE = re.compile(r"(?:^|\n)[\s*_`'\"#]*TERMINATE[\s*_`'\".!]*\Z")
 NO_REPLY = "(no answer)"
-OBJECTION = Tool(
-    name="raise_objection",
-    description="End the work as a failure because it cannot be done within the task's rules.",
-    parameters={
-        "type": "object",
-        "properties": {"reason": {"type": "string", "description": "Why it cannot be done."}},
-        "required": ["reason"],
-        "additionalProperties": False,
-    },
-)
 
 Act = Callable[[str, Any], Outcome]
 """Carries out an action by its name and arguments, as `Machine.act` does."""
-_LOOKUPS = frozenset(tool.name for tool in tool_definitions([LOOKUP]))
 
 
 def terminates(reply: Completion) -> bool:
@@ -45,7 +35,7 @@ def terminates(reply: Completion) -> bool:
 
 def is_lookup_only(reply: Completion) -> bool:
     """Whether a reply does nothing but look modules up: nobody else reads that."""
-    return bool(reply.calls) and all(call.name in _LOOKUPS for call in reply.calls)
+    return bool(reply.calls) and all(call.name in LOOKUPS for call in reply.calls)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,7 +52,7 @@ class Role:
 
     name: str
     system: str
-    tools: Sequence[Tool] = ()
+    tools: Sequence[ToolDefinition] = ()
     act: Act | None = None
     brief: str = ""
 

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from buildarena_geometry import ToolDefinition
 from buildarena_store import JournalEntry, Usage
 from buildarena_store.ids import content_hash
 from buildarena_worker.session.request_options import UNBOUNDED, RequestOptions
@@ -62,21 +63,6 @@ class Message:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Tool:
-    """A tool that a model may use.
-
-    Attributes:
-        name: Its name.
-        description: What it does, for the model.
-        parameters: JSON schema of its arguments.
-    """
-
-    name: str
-    description: str
-    parameters: Mapping[str, Any]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Request:
     """What is sent to a model.
 
@@ -89,7 +75,7 @@ class Request:
 
     model_config: Mapping[str, Any]
     messages: Sequence[Message]
-    tools: Sequence[Tool] = ()
+    tools: Sequence[ToolDefinition] = ()
     seed: int = 0
 
     @property

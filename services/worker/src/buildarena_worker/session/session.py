@@ -6,11 +6,11 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from buildarena_benchmark import Task, broken_constraint
-from buildarena_geometry import Machine
+from buildarena_geometry import Machine, ToolDefinition
 from buildarena_pipeline.catalog.prompt_packs import PromptPack
 from buildarena_pipeline.transcript import ActionResult, ModelTurn, Transcript
 from buildarena_worker.session.host import SessionHost
-from buildarena_worker.session.messages import Completion, Message, Request, Tool
+from buildarena_worker.session.messages import Completion, Message, Request
 from buildarena_worker.session.results import ConstructionFailedError
 
 OnTurn = Callable[[ModelTurn, int], None]
@@ -76,7 +76,7 @@ class Session:
         return self.machine
 
     def ask(
-        self, messages: Sequence[Message], tools: Sequence[Tool], *, phase: str, role: str
+        self, messages: Sequence[Message], tools: Sequence[ToolDefinition], *, phase: str, role: str
     ) -> Completion:
         """The model's reply to a conversation.
 

@@ -7,12 +7,19 @@ from typing import Any
 
 import numpy as np
 
-from buildarena_geometry import Accepted, Cause, Machine, Outcome, Refused
+from buildarena_geometry import (
+    Accepted,
+    Cause,
+    Machine,
+    Outcome,
+    Refused,
+    ToolDefinition,
+    object_schema,
+)
 from buildarena_pipeline.transcript import Turn
 from buildarena_simulation import Trajectory
 from buildarena_store import RolloutRecord
 from buildarena_worker.session.dialogue import Act, Dialogue, Role
-from buildarena_worker.session.messages import Tool
 from buildarena_worker.session.session import Session
 from buildarena_worker.workflow.machine_tools import QUERIES, tools_named
 
@@ -20,34 +27,27 @@ ANALYST_TURNS = 20
 ROWS = 60
 """Rows that one look at transcript or trajectory returns at most."""
 
-TRANSCRIPT = Tool(
+TRANSCRIPT = ToolDefinition(
     name="read_transcript",
     description=f"Read turns of the session, at most {ROWS} from the given one on.",
-    parameters={
-        "type": "object",
-        "properties": {"first_turn": {"type": "integer", "minimum": 0}},
-        "required": ["first_turn"],
-        "additionalProperties": False,
-    },
+    parameters=object_schema({"first_turn": {"type": "integer", "minimum": 0}}, ["first_turn"]),
 )
-TRAJECTORY = Tool(
+TRAJECTORY = ToolDefinition(
     name="read_trajectory",
     description=(
         "Read positions over time (seconds; x east, y north, z up) of a block, or of the cargo "
         f"with block 'cargo'; at most {ROWS} rows."
     ),
-    parameters={
-        "type": "object",
-        "properties": {
+    parameters=object_schema(
+        {
             "block": {"type": "string"},
             "from_s": {"type": "number", "minimum": 0},
             "to_s": {"type": "number", "minimum": 0},
         },
-        "required": ["block", "from_s", "to_s"],
-        "additionalProperties": False,
-    },
+        ["block", "from_s", "to_s"],
+    ),
 )
-BREAKS = Tool(
+BREAKS = ToolDefinition(
     name="read_breaks",
     description="Read which joints broke in the trial, and when.",
     parameters={"type": "object", "properties": {}, "additionalProperties": False},

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from buildarena_environment.tools import LOOKUPS, OBJECTION
 from buildarena_geometry import Machine
-from buildarena_worker.session.dialogue import OBJECTION, Dialogue, Role, is_lookup_only, terminates
+from buildarena_worker.session.dialogue import Dialogue, Role, is_lookup_only, terminates
 from buildarena_worker.session.messages import Completion
 from buildarena_worker.session.results import ConstructionFailedError
 from buildarena_worker.session.session import Session
 from buildarena_worker.workflow.machine_tools import (
     ASSEMBLE,
     BUILD,
-    LOOKUPS,
     REFINE,
     connectors_of,
     lookups,
