@@ -11,6 +11,7 @@ from gymnasium.error import InvalidAction, ResetNeeded
 
 from buildarena_benchmark import Task
 from buildarena_environment import (
+    DEFAULT_STEPS,
     Answer,
     Environment,
     EpisodeOverError,
@@ -61,7 +62,7 @@ class BuildEnv(gymnasium.Env[str, str]):
         task: Task | str,
         *,
         simulator: str = DEFAULT_ENGINE,
-        steps: int = 2000,
+        steps: int = DEFAULT_STEPS,
         rounds: int = 1,
         rewards: Mapping[str, float] | None = None,
         reference: float | None = None,

@@ -6,6 +6,7 @@ Importing this package loads no engine; the first trial does.
 from buildarena_environment.calls import Answer, call, call_text, read_call
 from buildarena_environment.choices import references
 from buildarena_environment.environment import (
+    DEFAULT_STEPS,
     Environment,
     Limits,
     Observation,
@@ -30,6 +31,7 @@ from buildarena_environment.workbench import Workbench
 
 __all__ = [
     "ASSEMBLY",
+    "DEFAULT_STEPS",
     "MAIN",
     "REWARDS",
     "Answer",

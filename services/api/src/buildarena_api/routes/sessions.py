@@ -149,7 +149,7 @@ def open_session(
         force=caller.is_admin,
     )
     response.headers["Location"] = f"/v1/jobs/{opened.job.id}"
-    if opened.again:
+    if opened.reopened:
         response.status_code = 200
     return SessionOpened(
         id=opened.job.id,

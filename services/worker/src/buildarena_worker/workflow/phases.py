@@ -56,8 +56,8 @@ def plan_phase(session: Session) -> Plan:
         try:
             plan = read_plan(text)
             _check_plan(session, plan)
-        except PlanError as found:
-            error = found
+        except PlanError as unusable:
+            error = unusable
             dialogue.remark(planner, pack.say("plan_again", error=str(error)))
         else:
             session.plan = plan.text
