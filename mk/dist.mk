@@ -5,3 +5,4 @@ dist: $(WEB_STAMP) ## Builds wheels and sdists of all distributions, and the ver
 
 version: ## Gives every distribution a new version: make version V=0.2.0
 	@bash mk/version.sh $(V) $(PACKAGES) $(addprefix integrations/,$(INTEGRATIONS))
+	@$(MAKE) --no-print-directory openapi

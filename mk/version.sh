@@ -12,6 +12,9 @@ for package in "$@"; do
         -e "s/^version = \".*\"/version = \"$version\"/" \
         -e "s/\"(buildarena-[a-z-]+(\[[a-z]+\])?)==[^\"]+\"/\"\1==$version\"/" "$package/pyproject.toml"
     sed -E -i.before "s/^__version__ = \".*\"/__version__ = \"$version\"/" "$package"/src/*/__init__.py
-    rm -f "$package"/pyproject.toml.before "$package"/src/*/__init__.py.before
+    if [ -f "$package/openenv.yaml" ]; then
+        sed -E -i.before "s/^version: .*/version: $version/" "$package/openenv.yaml"
+    fi
+    rm -f "$package"/openenv.yaml.before "$package"/pyproject.toml.before "$package"/src/*/__init__.py.before
 done
-echo "every distribution is now $version; run make install, and say in CHANGELOG.md what changed"
+echo "every distribution is now $version; say in CHANGELOG.md what changed"

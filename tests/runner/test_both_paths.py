@@ -28,9 +28,9 @@ from buildarena_pipeline.runtime.active_lease import LeaseKeeper
 from buildarena_pipeline.runtime.job_runner import JobRunner
 from buildarena_pipeline.runtime.simulators.simulator import (
     File,
-    Simulated,
     SimulatorFaultError,
-    Trial,
+    TrialRequest,
+    TrialResult,
 )
 from buildarena_simulation import write_trajectory
 from buildarena_simworker.engines import EngineSimulator
@@ -68,16 +68,18 @@ class Played(EngineSimulator):
 
     repeatable = False
 
-    def __init__(self, around: Callable[[Trial, Callable[[], Simulated]], Simulated]) -> None:
+    def __init__(
+        self, around: Callable[[TrialRequest, Callable[[], TrialResult]], TrialResult]
+    ) -> None:
         super().__init__("mujoco")
         self._around = around
 
-    def run(self, trial: Trial) -> Simulated:
+    def run(self, trial: TrialRequest) -> TrialResult:
         return self._around(trial, lambda: super(Played, self).run(trial))
 
 
 def raising(error: Exception) -> Played:
-    def around(*_: object) -> Simulated:
+    def around(*_: object) -> TrialResult:
         raise error
 
     return Played(around)
@@ -151,9 +153,9 @@ def test_files_are_kept_by_name(context, do_next) -> None:
     job = waiting(context)
     told = {"log-0.txt": File(data=b"it went well", media_type="text/plain")}
 
-    def around(_: Trial, run: Callable[[], Simulated]) -> Simulated:
+    def around(_: TrialRequest, run: Callable[[], TrialResult]) -> TrialResult:
         done = run()
-        return Simulated(trajectory=done.trajectory, versions=done.versions, files=told)
+        return TrialResult(trajectory=done.trajectory, versions=done.versions, files=told)
 
     assert do_next(Played(around))
     ended(context, job)
@@ -164,7 +166,7 @@ def test_files_are_kept_by_name(context, do_next) -> None:
 def test_a_cancelled_trial_is_broken_off(context, do_next) -> None:
     job = waiting(context)
 
-    def around(trial: Trial, run: Callable[[], Simulated]) -> Simulated:
+    def around(trial: TrialRequest, run: Callable[[], TrialResult]) -> TrialResult:
         context.store.lifecycle.cancel_job(job.id, owner=None, force=True)
         for _ in range(200):
             trial.require_held()
@@ -180,7 +182,7 @@ def test_a_cancelled_trial_is_broken_off(context, do_next) -> None:
 def test_who_lost_its_lease_writes_nothing(context, do_next) -> None:
     job = waiting(context)
 
-    def around(_: Trial, run: Callable[[], Simulated]) -> Simulated:
+    def around(_: TrialRequest, run: Callable[[], TrialResult]) -> TrialResult:
         done = run()
         with lease_of_another(context):
             return done

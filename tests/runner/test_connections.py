@@ -18,7 +18,7 @@ from support.servers.runner_rig import MUJOCO, ended, runner_key, slot, true_tra
 
 from buildarena_pipeline.keepalive import socket_options
 from buildarena_pipeline.runtime.context import open_context
-from buildarena_pipeline.runtime.simulators.simulator import File, Simulated
+from buildarena_pipeline.runtime.simulators.simulator import File, TrialResult
 from buildarena_simulation import write_trajectory
 from buildarena_simworker.engines import EngineSimulator
 from buildarena_simworker.remote import api as remote_api
@@ -32,7 +32,7 @@ class WithLog(EngineSimulator):
         super().__init__("mujoco")
         self._log = File(data=os.urandom(size), media_type="text/plain")
 
-    def run(self, trial) -> Simulated:
+    def run(self, trial) -> TrialResult:
         return replace(super().run(trial), files={"log-0.txt": self._log})
 
 
@@ -112,7 +112,7 @@ def test_an_api_that_is_away_is_waited_for(context) -> None:
         comes_back = threading.Timer(1.0, lambda: setattr(proxy, "away", False))
 
         class Away(EngineSimulator):
-            def run(self, trial) -> Simulated:
+            def run(self, trial) -> TrialResult:
                 done = super().run(trial)
                 proxy.away = True
                 comes_back.start()

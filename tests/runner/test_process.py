@@ -104,7 +104,7 @@ def test_a_killed_runner_costs_a_lease_and_leaves_no_process(context, url, tmp_p
 def test_a_runner_loads_nothing_that_it_does_not_need() -> None:
     script = (
         "import sys, json\n"
-        "import buildarena_simworker.remote.process, buildarena_simworker.remote.engine_process\n"
+        "import buildarena_simworker.remote.process, buildarena_simworker.registered\n"
         "import buildarena_simworker.remote.doctor\n"
         "import buildarena_simworker_besiege.simulator\n"
         "print(json.dumps(sorted({name.split('.')[0] for name in sys.modules})))\n"

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from buildarena.service import job_machine, job_trial, jobs, leaderboard
     from buildarena.trials import Trial, simulate, simulate_all
 
-__version__ = "0.1.0"
+__version__ = "1.0.0rc1"
 
 _PLACES: Final = {
     "Feedback": "machines",

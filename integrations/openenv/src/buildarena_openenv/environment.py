@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from importlib.metadata import version
 from typing import Any, Final
 
 from openenv.core.env_server.interfaces import Environment as ServedEnvironment
@@ -129,7 +130,7 @@ class BuildEnvironment(ServedEnvironment[BuildAction, BuildObservation, BuildSta
         return EnvironmentMetadata(
             name="buildarena",
             description="Machines that are built by tool calls and simulated",
-            version="0.1.0",
+            version=version("buildarena-openenv"),
         )
 
     def _made(self, seed: int | None, settings: Mapping[str, Any]) -> Environment:

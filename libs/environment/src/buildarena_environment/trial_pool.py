@@ -5,20 +5,30 @@ from __future__ import annotations
 import json
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import lru_cache, partial
 from queue import SimpleQueue
 from typing import Any, Final, Self
 
 from buildarena_benchmark import Task, builtin_tasks, parse_task
 from buildarena_environment.trials import Trial, try_machine
 from buildarena_environment.warm_process import ProcessEndedError, WarmProcess
-from buildarena_geometry import DocumentError, Machine
-from buildarena_simulation import DEFAULT_ENGINE, SimulationError, read_trajectory, write_trajectory
+from buildarena_geometry import DocumentError, KeyPress, Machine
+from buildarena_simulation import (
+    DEFAULT_ENGINE,
+    MachineNotSimulable,
+    SimulationError,
+    Trajectory,
+    read_trajectory,
+    simulate,
+    write_trajectory,
+)
 
 LONGEST_TRIAL_S: Final = 600.0
+TASKS_READ: Final = 64
+"""Tasks that a process remembers."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,14 +47,19 @@ class Evaluation:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Question:
-    """What a process is asked; see `TrialPool.submit` and `text_of`."""
+    """What a process is asked, in documents: a task and a machine have parts that no pipe takes.
+
+    See `TrialPool.submit` and `text_of`; without `scored`, only a simulation is asked for.
+    """
 
     task: str
     machine: str
     simulator: str
-    seed: int | None
-    whole: bool
-    trajectory: bool
+    seed: int | None = None
+    whole: bool = True
+    trajectory: bool = True
+    scored: bool = True
+    controls: Sequence[KeyPress] | None = None
 
 
 class TrialPool:
@@ -59,6 +74,7 @@ class TrialPool:
         timeout_s: Seconds after which a trial is broken off.
         trajectories: Whether trials bring their trajectories, which is slower.
         whole: False ends each trial when it is decided, see `try_machine`.
+        name: What its processes are called in messages.
 
     Raises:
         ValueError: A number is out of range.
@@ -71,6 +87,7 @@ class TrialPool:
         timeout_s: float = LONGEST_TRIAL_S,
         trajectories: bool = False,
         whole: bool = True,
+        name: str = "trials",
     ) -> None:
         count = len(os.sched_getaffinity(0)) if processes is None else processes
         if count < 1:
@@ -78,9 +95,8 @@ class TrialPool:
         if not timeout_s > 0:
             raise ValueError(f"timeout_s is {timeout_s}: it must be above 0")
         self._timeout_s, self._trajectories, self._whole = timeout_s, trajectories, whole
-        self.processes = [
-            WarmProcess(f"trials {number + 1}", _answering) for number in range(count)
-        ]
+        numbers = [f" {number + 1}" for number in range(count)] if count > 1 else [""]
+        self.processes = [WarmProcess(name + number, _answering) for number in numbers]
         self._free: SimpleQueue[WarmProcess] = SimpleQueue()
         for process in self.processes:
             self._free.put(process)
@@ -91,6 +107,51 @@ class TrialPool:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+    def start(self) -> None:
+        """Starts the processes, so that the first trials find them warm."""
+        for process in self.processes:
+            process.start()
+
+    def simulate(
+        self,
+        task: Task,
+        machine: Machine,
+        simulator: str,
+        *,
+        controls: Sequence[KeyPress] | None = None,
+        meanwhile: Callable[[], object] = lambda: None,
+    ) -> Trajectory:
+        """As `buildarena_simulation.simulate`, in one of the processes; waits for it.
+
+        Args:
+            task: The task whose scenario the machine is put through; it is not scored.
+            machine: The machine.
+            simulator: Name of the engine.
+            controls: Key presses of this run; None for the machine's own.
+            meanwhile: Called every now and then; what it raises breaks the trial off.
+
+        Raises:
+            MachineNotSimulable: The engine can't take the machine.
+            SimulationError: The engine failed, which says nothing of the machine.
+            ProcessEndedError: The engine ended its process.
+        """
+        question = _Question(
+            task=text_of(task),
+            machine=json.dumps(machine.to_document()),
+            simulator=simulator,
+            scored=False,
+            controls=controls,
+        )
+        process = self._free.get()
+        try:
+            outcome = process.ask(question, meanwhile=meanwhile)
+        finally:
+            self._free.put(process)
+        if isinstance(outcome, Exception):
+            raise outcome
+        simulated: Trajectory = outcome
+        return simulated
 
     def submit(
         self, task: Task, document: str, simulator: str, seed: int | None = None
@@ -126,10 +187,11 @@ class TrialPool:
         Raises:
             SimulationError: The engine failed or crashed, or the trial took too long.
         """
-        found = self.submit(task, json.dumps(machine.to_document()), simulator, seed).result()
-        if found.trial is None:
-            raise SimulationError(found.error)
-        return found.trial
+        document = json.dumps(machine.to_document())
+        evaluation = self.submit(task, document, simulator, seed).result()
+        if evaluation.trial is None:
+            raise SimulationError(evaluation.error)
+        return evaluation.trial
 
     def close(self) -> None:
         """Ends the processes; trials under way are broken off."""
@@ -172,7 +234,7 @@ def text_of(task: Task) -> str:
     return json.dumps(dict(task.as_document()))
 
 
-@cache
+@lru_cache(maxsize=TASKS_READ)
 def task_from(text: str) -> Task:
     """The task of `text_of`; YAML, which tasks are written in, contains JSON.
 
@@ -193,10 +255,13 @@ def _answering() -> Callable[[Any], Any]:
     return _answered
 
 
-def _answered(question: _Question) -> dict[str, Any]:
+def _answered(question: _Question) -> Any:
+    task = task_from(question.task)
+    if not question.scored:
+        return _simulated(task, question)
     try:
         trial = try_machine(
-            task_from(question.task),
+            task,
             Machine.from_document(json.loads(question.machine)),
             question.simulator,
             seed=question.seed,
@@ -204,8 +269,16 @@ def _answered(question: _Question) -> dict[str, Any]:
         )
     except (SimulationError, DocumentError) as error:
         return {"error": str(error)}
-    kept = trial.trajectory if question.trajectory else None
+    trajectory = trial.trajectory if question.trajectory else None
     return {
         "trial": trial.as_document(),
-        "trajectory": None if kept is None else write_trajectory(kept),
+        "trajectory": None if trajectory is None else write_trajectory(trajectory),
     }
+
+
+def _simulated(task: Task, question: _Question) -> Trajectory | Exception:
+    machine = Machine.from_document(json.loads(question.machine))
+    try:
+        return simulate(machine, task.scenario, question.simulator, controls=question.controls)
+    except (MachineNotSimulable, SimulationError) as error:
+        return error

@@ -29,7 +29,7 @@ from buildarena_geometry.tools import (
     tool_definitions,
 )
 
-__version__ = "0.1.0"
+__version__ = "1.0.0rc1"
 
 __all__ = [
     "DOCUMENT_VERSION",

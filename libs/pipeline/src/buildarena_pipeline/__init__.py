@@ -4,4 +4,4 @@ Postgres is the truth; messages are only hints. A lost message, a doubled messag
 therefore loses nothing: the reaper notifies workers again of what waits too long.
 """
 
-__version__ = "0.1.0"
+__version__ = "1.0.0rc1"

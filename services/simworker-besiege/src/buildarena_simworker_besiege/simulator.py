@@ -15,9 +15,9 @@ from buildarena_pipeline.runtime.simulators.simulator import (
     BESIEGE,
     File,
     MachineRefusedError,
-    Simulated,
     SimulatorFaultError,
-    Trial,
+    TrialRequest,
+    TrialResult,
 )
 from buildarena_simworker_besiege.desktop import Desktop
 from buildarena_simworker_besiege.errors import LevelClosedError, NotSetUpError
@@ -60,7 +60,7 @@ class BesiegeSimulator:
             **self._facts,
         }
 
-    def run(self, trial: Trial) -> Simulated:
+    def run(self, trial: TrialRequest) -> TrialResult:
         """Plays the machine in the game; see `Simulator`."""
         if trial.version != self._settings.version:
             raise PermanentError(
@@ -105,7 +105,7 @@ class BesiegeSimulator:
                 for index, shot in enumerate(shots)
             }
             raise SimulatorFaultError(str(error), files=files, delay_s=5.0) from error
-        return Simulated(
+        return TrialResult(
             trajectory=played.trajectory,
             versions={**self.versions, **_course(played)},
             files=_files(played, trial.number),
@@ -157,7 +157,7 @@ def _found(settings: Settings) -> tuple[str, str]:
     return f"{BESIEGE} {version}", ""
 
 
-def _file_name(trial: Trial) -> str:
+def _file_name(trial: TrialRequest) -> str:
     """A name that any keyboard types with single keys: letters and digits."""
     plain = "".join(filter(str.isalnum, trial.job_id.rpartition("_")[2].lower()))
     return f"ba{plain[:10]}n{trial.number}"

@@ -13,7 +13,7 @@ from support.player import Player
 
 from buildarena_benchmark import Task, builtin_tasks
 from buildarena_geometry import Machine
-from buildarena_pipeline.runtime.simulators.simulator import Trial
+from buildarena_pipeline.runtime.simulators.simulator import TrialRequest
 from buildarena_simulation import Scenario
 from buildarena_simworker_besiege.calibrate import TRIAL_S
 
@@ -122,9 +122,9 @@ def short_trial(name: str) -> tuple[Task, Machine]:
     return replace(task, scenario=scenario), experts_machine(name)
 
 
-def trial_of(task: Task, machine: Machine, *, job_id: str = "job_0001") -> Trial:
+def trial_of(task: Task, machine: Machine, *, job_id: str = "job_0001") -> TrialRequest:
     """One run of a machine, as the simulate stage asks a simulator for it."""
-    return Trial(
+    return TrialRequest(
         job_id=job_id,
         number=0,
         token=1,

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from buildarena_environment import TrialPool
+from buildarena_environment.warm_process import ProcessEndedError
 from buildarena_pipeline.runtime.simulators.simulator import (
     MachineRefusedError,
-    Simulated,
     SimulatorFaultError,
-    Trial,
+    TrialRequest,
+    TrialResult,
 )
 from buildarena_simulation import (
     SIMULATION_VERSION,
@@ -25,37 +27,46 @@ class EngineSimulator:
 
     Args:
         name: The engine's name.
+        pool: The process to run them in, warm between trials: an engine that crashes there costs
+            one trial. None for this process. It is closed with the simulator.
     """
 
     repeatable = True
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, pool: TrialPool | None = None) -> None:
         self.name = name
-
-    @property
-    def versions(self) -> Mapping[str, Any]:
-        """What can change a trajectory."""
-        return {
+        self._pool = pool
+        self.versions: Mapping[str, Any] = {
             "simulation": SIMULATION_VERSION,
-            "engine": self.name,
-            "engine_version": engine_version(self.name),
+            "engine": name,
+            "engine_version": engine_version(name),
         }
 
-    def run(self, trial: Trial) -> Simulated:
+    def run(self, trial: TrialRequest) -> TrialResult:
         """Simulates the machine; see `Simulator`."""
+        machine, task, controls = trial.machine, trial.task, trial.controls
         try:
-            trajectory = simulate(
-                trial.machine,
-                trial.task.scenario,
-                engine=self.name,
-                controls=trial.controls,
-                on_progress=lambda _: trial.require_held(),
-            )
+            if self._pool is None:
+                trajectory = simulate(
+                    machine,
+                    task.scenario,
+                    engine=self.name,
+                    controls=controls,
+                    on_progress=lambda _: trial.require_held(),
+                )
+            else:
+                trajectory = self._pool.simulate(
+                    task, machine, self.name, controls=controls, meanwhile=trial.require_held
+                )
         except MachineNotSimulable as error:
             raise MachineRefusedError(str(error)) from error
         except SimulationError as error:
             raise SimulatorFaultError(str(error)) from error
-        return Simulated(trajectory=trajectory, versions=self.versions)
+        except ProcessEndedError as error:
+            raise SimulatorFaultError(f"{error} in the middle of a trial") from error
+        return TrialResult(trajectory=trajectory, versions=self.versions)
 
     def close(self) -> None:
-        """An engine holds nothing between trials."""
+        """Ends its process at once, if it has one; an engine holds nothing between trials."""
+        if self._pool is not None:
+            self._pool.close()

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from buildarena_environment import TrialPool
 from buildarena_pipeline.runtime.simulators.installed import InstalledSimulator
 from buildarena_pipeline.runtime.simulators.simulator import Simulator
 from buildarena_simulation import ENGINES, SIMULATION_VERSION, engine_version
 from buildarena_simworker.engines import EngineSimulator
-from buildarena_simworker.remote.engine_process import EngineProcess
 
 
 def engine_simulator(name: str) -> InstalledSimulator:
@@ -15,17 +15,17 @@ def engine_simulator(name: str) -> InstalledSimulator:
         name=name,
         kind="engine",
         make=lambda _: EngineSimulator(name),
-        make_isolated=lambda _: _warm_process(name),
+        make_isolated=lambda _: _isolated(name),
         version=lambda _: SIMULATION_VERSION,
         examine=lambda _: _found(name),
         available=name in ENGINES,
     )
 
 
-def _warm_process(name: str) -> Simulator:
-    engine = EngineProcess(name)
-    engine.start()
-    return engine
+def _isolated(name: str) -> Simulator:
+    pool = TrialPool(1, name=name)
+    pool.start()
+    return EngineSimulator(name, pool)
 
 
 def _found(name: str) -> tuple[str, str]:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from buildarena_pipeline.runtime.active_lease import ActiveLease
 from buildarena_pipeline.runtime.context import Context
-from buildarena_pipeline.runtime.simulators.simulator import Simulator, Trial
-from buildarena_pipeline.runtime.trial_outcomes import File, TrialOutcome
+from buildarena_pipeline.runtime.simulators.simulator import Simulator, TrialRequest
 from buildarena_pipeline.runtime.trial_repository import DueTrial, TrialRepository
+from buildarena_pipeline.runtime.trials import File, TrialResult
 from buildarena_simworker.trials import do_trial
 from buildarena_store import StaleLeaseError
 
@@ -30,7 +30,7 @@ class SimulateHandler:
 
 
 class _LeasedInDatabase:
-    """A `LeasedTrial` of this process' own lease."""
+    """A `TrialSource` of this process' own lease."""
 
     def __init__(self, trials: TrialRepository, active: ActiveLease, *, repeatable: bool) -> None:
         self._trials = trials
@@ -38,12 +38,12 @@ class _LeasedInDatabase:
         self._repeatable = repeatable
         self._due: DueTrial | None = None
 
-    def take(self) -> Trial | None:
+    def take(self) -> TrialRequest | None:
         lease = self._active.lease
         due = self._due = self._trials.due(lease.job)
         if self._repeatable and self._trials.repeat(lease, due):
             return None
-        return Trial(
+        return TrialRequest(
             job_id=lease.job.id,
             number=due.request.number,
             token=lease.token,
@@ -54,7 +54,7 @@ class _LeasedInDatabase:
             require_held=self._require,
         )
 
-    def complete(self, outcome: TrialOutcome) -> None:
+    def complete(self, outcome: TrialResult) -> None:
         assert self._due is not None, "a trial is taken before it is completed"  # noqa: S101
         self._trials.complete(self._active.lease, self._due, outcome)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from typing import Protocol
 
 from buildarena_pipeline.errors import TransientError
@@ -10,25 +11,25 @@ from buildarena_pipeline.runtime.simulators.simulator import (
     MachineRefusedError,
     Simulator,
     SimulatorFaultError,
-    Trial,
+    TrialRequest,
 )
-from buildarena_pipeline.runtime.trial_outcomes import File, TrialOutcome
+from buildarena_pipeline.runtime.trials import File, TrialResult
 
 
-class LeasedTrial(Protocol):
+class TrialSource(Protocol):
     """A trial that somebody leased: where it comes from and where its outcome goes.
 
     Workers beside the database have one implementation, those that reach only the API another.
     """
 
-    def take(self) -> Trial | None:
+    def take(self) -> TrialRequest | None:
         """What is to be run; None when an earlier trial with the same input told its outcome.
 
         Raises:
             PermanentError: The job can't be done.
         """
 
-    def complete(self, outcome: TrialOutcome) -> None:
+    def complete(self, outcome: TrialResult) -> None:
         """Hands the outcome over, to be scored.
 
         Raises:
@@ -39,7 +40,7 @@ class LeasedTrial(Protocol):
         """Keeps what shows a fault with the job."""
 
 
-def run_trial(simulator: Simulator, trial: Trial) -> TrialOutcome:
+def run_trial(simulator: Simulator, trial: TrialRequest) -> TrialResult:
     """Runs a trial to its outcome; a machine that the simulator refuses is an outcome too.
 
     Raises:
@@ -49,23 +50,13 @@ def run_trial(simulator: Simulator, trial: Trial) -> TrialOutcome:
     """
     started = time.perf_counter()
     try:
-        simulated = simulator.run(trial)
+        result = simulator.run(trial)
     except MachineRefusedError:
-        return TrialOutcome(
-            trajectory=None,
-            versions=dict(simulator.versions),
-            wall_s=time.perf_counter() - started,
-        )
-    return TrialOutcome(
-        trajectory=simulated.trajectory,
-        versions=dict(simulated.versions),
-        wall_s=time.perf_counter() - started,
-        files=simulated.files,
-        annotations=simulated.annotations,
-    )
+        result = TrialResult(trajectory=None, versions=dict(simulator.versions))
+    return replace(result, wall_s=time.perf_counter() - started)
 
 
-def do_trial(simulator: Simulator, leased: LeasedTrial) -> None:
+def do_trial(simulator: Simulator, leased: TrialSource) -> None:
     """Takes, runs and hands over a trial; what shows a fault is kept before it is reported.
 
     Raises:

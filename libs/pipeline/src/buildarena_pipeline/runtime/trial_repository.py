@@ -18,7 +18,7 @@ from buildarena_pipeline.errors import PermanentError
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.notify import Notifier
 from buildarena_pipeline.runtime.scoring import best_rollout, rollout_score, task_of
-from buildarena_pipeline.runtime.trial_outcomes import PARQUET, File, TrialOutcome
+from buildarena_pipeline.runtime.trials import PARQUET, File, TrialResult
 from buildarena_simulation import Trajectory, write_trajectory
 from buildarena_store import ArtifactInfo, ArtifactStore, Job, Lease, RolloutRecord, Stage, Store
 from buildarena_store.states import CONSTRUCT_QUEUE
@@ -125,7 +125,7 @@ class TrialRepository:
         self._write(lease, due, values, {})
         return True
 
-    def complete(self, lease: Lease, due: DueTrial, outcome: TrialOutcome) -> None:
+    def complete(self, lease: Lease, due: DueTrial, outcome: TrialResult) -> None:
         """Scores a trial and moves its job on, all or nothing: it ends, or goes on being built.
 
         Raises:

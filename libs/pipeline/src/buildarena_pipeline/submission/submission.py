@@ -226,11 +226,11 @@ class Submissions:
             *simulator_issues(self._context, variant.simulator),
             *_unknown("prompt pack", {"prompts": variant.prompts}, self._packs.names),
         ]
-        issues = issues or self._hopeless(variant.workflow, tasks, found)
+        issues = issues or self._infeasible(variant.workflow, tasks, found)
         if issues:
             raise SubmissionError(issues)
 
-    def _hopeless(
+    def _infeasible(
         self, workflow: str, tasks: Mapping[str, str], found: Mapping[str, Task]
     ) -> list[ValidationIssue]:
         """An issue for each task that asks for more sub-structures than the workflow builds."""

@@ -17,8 +17,8 @@ from buildarena_pipeline.runtime.trial_checks import (
     checked_versions,
     require_refusable,
 )
-from buildarena_pipeline.runtime.trial_outcomes import File, TrialOutcome
 from buildarena_pipeline.runtime.trial_repository import DueTrial, TrialRepository
+from buildarena_pipeline.runtime.trials import File, TrialResult
 from buildarena_simulation import Trajectory
 from buildarena_store import Lease, StaleLeaseError, UploadedFile, UploadError, Uploads, clean
 from buildarena_store.artifacts.kinds import EVIDENCE
@@ -116,7 +116,7 @@ class Outcomes:
         self._uploads.drop(named)
         return "done"
 
-    def _checked(self, named: JobToken, due: DueTrial, said: Outcome) -> TrialOutcome:
+    def _checked(self, named: JobToken, due: DueTrial, said: Outcome) -> TrialResult:
         simulator, version = due.request.engine, due.version
         if said.annotations is not None and simulator != BESIEGE:
             raise OutcomeRefusedError("only trials in the game have annotations")
@@ -138,7 +138,7 @@ class Outcomes:
                 scenario=due.task.scenario,
             )
         annotations = said.annotations
-        return TrialOutcome(
+        return TrialResult(
             trajectory=trajectory,
             versions=checked_versions(
                 said.versions, simulator=simulator, version=version, trajectory=trajectory

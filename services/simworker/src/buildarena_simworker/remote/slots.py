@@ -16,8 +16,8 @@ from buildarena_benchmark.tasks.task import task_of
 from buildarena_geometry import KeyPress, Machine
 from buildarena_pipeline.errors import PermanentError, TransientError
 from buildarena_pipeline.periodic import Periodic
-from buildarena_pipeline.runtime.simulators.simulator import Simulator, Trial
-from buildarena_pipeline.runtime.trial_outcomes import File, TrialOutcome
+from buildarena_pipeline.runtime.simulators.simulator import Simulator, TrialRequest
+from buildarena_pipeline.runtime.trials import File, TrialResult
 from buildarena_simulation import write_trajectory
 from buildarena_simworker.remote.api import HeldLease, RunnerApi
 from buildarena_simworker.remote.errors import (
@@ -117,7 +117,7 @@ class Heartbeats:
 
 
 class LeasedOverHttp:
-    """A `LeasedTrial` that came from the API.
+    """A `TrialSource` that came from the API.
 
     Args:
         api: Where it came from.
@@ -131,12 +131,12 @@ class LeasedOverHttp:
         self._document = document
         self.evidence: list[dict[str, Any]] = []
 
-    def take(self) -> Trial:
-        """What is to be run; see `LeasedTrial`."""
+    def take(self) -> TrialRequest:
+        """What is to be run; see `TrialSource`."""
         given = self._document
         try:
             controls = given["controls"]
-            return Trial(
+            return TrialRequest(
                 job_id=self._active.lease.job_id,
                 number=int(given["number"]),
                 token=self._active.lease.token,
@@ -153,8 +153,8 @@ class LeasedOverHttp:
                 delay_s=5.0,
             ) from error
 
-    def complete(self, outcome: TrialOutcome) -> None:
-        """Uploads the trajectory and hands it over; see `LeasedTrial`."""
+    def complete(self, outcome: TrialResult) -> None:
+        """Uploads the trajectory and hands it over; see `TrialSource`."""
         lease, trajectory = self._active.lease, outcome.trajectory
         sent = None if trajectory is None else write_trajectory(trajectory)
         body = {
@@ -172,7 +172,7 @@ class LeasedOverHttp:
             raise TransientError(str(error), reason="outcome_refused", delay_s=5.0) from error
 
     def keep_evidence(self, files: Mapping[str, File]) -> None:
-        """Uploads what shows a fault, which is then named in its report; see `LeasedTrial`."""
+        """Uploads what shows a fault, which is then named in its report; see `TrialSource`."""
         self.evidence = self._uploaded(files)
 
     def _uploaded(self, files: Mapping[str, File]) -> list[dict[str, Any]]:

@@ -2,72 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping
 from typing import Any, Final, Literal, Protocol
 
-from buildarena_benchmark import Task
-from buildarena_geometry import KeyPress, Machine
-from buildarena_pipeline.runtime.trial_outcomes import File
-from buildarena_simulation import Trajectory
+from buildarena_pipeline.runtime.trials import File, TrialRequest, TrialResult
 
 __all__ = [
     "BESIEGE",
     "File",
     "MachineRefusedError",
-    "Simulated",
     "Simulator",
     "SimulatorFaultError",
     "SimulatorKind",
-    "Trial",
+    "TrialRequest",
+    "TrialResult",
 ]
 
 SimulatorKind = Literal["engine", "game"]
 
 BESIEGE: Final = "besiege"
 """The game Besiege itself, played by a runner on a machine that has it."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Trial:
-    """One machine to be run.
-
-    Attributes:
-        job_id: The job it belongs to.
-        number: Which of the job's rollouts it is.
-        token: Of the lease under which it runs; no other run of the job has it.
-        version: The simulator's version that the job was submitted for.
-        task: What the machine is put through.
-        machine: The machine.
-        controls: Key presses of this run; None for the machine's own.
-        require_held: Raises `StaleLeaseError` once the job is somebody else's.
-    """
-
-    job_id: str
-    number: int
-    token: int
-    version: str
-    task: Task
-    machine: Machine
-    controls: Sequence[KeyPress] | None
-    require_held: Callable[[], None]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Simulated:
-    """What came of a trial.
-
-    Attributes:
-        trajectory: What the scorer reads.
-        versions: Everything about the simulator that can change the trajectory.
-        files: Further bytes to keep with the job, by name.
-        annotations: What our engines say of the same machine, by engine; never part of the score.
-    """
-
-    trajectory: Trajectory
-    versions: Mapping[str, Any]
-    files: Mapping[str, File] = field(default_factory=dict)
-    annotations: Mapping[str, Any] | None = None
 
 
 class MachineRefusedError(Exception):
@@ -119,7 +73,7 @@ class Simulator(Protocol):
     def repeatable(self) -> bool:
         """Whether the same input gives the same bytes."""
 
-    def run(self, trial: Trial) -> Simulated:
+    def run(self, trial: TrialRequest) -> TrialResult:
         """Runs a trial.
 
         Raises:

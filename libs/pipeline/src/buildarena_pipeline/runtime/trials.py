@@ -1,0 +1,65 @@
+"""A trial as the simulators' side sees it: what is asked, and what came; no score, no database."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+from buildarena_benchmark import Task
+from buildarena_geometry import KeyPress, Machine
+from buildarena_simulation import Trajectory
+
+PARQUET: Final = "application/vnd.apache.parquet"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class File:
+    """Bytes to be stored with a job."""
+
+    data: bytes
+    media_type: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrialRequest:
+    """One machine to be run.
+
+    Attributes:
+        job_id: The job it belongs to.
+        number: Which of the job's rollouts it is.
+        token: Of the lease under which it runs; no other run of the job has it.
+        version: The simulator's version that the job was submitted for.
+        task: What the machine is put through.
+        machine: The machine.
+        controls: Key presses of this run; None for the machine's own.
+        require_held: Raises `StaleLeaseError` once the job is somebody else's.
+    """
+
+    job_id: str
+    number: int
+    token: int
+    version: str
+    task: Task
+    machine: Machine
+    controls: Sequence[KeyPress] | None
+    require_held: Callable[[], None]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrialResult:
+    """What came of a trial.
+
+    Attributes:
+        trajectory: What the scorer reads; None when the simulator refused the machine.
+        versions: Everything about the simulator that can change the trajectory.
+        wall_s: How long it took, seconds; whoever runs the simulator measures it.
+        files: Further bytes to store with the job, by name.
+        annotations: What our engines say of the same machine, by engine; never part of the score.
+    """
+
+    trajectory: Trajectory | None
+    versions: Mapping[str, Any]
+    wall_s: float = 0.0
+    files: Mapping[str, File] = field(default_factory=dict)
+    annotations: Mapping[str, Any] | None = None
