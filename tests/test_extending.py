@@ -127,7 +127,7 @@ require_known_protocols(registry)
 config = {"name": "mine/talker", "decoding": {}}
 client = ModelClients(registry).for_config(config)
 said = client.complete(Request(model_config=config, messages=[Message(role="user", text="Hi")]))
-print(said.reply.text, said.usage.requests)
+print(said.text, said.usage.requests)
 client.close()
 """
 

@@ -105,7 +105,7 @@ class Player:
         if client is not None:
             active = ActiveLease(lease=None, budgeted=False, lost=lost)  # type: ignore[arg-type]
             host = LiveHost(
-                kept=host,
+                replay=host,
                 client=client,
                 journal=StoredInMemory(written, append),  # type: ignore[arg-type]
                 active=active,

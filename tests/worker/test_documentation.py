@@ -13,7 +13,7 @@ from buildarena_benchmark import builtin_tasks, parse_custom_task
 from buildarena_pipeline.catalog.specs import JobSpec
 from buildarena_pipeline.runtime.simulators.installed import announced, installed_simulators
 from buildarena_worker.builtin.designs import DESIGNS
-from buildarena_worker.session.messages import Reply
+from buildarena_worker.session.messages import Completion
 
 DOCS = Path(__file__).parents[2] / "docs"
 GUIDE = (DOCS / "extending.md").read_text()
@@ -27,7 +27,11 @@ def test_the_workflow_of_the_guide_works_as_it_stands(play, tmp_path: Path) -> N
     file = tmp_path / "builder_critic.py"
     file.write_text(source)
     model = Scripted(
-        START, Reply(text="Done."), Reply(text="Too small."), BLOCK, Reply(text="Done.")
+        START,
+        Completion(text="Done."),
+        Completion(text="Too small."),
+        BLOCK,
+        Completion(text="Done."),
     )
     played = play(
         workflow="builder-critic",
@@ -50,7 +54,7 @@ def test_what_it_builds_offers_the_tasks_modules(play, tmp_path: Path, listed: s
         "attach_block_to", base_block="1", face="A", new_block="Cog Large Unpowered", note=""
     )
     look = [call("describe_module", module="Cog Large Unpowered")] * (listed == "on_demand")
-    model = Scripted(START, *look, winch, Reply(text="Done."))
+    model = Scripted(START, *look, winch, Completion(text="Done."))
     played = play(
         workflow="builder-critic",
         task=replace(task, constraints=limits),

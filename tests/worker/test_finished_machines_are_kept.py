@@ -5,16 +5,15 @@ from __future__ import annotations
 import pytest
 from support.providers.scripted import call
 
-from buildarena_store import Usage
 from buildarena_worker.builtin import BuiltinClient
-from buildarena_worker.session.messages import Completion, Reply, Request
+from buildarena_worker.session.messages import Completion, Request
 from buildarena_worker.workflow.plan import read_plan
 
 
 class Spoiling:
     """The expert, until the machine is to be refined: then it is spoilt at guidance's request."""
 
-    def __init__(self, *, guidance: Reply, builder: Reply) -> None:
+    def __init__(self, *, guidance: Completion, builder: Completion) -> None:
         self._expert = BuiltinClient("expert")
         self._guidance, self._builder = guidance, builder
         self._left = 3
@@ -28,17 +27,17 @@ class Spoiling:
         if not builds and self._left == 0:
             reply = self._guidance
         else:
-            reply = self._builder if builds else Reply(text="Do it.")
+            reply = self._builder if builds else Completion(text="Do it.")
             self._left -= not builds
-        return Completion(reply=reply, usage=Usage(requests=1), latency_s=0.0)
+        return reply
 
 
 @pytest.mark.parametrize(
     ("guidance", "spoils"),
     [
         (call("raise_objection", reason="it is all wrong"), False),
-        (Reply(text="TERMINATE"), True),
-        (Reply(text="Go on and on."), False),
+        (Completion(text="TERMINATE"), True),
+        (Completion(text="Go on and on."), False),
     ],
 )
 def test_a_refinement_that_fails_leaves_the_machine_as_it_was(play, guidance, spoils) -> None:
@@ -57,7 +56,9 @@ def test_a_refinement_that_fails_leaves_the_machine_as_it_was(play, guidance, sp
 def test_a_refinement_within_the_rules_is_taken(play) -> None:
     plain = play(task="transport-1").session.machine
     wheel = next(block.id for block in plain.blocks.values() if block.module.spins)
-    model = Spoiling(guidance=Reply(text="TERMINATE"), builder=call("flip_spin", block_id=wheel))
+    model = Spoiling(
+        guidance=Completion(text="TERMINATE"), builder=call("flip_spin", block_id=wheel)
+    )
     refined = play(task="transport-1", client=model).session.machine
     assert refined.blocks[wheel].flipped != plain.blocks[wheel].flipped
 

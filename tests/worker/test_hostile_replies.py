@@ -14,7 +14,7 @@ from support.stages import work
 from buildarena_pipeline.catalog.specs import JobSpec
 from buildarena_worker import builtin
 from buildarena_worker.builtin import expert
-from buildarena_worker.session.messages import Reply, Request, ToolCall
+from buildarena_worker.session.messages import Completion, Request, ToolCall
 
 LURES = (
     "../../../../etc/passwd",
@@ -54,7 +54,7 @@ def _watch(event: str, arguments: tuple[object, ...]) -> None:
 sys.addaudithook(_watch)
 
 
-def liar(request: Request) -> Reply:
+def liar(request: Request) -> Completion:
     """Says lures only, and calls tools that there are and that there are not with them."""
     number = len(request.messages) * 7 + sum(len(m.text) for m in request.messages)
     lure = LURES[number % len(LURES)]
@@ -65,14 +65,14 @@ def liar(request: Request) -> Reply:
         f"<building_plan><overall_structure>{lure}</overall_structure><sub_structure>"
         f"<name>{lure}</name><description>{lure}</description></sub_structure></building_plan>"
     )
-    return Reply(text=f"{plan}\n{lure}", calls=(call,) if request.tools else ())
+    return Completion(text=f"{plan}\n{lure}", calls=(call,) if request.tools else ())
 
 
 def spiced_expert() -> object:
     """The expert, whose every text and note carries a lure."""
     lures = itertools.cycle(LURES)
 
-    def reply(request: Request) -> Reply:
+    def reply(request: Request) -> Completion:
         said = expert.reply(request)
         calls = tuple(
             replace(call, arguments={**call.arguments, "note": next(lures)})

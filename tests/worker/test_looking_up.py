@@ -11,7 +11,7 @@ from support.providers.scripted import Recording, Scripted, call
 from buildarena_benchmark import builtin_tasks
 from buildarena_geometry import LOOKUP, module_set, tool_definitions
 from buildarena_pipeline.replays.from_turns import replay_of_turns
-from buildarena_worker.session.messages import Reply
+from buildarena_worker.session.messages import Completion
 from buildarena_worker.workflow.phases import MAX_LOOKUPS
 
 LOOKUPS = {tool.name for tool in tool_definitions([LOOKUP])}
@@ -102,7 +102,7 @@ def test_further_types_are_built_and_replayed(play):
         call("start"),
         call("attach_block_to", **attach),
         call("attach_block_to", **{**attach, "face": "B", "new_block": "Rocket"}),
-        Reply(text="TERMINATE"),
+        Completion(text="TERMINATE"),
     )
     played = play(task=task("told"), client=model, workflow="builder")
     turns = played.session.transcript.turns

@@ -6,12 +6,12 @@ import pytest
 from support.providers.scripted import Scripted, call
 
 from buildarena_store import StaleLeaseError, Usage
-from buildarena_worker.session.messages import Message, Reply, ToolCall
+from buildarena_worker.session.messages import Completion, Message, ToolCall
 from buildarena_worker.session.results import Diverged, Failed, LimitReached, Superseded
 
 START = call("start", init_shift=[0, 0, 0], init_rotation=[0, 0, 0], note="")
 BLOCK = call("attach_block_to", base_block="1", face="A", new_block="Small Wooden Block", note="")
-PLAN = Reply(
+PLAN = Completion(
     text="""Here you are. <building_plan><overall_structure>a & b < c</overall_structure>
 <sub_structures><sub_structure><name>one</name><description>a block</description></sub_structure>
 </sub_structures></building_plan>"""
@@ -101,7 +101,7 @@ def test_limits_stop_a_session_within_one_request(play, limits, requests) -> Non
 
 
 def test_an_unreadable_plan_gets_one_more_try(play) -> None:
-    model = Scripted(Reply(text="I would rather not."), PLAN)
+    model = Scripted(Completion(text="I would rather not."), PLAN)
     played = play(client=model)
     assert "there is no <building_plan>" in model.requests[1].messages[-1].text
     assert [turn.stage for turn in played.session.transcript.turns][:3] == ["plan", "plan", "draft"]
@@ -110,12 +110,12 @@ def test_an_unreadable_plan_gets_one_more_try(play) -> None:
 def test_too_many_sub_structures_fail_the_plan(play) -> None:
     part = "<sub_structure><name>{}</name><function>x</function></sub_structure>"
     text = PLAN.text.replace("</sub_structures>", part.format("two") + "</sub_structures>")
-    failure = play(client=Scripted(last=Reply(text=text))).failure
+    failure = play(client=Scripted(last=Completion(text=text))).failure
     assert isinstance(failure, Failed)
     assert failure.reason == "constraint_violated"
     assert "2 sub-structures, the task allows 1" in failure.detail
     # One such plan, as one that can't be read, costs a turn.
-    model = Scripted(Reply(text=text), Reply(text="no"), Reply(text="no"), PLAN)
+    model = Scripted(Completion(text=text), Completion(text="no"), Completion(text="no"), PLAN)
     played = play(client=model)
     assert [turn.stage for turn in played.session.transcript.turns][:5] == ["plan"] * 4 + ["draft"]
     assert "2 sub-structures, the task allows 1" in model.requests[1].messages[-1].text
@@ -124,10 +124,10 @@ def test_too_many_sub_structures_fail_the_plan(play) -> None:
 @pytest.mark.parametrize("role", ["reviewer", "guidance"])
 def test_an_objection_ends_the_session(play, role) -> None:
     objection = call("raise_objection", reason="no rope")
-    draft = Reply(text="a drawing")
+    draft = Completion(text="a drawing")
     replies = [PLAN, draft, objection]
     if role == "guidance":
-        replies = [PLAN, draft, Reply(text="TERMINATE"), draft, START, objection]
+        replies = [PLAN, draft, Completion(text="TERMINATE"), draft, START, objection]
     failure = play(client=Scripted(*replies)).failure
     assert isinstance(failure, Failed)
     assert failure.reason == "objection"
@@ -135,7 +135,7 @@ def test_an_objection_ends_the_session(play, role) -> None:
 
 
 def test_parallel_calls_are_refused_and_do_nothing(play) -> None:
-    twice = Reply(text="", calls=(*START.calls, ToolCall(id="c2", name="reset", arguments={})))
+    twice = Completion(text="", calls=(*START.calls, ToolCall(id="c2", name="reset", arguments={})))
     model = Scripted(twice)
     played = play(workflow="builder", client=model)
     (first, *_) = played.session.transcript.turns
@@ -150,11 +150,11 @@ def test_parallel_calls_are_refused_and_do_nothing(play) -> None:
     [
         (call("fly", height=3), "unknown_action"),
         (
-            Reply(text="", calls=(ToolCall(id="c", name="start", arguments="no json"),)),
+            Completion(text="", calls=(ToolCall(id="c", name="start", arguments="no json"),)),
             "malformed_arguments",
         ),
         (
-            Reply(text="", calls=(ToolCall(id="c", name="start", arguments=[1]),)),
+            Completion(text="", calls=(ToolCall(id="c", name="start", arguments=[1]),)),
             "malformed_arguments",
         ),
         (
@@ -170,7 +170,11 @@ def test_bad_tool_calls_are_refused_with_one_class(play, reply, reason) -> None:
 
 def test_an_empty_reply_is_heard_as_no_answer(play) -> None:
     model = Scripted(
-        PLAN, Reply(text="drawing"), Reply(text="TERMINATE"), Reply(text="drawing"), Reply(text="")
+        PLAN,
+        Completion(text="drawing"),
+        Completion(text="TERMINATE"),
+        Completion(text="drawing"),
+        Completion(text=""),
     )
     play(client=model)
     assert model.requests[5].messages[-1].text.endswith("[builder] (no answer)")
@@ -179,11 +183,11 @@ def test_an_empty_reply_is_heard_as_no_answer(play) -> None:
 def test_roles_see_the_thread_from_their_own_side(play) -> None:
     model = Scripted(
         PLAN,
-        Reply(text="drawing"),
-        Reply(text="TERMINATE"),
-        Reply(text="final"),
+        Completion(text="drawing"),
+        Completion(text="TERMINATE"),
+        Completion(text="final"),
         START,
-        Reply(text="Go on."),
+        Completion(text="Go on."),
         START,
     )
     play(client=model)
@@ -208,13 +212,13 @@ def test_roles_see_the_thread_from_their_own_side(play) -> None:
     ],
 )
 def test_a_stage_ends_with_the_word_alone_on_the_last_line(play, text, ends) -> None:
-    model = Scripted(START, BLOCK, Reply(text=text), last=Reply(text="TERMINATE"))
+    model = Scripted(START, BLOCK, Completion(text=text), last=Completion(text="TERMINATE"))
     played = play(workflow="builder", client=model)
     assert (len(played.entries) == 3) == ends
 
 
 def test_two_replies_of_one_role_are_never_next_to_each_other(play) -> None:
-    model = Scripted(START, Reply(text="Hm."), Reply(text="Hm again."), BLOCK)
+    model = Scripted(START, Completion(text="Hm."), Completion(text="Hm again."), BLOCK)
     play(workflow="builder", client=model)
     for request in model.requests:
         roles = [m.role for m in request.messages]
@@ -224,7 +228,9 @@ def test_two_replies_of_one_role_are_never_next_to_each_other(play) -> None:
 
 
 def test_views_only_grow(play) -> None:
-    model = Scripted(PLAN, Reply(text="drawing"), Reply(text="TERMINATE"), Reply(text="final"))
+    model = Scripted(
+        PLAN, Completion(text="drawing"), Completion(text="TERMINATE"), Completion(text="final")
+    )
     played = play(client=model)
     seen: dict[tuple[str, str], list[Message]] = {}
     for turn, request in zip(played.session.transcript.turns, model.requests, strict=False):
@@ -240,7 +246,7 @@ def test_a_machine_of_one_block_is_no_machine(play) -> None:
 
 
 def test_endless_talk_meets_the_turn_limit(play) -> None:
-    talk = Reply(text="Let me think.")
+    talk = Completion(text="Let me think.")
     played = play(workflow="builder", client=Scripted(last=talk))
     assert isinstance(played.failure, Failed)
     assert played.failure.reason == "turn_limit"

@@ -12,14 +12,14 @@ from buildarena_pipeline.errors import PermanentError, StartupError
 from buildarena_simulation import simulate
 from buildarena_worker.builtin.expert import reply as expert
 from buildarena_worker.builtin.reading import read_situation
-from buildarena_worker.session.messages import Reply, Request
+from buildarena_worker.session.messages import Completion, Request
 from buildarena_worker.session.results import Failed
 from buildarena_worker.workflow import Workflows
 from buildarena_worker.workflow.rounds import Loop
 
 START = call("start", init_shift=[0, 0, 0], init_rotation=[0, 0, 0], note="")
 BLOCK = call("attach_block_to", base_block="1", face="A", new_block="Small Wooden Block", note="")
-DONE = Reply(text="TERMINATE")
+DONE = Completion(text="TERMINATE")
 CROSS = [START, BLOCK, DONE]
 
 
@@ -93,7 +93,7 @@ def test_an_analyst_looks_and_its_advice_reaches_the_next_round(play, rollout) -
         call("get_machine_summary"),
         call("attach_block_to", base_block="1", face="B", new_block="Torch", note=""),
     ]
-    model = Scripted(*CROSS, *looks, Reply(text="Make it longer than the gap."), *CROSS)
+    model = Scripted(*CROSS, *looks, Completion(text="Make it longer than the gap."), *CROSS)
     played = play(
         workflow="builder",
         client=model,

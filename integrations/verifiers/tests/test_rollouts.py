@@ -72,7 +72,7 @@ def record(trace) -> dict:
 
 
 def test_the_expert_earns_the_services_scores_in_all_tasks(scripts, experts) -> None:
-    environment = load_environment(rewards={"success": 1.0, "indicator": 0.5})
+    environment = load_environment(simulator="mujoco", rewards={"success": 1.0, "indicator": 0.5})
     whole = {task: [several([*script, SUBMIT])] for task, script in scripts.items()}
     with serving(whole) as stand_in:
         traces = played(environment, stand_in.url)
@@ -120,7 +120,7 @@ def test_64_rollouts_at_once_earn_what_their_own_machines_score(scripts) -> None
 
 def test_a_crashed_engine_costs_one_rollout(scripts) -> None:
     rollouts = 6
-    environment = load_environment("transport-1", processes=1)
+    environment = load_environment("transport-1", "mujoco", processes=1)
     killed = []
 
     def kill_once() -> None:

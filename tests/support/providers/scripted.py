@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from buildarena_store import Usage
 from buildarena_worker.builtin import BuiltinClient
-from buildarena_worker.session.messages import Completion, Reply, Request, ToolCall
+from buildarena_worker.session.messages import Completion, Request, ToolCall
 
 
 class Scripted:
     """A model that says given things in turn, then one thing forever."""
 
-    def __init__(self, *replies: Reply, last: Reply | None = None) -> None:
+    def __init__(self, *replies: Completion, last: Completion | None = None) -> None:
         self.replies = list(replies)
-        self.last = last or Reply(text="TERMINATE")
+        self.last = last or Completion(text="TERMINATE")
         self.requests: list[Request] = []
 
     def complete(self, request: Request, options: object = None) -> Completion:
@@ -20,11 +22,11 @@ class Scripted:
         self.requests.append(request)
         reply = self.replies.pop(0) if self.replies else self.last
         usage = Usage(requests=1, input_tokens=10, output_tokens=5)
-        return Completion(reply=reply, usage=usage, latency_s=1.0)
+        return replace(reply, usage=usage, latency_s=1.0)
 
 
-def call(name: str, /, **arguments: object) -> Reply:
-    return Reply(text="", calls=(ToolCall(id="c1", name=name, arguments=arguments),))
+def call(name: str, /, **arguments: object) -> Completion:
+    return Completion(text="", calls=(ToolCall(id="c1", name=name, arguments=arguments),))
 
 
 class Recording:

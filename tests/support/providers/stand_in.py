@@ -18,8 +18,9 @@ from dataclasses import dataclass, field
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any, Self
 
+from buildarena_geometry import ToolDefinition
 from buildarena_worker.builtin import MODELS
-from buildarena_worker.session.messages import Message, Reply, Request, Tool, ToolCall
+from buildarena_worker.session.messages import Completion, Message, Request, ToolCall
 
 Fault = Callable[[int], str | bytes | None]
 """From the number of a request to what goes wrong: '429', '500', 'drop', 'slow', 'hang', 'drip',
@@ -58,7 +59,7 @@ class ProviderStandIn:
         fault: Fault = lambda _: None,
         latency_s: float = 0.0,
         elsewhere: str = "http://127.0.0.1:9/",
-        respond: Callable[[Request], Reply] | None = None,
+        respond: Callable[[Request], Completion] | None = None,
         raw: Any = None,
     ) -> None:
         self.raw = raw
@@ -204,7 +205,7 @@ def _wire_of(path: str) -> str:
     return "anthropic" if path.endswith("/messages") else "openai"
 
 
-def _used(body: dict[str, Any], reply: Reply) -> tuple[int, int, int]:
+def _used(body: dict[str, Any], reply: Completion) -> tuple[int, int, int]:
     """Input, output and cached tokens: any exact rule will do."""
     size = len(json.dumps(body.get("messages") or body.get("contents")))
     return size // 4, 1 + len(json.dumps(reply.to_json())) // 4, size // 16
@@ -235,7 +236,7 @@ class OpenAIWire:
                 )
             )
         tools = [
-            Tool(
+            ToolDefinition(
                 name=t["function"]["name"],
                 description=t["function"].get("description", ""),
                 parameters=t["function"]["parameters"],
@@ -247,7 +248,7 @@ class OpenAIWire:
         )
 
     @staticmethod
-    def write(reply: Reply, used: tuple[int, int, int], number: int) -> dict[str, Any]:
+    def write(reply: Completion, used: tuple[int, int, int], number: int) -> dict[str, Any]:
         calls = [
             {
                 "id": c.id,
@@ -300,13 +301,15 @@ class _Anthropic:
             if said or calls:
                 messages.append(Message(role=m["role"], text=said, calls=calls))
         tools = [
-            Tool(name=t["name"], description=t.get("description", ""), parameters=t["input_schema"])
+            ToolDefinition(
+                name=t["name"], description=t.get("description", ""), parameters=t["input_schema"]
+            )
             for t in body.get("tools") or ()
         ]
         return Request(model_config={}, messages=messages, tools=tools)
 
     @staticmethod
-    def write(reply: Reply, used: tuple[int, int, int], number: int) -> dict[str, Any]:
+    def write(reply: Completion, used: tuple[int, int, int], number: int) -> dict[str, Any]:
         content: list[dict[str, Any]] = [_part(reply.text)] if reply.text else []
         content += [
             {"type": "tool_use", "id": c.id, "name": c.name, "input": c.arguments}
@@ -355,7 +358,7 @@ class _Google:
                 role = "assistant" if content.get("role") == "model" else "user"
                 messages.append(Message(role=role, text=said, calls=calls))
         tools = [
-            Tool(
+            ToolDefinition(
                 name=f["name"],
                 description=f.get("description", ""),
                 parameters=f.get("parametersJsonSchema") or f.get("parameters") or {},
@@ -367,7 +370,7 @@ class _Google:
         return Request(model_config={}, messages=messages, tools=tools, seed=int(seed))
 
     @staticmethod
-    def write(reply: Reply, used: tuple[int, int, int], number: int) -> dict[str, Any]:
+    def write(reply: Completion, used: tuple[int, int, int], number: int) -> dict[str, Any]:
         parts: list[dict[str, Any]] = [{"text": reply.text}] if reply.text else []
         parts += [{"functionCall": {"name": c.name, "args": c.arguments}} for c in reply.calls]
         return {

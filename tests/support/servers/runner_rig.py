@@ -14,7 +14,7 @@ from support.clients.tenants import ADMIN
 
 from buildarena_benchmark.tasks.loading import parse_custom_task
 from buildarena_geometry import Machine
-from buildarena_pipeline.agents.machine_trials import try_machine
+from buildarena_pipeline.agents.machine_trials import request_trial
 from buildarena_pipeline.catalog.specs import JobSpec
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.simulators.simulator import Simulator
@@ -84,7 +84,7 @@ def waiting(context: Context, text: str = SHORT, *, seed: int = 0, owner: str | 
     task = parse_custom_task(text, origin="test")
     context.tasks.add(task, text)
     machine = two_blocks()
-    job, _ = try_machine(
+    job, _ = request_trial(
         context, machine, task=task.name, simulator="mujoco", seed=seed, owner=owner
     )
     # A runner that waits may have it already.

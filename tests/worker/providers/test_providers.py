@@ -7,12 +7,13 @@ from dataclasses import replace
 import pytest
 from support.providers.stand_in import ProviderStandIn
 
+from buildarena_geometry import ToolDefinition
 from buildarena_pipeline.catalog.models import ModelEntry, ProviderEntry
 from buildarena_pipeline.errors import PermanentError, TransientError
 from buildarena_store import Usage
 from buildarena_worker.providers.provider import ProviderClient
 from buildarena_worker.providers.retries import RetryPolicy
-from buildarena_worker.session.messages import Message, Reply, Request, Tool, ToolCall
+from buildarena_worker.session.messages import Completion, Message, Request, ToolCall
 from buildarena_worker.session.results import Failed
 
 PROTOCOLS = ["openai", "anthropic", "google"]
@@ -58,7 +59,7 @@ FAULTS = [
 def test_passing_faults_are_retried(protocol, fault, client) -> None:
     with ProviderStandIn("idle", fault=lambda n: fault if n < 2 else None) as standin:
         answer = client(standin, protocol).complete(ask())
-    assert answer.reply.text == "TERMINATE"
+    assert answer.text == "TERMINATE"
     assert answer.attempts == 3
     assert answer.usage.requests == 1
 
@@ -109,9 +110,9 @@ def test_decoding_and_seed_go_over_the_wire(client) -> None:
 
 
 def test_every_request_carries_its_own_tools(client) -> None:
-    def tool(name: str, unit: str) -> Tool:
+    def tool(name: str, unit: str) -> ToolDefinition:
         parameters = {"type": "object", "properties": {unit: {"type": "number"}}}
-        return Tool(name=name, description=f"Moves by {unit}.", parameters=parameters)
+        return ToolDefinition(name=name, description=f"Moves by {unit}.", parameters=parameters)
 
     asked = [[tool("move", "metres")], [tool("move", "feet")], [tool("move", "metres")], []]
     with ProviderStandIn("idle") as standin:
@@ -127,12 +128,12 @@ def test_every_request_carries_its_own_tools(client) -> None:
 
 
 def test_arguments_that_are_no_json_reach_the_session_as_text(client) -> None:
-    def respond(_: Request) -> Reply:
-        return Reply(text="", calls=(ToolCall(id="c", name="start", arguments=[1, "x"]),))
+    def respond(_: Request) -> Completion:
+        return Completion(text="", calls=(ToolCall(id="c", name="start", arguments=[1, "x"]),))
 
     with ProviderStandIn(respond=respond) as standin:
         answer = client(standin).complete(ask())
-    (call,) = answer.reply.calls
+    (call,) = answer.calls
     assert call.arguments == [1, "x"]
 
 
@@ -160,7 +161,7 @@ def test_an_overflowing_context_is_the_models_own_failure(play, client) -> None:
 
 @pytest.mark.parametrize("finish", ["length", "content_filter"])
 def test_cut_and_filtered_replies_are_marked_in_the_transcript(play, client, finish) -> None:
-    with ProviderStandIn(respond=lambda _: Reply(text="half a", finish=finish)) as standin:
+    with ProviderStandIn(respond=lambda _: Completion(text="half a", finish=finish)) as standin:
         played = play(client=client(standin))
     assert [turn.finish for turn in played.session.transcript.turns] == [finish] * 5
     assert played.failure.reason == "plan_unreadable"

@@ -9,7 +9,7 @@ import pytest
 from support.providers.stand_in import ProviderStandIn
 
 from buildarena_worker.builtin.expert import reply as expert
-from buildarena_worker.session.messages import Reply, Request
+from buildarena_worker.session.messages import Completion, Request
 from buildarena_worker.workflow.rounds import Loop
 
 PROTOCOLS = ["openai", "anthropic", "google"]
@@ -36,12 +36,12 @@ def is_strict(roles: list[str]) -> bool:
     )
 
 
-def awkward(request: Request) -> Reply:
+def awkward(request: Request) -> Completion:
     """The expert, but its first plan and its first program can't be read."""
     own = [m for m in request.messages if m.role == "assistant"]
     role = request.messages[0].text.splitlines()[0]
     if role in {"# Role: planner", "# Role: controller"} and not own:
-        return Reply(text="Let me think aloud first.")
+        return Completion(text="Let me think aloud first.")
     return expert(request)
 
 

@@ -21,7 +21,7 @@ from buildarena_cli.client import Client, at
 from buildarena_cli.errors import CommandError
 from buildarena_cli.ids import checked_id
 from buildarena_environment import MAIN
-from buildarena_environment.workbench import MACHINE, building_tools
+from buildarena_environment.tools import MACHINE, building_tools
 from buildarena_geometry.modules.names import CaselessNames
 
 INSTRUCTIONS = """Build a machine for a BuildArena task. Call list_tasks, then open_session for one

@@ -11,6 +11,7 @@ from gymnasium.error import InvalidAction, ResetNeeded
 
 from buildarena_benchmark import Task
 from buildarena_environment import (
+    DEFAULT_STEPS,
     Answer,
     Environment,
     EpisodeOverError,
@@ -61,7 +62,7 @@ class BuildEnv(gymnasium.Env[str, str]):
         task: Task | str,
         *,
         simulator: str = DEFAULT_ENGINE,
-        steps: int = 2000,
+        steps: int = DEFAULT_STEPS,
         rounds: int = 1,
         rewards: Mapping[str, float] | None = None,
         reference: float | None = None,
@@ -111,14 +112,7 @@ class BuildEnv(gymnasium.Env[str, str]):
         if "state" in chosen:
             self.environment.restore(chosen["state"])
         self._begun = True
-        tools = [
-            {
-                "name": tool.name,
-                "description": tool.description,
-                "parameters": dict(tool.parameters),
-            }
-            for tool in seen.tools
-        ]
+        tools = [tool.as_document() for tool in seen.tools]
         return observed(seen.briefing), {"tools": json.dumps(tools)}
 
     def step(self, action: str) -> tuple[str, float, bool, bool, dict[str, Any]]:

@@ -11,6 +11,7 @@ from inspect_ai.solver import TaskState
 
 from buildarena_environment import (
     ASSEMBLY,
+    DEFAULT_STEPS,
     MAIN,
     Environment,
     EpisodeOverError,
@@ -48,7 +49,7 @@ class Conditions:
     simulator: str = DEFAULT_ENGINE
     seed: int | None = None
     rounds: int = 1
-    steps: int = 2000
+    steps: int = DEFAULT_STEPS
     rewards: Mapping[str, float] | None = None
 
     def environment(self) -> Environment:

@@ -12,7 +12,7 @@ from inspect_ai.model import ChatMessageUser, ContentImage, ContentText
 from inspect_ai.solver import TaskState
 
 from buildarena_environment import Trial
-from buildarena_environment.trials import told
+from buildarena_environment.trials import score_text
 from buildarena_geometry import Machine
 from buildarena_inspect.building import CALLS, STATE, Building, building_of, end
 from buildarena_inspect.errors import LogError
@@ -63,7 +63,8 @@ def _pictured(building: Building, machine: Machine, trial: Trial) -> ChatMessage
     return ChatMessageUser(
         content=[
             ContentText(
-                text=f"Trial of {task.name}, for readers of this log. " + told(task, trial.score)
+                text=f"Trial of {task.name}, for readers of this log. "
+                + score_text(task, trial.score)
             ),
             ContentImage(image=f"data:image/png;base64,{image}"),
         ],

@@ -30,8 +30,8 @@ from buildarena_inspect.scorers import machine_hash
 from buildarena_inspect.tools import parameters_of
 from buildarena_inspect.trial_processes import try_machine
 from buildarena_pipeline.runtime.trial_repository import tracked_at_1_hz
-from buildarena_store import JournalEntry, RolloutRecord, Usage
-from buildarena_worker.session.messages import Message, Reply, Request, ToolCall
+from buildarena_store import RolloutRecord, Usage
+from buildarena_worker.session.messages import Completion, Message, Request, ToolCall
 
 if TYPE_CHECKING:
     from buildarena_environment import Trial
@@ -61,27 +61,17 @@ class RoleHost:
     def __init__(self, building: Building) -> None:
         self._building = building
         self._said: dict[tuple[str, ...], ChatMessageAssistant] = {}
-        self._sequence = 0
         self.output: ModelOutput | None = None
 
-    def ask(self, request: Request, *, phase: str, role: str) -> JournalEntry:
-        """The model's answer to a request."""
+    def ask(self, request: Request, *, phase: str, role: str) -> Completion:
+        """The model's reply to a request."""
+        del phase
         started = time.monotonic()
         output = anyio.from_thread.run(self._generated, request, role)
         self.output = output
-        reply = _reply(output)
-        self._said[_key(reply.text, reply.calls)] = output.message
-        entry = JournalEntry(
-            sequence=self._sequence,
-            stage=phase,
-            role=role,
-            request_hash="",
-            reply=reply.to_json(),
-            usage=_usage(output),
-            latency_s=time.monotonic() - started,
-        )
-        self._sequence += 1
-        return entry
+        completion = _completion(output, time.monotonic() - started)
+        self._said[_key(completion.text, completion.calls)] = output.message
+        return completion
 
     def simulate(
         self, machine: Machine, controls: Sequence[KeyPress] | None, *, final: bool
@@ -134,15 +124,17 @@ def _key(text: str, calls: Sequence[ToolCall]) -> tuple[str, ...]:
     return tuple(call.id for call in calls) or (text,)
 
 
-def _reply(output: ModelOutput) -> Reply:
+def _completion(output: ModelOutput, latency_s: float) -> Completion:
     message = output.message
-    return Reply(
+    return Completion(
         text=message.text,
         calls=tuple(
             ToolCall(id=call.id, name=call.function, arguments=_arguments(call))
             for call in message.tool_calls or ()
         ),
         finish=FINISHES.get(output.stop_reason, "stop"),
+        usage=_usage(output),
+        latency_s=latency_s,
     )
 
 

@@ -15,7 +15,6 @@ from buildarena_inspect.errors import ChoiceError
 
 if TYPE_CHECKING:
     from buildarena_pipeline.transcript import ModelTurn
-    from buildarena_store import JournalEntry
     from buildarena_worker.session.session import Session
 
 PACK = "default"
@@ -60,8 +59,8 @@ def _play(state: TaskState, building: Building) -> None:
     from buildarena_worker.workflow.five_role import FiveRole
     from buildarena_worker.workflow.rounds import Loop, run_session
 
-    def on_turn(turn: ModelTurn, entry: JournalEntry) -> None:
-        del entry
+    def on_turn(turn: ModelTurn, sequence: int) -> None:
+        del sequence
         state.messages.append(_told(turn))
 
     host = RoleHost(building)

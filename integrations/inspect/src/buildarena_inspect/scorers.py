@@ -12,7 +12,7 @@ from inspect_ai.solver import TaskState
 from buildarena_benchmark.flags import is_disqualified
 from buildarena_benchmark.tasks.task import SCORER_VERSION
 from buildarena_environment import Trial
-from buildarena_environment.trials import told
+from buildarena_environment.trials import score_text
 from buildarena_geometry import Machine
 from buildarena_geometry.machine_files import machine_bytes
 from buildarena_inspect.building import Building, building_of
@@ -34,7 +34,7 @@ def success() -> Scorer:
         trial = await building.ended()
         return Score(
             value=CORRECT if trial.counts else INCORRECT,
-            explanation=trial.detail or told(building.environment.task, trial.score),
+            explanation=trial.detail or score_text(building.environment.task, trial.score),
             metadata=described(building, trial),
         )
 

@@ -14,6 +14,7 @@ from inspect_ai.scorer import Scorer
 from inspect_ai.solver import Solver
 
 from buildarena_benchmark import builtin_tasks
+from buildarena_environment import DEFAULT_STEPS
 from buildarena_inspect.building import Conditions
 from buildarena_inspect.errors import ChoiceError, UnguardedProgramError
 from buildarena_inspect.log_artifacts import keep
@@ -95,7 +96,7 @@ def _named(name: str, tasks: Sequence[str]) -> Callable[..., Task]:
         rewards: dict[str, float] | str | None = None,
         solver: str = "react",
         seed: int | None = None,
-        steps: int = 2000,
+        steps: int = DEFAULT_STEPS,
     ) -> Task:
         return _made(
             tasks,

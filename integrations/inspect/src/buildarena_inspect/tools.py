@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import Any
 
 from inspect_ai.tool import ToolDef, ToolError, ToolParams
 from inspect_ai.tool._tool_canonical import set_tool_canonical_arguments
 from inspect_ai.util import JSONSchema
 
 from buildarena_environment import EpisodeOverError, NothingToSubmitError, tools_of_models
+from buildarena_environment.tools import SUBMIT
 from buildarena_geometry import ToolDefinition
 from buildarena_inspect.building import Building
-
-SUBMIT: Final = "submit"
 
 
 def building_tools(building: Building) -> list[ToolDef]:
     """All actions, each on this building."""
-    return [_action(tool, building) for tool in tools_of_models() if tool.name != SUBMIT]
+    return [_action(tool, building) for tool in tools_of_models() if tool is not SUBMIT]
 
 
 def submit_tool(building: Building) -> ToolDef:
@@ -26,7 +25,6 @@ def submit_tool(building: Building) -> ToolDef:
 
     What can't be submitted is an error that the model reads; agents of Inspect go on after one.
     """
-    (definition,) = (tool for tool in tools_of_models() if tool.name == SUBMIT)
 
     async def execute() -> str:
         try:
@@ -34,7 +32,7 @@ def submit_tool(building: Building) -> ToolDef:
         except (NothingToSubmitError, EpisodeOverError) as error:
             raise ToolError(str(error)) from error
 
-    return _tool(definition, execute)
+    return _tool(SUBMIT, execute)
 
 
 def parameters_of(schema: Mapping[str, Any]) -> ToolParams:

@@ -10,7 +10,7 @@ from typing import Any, Final
 from openenv.core.env_server.interfaces import Environment as ServedEnvironment
 from openenv.core.env_server.types import EnvironmentMetadata
 
-from buildarena_environment import Answer, Environment, Limits, TrialPool, call
+from buildarena_environment import DEFAULT_STEPS, Answer, Environment, Limits, TrialPool, call
 from buildarena_openenv.models import BuildAction, BuildObservation, BuildState
 from buildarena_simulation import DEFAULT_ENGINE
 
@@ -21,7 +21,6 @@ MAX_PARTS: Final = 5_000
 """Parts that all machines of a session may have together; the largest task allows 500."""
 MAX_SEED: Final = 2**31
 DEFAULT_TASK: Final = "support-1"
-DEFAULT_STEPS: Final = 2000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,14 +87,7 @@ class BuildEnvironment(ServedEnvironment[BuildAction, BuildObservation, BuildSta
         self._environment = self._made(seed, settings)
         self._episode_id = episode_id
         seen = self._environment.observation
-        tools = [
-            {
-                "name": tool.name,
-                "description": tool.description,
-                "parameters": dict(tool.parameters),
-            }
-            for tool in seen.tools
-        ]
+        tools = [tool.as_document() for tool in seen.tools]
         return BuildObservation(text=seen.briefing, tools=tools, reward=0.0)
 
     def step(

@@ -12,10 +12,9 @@ from fastapi import FastAPI
 from openenv.core.env_server.http_server import create_app
 from openenv.core.env_server.types import ConcurrencyConfig
 
-from buildarena_environment import TrialPool
+from buildarena_environment import DEFAULT_STEPS, TrialPool
 from buildarena_openenv.body_limit import BodyLimitMiddleware
 from buildarena_openenv.environment import (
-    DEFAULT_STEPS,
     DEFAULT_TASK,
     BuildEnvironment,
     Terms,

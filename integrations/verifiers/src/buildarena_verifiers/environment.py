@@ -50,24 +50,20 @@ def load_environment(
     tasks: Sequence[str] | str | None = None,
     simulator: str = DEFAULT_ENGINE,
     *,
-    rounds: int = 1,
-    steps: int = 2000,
-    start_seeds: Sequence[int] = (),
     rewards: Mapping[str, float] | None = None,
     processes: int | None = None,
     trial_timeout_s: float = 600.0,
+    **episodes: Any,
 ) -> BuildEnv:
     """The environment, for programs that don't write a configuration.
 
     Args:
         tasks: Names of tasks, or one; all by default.
         simulator: Name of the engine that tries machines.
-        rounds: How often a builder may submit.
-        steps: Calls that it may make.
-        start_seeds: A row for each start; by default one that starts exactly.
         rewards: Weights by the names of `buildarena_environment.rewards`; success alone by default.
         processes: Processes that try machines; by default one for each core.
         trial_timeout_s: Seconds after which a trial is broken off.
+        episodes: `rounds`, `steps` and `start_seeds`, as in `BuildTasksetConfig`.
 
     Raises:
         UnknownChoiceError: A task, the simulator or a reward does not exist.
@@ -78,9 +74,7 @@ def load_environment(
         id=ID,
         tasks=names,
         simulator=simulator,
-        rounds=rounds,
-        steps=steps,
-        start_seeds=list(start_seeds),
+        **episodes,
         task=BuildTaskConfig(
             processes=processes,
             trial_timeout_s=trial_timeout_s,

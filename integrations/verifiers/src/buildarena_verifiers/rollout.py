@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from buildarena_environment import Answer, Environment, NothingToSubmitError, best_trial, call
+from buildarena_environment.tools import SUBMIT
 from buildarena_geometry.json_texts import read_json
 from buildarena_verifiers.trial_runners import TrialRunner
 
@@ -29,14 +30,7 @@ class Seat:
     def tools(self) -> list[dict[str, Any]]:
         """The tools as chat completions name them."""
         return [
-            {
-                "type": "function",
-                "function": {
-                    "name": tool.name,
-                    "description": tool.description,
-                    "parameters": dict(tool.parameters),
-                },
-            }
+            {"type": "function", "function": tool.as_document()}
             for tool in self.environment.observation.tools
         ]
 
@@ -51,7 +45,7 @@ class Seat:
             SimulationError: The simulator failed.
         """
         read = _read(arguments)
-        if tool == "submit" or self.environment.steps_left <= 1:
+        if tool == SUBMIT.name or self.environment.steps_left <= 1:
             return await self._runner.run(lambda: self._call(tool, read))
         return self._call(tool, read)
 

@@ -9,7 +9,7 @@ import verifiers.v1 as vf
 from pydantic import Field, PrivateAttr
 
 from buildarena_benchmark import builtin_tasks
-from buildarena_environment import Environment, Limits
+from buildarena_environment import DEFAULT_STEPS, Environment, Limits
 from buildarena_simulation import DEFAULT_ENGINE
 from buildarena_verifiers.harness_config import BuildHarnessConfig
 from buildarena_verifiers.rollout import Seat
@@ -66,7 +66,7 @@ class BuildTasksetConfig(vf.TasksetConfig):
     tasks: list[str] = Field(default_factory=lambda: list(builtin_tasks()))
     simulator: str = DEFAULT_ENGINE
     rounds: int = Field(1, ge=1)
-    steps: int = Field(2000, ge=1)
+    steps: int = Field(DEFAULT_STEPS, ge=1)
     start_seeds: list[int] = Field(default_factory=list)
     task: BuildTaskConfig = BuildTaskConfig()
 

@@ -6,6 +6,7 @@ Importing this package loads no engine; the first trial does.
 from buildarena_environment.calls import Answer, call, call_text, read_call
 from buildarena_environment.choices import references
 from buildarena_environment.environment import (
+    DEFAULT_STEPS,
     Environment,
     Limits,
     Observation,
@@ -23,12 +24,14 @@ from buildarena_environment.errors import (
 from buildarena_environment.evaluating import Evaluator
 from buildarena_environment.rewards import REWARDS, Progress
 from buildarena_environment.snapshots import Snapshot
+from buildarena_environment.tools import ASSEMBLY, MAIN, tools_of_models
 from buildarena_environment.trial_pool import Evaluation, TrialPool
 from buildarena_environment.trials import Trial, best_trial, try_machine
-from buildarena_environment.workbench import ASSEMBLY, MAIN, Workbench, tools_of_models
+from buildarena_environment.workbench import Workbench
 
 __all__ = [
     "ASSEMBLY",
+    "DEFAULT_STEPS",
     "MAIN",
     "REWARDS",
     "Answer",

@@ -15,7 +15,7 @@ from typing import Final
 
 from buildarena_benchmark import Task
 from buildarena_benchmark.tasks.document import Constraints
-from buildarena_environment.workbench import ASSEMBLY, MAIN
+from buildarena_environment.tools import ASSEMBLY, MAIN
 from buildarena_geometry import modules_named
 from buildarena_geometry.feedback.modules import lookup_text, modules_text
 from buildarena_geometry.feedback.words import counted

@@ -7,8 +7,8 @@ from typing import Any, Final
 
 from buildarena_environment.environment import Environment, Submission
 from buildarena_environment.errors import CallError, NothingToSubmitError
+from buildarena_environment.tools import MAIN, SUBMIT
 from buildarena_environment.trials import Trial
-from buildarena_environment.workbench import MAIN, SUBMIT
 from buildarena_geometry.json_texts import read_json
 
 EXAMPLE: Final = '{"tool": "start", "arguments": {}}'
@@ -105,15 +105,15 @@ def read_call(text: str, *, longest: int | None = None) -> tuple[str, dict[str, 
     if longest is not None and len(text) > longest:
         raise CallError(f"the call has {len(text):,} characters: at most {longest:,} are read")
     try:
-        found = read_json(text)
+        value = read_json(text)
     except ValueError as error:
         raise CallError(f"this is not valid JSON ({error}): write {EXAMPLE}") from None
-    if not isinstance(found, dict):
+    if not isinstance(value, dict):
         raise CallError(f"a call is an object: write {EXAMPLE}")
-    for name in found:
+    for name in value:
         if name not in ("tool", "arguments"):
             raise CallError(f"a call has no {name[:40]!r}: choose from tool, arguments")
-    tool, arguments = found.get("tool"), found.get("arguments", {})
+    tool, arguments = value.get("tool"), value.get("arguments", {})
     if not isinstance(tool, str):
         raise CallError(f"'tool' is a tool's name: write {EXAMPLE}")
     if not isinstance(arguments, dict):

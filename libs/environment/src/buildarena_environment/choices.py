@@ -24,10 +24,10 @@ def chosen_task(task: Task | str) -> Task:
     """
     if isinstance(task, Task):
         return task
-    found = builtin_tasks().get(task.replace("_", "-"))
-    if found is None:
+    builtin = builtin_tasks().get(task.replace("_", "-"))
+    if builtin is None:
         raise UnknownChoiceError("task", task, builtin_tasks())
-    return found
+    return builtin
 
 
 def checked_simulator(name: str) -> str:
@@ -57,9 +57,9 @@ def reference_of(task: Task, given: float | None = None, *, needed: bool = False
         if not given > 0:
             raise ValueError(f"reference is {given}: it must be above 0")
         return given
-    found = references().get(task.name)
-    if found is not None and builtin_tasks().get(task.name) == task:
-        return found
+    reference = references().get(task.name)
+    if reference is not None and builtin_tasks().get(task.name) == task:
+        return reference
     if needed:
         raise ValueError(
             f"{task.name} has no reference indicator: give one, or leave the reward 'indicator' out"

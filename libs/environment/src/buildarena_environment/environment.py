@@ -24,14 +24,17 @@ from buildarena_environment.rewards import (
     weighed,
 )
 from buildarena_environment.snapshots import Snapshot
-from buildarena_environment.trials import Trial, Tries, best_trial, told, try_machine
-from buildarena_environment.workbench import MAIN, Workbench, tools_of_models
+from buildarena_environment.tools import MAIN, tools_of_models
+from buildarena_environment.trials import Trial, Tries, best_trial, score_text, try_machine
+from buildarena_environment.workbench import Workbench
 from buildarena_geometry import Accepted, Cause, Machine, Refused, ToolDefinition
 from buildarena_simulation import DEFAULT_ENGINE
 
 if TYPE_CHECKING:
     from buildarena_geometry import Outcome
 
+DEFAULT_STEPS: Final = 2000
+"""Steps that an episode may have unless it is given another limit."""
 ONCE: Final = "You submit once, and the machine has one trial."
 OFTEN: Final = (
     "You may submit $rounds times, and the machine has one trial each time; the best one counts."
@@ -50,7 +53,7 @@ class Limits:
             of copies grow fast. None for any number.
     """
 
-    steps: int = 2000
+    steps: int = DEFAULT_STEPS
     parts: int | None = None
 
     def __post_init__(self) -> None:
@@ -269,7 +272,7 @@ class Environment:
             return self._bench.act(machine, tool, arguments)
         before = self._bench.values()
         outcome = self._bench.act(machine, tool, arguments)
-        count = sum(found.part_count for found in self._bench.machines.values())
+        count = sum(machine.part_count for machine in self._bench.machines.values())
         if count <= room:
             return outcome
         self._bench.return_to(before)
@@ -309,7 +312,7 @@ class Environment:
         self._trials = (*self._trials, trial)
         self._done = trial.counts or len(self._trials) >= self.rounds
         self._reward = self._worth()
-        report = trial.detail or told(self.task, trial.score)
+        report = trial.detail or score_text(self.task, trial.score)
         return Submission(trial=trial, reward=self._reward, report=report, done=self._done)
 
     def finish(self) -> Submission:

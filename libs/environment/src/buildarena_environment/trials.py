@@ -58,14 +58,14 @@ class Trial:
         cls, document: Mapping[str, Any], trajectory: Trajectory | None = None
     ) -> Self:
         """A trial from `as_document`."""
-        found = Score(
+        measured = Score(
             success=bool(document["success"]),
             indicator=float(document["indicator"]),
             metrics=MappingProxyType(dict(document["metrics"])),
             flags=tuple(document["flags"]),
         )
         return cls(
-            score=found,
+            score=measured,
             reason=document["reason"],
             detail=document["detail"],
             wall_s=float(document["wall_s"]),
@@ -124,8 +124,8 @@ def try_machine(
             detail=refusal.reason,
             wall_s=time.perf_counter() - started,
         )
-    found = score(task, machine, trajectory)
-    return Trial(score=found, wall_s=time.perf_counter() - started, trajectory=trajectory)
+    measured = score(task, machine, trajectory)
+    return Trial(score=measured, wall_s=time.perf_counter() - started, trajectory=trajectory)
 
 
 def best_trial(trials: Sequence[Trial]) -> Trial:
@@ -137,20 +137,20 @@ def best_trial(trials: Sequence[Trial]) -> Trial:
     return max(trials, key=lambda trial: (trial.counts, trial.score.success, trial.score.indicator))
 
 
-def told(task: Task, found: Score) -> str:
+def score_text(task: Task, score: Score) -> str:
     """A trial's score in words, for models."""
     indicator = task.indicator
     parts = [
-        "It succeeded." if found.success else "It did not succeed.",
-        f"{indicator.name.capitalize()}: {found.indicator:.2f} {indicator.unit}.".strip(),
+        "It succeeded." if score.success else "It did not succeed.",
+        f"{indicator.name.capitalize()}: {score.indicator:.2f} {indicator.unit}.".strip(),
     ]
     known = [
-        f"{name} {_rendered(value)}" for name, value in found.metrics.items() if value is not None
+        f"{name} {_rendered(value)}" for name, value in score.metrics.items() if value is not None
     ]
     if known:
         parts.append("Measured: " + ", ".join(known) + ".")
-    if found.flags:
-        parts.append("Flags: " + ", ".join(found.flags) + ".")
+    if score.flags:
+        parts.append("Flags: " + ", ".join(score.flags) + ".")
     return " ".join(parts)
 
 

@@ -9,76 +9,17 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final, Self
 
 from buildarena_environment.errors import NothingToSubmitError
-from buildarena_geometry import (
-    GROUPS,
-    LOOKUP,
-    Cause,
-    Machine,
-    Refused,
-    ToolDefinition,
-    tool_definitions,
-)
+from buildarena_environment.tools import ASSEMBLY, LOOKUPS
+from buildarena_geometry import Cause, Machine, Refused
 from buildarena_geometry.modules.names import CaselessNames
 
 if TYPE_CHECKING:
     from buildarena_geometry import Catalogue, Outcome
     from buildarena_geometry.documents.log import LoggedState
 
-MAIN: Final = "main"
-"""What a machine is called where no name is given."""
-ASSEMBLY: Final = "assembly"
-"""The machine that is put together from copies of all others."""
 NAME: Final = re.compile(r"[A-Za-z0-9_-]{1,40}")
 """What a machine may be called."""
-SUBMIT: Final = ToolDefinition(
-    name="submit",
-    description="End the building: the machine is simulated and scored.",
-    parameters={
-        "type": "object",
-        "properties": {},
-        "required": [],
-        "additionalProperties": False,
-    },
-    group="submit",
-)
-MACHINE: Final = {
-    "type": "string",
-    "description": "Sub-structure it is meant for, a new one if there is none of this name; "
-    f"{ASSEMBLY!r} joins copies of all others.",
-    "default": MAIN,
-}
-"""Schema of the argument that says which machine a call is meant for."""
-_LOOKUPS: Final = CaselessNames(tool.name for tool in tool_definitions([LOOKUP]))
-
-
-def building_tools(*, on_demand: bool = False) -> tuple[ToolDefinition, ...]:
-    """All actions of the geometry library, as they are.
-
-    Args:
-        on_demand: Whether the task has its modules looked up, and there are tools for that.
-    """
-    return tool_definitions((*GROUPS, LOOKUP) if on_demand else GROUPS)
-
-
-def tools_of_models(*, on_demand: bool = False) -> tuple[ToolDefinition, ...]:
-    """The actions with one more argument, `machine`, and the tool that submits.
-
-    Args:
-        on_demand: As for `building_tools`.
-    """
-    building = [
-        ToolDefinition(
-            name=tool.name,
-            description=tool.description,
-            parameters={
-                **tool.parameters,
-                "properties": {**tool.parameters["properties"], "machine": MACHINE},
-            },
-            group=tool.group,
-        )
-        for tool in building_tools(on_demand=on_demand)
-    ]
-    return (*building, SUBMIT)
+_LOOKUPS: Final = CaselessNames(LOOKUPS)
 
 
 class Workbench:
@@ -118,12 +59,12 @@ class Workbench:
 
     def machine(self, name: str) -> Machine:
         """The machine with a name, empty when there was none."""
-        found = self._machines.get(name)
-        if found is None:
+        machine = self._machines.get(name)
+        if machine is None:
             available = self._machines if name == ASSEMBLY else None
-            found = Machine(catalogue=self._catalogue, available=available)
-            self._machines[name] = found
-        return found
+            machine = Machine(catalogue=self._catalogue, available=available)
+            self._machines[name] = machine
+        return machine
 
     def result(self) -> tuple[str, Machine] | None:
         """What is to be simulated: the assembly if there is one, otherwise the only machine."""

@@ -21,7 +21,13 @@ from buildarena_geometry.outcomes import (
 )
 from buildarena_geometry.poses import Pose
 from buildarena_geometry.steps import Difference, Step, step
-from buildarena_geometry.tools import GROUPS, LOOKUP, ToolDefinition, tool_definitions
+from buildarena_geometry.tools import (
+    GROUPS,
+    LOOKUP,
+    ToolDefinition,
+    object_schema,
+    tool_definitions,
+)
 
 __version__ = "1.0.0rc1"
 
@@ -65,6 +71,7 @@ __all__ = [
     "load_catalogue",
     "module_set",
     "modules_named",
+    "object_schema",
     "replay",
     "step",
     "tool_definitions",

@@ -40,13 +40,21 @@ class ToolDefinition:
         name: the action's name.
         description: what it does.
         parameters: JSON schema of its arguments, an object.
-        group: one of `GROUPS`, or `LOOKUP`.
+        group: one of `GROUPS`, or `LOOKUP`; empty for what is no action of a machine.
     """
 
     name: str
     description: str
     parameters: JsonSchema
-    group: str
+    group: str = ""
+
+    def as_document(self) -> dict[str, Any]:
+        """What a model is given, as JSON values."""
+        return {
+            "name": self.name,
+            "description": self.description,
+            "parameters": dict(self.parameters),
+        }
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -120,6 +128,16 @@ def tool_definitions(groups: Iterable[str] = GROUPS) -> tuple[ToolDefinition, ..
     )
 
 
+def object_schema(properties: Mapping[str, Any], required: Iterable[str] = ()) -> JsonSchema:
+    """The JSON schema of an object with these properties and no others."""
+    return {
+        "type": "object",
+        "properties": dict(properties),
+        "required": list(required),
+        "additionalProperties": False,
+    }
+
+
 def _action(propose: Callable[..., Change], group: str) -> Action:
     signature = inspect.signature(propose)
     hints = get_type_hints(propose, include_extras=True)
@@ -129,14 +147,9 @@ def _action(propose: Callable[..., Change], group: str) -> Action:
     required = tuple(
         name for name in arguments if signature.parameters[name].default is inspect.Parameter.empty
     )
-    schema: JsonSchema = {
-        "type": "object",
-        "properties": {
-            name: {**readers[name].schema, "description": about[name]} for name in arguments
-        },
-        "required": list(required),
-        "additionalProperties": False,
-    }
+    schema = object_schema(
+        {name: {**readers[name].schema, "description": about[name]} for name in arguments}, required
+    )
     definition = ToolDefinition(
         name=propose.__name__, description=description, parameters=schema, group=group
     )

@@ -68,8 +68,8 @@ class Transcripts:
                 )
             turns = [turn_of_call(index, call) for index, call in enumerate(calls, start=first)]
         by_index = {turn.index: asdict(turn) for turn in turns}
-        found = {event.id: by_index.get(int(event.data["index"])) for event in events}
-        return {id_: turn for id_, turn in found.items() if turn is not None}
+        by_event = {event.id: by_index.get(int(event.data["index"])) for event in events}
+        return {id_: turn for id_, turn in by_event.items() if turn is not None}
 
     def _so_far(self, job: Job) -> list[Turn]:
         if job.model_config.get("provider") != EXTERNAL_PROVIDER:

@@ -107,14 +107,14 @@ class ConstructHandler:
 
     def _host(self, active: ActiveLease) -> LiveHost:
         lease, job = active.lease, active.lease.job
-        kept = ReplayHost(
+        replay = ReplayHost(
             entries=[] if lease.first else self._store.journal.read(job.id),
             rollouts=[] if lease.first else self._store.rollouts.read(job.id),
             limits=job.limits,
             load_trajectory=lambda digest: read_trajectory(self._artifacts.get(digest)),
         )
         return LiveHost(
-            kept=kept,
+            replay=replay,
             client=self._clients.for_config(job.model_config),
             journal=self._store.journal,
             active=active,

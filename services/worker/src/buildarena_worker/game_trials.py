@@ -55,8 +55,8 @@ def annotations_again(
     Yields:
         Engine, what was kept, what was found.
     """
-    found = annotate(task, machine, None if controls is None else tuple(controls))
+    annotations = annotate(task, machine, None if controls is None else tuple(controls))
     for engine, kept in (record.annotations or {}).items():
-        now = found.get(engine)
-        if now is not None and all(kept[name] == now[name] for name in VERSIONS):
-            yield engine, kept, now
+        found = annotations.get(engine)
+        if found is not None and all(kept[name] == found[name] for name in VERSIONS):
+            yield engine, kept, found

@@ -9,17 +9,12 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from hashlib import sha256
-from threading import Lock
 from typing import Any
 
-import structlog
-from sqlalchemy.exc import OperationalError
-
-from buildarena_benchmark import Task, broken_constraint, failed_score, score
+from buildarena_benchmark import Score, Task, broken_constraint, failed_score, score
 from buildarena_besiege import LogIncompleteError, MachineNotPlayableError, prepare_run
 from buildarena_geometry import KeyPress, Machine
 from buildarena_geometry.machine_files import machine_bytes
@@ -53,7 +48,6 @@ from buildarena_store import (
     RolloutRecord,
     Store,
     Usage,
-    Verifications,
 )
 from buildarena_store.jobs.histories import Histories
 from buildarena_worker.game_trials import annotations_again, logged_trajectory
@@ -81,10 +75,8 @@ class Check:
     found: Any
 
 
-AT_ONCE = 2
-"""Verifications of one process at once, however many wait."""
-
-log = structlog.get_logger(__name__)
+SCORED = ("success", "indicator", "metrics", "flags")
+COUNTED = ("requests", "input_tokens", "output_tokens", "cached_tokens", "reasoning_tokens")
 
 
 class Verifier:
@@ -122,31 +114,32 @@ class Verifier:
         job = self._store.jobs.get(job_id)
         try:
             Histories(self._store.database, self._artifacts).unpack([job_id])
-            made_again = self._checks(job)
+            repeated = self._checks(job)
         except (ArtifactMissingError, ArtifactDamagedError) as error:
-            made_again = [_broken_off(str(error))]
-        checks = [*self._kept_checks(job), *made_again]
-        return {"ok": all(check.ok for check in checks), "checks": [asdict(c) for c in checks]}
+            repeated = [_broken_off(str(error))]
+        return report_of([*self._artifact_checks(job), *repeated])
 
-    def _kept_checks(self, job: Job) -> list[Check]:
-        """Whether the bytes of every artifact are those that were kept."""
+    def _artifact_checks(self, job: Job) -> list[Check]:
+        """Whether the bytes of every artifact are those that were stored."""
         named = {file.name: file.hash for file in self._store.jobs.files(job.id)}
         for record in self._store.rollouts.read(job.id):
             named[f"machine of rollout {record.number}"] = record.machine_hash
             if record.trajectory_hash is not None:
                 named[f"trajectory-{record.number}"] = record.trajectory_hash
-        found: dict[str, str] = {}
-        for digest in set(named.values()):
-            try:
-                found[digest] = _hash(self._artifacts.get(digest))
-            except ArtifactMissingError:
-                found[digest] = "missing"
-            except ArtifactDamagedError:
-                found[digest] = "damaged"
+        states = {digest: self._state_of(digest) for digest in set(named.values())}
         return [
-            _compare(f"artifact {name}", digest, found[digest])
+            _compare(f"artifact {name}", digest, states[digest])
             for name, digest in sorted(named.items())
         ]
+
+    def _state_of(self, digest: str) -> str:
+        """The hash of an artifact's bytes, or what is wrong with it."""
+        try:
+            return _hash(self._artifacts.get(digest))
+        except ArtifactMissingError:
+            return "missing"
+        except ArtifactDamagedError:
+            return "damaged"
 
     def _checks(self, job: Job) -> list[Check]:
         if job.state != JobState.DONE or job.success is None:
@@ -190,10 +183,8 @@ class Verifier:
         with self._store.database.transaction() as connection:
             calls = self._store.external_calls.read(job.id, connection=connection)
         bench = bench_of(task_of(job, self._tasks))
-        again = [bench.call(call.machine, call.tool, call.arguments) for call in calls]
-        checks = [
-            _compare("calls", [_answer_of(call) for call in calls], [_answer_of(c) for c in again])
-        ]
+        repeated = [bench.call(call.machine, call.tool, call.arguments) for call in calls]
+        checks = [_compare("calls", _feedback_of(calls), _feedback_of(repeated))]
         chosen = bench.result()
         return checks + self._trial_checks(job, None if chosen is None else chosen[1])
 
@@ -254,19 +245,19 @@ class Verifier:
                     controls=None if controls is None else tuple(controls),
                 )
         except (MachineNotSimulable, MachineNotPlayableError):
-            again, digest = failed_score(task, machine), None
+            repeated, digest = failed_score(task, machine), None
         except LogIncompleteError as error:
             return [*checks, Check(name=f"{name}: log", ok=False, kept="", found=str(error))]
         except UnknownEngineError as error:
             kept = record.engine
             return [*checks, Check(name=f"{name}: engine", ok=False, kept=kept, found=str(error))]
         else:
-            again = score(task, machine, trajectory)
+            repeated = score(task, machine, trajectory)
             digest = _hash(self._written_as(record.trajectory_hash, trajectory))
         checks.append(_compare(f"{name}: trajectory", record.trajectory_hash, digest))
         for field in SCORED:
             kept = _plain(getattr(record, field))
-            checks.append(_compare(f"{name}: {field}", kept, _plain(getattr(again, field))))
+            checks.append(_compare(f"{name}: {field}", kept, _plain(getattr(repeated, field))))
         return checks
 
     def _written_as(self, kept: str | None, trajectory: Trajectory) -> bytes:
@@ -294,86 +285,27 @@ class Verifier:
     def _score_checks(
         self, job: Job, machine: Machine | None, records: Sequence[RolloutRecord]
     ) -> list[Check]:
-        if any(record.finished_at for record in records):
-            best = best_rollout(records)
-            wanted = {name: _plain(getattr(best, name)) for name in SCORED}
-        else:
-            failed = failed_score(task_of(job, self._tasks), machine)
-            wanted = {name: _plain(getattr(failed, name)) for name in SCORED}
-        return [_compare(f"score: {n}", _plain(getattr(job, n)), v) for n, v in wanted.items()]
+        counted: RolloutRecord | Score = (
+            best_rollout(records)
+            if any(record.finished_at for record in records)
+            else failed_score(task_of(job, self._tasks), machine)
+        )
+        return [
+            _compare(f"score: {n}", _plain(getattr(job, n)), _plain(getattr(counted, n)))
+            for n in SCORED
+        ]
 
     def _artifact(self, job: Job, name: str) -> str | None:
         return self._store.jobs.artifacts(job.id).get(name)
 
 
-class VerificationRunner:
-    """Does the verifications that messages speak of, in threads of its own.
-
-    Messages arrive in the threads of sessions: they only wake it, and take no session's place.
-
-    Args:
-        verifications: What was asked for.
-        verifier: Does them.
-    """
-
-    def __init__(self, verifications: Verifications, verifier: Verifier) -> None:
-        self._verifications = verifications
-        self._verifier = verifier
-        self._threads = ThreadPoolExecutor(AT_ONCE, thread_name_prefix="verifying")
-        self._lock = Lock()
-        self._active = 0
-        self._stopping = False
-
-    def wake(self, _: str) -> None:
-        """Has waiting verifications done, unless as many as may be are being done."""
-        with self._lock:
-            if self._active < AT_ONCE and not self._stopping:
-                self._active += 1
-                self._threads.submit(self._do_next)
-
-    def stop(self) -> None:
-        """Begins no further verification."""
-        self._stopping = True
-
-    def process_one(self) -> bool:
-        """Does the verification that waits longest; False when none waits."""
-        claimed = self._verifications.claim_next()
-        if claimed is None:
-            return False
-        try:
-            report = self._verifier.verify(claimed.job_id)
-        except (ArtifactStoreError, OperationalError) as error:
-            # Not the job's fault: another worker does it when this one's claim is too old.
-            log.warning("verification_put_off", job=claimed.job_id, error=str(error))
-            return False
-        except Exception as error:
-            log.exception("verification_failed", job=claimed.job_id)
-            failed = Check(name="verification", ok=False, kept=None, found=f"it broke off: {error}")
-            report = {"ok": False, "checks": [asdict(failed)]}
-        self._verifications.finish(claimed.id, report)
-        return True
-
-    def _do_next(self) -> None:
-        try:
-            again = self.process_one()
-        except Exception:
-            # The reaper notifies again.
-            log.exception("verifications_unreadable")
-            again = False
-        with self._lock, suppress(RuntimeError):
-            if again and not self._stopping:
-                self._threads.submit(self._do_next)  # refused when the process ends
-                return
-        with self._lock:
-            self._active -= 1
+def report_of(checks: Sequence[Check]) -> dict[str, Any]:
+    """The checks as the report that is stored."""
+    return {"ok": all(check.ok for check in checks), "checks": [asdict(c) for c in checks]}
 
 
-SCORED = ("success", "indicator", "metrics", "flags")
-COUNTED = ("requests", "input_tokens", "output_tokens", "cached_tokens", "reasoning_tokens")
-
-
-def _answer_of(call: ExternalCall) -> list[Any]:
-    return [call.ok, call.reason, call.feedback]
+def _feedback_of(calls: Sequence[ExternalCall]) -> list[list[Any]]:
+    return [[call.ok, call.reason, call.feedback] for call in calls]
 
 
 def _usage_checks(job: Job, usage: Usage) -> list[Check]:

@@ -8,7 +8,8 @@ from buildarena_pipeline.runtime.context import Context
 from buildarena_worker.construct import ConstructHandler
 from buildarena_worker.providers.clients import ModelClients
 from buildarena_worker.session.concurrency_gate import ConcurrencyGate
-from buildarena_worker.verify import VerificationRunner, Verifier
+from buildarena_worker.verification_runner import VerificationRunner
+from buildarena_worker.verify import Verifier
 from buildarena_worker.workflow import Workflows
 
 

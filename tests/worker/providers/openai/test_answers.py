@@ -25,13 +25,18 @@ def meaning(case: dict[str, Any]) -> dict[str, Any]:
         answered = READERS[case.get("url", URL)].read(case["status"], {}, case["body"].encode())
     except ProviderError as error:
         return {"failure": error.failure.value, "overloaded": error.overloaded}
-    reply, tokens = answered.reply.to_json(), answered.tokens
+    reply, usage = answered.to_json(), answered.usage
     for call in reply["calls"]:
         call[0] = "(made)" if len(str(call[0])) > 8 else call[0]
     return {
         "reply": reply,
-        "tokens": [tokens.input, tokens.output, tokens.cached, tokens.reasoning],
-        "id": answered.response_id,
+        "tokens": [
+            usage.input_tokens,
+            usage.output_tokens,
+            usage.cached_tokens,
+            usage.reasoning_tokens,
+        ],
+        "id": answered.provider_request_id,
     }
 
 

@@ -8,10 +8,11 @@ from typing import Any
 
 import pytest
 
+from buildarena_geometry import ToolDefinition
 from buildarena_worker.providers.openai.request import RequestWriter
 from buildarena_worker.providers.openai.schema import function_tool
 from buildarena_worker.session.dialogue import OBJECTION
-from buildarena_worker.session.messages import Message, Request, Tool, ToolCall
+from buildarena_worker.session.messages import Message, Request, ToolCall
 from buildarena_worker.workflow.analyst import BREAKS, TRAJECTORY, TRANSCRIPT
 from buildarena_worker.workflow.machine_tools import ASSEMBLE, BUILD, QUERIES, REFINE, tools_named
 
@@ -86,7 +87,7 @@ TOOLS = {
     "objection": [OBJECTION],
     "analyst": [*tools_named(QUERIES), TRANSCRIPT, TRAJECTORY, BREAKS],
     "odd": [
-        Tool(
+        ToolDefinition(
             name=name,
             description="Nothing at all." if name == "bare" else "d",
             parameters=parameters,
@@ -114,7 +115,7 @@ def test_requests_carry_what_kept_ones_carried(case) -> None:
 
 def test_schemas_are_written_as_kept_ones_were() -> None:
     for case in json.loads((Path(__file__).parents[3] / "data/openai/schemas.json").read_text()):
-        tool = Tool(name="t", description="d", parameters=case["given"])
+        tool = ToolDefinition(name="t", description="d", parameters=case["given"])
         function = function_tool(tool)["function"]
         found = {"sent": function["parameters"], "strict": function.get("strict", False)}
         assert found == {"sent": case["sent"], "strict": case["strict"]}, case["given"]

@@ -6,10 +6,8 @@ import json
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from buildarena_environment.tools import OBJECTION
 from buildarena_geometry import tool_definitions
-
-OBJECTION = "raise_objection"
-"""What a role calls to give up; no action of a machine."""
 
 
 def compact(value: Any) -> str:
@@ -49,22 +47,8 @@ def chat(statement: str | None, turns: Iterable[Mapping[str, Any]]) -> list[dict
 
 def tools() -> str:
     """The definitions of all actions, and of the way to give up, as JSON."""
-    given_up = {
-        "name": OBJECTION,
-        "description": "End the work as a failure because it cannot be done within the task's "
-        "rules.",
-        "parameters": {
-            "type": "object",
-            "properties": {"reason": {"type": "string", "description": "Why it cannot be done."}},
-            "required": ["reason"],
-            "additionalProperties": False,
-        },
-    }
-    actions = [
-        {"name": tool.name, "description": tool.description, "parameters": dict(tool.parameters)}
-        for tool in tool_definitions()
-    ]
-    return compact([{"type": "function", "function": tool} for tool in [*actions, given_up]])
+    offered = (tool.as_document() for tool in (*tool_definitions(), OBJECTION))
+    return compact([{"type": "function", "function": tool} for tool in offered])
 
 
 def _message(

@@ -26,7 +26,7 @@ class TooManyTrialsError(PipelineError):
     """The owner has as many trials of files under way as one may have."""
 
 
-def try_machine(
+def request_trial(
     context: Context,
     machine: Machine,
     *,
@@ -35,7 +35,7 @@ def try_machine(
     seed: int = 0,
     owner: str | None = None,
 ) -> tuple[Job, bool]:
-    """Puts a machine through a task's trial.
+    """Opens a job that puts a machine through a task's trial.
 
     An equal machine on the same task, simulator and seed gives the same job, whoever asks.
 
@@ -54,14 +54,14 @@ def try_machine(
         SubmissionError: The task or the simulator is unknown.
         TooManyTrialsError: Too many are under way.
     """
-    found = chosen_task(context, task, simulator)
+    chosen = chosen_task(context, task, simulator)
     digest = sha256(machine_bytes(machine)).hexdigest()
     name = f"file/{digest[:NAME_LENGTH]}"
     config = {"name": name, "provider": FILE_PROVIDER, "model": digest}
     track = file_track(simulator, simulation_version(context, simulator))
     key = JobKey(
         task=task,
-        task_version=found.version,
+        task_version=chosen.version,
         model_hash=configuration_hash(config, {}),
         track=track.id,
         seed=seed,

@@ -57,13 +57,13 @@ class OpenedSession:
         job: Its job.
         task: What is to be built.
         briefing: What its agent must know to play.
-        again: Whether it was open already.
+        reopened: Whether it was open already.
     """
 
     job: Job
     task: Task
     briefing: str
-    again: bool
+    reopened: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -157,8 +157,8 @@ class ExternalSessions:
             claim_name(kind, agent, owner=owner, connection=connection, force=force)
             self._context.store.jobs.add([new], connection=connection)
             calls = self._context.store.external_calls
-            again = not calls.open(key.job_id, connection=connection)
-            if again:
+            reopened = not calls.open(key.job_id, connection=connection)
+            if reopened:
                 lease = calls.lease(key.job_id, connection=connection)
                 if lease is None or lease.job.owner != owner:
                     message = (
@@ -169,7 +169,7 @@ class ExternalSessions:
             job=self._context.store.jobs.get(key.job_id),
             task=chosen,
             briefing=briefing(chosen),
-            again=again,
+            reopened=reopened,
         )
 
     def call(self, job_id: str, *, machine: str, tool: str, arguments: Any) -> ExternalCall:

@@ -35,16 +35,16 @@ def chosen_task(
     Raises:
         SubmissionError: Something is wrong; it names all of it.
     """
-    found = context.tasks.named([task]).get(task)
+    chosen = context.tasks.named([task]).get(task)
     issues = []
-    if found is None:
+    if chosen is None:
         choices = tuple(sorted(context.tasks.newest()))
         message = f"there is no task {task!r}"
         issues.append(ValidationIssue(path="task", message=message, choices=choices))
     issues += [*simulator_issues(context, simulator), *further]
-    if issues or found is None:
+    if issues or chosen is None:
         raise SubmissionError(issues)
-    return found
+    return chosen
 
 
 def submit_machine(
@@ -68,8 +68,8 @@ def submit_machine(
         The queue to announce it in once the transaction is done; None when the job has ended.
     """
     job = lease.job
-    kept = context.artifacts.put(machine_bytes(machine), JSON)
-    made = {"machine": kept}
+    stored = context.artifacts.put(machine_bytes(machine), JSON)
+    made = {"machine": stored}
     if transcript is not None:
         made["transcript"] = context.artifacts.put(transcript.to_json(spaced=True), JSON)
     context.store.results.attach(job.id, made, connection=connection)
@@ -84,7 +84,7 @@ def submit_machine(
         context.store.results.finish(lease, score, connection=connection, refusals=refusals)
         return None
     engine = str(job.track_config["simulator"])
-    request = RolloutRequest(number=0, final=True, engine=engine, machine_hash=kept.hash)
+    request = RolloutRequest(number=0, final=True, engine=engine, machine_hash=stored.hash)
     context.store.rollouts.request(job.id, request, connection=connection)
     queue = simulate_queue(engine)
     context.store.leases.queue_again(

@@ -55,12 +55,12 @@ class Announcer:
             thread.join(timeout=LONGEST_JOIN_S)
 
     def _run(self) -> None:
-        while (found := self._next()) is not None:
+        while (announcement := self._next()) is not None:
             try:
-                self._send(*found)
+                self._send(*announcement)
             except Exception:
                 # What was not sent is sent again by the reaper; the thread must go on.
-                log.exception("announcement_failed", queue=found[0])
+                log.exception("announcement_failed", queue=announcement[0])
 
     def _next(self) -> tuple[str, list[str]] | None:
         with self._changed:

@@ -74,12 +74,12 @@ class TaskCatalog:
         The database is queried only when a name is not a built-in task's.
         """
         builtin = builtin_tasks()
-        found = {name: builtin[name] for name in names if name in builtin}
+        tasks = {name: builtin[name] for name in names if name in builtin}
         others = {name for name in names if name not in builtin}
         if others:
             entries = self._entries(self._tasks.newest(others))
-            found |= {entry.task.name: entry.task for entry in entries}
-        return found
+            tasks |= {entry.task.name: entry.task for entry in entries}
+        return tasks
 
     def exact(self, name: str, version: str) -> Task | None:
         """This very version, or None when it is not there, or no longer scored as it was."""
@@ -133,10 +133,10 @@ class TaskCatalog:
         added = self._tasks.add(
             name=task.name, version=task.version, document=text, owner=owner, force=force
         )
-        kept = self.exact(task.name, task.version)
-        if kept is not None and kept != task:
+        stored = self.exact(task.name, task.version)
+        if stored is not None and stored != task:
             fields = ("title", "category", "level", "indicator", "difficulty")
-            changed = [name for name in fields if getattr(kept, name) != getattr(task, name)]
+            changed = [name for name in fields if getattr(stored, name) != getattr(task, name)]
             raise TaskChangedError(
                 f"version {task.version} of {task.name} exists with another "
                 f"{' and '.join(changed)}, which cannot be changed alone: they stay as they were "
@@ -147,16 +147,16 @@ class TaskCatalog:
     def _entries(self, rows: Sequence[StoredTask]) -> list[CatalogueEntry]:
         """Stored tasks as they count now; those that can no longer be read are left out."""
         parsed = self._load([(row.name, row.version) for row in rows])
-        found = []
+        entries = []
         for row in rows:
             task = parsed[row.name, row.version] or self._renewed(row)
             if task is not None and task.name not in builtin_tasks():
-                found.append(
+                entries.append(
                     CatalogueEntry(
                         task=task, custom=True, owner=row.owner, created_at=row.created_at
                     )
                 )
-        return found
+        return entries
 
     def _renewed(self, row: StoredTask) -> Task | None:
         """The task's text under the version that it has now.
@@ -179,17 +179,17 @@ class TaskCatalog:
     def _load(self, keys: Sequence[TaskKey]) -> Mapping[TaskKey, Task | None]:
         """Tasks by key; None for those that are not there under this version."""
         parsed = self._parsed
-        found = {key: parsed[key] for key in keys if key in parsed}
-        missing = [key for key in keys if key not in found]
+        tasks = {key: parsed[key] for key in keys if key in parsed}
+        missing = [key for key in keys if key not in tasks]
         if missing:
             texts = self._tasks.documents(missing)
             for key in missing:
-                found[key] = None
+                tasks[key] = None
                 if key in texts:
                     task = _parsed(texts[key], key[0])
-                    found[key] = task if task and task.version == key[1] else None
-                    self._keep(*key, found[key])
-        return found
+                    tasks[key] = task if task and task.version == key[1] else None
+                    self._keep(*key, tasks[key])
+        return tasks
 
     def _keep(self, name: str, version: str, task: Task | None) -> None:
         if len(self._parsed) >= MAX_PARSED:

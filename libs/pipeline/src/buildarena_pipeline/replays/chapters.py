@@ -95,7 +95,7 @@ class Recorder:
             Whether it was accepted.
         """
         self._work += chapter.machine.part_count + sum(
-            one.part_count for one in chapter.machine.available.values()
+            part.part_count for part in chapter.machine.available.values()
         )
         if not self.complete or self._work > MAX_WORK:
             self.complete = False

@@ -1,4 +1,4 @@
-"""The replay of a kept machine: its own log, with the turns of the transcript beside it."""
+"""The replay of a logged machine: its own log, with the turns of the transcript beside it."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from itertools import groupby
 from typing import Any, Final
 
 from buildarena_environment import ASSEMBLY
+from buildarena_environment.tools import OBJECTION
 from buildarena_geometry import Machine
 from buildarena_geometry.documents.log import LoggedState
 from buildarena_pipeline.replays.chapters import (
@@ -19,7 +20,7 @@ from buildarena_pipeline.replays.chapters import (
     Turn,
     refused_step,
 )
-from buildarena_pipeline.replays.from_turns import ASSEMBLE, BUILD, OBJECTION, REFINE, place
+from buildarena_pipeline.replays.from_turns import ASSEMBLE, BUILD, REFINE, place
 
 CONTROL: Final = "control"
 LOOKING: Final = ("get_", "review_")
@@ -27,7 +28,7 @@ LOOKING: Final = ("get_", "review_")
 PROGRAMMED: Final = frozenset({"add_control_key", "add_control_sequence"})
 """What the session does with a controller's program, which is text and no action."""
 
-Told = tuple[int, Mapping[str, Any]]
+TurnAction = tuple[int, Mapping[str, Any]]
 """An action of the transcript with its turn."""
 
 
@@ -41,24 +42,24 @@ def replay_of_document(document: object, turns: Sequence[Turn]) -> Replay:
     Raises:
         DocumentError: It is no machine document.
     """
-    kept = Machine.from_document(document).logged
-    offered = kept.state.catalogue
+    logged = Machine.from_document(document).logged
+    offered = logged.state.catalogue
     recorder = Recorder()
     chapters: dict[str, Chapter] = {}
-    for name, one in kept.available.items():
+    for name, built in logged.available.items():
         chapter = Chapter(name=name, kind="sub_structure", machine=Machine(catalogue=offered))
-        chapters[name] = _played(recorder, chapter, one, _of_part(turns, name))
-    if kept.available:
+        chapters[name] = _played(recorder, chapter, built, _of_part(turns, name))
+    if logged.available:
         made = {name: chapter.machine for name, chapter in chapters.items()}
         last = Chapter(
             name=ASSEMBLY, kind="assembly", machine=Machine(catalogue=offered, available=made)
         )
-        _played(recorder, last, kept, _of_assembly(turns))
+        _played(recorder, last, logged, _of_assembly(turns))
     else:
-        built = [turn for turn in turns if turn["stage"] == BUILD]
-        part = built[-1].get("sub_structure") if built else None
+        building = [turn for turn in turns if turn["stage"] == BUILD]
+        part = building[-1].get("sub_structure") if building else None
         last = Chapter(name=part or "machine", kind="machine", machine=Machine(catalogue=offered))
-        _played(recorder, last, kept, _of_part(turns, part))
+        _played(recorder, last, logged, _of_part(turns, part))
     _name_controller(last, turns)
     return Replay(
         chapters=[*chapters.values(), last], machine=last.machine, complete=recorder.complete
@@ -66,24 +67,24 @@ def replay_of_document(document: object, turns: Sequence[Turn]) -> Replay:
 
 
 def _played(
-    recorder: Recorder, chapter: Chapter, kept: LoggedState, told: Sequence[Told]
+    recorder: Recorder, chapter: Chapter, logged: LoggedState, actions: Sequence[TurnAction]
 ) -> Chapter:
     """A machine's log done again, each action with the turn that asked for it."""
     wanted = [
         _key(action["name"], action["arguments"], None if action["ok"] else action["reason"])
-        for _, action in told
+        for _, action in actions
     ]
-    records = kept.records
+    records = logged.records
     done = [_key(record.name, record.arguments, record.reason) for record in records]
     for tag, start, end, first, last in SequenceMatcher(None, wanted, done).get_opcodes():
         if tag == "equal":
-            for (turn, _), record in zip(told[start:end], records[first:last], strict=True):
+            for (turn, _), record in zip(actions[start:end], records[first:last], strict=True):
                 recorder.record(chapter, turn, record.name, record.arguments)
             continue
         chapter.steps += [
             refused_step(turn, action)
-            for turn, action in told[start:end]
-            if not action["ok"] and action["name"] != OBJECTION
+            for turn, action in actions[start:end]
+            if not action["ok"] and action["name"] != OBJECTION.name
         ]
         for record in records[first:last]:
             recorder.record(chapter, None, record.name, record.arguments)
@@ -96,28 +97,28 @@ def _played(
     return chapter
 
 
-def _of_part(turns: Sequence[Turn], name: str | None) -> list[Told]:
+def _of_part(turns: Sequence[Turn], name: str | None) -> list[TurnAction]:
     """The actions of a part's last dialogue of building, and of those that corrected it."""
-    found: list[Told] = []
+    actions: list[TurnAction] = []
     for (phase, part), dialogue in groupby(turns, key=place):
         if part != name:
             continue
         if phase == BUILD:
-            found = _actions(list(dialogue))
+            actions = _actions(list(dialogue))
         elif phase == REFINE:
-            found += _actions(list(dialogue))
-    return found
+            actions += _actions(list(dialogue))
+    return actions
 
 
-def _of_assembly(turns: Sequence[Turn]) -> list[Told]:
-    found: list[Told] = []
+def _of_assembly(turns: Sequence[Turn]) -> list[TurnAction]:
+    actions: list[TurnAction] = []
     for (phase, _), dialogue in groupby(turns, key=place):
         if phase == ASSEMBLE:
-            found = _actions(list(dialogue))
-    return found
+            actions = _actions(list(dialogue))
+    return actions
 
 
-def _actions(turns: Sequence[Turn]) -> list[Told]:
+def _actions(turns: Sequence[Turn]) -> list[TurnAction]:
     return [(turn["index"], action) for turn in turns for action in turn["actions"]]
 
 

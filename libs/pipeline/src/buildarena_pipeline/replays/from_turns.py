@@ -7,6 +7,7 @@ from itertools import groupby
 from typing import Any, Final
 
 from buildarena_environment import ASSEMBLY
+from buildarena_environment.tools import OBJECTION
 from buildarena_geometry import Catalogue, Machine, RefusalClass
 from buildarena_geometry.modules.sets import modules_of_action, smallest_set
 from buildarena_pipeline.agents.workbench import Workbench
@@ -28,7 +29,6 @@ NO_BUILDING: Final = frozenset({PLAN, "draft", "control", "analyse"})
 """Phases in which no machine is built; an analyst only looks at one."""
 BEFORE_THE_MACHINE: Final = frozenset({"parallel_calls", "unknown_action"})
 """Refusals of the session, which the machine never heard of."""
-OBJECTION: Final = "raise_objection"
 
 
 def replay_of_turns(turns: Sequence[Turn]) -> Replay:
@@ -111,7 +111,7 @@ class _Session:
         given_up = False
         for turn in turns:
             for action in turn["actions"]:
-                given_up = given_up or (action["name"] == OBJECTION and action["ok"])
+                given_up = given_up or (action["name"] == OBJECTION.name and action["ok"])
                 self._act(chapter, turn["index"], action)
         if phase == REFINE and given_up:
             chapter.machine = before
@@ -140,7 +140,7 @@ class _Session:
         return made
 
     def _act(self, chapter: Chapter, turn: int, action: Mapping[str, Any]) -> None:
-        if action["name"] == OBJECTION:
+        if action["name"] == OBJECTION.name:
             return
         if not action["ok"] and action["reason"] in BEFORE_THE_MACHINE:
             chapter.steps.append(refused_step(turn, action))

@@ -24,19 +24,19 @@ def annotate(
     Returns:
         By engine: success, indicator, flags, and the versions of model and engine.
     """
-    found: dict[str, dict[str, Any]] = {}
+    annotations: dict[str, dict[str, Any]] = {}
     for engine in ENGINES:
         try:
             start = game_start(machine, task.scenario)
             trajectory = simulate(machine, task.scenario, engine, controls=controls, start=start)
         except BuildarenaSimulationError:
             continue
-        said = score(task, machine, trajectory)
-        found[engine] = {
-            "success": said.success,
-            "indicator": said.indicator,
-            "flags": list(said.flags),
+        measured = score(task, machine, trajectory)
+        annotations[engine] = {
+            "success": measured.success,
+            "indicator": measured.indicator,
+            "flags": list(measured.flags),
             "simulation": trajectory.simulation_version,
             "engine_version": trajectory.engine_version,
         }
-    return found
+    return annotations

@@ -16,7 +16,7 @@ from buildarena_api.scenes import MachineScene, Vector, machine_scene
 from buildarena_api.schemas import JobView
 from buildarena_benchmark import ValidationIssue, broken_constraint
 from buildarena_geometry import Machine
-from buildarena_pipeline.agents.machine_trials import TooManyTrialsError, try_machine
+from buildarena_pipeline.agents.machine_trials import TooManyTrialsError, request_trial
 from buildarena_pipeline.catalog.specs import MAX_SEED, Name
 from buildarena_pipeline.runtime.context import Context
 from buildarena_simulation import DEFAULT_ENGINE
@@ -124,7 +124,7 @@ def try_file(
     if fault is not None:
         raise refused(fault)
     try:
-        job, fresh = try_machine(
+        job, fresh = request_trial(
             context,
             machine,
             task=wanted.task,

@@ -14,7 +14,7 @@ from buildarena_api.http.access import Caller, CallerDep
 from buildarena_api.http.problems import ProblemError, problem_responses
 from buildarena_api.schemas import JobView
 from buildarena_environment import ASSEMBLY, MAIN, NothingToSubmitError
-from buildarena_environment.workbench import building_tools
+from buildarena_environment.tools import building_tools
 from buildarena_pipeline.agents.briefing import LIMITS
 from buildarena_pipeline.agents.sessions import SessionClosedError
 from buildarena_pipeline.catalog.specs import Name, Seed
@@ -149,7 +149,7 @@ def open_session(
         force=caller.is_admin,
     )
     response.headers["Location"] = f"/v1/jobs/{opened.job.id}"
-    if opened.again:
+    if opened.reopened:
         response.status_code = 200
     return SessionOpened(
         id=opened.job.id,
@@ -215,8 +215,7 @@ def submit_session(
 
 def _tools(*, on_demand: bool) -> list[ToolView]:
     return [
-        ToolView(name=tool.name, description=tool.description, parameters=dict(tool.parameters))
-        for tool in building_tools(on_demand=on_demand)
+        ToolView.model_validate(tool.as_document()) for tool in building_tools(on_demand=on_demand)
     ]
 
 

@@ -6,12 +6,13 @@ provider's wire format. They are baselines, marked as such on leaderboards.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from decimal import Decimal
 
 from buildarena_pipeline.errors import PermanentError
 from buildarena_store import Usage
 from buildarena_worker.builtin import expert, idle, random_builder
-from buildarena_worker.session.messages import Completion, Reply, Request
+from buildarena_worker.session.messages import Completion, Request
 from buildarena_worker.session.request_options import UNBOUNDED, RequestOptions
 
 MODELS = {"expert": expert.reply, "random": random_builder.reply, "idle": idle.reply}
@@ -39,16 +40,17 @@ class BuiltinClient:
     def complete(self, request: Request, options: RequestOptions = UNBOUNDED) -> Completion:
         """The model's reply; tokens are estimated from the length of the texts, at no cost."""
         del options
-        reply = self._reply(request)
+        completion = self._reply(request)
         usage = Usage(
             requests=1,
             input_tokens=sum(len(message.text) for message in request.messages)
             // CHARACTERS_PER_TOKEN,
-            output_tokens=max(1, _length(reply) // CHARACTERS_PER_TOKEN),
+            output_tokens=max(1, _length(completion) // CHARACTERS_PER_TOKEN),
             cost_usd=Decimal(),
         )
-        return Completion(reply=reply, usage=usage, latency_s=0.0)
+        return replace(completion, usage=usage)
 
 
-def _length(reply: Reply) -> int:
-    return len(reply.text) + sum(len(call.name) + len(str(call.arguments)) for call in reply.calls)
+def _length(completion: Completion) -> int:
+    calls = sum(len(call.name) + len(str(call.arguments)) for call in completion.calls)
+    return len(completion.text) + calls

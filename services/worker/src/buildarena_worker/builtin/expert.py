@@ -14,7 +14,7 @@ from buildarena_worker.builtin.designs import DESIGNS
 from buildarena_worker.builtin.designs.design import Design
 from buildarena_worker.builtin.designs.drafting import Action
 from buildarena_worker.builtin.reading import Situation, read_situation
-from buildarena_worker.session.messages import Reply, Request, ToolCall
+from buildarena_worker.session.messages import Completion, Request, ToolCall
 
 DONE = "TERMINATE"
 DESCRIBE = "describe_module"
@@ -22,26 +22,26 @@ DESIGNERS = ("planner", "drafter", "guidance", "engineer")
 """The roles that must know modules; guidance only where it has no drawing."""
 
 
-def reply(request: Request) -> Reply:
+def reply(request: Request) -> Completion:
     """The next thing to say or do; an objection to tasks it has no design for."""
     situation = read_situation(request)
     if situation.task not in DESIGNS:
-        return Reply(text=f"I have no design for {situation.task or 'this task'}. {DONE}")
+        return Completion(text=f"I have no design for {situation.task or 'this task'}. {DONE}")
     design = _design(situation.task, request.seed)
     looking = _look_up(design, situation, request)
     if looking is not None:
         return looking
     speakers = {
-        "planner": lambda: Reply(text=_plan(design)),
-        "drafter": lambda: Reply(text=_drawing(design, situation)),
-        "reviewer": lambda: Reply(text=DONE),
+        "planner": lambda: Completion(text=_plan(design)),
+        "drafter": lambda: Completion(text=_drawing(design, situation)),
+        "reviewer": lambda: Completion(text=DONE),
         "guidance": lambda: _guide(design, situation),
         "builder": lambda: _build(design, situation, request),
         "engineer": lambda: _act(_whole_script(design), situation.own_actions),
-        "controller": lambda: Reply(text=json.dumps(design.control)),
+        "controller": lambda: Completion(text=json.dumps(design.control)),
     }
     speak = speakers.get(situation.role)
-    return speak() if speak else Reply(text=DONE)
+    return speak() if speak else Completion(text=DONE)
 
 
 @lru_cache(maxsize=1024)  # sessions that one process may play at once
@@ -49,7 +49,7 @@ def _design(task: str, seed: int) -> Design:
     return DESIGNS[task](seed)
 
 
-def _look_up(design: Design, situation: Situation, request: Request) -> Reply | None:
+def _look_up(design: Design, situation: Situation, request: Request) -> Completion | None:
     """What a role that designs looks up before it speaks: the modules it uses, in one call."""
     if situation.own_lookups or not any(tool.name == DESCRIBE for tool in request.tools):
         return None
@@ -65,7 +65,7 @@ def _look_up(design: Design, situation: Situation, request: Request) -> Reply | 
         if argument in ("new_block", "connector")
     )
     call = ToolCall(id="look_1", name=DESCRIBE, arguments={"module": ", ".join(used)})
-    return Reply(text="", calls=(call,)) if used else None
+    return Completion(text="", calls=(call,)) if used else None
 
 
 def _plan(design: Design) -> str:
@@ -102,28 +102,28 @@ def _drawing(design: Design, situation: Situation) -> str:
     return f"Drawing of {situation.part}, in building order:\n{steps}"
 
 
-def _build(design: Design, situation: Situation, request: Request) -> Reply:
+def _build(design: Design, situation: Situation, request: Request) -> Completion:
     if not situation.own_turns and not situation.refining:
         names = ", ".join(tool.name for tool in request.tools)
-        return Reply(text=f"My tools: {names}. Tell me blocks by number and faces by letter.")
+        return Completion(text=f"My tools: {names}. Tell me blocks by number and faces by letter.")
     return _act(_script(design, situation), situation.own_actions)
 
 
-def _guide(design: Design, situation: Situation) -> Reply:
+def _guide(design: Design, situation: Situation) -> Completion:
     script = _script(design, situation)
     # The builder's first reply only tells its tools.
     done = situation.builder_turns - 1
     if situation.refining or done >= len(script):
-        return Reply(text=DONE)
-    return Reply(text=_rendered(script[done]))
+        return Completion(text=DONE)
+    return Completion(text=_rendered(script[done]))
 
 
-def _act(script: Sequence[Action], done: int) -> Reply:
+def _act(script: Sequence[Action], done: int) -> Completion:
     if done >= len(script):
-        return Reply(text=DONE)
+        return Completion(text=DONE)
     name, arguments = script[done]
     call = ToolCall(id=f"call_{done + 1}", name=name, arguments=dict(arguments))
-    return Reply(text="", calls=(call,))
+    return Completion(text="", calls=(call,))
 
 
 def _rendered(action: Action) -> str:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from buildarena_worker.session.messages import Reply, Request
+from buildarena_worker.session.messages import Completion, Request
 
 
-def reply(request: Request) -> Reply:
+def reply(request: Request) -> Completion:
     """Always the word that ends a phase."""
     del request
-    return Reply(text="TERMINATE")
+    return Completion(text="TERMINATE")

@@ -9,8 +9,10 @@ import json
 import random
 from typing import Any
 
+from buildarena_environment.tools import OBJECTION
+from buildarena_geometry import ToolDefinition
 from buildarena_worker.builtin.reading import Situation, read_situation
-from buildarena_worker.session.messages import Reply, Request, Tool, ToolCall
+from buildarena_worker.session.messages import Completion, Request, ToolCall
 
 BLOCKS = ("Small Wooden Block", "Powered Wheel", "Water Cannon", "Torch", "Steel Beam")
 CONNECTORS = ("Brace", "Winch", "Torch")
@@ -26,22 +28,22 @@ PART = """<sub_structure><name>part_{number}</name>
 <description>a random heap</description></sub_structure>"""
 
 
-def reply(request: Request) -> Reply:
+def reply(request: Request) -> Completion:
     """A reply of the right kind for the role, chosen by chance."""
     situation = read_situation(request)
     rng = _rng(request, situation)
     if situation.role == "planner":
         count = 2 if "exactly 2 sub-structures" in situation.last_text else 1
         parts = "".join(PART.format(number=number + 1) for number in range(count))
-        return Reply(text=PLAN.format(parts=parts))
+        return Completion(text=PLAN.format(parts=parts))
     if situation.role == "drafter":
-        return Reply(text="A heap of blocks, each on some face of another.")
+        return Completion(text="A heap of blocks, each on some face of another.")
     if situation.role == "reviewer":
-        return Reply(text="TERMINATE")
+        return Completion(text="TERMINATE")
     if situation.role == "guidance":
         return _guide(situation, request)
     if situation.role == "controller":
-        return Reply(text=_program(rng))
+        return Completion(text=_program(rng))
     return _act(situation, request, rng)
 
 
@@ -57,19 +59,19 @@ def _length(request: Request, situation: Situation) -> int:
     return rng.randint(MIN_ACTIONS, MAX_ACTIONS)
 
 
-def _guide(situation: Situation, request: Request) -> Reply:
+def _guide(situation: Situation, request: Request) -> Completion:
     most = 2 if situation.refining else _length(request, situation)
     if situation.builder_turns >= most:
-        return Reply(text="TERMINATE")
-    return Reply(text="Do something.")
+        return Completion(text="TERMINATE")
+    return Completion(text="Do something.")
 
 
-def _act(situation: Situation, request: Request, rng: random.Random) -> Reply:
-    tools = {tool.name: tool for tool in request.tools if tool.name != "raise_objection"}
+def _act(situation: Situation, request: Request, rng: random.Random) -> Completion:
+    tools = {tool.name: tool for tool in request.tools if tool.name != OBJECTION.name}
     if not tools or (
         situation.role == "engineer" and situation.own_turns >= _length(request, situation)
     ):
-        return Reply(text="TERMINATE")
+        return Completion(text="TERMINATE")
     if situation.own_actions == 0 and "start" in tools:
         name = "start"
     elif "attach_block_to" in tools and not situation.assembling and rng.random() < 0.7:  # noqa: PLR2004 - mostly blocks, so that heaps grow
@@ -81,10 +83,10 @@ def _act(situation: Situation, request: Request, rng: random.Random) -> Reply:
         name=name,
         arguments=_arguments(tools[name], situation, rng),
     )
-    return Reply(text="", calls=(call,), finish="stop")
+    return Completion(text="", calls=(call,), finish="stop")
 
 
-def _arguments(tool: Tool, situation: Situation, rng: random.Random) -> dict[str, Any]:
+def _arguments(tool: ToolDefinition, situation: Situation, rng: random.Random) -> dict[str, Any]:
     properties = tool.parameters.get("properties", {})
     required = tool.parameters.get("required", [])
     return {name: _value(name, properties[name], situation, rng) for name in required}

@@ -5,11 +5,9 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from buildarena_geometry import LOOKUP, tool_definitions
+from buildarena_environment.tools import LOOKUPS
 from buildarena_worker.session.messages import Request
 
-LOOKUPS = frozenset(tool.name for tool in tool_definitions([LOOKUP]))
-"""The tools that modules are looked up with."""
 _ROLE = re.compile(r"^# Role: (\S+)", re.MULTILINE)
 _TASK = re.compile(r"^# Task: (\S+)", re.MULTILINE)
 _PART = re.compile(r"^## (?:Sub-structure|Refinement of): (.+)$", re.MULTILINE)
@@ -74,5 +72,5 @@ def read_situation(request: Request) -> Situation:
 
 
 def _first(pattern: re.Pattern[str], text: str) -> str:
-    found = pattern.search(text)
-    return found.group(1) if found else ""
+    match = pattern.search(text)
+    return match.group(1) if match else ""

@@ -11,9 +11,10 @@ from typing import Any
 import httpx2
 
 from buildarena_geometry.json_texts import is_too_deep, read_json
-from buildarena_worker.providers.bounds import MAX_BODY
+from buildarena_store import Usage
+from buildarena_worker.providers.bounds import MAX_BODY, usage_of
 from buildarena_worker.providers.failures import Failure, ProviderError, redirected
-from buildarena_worker.providers.response import TokenCounts
+from buildarena_worker.session.messages import ONE_REQUEST
 
 USAGE = {
     "usage": ("input_tokens", "output_tokens", "cache_read_input_tokens"),
@@ -56,19 +57,17 @@ class Received:
         """Whether the provider says that it answered."""
         return self.status is not None and self.status < HTTPStatus.MULTIPLE_CHOICES
 
-    def tokens(self) -> TokenCounts:
+    def usage(self) -> Usage:
         """What the answer says it used, as far as that can be read."""
         try:
             answer = read_json(self.body)
         except ValueError:
-            return TokenCounts()
+            return ONE_REQUEST
         for name, (sent, received, cached) in USAGE.items():
             usage = answer.get(name) if isinstance(answer, dict) else None
             if isinstance(usage, Mapping):
-                return TokenCounts.bounded(
-                    usage.get(sent), usage.get(received), usage.get(cached), 0
-                )
-        return TokenCounts()
+                return usage_of(usage.get(sent), usage.get(received), usage.get(cached), 0)
+        return ONE_REQUEST
 
 
 RECEIVED: ContextVar[Received] = ContextVar("received")

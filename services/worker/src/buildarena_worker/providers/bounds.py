@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from typing import Any
 
 from buildarena_geometry.json_texts import read_json
 from buildarena_geometry.json_values import levels
-from buildarena_worker.session.messages import Reply, ToolCall
+from buildarena_store import Usage
+from buildarena_worker.session.messages import Completion, ToolCall
 
 MAX_BODY = 8 * 1024 * 1024
 """Bytes of an answer; the rest is not read."""
@@ -33,8 +35,24 @@ def count_of(value: Any, most: int = MAX_TOKENS) -> int:
     return min(max(value, 0), most)
 
 
-def bounded(reply: Reply) -> Reply:
-    """A reply without what exceeds the bounds.
+def usage_of(sent: Any, received: Any, cached: Any, reasoning: Any) -> Usage:
+    """What one request used, as its provider counts: what is no count is 0.
+
+    Cached tokens are at most the sent ones. Reasoning is not bounded by the output: some providers
+    do not count it as output.
+    """
+    input_tokens = count_of(sent)
+    return Usage(
+        requests=1,
+        input_tokens=input_tokens,
+        output_tokens=count_of(received),
+        cached_tokens=count_of(cached, input_tokens),
+        reasoning_tokens=count_of(reasoning),
+    )
+
+
+def bounded(completion: Completion) -> Completion:
+    """A completion without what exceeds the bounds.
 
     Raises:
         TypeError: A text or name is none.
@@ -45,10 +63,18 @@ def bounded(reply: Reply) -> Reply:
             name=_text(call.name, MAX_NAME),
             arguments=bounded_arguments(call.arguments),
         )
-        for call in reply.calls[:MAX_CALLS]
+        for call in completion.calls[:MAX_CALLS]
     )
-    text = _text(reply.text, MAX_TEXT)
-    return Reply(text=text, calls=calls, finish=reply.finish if text == reply.text else "length")
+    text = _text(completion.text, MAX_TEXT)
+    finish = completion.finish if text == completion.text else "length"
+    named = completion.provider_request_id
+    return replace(
+        completion,
+        text=text,
+        calls=calls,
+        finish=finish,
+        provider_request_id=None if named is None else str(named)[:MAX_NAME],
+    )
 
 
 def arguments_of(raw: Any) -> Any:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from enum import StrEnum
 
-from buildarena_worker.providers.response import TokenCounts
+from buildarena_store import Usage
+from buildarena_worker.session.messages import ONE_REQUEST
 
 
 class Failure(StrEnum):
@@ -49,7 +50,7 @@ class ProviderError(Exception):
         failure: What kind of failure it is.
         overloaded: Whether the provider said that it gets too many requests.
         headers: The answer's headers in lower case, if there was an answer.
-        tokens: What the answer says it used, as far as that can be read.
+        usage: What the answer says it used, as far as that can be read.
     """
 
     def __init__(
@@ -59,13 +60,13 @@ class ProviderError(Exception):
         *,
         overloaded: bool = False,
         headers: Mapping[str, str] | None = None,
-        tokens: TokenCounts | None = None,
+        usage: Usage = ONE_REQUEST,
     ) -> None:
         super().__init__(message)
         self.failure = failure
         self.overloaded = overloaded
         self.headers = headers
-        self.tokens = tokens or TokenCounts()
+        self.usage = usage
 
 
 def redirected(status: int, location: str | None) -> ProviderError:

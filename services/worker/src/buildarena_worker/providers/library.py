@@ -32,17 +32,13 @@ from pydantic_ai.messages import (
 )
 from pydantic_ai.models import Model, ModelRequestParameters
 from pydantic_ai.settings import ModelSettings
-from pydantic_ai.tools import ToolDefinition
+from pydantic_ai.tools import ToolDefinition as LibraryTool
 
+from buildarena_geometry import ToolDefinition
 from buildarena_worker.providers.bounded_http import RECEIVED, Received
-from buildarena_worker.providers.bounds import MAX_CALLS, MAX_NAME, arguments_of, bounded
+from buildarena_worker.providers.bounds import MAX_CALLS, arguments_of, bounded, usage_of
 from buildarena_worker.providers.failures import RETRIED_STATUS, Failure, ProviderError
-from buildarena_worker.providers.response import (
-    ProviderResponse,
-    TokenCounts,
-    arguments_text,
-)
-from buildarena_worker.session.messages import Message, Reply, Request, Tool, ToolCall
+from buildarena_worker.session.messages import Completion, Message, Request, ToolCall
 
 POOLS = 16
 """Connection pools per model over httpx at most: it looks at all connections of a pool for each
@@ -86,7 +82,7 @@ class LibrarySender:
         self._pools = [_Pool(connect())]
         self._takes_parallel_tool_calls = takes_parallel_tool_calls
 
-    async def send(self, request: Request) -> ProviderResponse:
+    async def send(self, request: Request) -> Completion:
         """The model's answer to a conversation.
 
         Raises:
@@ -116,7 +112,7 @@ class LibrarySender:
     @contextmanager
     def _model(self) -> Iterator[Model]:
         """The model with the fewest open requests."""
-        pool = min(self._pools, key=lambda one: one.open)
+        pool = min(self._pools, key=lambda pool: pool.open)
         if pool.open >= SMALL_POOL and len(self._pools) < POOLS:
             pool = _Pool(self._connect())
             self._pools.append(pool)
@@ -146,7 +142,7 @@ def _translated(error: Exception, received: Received) -> ProviderError:
         return ProviderError(
             f"the answer can't be read: {type(error).__name__}: {error}",
             Failure.GARBAGE,
-            tokens=received.tokens(),
+            usage=received.usage(),
         )
     status = error.status_code if isinstance(error, ModelHTTPError) else None
     named = [failure for kind, failure in FAILURES if isinstance(error, kind)]
@@ -194,17 +190,17 @@ def _response_parts(message: Message) -> list[ModelResponsePart]:
     if message.text:
         parts.append(TextPart(content=message.text))
     parts += [
-        ToolCallPart(tool_name=call.name, args=arguments_text(call), tool_call_id=call.id)
+        ToolCallPart(tool_name=call.name, args=call.arguments_json, tool_call_id=call.id)
         for call in message.calls
     ]
     return parts
 
 
-def request_parameters(tools: Sequence[Tool]) -> ModelRequestParameters:
+def request_parameters(tools: Sequence[ToolDefinition]) -> ModelRequestParameters:
     """The tools in pydantic-ai's form."""
     return ModelRequestParameters(
         function_tools=[
-            ToolDefinition(
+            LibraryTool(
                 name=tool.name,
                 description=tool.description,
                 parameters_json_schema=dict(tool.parameters),
@@ -215,7 +211,7 @@ def request_parameters(tools: Sequence[Tool]) -> ModelRequestParameters:
     )
 
 
-def from_library(response: ModelResponse) -> ProviderResponse:
+def from_library(response: ModelResponse) -> Completion:
     """An answer in our form."""
     text = "".join(part.content for part in response.parts if isinstance(part, TextPart))
     calls = tuple(
@@ -224,14 +220,17 @@ def from_library(response: ModelResponse) -> ProviderResponse:
         if isinstance(part, ToolCallPart)
     )[:MAX_CALLS]
     finish, used = response.finish_reason, response.usage
-    named = response.provider_response_id
-    return ProviderResponse(
-        reply=bounded(Reply(text=text, calls=calls, finish=FINISH.get(finish, finish or "stop"))),
-        tokens=TokenCounts.bounded(
-            used.input_tokens,
-            used.output_tokens,
-            used.cache_read_tokens,
-            used.details.get("reasoning_tokens") if used.details else 0,
-        ),
-        response_id=None if named is None else str(named)[:MAX_NAME],
+    return bounded(
+        Completion(
+            text=text,
+            calls=calls,
+            finish=FINISH.get(finish, finish or "stop"),
+            usage=usage_of(
+                used.input_tokens,
+                used.output_tokens,
+                used.cache_read_tokens,
+                used.details.get("reasoning_tokens") if used.details else 0,
+            ),
+            provider_request_id=response.provider_response_id,
+        )
     )

@@ -11,6 +11,7 @@ import math
 import os
 import random
 import time
+from dataclasses import replace
 
 import structlog
 
@@ -23,10 +24,9 @@ from buildarena_store.jobs.journal import GARBAGE, OUT_OF_TIME
 from buildarena_worker.providers.failures import Failure, ProviderError
 from buildarena_worker.providers.registry import sender_for
 from buildarena_worker.providers.request_loop import RequestLoop
-from buildarena_worker.providers.response import ProviderResponse, TokenCounts
 from buildarena_worker.providers.retries import RetryPolicy
 from buildarena_worker.providers.throttle import Throttle
-from buildarena_worker.session.messages import Completion, Reply, Request
+from buildarena_worker.session.messages import ONE_REQUEST, Completion, Request
 from buildarena_worker.session.request_options import UNBOUNDED, RequestOptions
 
 log = structlog.get_logger(__name__)
@@ -99,7 +99,7 @@ class ProviderClient:
         started = time.monotonic()
         for attempts in range(1, self._policy.attempts + 1):
             try:
-                answered = await self._send(request, options)
+                completion = await self._send(request, options)
             except (ProviderError, TimeoutError) as error:
                 failure = error.failure if isinstance(error, ProviderError) else Failure.OUTAGE
                 detail = _first_line(error, self._key)
@@ -107,7 +107,7 @@ class ProviderClient:
                 if failure in OWN_FAILURES:
                     return _empty(failure.value, "", latency_s, attempts, detail=detail)
                 if isinstance(error, ProviderError) and failure is Failure.GARBAGE:
-                    usage = self._usage(error.tokens)
+                    usage = self._priced(error.usage)
                     return _empty(GARBAGE, detail, latency_s, attempts, usage=usage)
                 if failure is not Failure.OUTAGE:
                     message = f"{self._entry.name}: {detail}"
@@ -123,47 +123,37 @@ class ProviderClient:
                 log.info("model_retry", model=self._entry.name, attempts=attempts, wait_s=wait_s)
                 await asyncio.sleep(wait_s)
             else:
-                return self._answer(answered, time.monotonic() - started, attempts)
+                return replace(
+                    completion,
+                    usage=self._priced(completion.usage),
+                    latency_s=time.monotonic() - started,
+                    attempts=attempts,
+                )
         raise AssertionError("the last attempt returns or raises")
 
-    async def _send(self, request: Request, options: RequestOptions) -> ProviderResponse:
+    async def _send(self, request: Request, options: RequestOptions) -> Completion:
         """Sends a request once, when the provider's shared limit lets it."""
         async with self._throttle.slot(options.owner) as slot:
             options.sent.set()
             try:
                 async with asyncio.timeout(self._policy.timeout_s):
-                    answered = await self._sender.send(request)
+                    completion = await self._sender.send(request)
             except ProviderError as error:
                 options.sent.clear()
                 if error.overloaded:
                     slot.rejected()
                 raise
             slot.succeeded()
-            return answered
+            return completion
 
-    def _answer(self, answered: ProviderResponse, latency_s: float, attempts: int) -> Completion:
-        return Completion(
-            reply=answered.reply,
-            usage=self._usage(answered.tokens),
-            latency_s=latency_s,
-            attempts=attempts,
-            provider_request_id=answered.response_id,
+    def _priced(self, usage: Usage) -> Usage:
+        cost_usd = price_usd(
+            self._entry,
+            input_tokens=usage.input_tokens,
+            output_tokens=usage.output_tokens,
+            cached_tokens=usage.cached_tokens,
         )
-
-    def _usage(self, tokens: TokenCounts) -> Usage:
-        return Usage(
-            requests=1,
-            input_tokens=tokens.input,
-            output_tokens=tokens.output,
-            cached_tokens=tokens.cached,
-            reasoning_tokens=tokens.reasoning,
-            cost_usd=price_usd(
-                self._entry,
-                input_tokens=tokens.input,
-                output_tokens=tokens.output,
-                cached_tokens=tokens.cached,
-            ),
-        )
+        return replace(usage, cost_usd=cost_usd)
 
 
 def _key_of(entry: ModelEntry, provider: ProviderEntry) -> str:
@@ -189,14 +179,12 @@ def _empty(
     latency_s: float,
     attempts: int,
     *,
-    usage: Usage = Usage(requests=1),  # noqa: B008 - frozen
+    usage: Usage = ONE_REQUEST,
     detail: str | None = None,
 ) -> Completion:
-    """An answer without a reply that a session could go on with."""
+    """A completion that a session can't go on with."""
     log.info("model_failure", finish=finish, detail=detail or text)
-    return Completion(
-        reply=Reply(text=text, finish=finish), usage=usage, latency_s=latency_s, attempts=attempts
-    )
+    return Completion(text=text, finish=finish, usage=usage, latency_s=latency_s, attempts=attempts)
 
 
 def _first_line(error: Exception, key: str) -> str:

@@ -22,8 +22,7 @@ from buildarena_pipeline.catalog.models import (
 )
 from buildarena_pipeline.errors import PermanentError, StartupError
 from buildarena_worker import providers
-from buildarena_worker.providers.response import ProviderResponse
-from buildarena_worker.session.messages import Request
+from buildarena_worker.session.messages import Completion, Request
 
 GROUP: Final = "buildarena.providers"
 
@@ -31,7 +30,7 @@ GROUP: Final = "buildarena.providers"
 class Sender(Protocol):
     """Sends requests to one model, each once."""
 
-    async def send(self, request: Request) -> ProviderResponse:
+    async def send(self, request: Request) -> Completion:
         """The model's answer to a conversation.
 
         Raises:

@@ -9,31 +9,23 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
-from buildarena_geometry import LOOKUP, tool_definitions
+from buildarena_environment.tools import LOOKUPS, OBJECTION
+from buildarena_geometry import Outcome, Refused, ToolDefinition
 from buildarena_pipeline.transcript import ActionResult
-from buildarena_worker.session.messages import Message, Reply, Tool, ToolCall
+from buildarena_worker.session.messages import Completion, Message, ToolCall
 from buildarena_worker.session.results import ConstructionFailedError
 from buildarena_worker.session.session import Session
 
 _LAST_LINE = re.compile(r"(?:^|\n)[\s*_`'\"#]*TERMINATE[\s*_`'\".!]*\Z")
 NO_REPLY = "(no answer)"
-OBJECTION = Tool(
-    name="raise_objection",
-    description="End the work as a failure because it cannot be done within the task's rules.",
-    parameters={
-        "type": "object",
-        "properties": {"reason": {"type": "string", "description": "Why it cannot be done."}},
-        "required": ["reason"],
-        "additionalProperties": False,
-    },
-)
 
-Act = Callable[[ToolCall], ActionResult]
-_LOOKUPS = frozenset(tool.name for tool in tool_definitions([LOOKUP]))
+Act = Callable[[str, Any], Outcome]
+"""Carries out an action by its name and arguments, as `Machine.act` does."""
 
 
-def terminates(reply: Reply) -> bool:
+def terminates(reply: Completion) -> bool:
     """Whether a reply ends its stage: TERMINATE stands alone on its last line, without a call.
 
     A role that speaks of the word, or says when it will say it, does not end anything.
@@ -41,9 +33,9 @@ def terminates(reply: Reply) -> bool:
     return not reply.calls and _LAST_LINE.search(reply.text) is not None
 
 
-def is_lookup_only(reply: Reply) -> bool:
+def is_lookup_only(reply: Completion) -> bool:
     """Whether a reply does nothing but look modules up: nobody else reads that."""
-    return bool(reply.calls) and all(call.name in _LOOKUPS for call in reply.calls)
+    return bool(reply.calls) and all(call.name in LOOKUPS for call in reply.calls)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,7 +52,7 @@ class Role:
 
     name: str
     system: str
-    tools: Sequence[Tool] = ()
+    tools: Sequence[ToolDefinition] = ()
     act: Act | None = None
     brief: str = ""
 
@@ -68,7 +60,7 @@ class Role:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Utterance:
     role: str
-    reply: Reply
+    reply: Completion
     actions: Sequence[ActionResult]
 
 
@@ -106,23 +98,20 @@ class Dialogue:
         """Says something to one role; it stays in what that role reads."""
         self._thread.append(_Remark(to=role.name, text=text))
 
-    def turn(self, role: Role) -> Reply:
+    def turn(self, role: Role) -> Completion:
         """Lets a role speak and carries out the tool it calls.
 
         Raises:
             ConstructionFailedError: The role raised an objection.
         """
-        reply, entry = self._session.ask(
-            self._view(role), role.tools, phase=self._phase, role=role.name
-        )
+        reply = self._session.ask(self._view(role), role.tools, phase=self._phase, role=role.name)
         actions = _carry_out(role, reply)
         self._thread.append(_Utterance(role=role.name, reply=reply, actions=actions))
         self._session.record(
             phase=self._phase,
             sub_structure=self._sub_structure,
             role=role.name,
-            reply=reply,
-            entry=entry,
+            completion=reply,
             actions=actions,
         )
         for action in actions:
@@ -183,35 +172,33 @@ def _rendered_arguments(arguments: object) -> str:
     return str(arguments)
 
 
-def _carry_out(role: Role, reply: Reply) -> list[ActionResult]:
-    calls = reply.calls
-    if not calls:
-        return []
-    if len(calls) > 1:
+def _carry_out(role: Role, reply: Completion) -> list[ActionResult]:
+    if len(reply.calls) > 1:
         text = "One tool call per reply; of these nothing was done."
-        return [_refused(call, "parallel_calls", text) for call in calls]
-    call = calls[0]
+        return [_result(call, text, "parallel_calls") for call in reply.calls]
+    return [_carried_out(role, call) for call in reply.calls]
+
+
+def _carried_out(role: Role, call: ToolCall) -> ActionResult:
     if call.name not in {tool.name for tool in role.tools}:
         names = ", ".join(tool.name for tool in role.tools) or "none"
-        return [
-            _refused(call, "unknown_action", f"There is no tool {call.name!r}. Tools: {names}.")
-        ]
+        text = f"There is no tool {call.name!r}. Tools: {names}."
+        return _result(call, text, "unknown_action")
     if call.name == OBJECTION.name:
         reason = call.arguments.get("reason") if isinstance(call.arguments, dict) else None
-        return [
-            ActionResult(
-                name=call.name,
-                arguments=call.arguments,
-                ok=True,
-                reason=None,
-                feedback=str(reason or "no reason given"),
-            )
-        ]
+        return _result(call, str(reason or "no reason given"))
     assert role.act is not None, "a role with machine tools carries them out"  # noqa: S101 - ours
-    return [role.act(call)]
+    outcome = role.act(call.name, call.arguments)
+    return _result(
+        call, outcome.text, outcome.reason.value if isinstance(outcome, Refused) else None
+    )
 
 
-def _refused(call: ToolCall, reason: str, text: str) -> ActionResult:
+def _result(call: ToolCall, feedback: str, refusal: str | None = None) -> ActionResult:
     return ActionResult(
-        name=call.name, arguments=call.arguments, ok=False, reason=reason, feedback=text
+        name=call.name,
+        arguments=call.arguments,
+        ok=refusal is None,
+        reason=refusal,
+        feedback=feedback,
     )

@@ -1,8 +1,8 @@
 """What a session asks of the outside world: model replies and simulations.
 
-A session is a deterministic function of its task, seed, settings and the answers that came
-through here. Both kinds of answers are kept, so a session that died is resumed by running it
-again: it gets the kept answers first.
+A session is a deterministic function of its task, seed, settings and the completions and
+simulations that came through here. Both are stored, so a session that died is resumed by running
+it again: it gets what is stored first.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ OUTAGE_DELAY_S = 30.0
 
 
 class SessionHost(Protocol):
-    """Where a session's answers come from."""
+    """Where a session's completions and simulations come from."""
 
-    def ask(self, request: Request, *, phase: str, role: str) -> JournalEntry:
-        """The model's answer to a request, with what it cost.
+    def ask(self, request: Request, *, phase: str, role: str) -> Completion:
+        """The model's reply to a request, with what it cost.
 
         Raises:
             SessionEnded: There is none, and the session can't go on.
@@ -56,13 +56,13 @@ class SessionHost(Protocol):
 
 
 class ReplayHost:
-    """Gives kept answers only.
+    """Gives what is stored, and nothing else.
 
     Args:
         entries: The job's journal.
         rollouts: Its rollouts; those that are not finished do not count.
         limits: Its limits.
-        load_trajectory: Reads a kept trajectory by its hash.
+        load_trajectory: Reads a stored trajectory by its hash.
 
     Attributes:
         simulated: Copies of the machines whose rollouts were given, with their key presses. What an
@@ -86,12 +86,12 @@ class ReplayHost:
 
     @property
     def sequence(self) -> int:
-        """Place of the next answer in the journal."""
+        """Place of the next completion in the journal."""
         return self._sequence
 
     @property
     def usage(self) -> Usage:
-        """What the given answers cost together."""
+        """What the given completions cost together."""
         return self._spending.usage
 
     @property
@@ -99,27 +99,27 @@ class ReplayHost:
         """What was used, and the limits on it."""
         return self._spending
 
-    def ask(self, request: Request, *, phase: str, role: str) -> JournalEntry:
-        """The kept answer to a request.
+    def ask(self, request: Request, *, phase: str, role: str) -> Completion:
+        """The stored completion of a request.
 
         Raises:
-            SessionEnded: A limit is reached, the journal has come to its end, or its answer
+            SessionEnded: A limit is reached, the journal has come to its end, or its completion
                 belongs to another request.
         """
         del phase, role
-        entry = self.kept(request)
-        if entry is None:
+        completion = self.stored(request)
+        if completion is None:
             self.require_room()
             raise SessionEnded(Diverged(detail=f"the journal ends at entry {self._sequence}"))
-        return entry
+        return completion
 
-    def kept(self, request: Request) -> JournalEntry | None:
-        """The kept answer to a request, if there is one.
+    def stored(self, request: Request) -> Completion | None:
+        """The stored completion of a request, if there is one.
 
-        Entries that hold no answer are counted and passed over: it was asked again after them.
+        Entries without a usable reply are counted and passed over: the request was repeated.
 
         Raises:
-            SessionEnded: A limit is reached, or the answer belongs to another request.
+            SessionEnded: A limit is reached, or the completion belongs to another request.
         """
         while self._sequence < len(self._entries):
             self.require_room()
@@ -133,7 +133,7 @@ class ReplayHost:
                 )
             self.count(entry)
             if entry.answers:
-                return entry
+                return Completion.from_entry(entry)
         return None
 
     def require_room(self) -> None:
@@ -145,14 +145,14 @@ class ReplayHost:
         self._spending.require_room()
 
     def count(self, entry: JournalEntry) -> None:
-        """Counts an answer that was given, here or by a host that goes on from here."""
+        """Counts an entry that was read here, or written by a host that goes on from here."""
         self._sequence += 1
         self._spending.add(entry)
 
     def simulate(
         self, machine: Machine, controls: Sequence[KeyPress] | None, *, final: bool
     ) -> RolloutRecord:
-        """The kept rollout of the machine.
+        """The stored rollout of the machine.
 
         Raises:
             SessionEnded: There is none yet.
@@ -173,23 +173,23 @@ class ReplayHost:
 
 
 class LiveHost:
-    """Gives kept answers first, then asks the model, and keeps its answers.
+    """Gives what is stored first, then asks the model, and stores its completions.
 
     Args:
-        kept: The answers so far.
-        client: Answers new requests.
-        journal: Keeps an answer before it is used.
+        replay: What is stored so far.
+        client: Completes new requests.
+        journal: Stores a completion before it is used.
         active: The lease under which the session runs.
         guard: Reserves what a request may cost before it is sent.
         gate: Where the session gives up its place while it waits for a reply.
-        first_wait_s: Seconds to wait after an answer that can't be read; doubles with each.
+        first_wait_s: Seconds to wait after a reply that can't be read; doubles with each.
         owner: Whose session it is; empty for the operator's.
     """
 
     def __init__(
         self,
         *,
-        kept: ReplayHost,
+        replay: ReplayHost,
         client: ModelClient,
         journal: Journal,
         active: ActiveLease,
@@ -198,7 +198,7 @@ class LiveHost:
         first_wait_s: float | None = None,
         owner: str = "",
     ) -> None:
-        self._kept = kept
+        self._replay = replay
         self._client = client
         self._journal = journal
         self._active = active
@@ -207,31 +207,31 @@ class LiveHost:
         self._owner = owner
         self._first_wait_s = FIRST_WAIT_S if first_wait_s is None else first_wait_s
 
-    def ask(self, request: Request, *, phase: str, role: str) -> JournalEntry:
-        """The kept answer to a request if there is one, otherwise the model's.
+    def ask(self, request: Request, *, phase: str, role: str) -> Completion:
+        """The stored completion of a request if there is one, otherwise the model's.
 
         Raises:
-            SessionEnded: The limits or the budget allow no more, the lease ended, or the kept
-                answer belongs to another request.
+            SessionEnded: The limits or the budget allow no more, the lease ended, or the stored
+                completion belongs to another request.
         """
-        kept = self._kept.kept(request)
-        if kept is not None:
-            return kept
+        stored = self._replay.stored(request)
+        if stored is not None:
+            return stored
         for failures in range(GARBAGE_IN_A_ROW):
-            self._kept.require_room()
-            entry = self._asked(request, failures, phase=phase, role=role)
+            self._replay.require_room()
+            entry = self._requested(request, failures, phase=phase, role=role)
             if entry.answers:
-                return entry
-        self._kept.require_room()
+                return Completion.from_entry(entry)
+        self._replay.require_room()
         raise TransientError(
             f"{GARBAGE_IN_A_ROW} answers in a row can't be read, the last: {entry.reply['text']}",
             reason="provider_outage",
             delay_s=OUTAGE_DELAY_S,
         )
 
-    def _asked(self, request: Request, failures: int, *, phase: str, role: str) -> JournalEntry:
-        """What the model answered, kept; after answers that can't be read, a wait comes first."""
-        sequence = self._kept.sequence
+    def _requested(self, request: Request, failures: int, *, phase: str, role: str) -> JournalEntry:
+        """The model's reply as the journal has it; it waits first after unreadable ones."""
+        sequence = self._replay.sequence
         request_hash = request.hash  # a walk through the whole conversation, which wants a place
         with (
             span("model request", stage=phase, role=role, sequence=sequence),
@@ -240,54 +240,54 @@ class LiveHost:
             waited_s = self._wait(failures)
             self._require_held()
             self._budget.reserve(request)
-            answer = self._answer(request, waited_s)
-            latency_s = waited_s + answer.latency_s
-            if answer.reply.finish == OUT_OF_TIME:
-                latency_s = self._kept.spending.to_the_end(latency_s)
+            completion = self._completion(request, waited_s)
+            latency_s = waited_s + completion.latency_s
+            if completion.finish == OUT_OF_TIME:
+                latency_s = self._replay.spending.to_the_end(latency_s)
             entry = JournalEntry(
                 sequence=sequence,
                 stage=phase,
                 role=role,
                 request_hash=request_hash,
-                reply=clean(answer.reply.to_json()),
-                usage=answer.usage,
+                reply=clean(completion.to_json()),
+                usage=completion.usage,
                 latency_s=latency_s,
-                tries=answer.attempts,
-                provider_request_id=clean(answer.provider_request_id),
+                tries=completion.attempts,
+                provider_request_id=clean(completion.provider_request_id),
             )
-            self._keep(entry)
-        self._kept.count(entry)
+            self._store(entry)
+        self._replay.count(entry)
         return entry
 
     def _wait(self, failures: int) -> float:
-        """Waits after so many answers that can't be read; returns how long."""
+        """Waits after so many replies that can't be read; returns how long."""
         if not failures:
             return 0.0
         wait_s: float = min(
-            self._first_wait_s * 2 ** (failures - 1), self._kept.spending.seconds_left
+            self._first_wait_s * 2 ** (failures - 1), self._replay.spending.seconds_left
         )
         self._active.wait(wait_s)
         return wait_s
 
-    def _answer(self, request: Request, waited_s: float) -> Completion:
-        left_s = self._kept.spending.seconds_left - waited_s
+    def _completion(self, request: Request, waited_s: float) -> Completion:
+        left_s = self._replay.spending.seconds_left - waited_s
         options = RequestOptions(within_s=left_s, active=self._active, owner=self._owner)
         try:
-            answer = self._client.complete(request, options)
+            completion = self._client.complete(request, options)
         except CancelledError:
             if self._active.lost and options.sent.is_set():
                 self._budget.charge_lost(self._budget.sent(request))
             self._require_held()
             raise
-        if answer.reply.finish == OUT_OF_TIME and options.sent.is_set():
-            return replace(answer, usage=self._budget.sent(request))
-        return answer
+        if completion.finish == OUT_OF_TIME and options.sent.is_set():
+            return replace(completion, usage=self._budget.sent(request))
+        return completion
 
     def _require_held(self) -> None:
         if self._active.lost:
             raise SessionEnded(Superseded())
 
-    def _keep(self, entry: JournalEntry) -> None:
+    def _store(self, entry: JournalEntry) -> None:
         try:
             self._journal.append(self._active.lease, entry)
         except StaleLeaseError as stale:
@@ -298,13 +298,13 @@ class LiveHost:
     def simulate(
         self, machine: Machine, controls: Sequence[KeyPress] | None, *, final: bool
     ) -> RolloutRecord:
-        """The kept rollout of the machine.
+        """The stored rollout of the machine.
 
         Raises:
             SessionEnded: There is none yet: the session suspends.
         """
-        return self._kept.simulate(machine, controls, final=final)
+        return self._replay.simulate(machine, controls, final=final)
 
     def trajectory(self, record: RolloutRecord) -> Trajectory | None:
         """The trajectory of a rollout; None when its machine could not be simulated."""
-        return self._kept.trajectory(record)
+        return self._replay.trajectory(record)

@@ -6,13 +6,17 @@ provider's or a library's does.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Protocol
 
-from buildarena_store import Usage
+from buildarena_geometry import ToolDefinition
+from buildarena_store import JournalEntry, Usage
 from buildarena_store.ids import content_hash
 from buildarena_worker.session.request_options import UNBOUNDED, RequestOptions
+
+ONE_REQUEST = Usage(requests=1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,6 +32,15 @@ class ToolCall:
     id: str
     name: str
     arguments: Any
+
+    @property
+    def arguments_json(self) -> str:
+        """The arguments as JSON: an object, even when the model gave something else.
+
+        Providers accept nothing else in a conversation.
+        """
+        arguments = self.arguments if isinstance(self.arguments, dict) else {"text": self.arguments}
+        return json.dumps(arguments, ensure_ascii=False, separators=(",", ":"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,21 +63,6 @@ class Message:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Tool:
-    """A tool that a model may use.
-
-    Attributes:
-        name: Its name.
-        description: What it does, for the model.
-        parameters: JSON schema of its arguments.
-    """
-
-    name: str
-    description: str
-    parameters: Mapping[str, Any]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Request:
     """What is sent to a model.
 
@@ -77,7 +75,7 @@ class Request:
 
     model_config: Mapping[str, Any]
     messages: Sequence[Message]
-    tools: Sequence[Tool] = ()
+    tools: Sequence[ToolDefinition] = ()
     seed: int = 0
 
     @property
@@ -94,55 +92,50 @@ class Request:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Reply:
-    """What a model answered.
+class Completion:
+    """A model's reply, with what it took to get it.
 
     Attributes:
         text: What it said.
         calls: Tools it wants to use.
         finish: Why it stopped: ``stop``, ``length``, ``tool_call``, ``content_filter``, ``error``;
-            ``garbage`` and ``out_of_time`` stand for answers that can't be read or did not come.
-    """
-
-    text: str
-    calls: Sequence[ToolCall] = field(default_factory=tuple)
-    finish: str = "stop"
-
-    def to_json(self) -> dict[str, Any]:
-        """The form that journals keep."""
-        return {
-            "text": self.text,
-            "calls": [[call.id, call.name, call.arguments] for call in self.calls],
-            "finish": self.finish,
-        }
-
-    @staticmethod
-    def from_json(data: Mapping[str, Any]) -> Reply:
-        """A reply from a journal."""
-        calls = tuple(
-            ToolCall(id=id_, name=name, arguments=arguments)
-            for id_, name, arguments in data["calls"]
-        )
-        return Reply(text=data["text"], calls=calls, finish=data["finish"])
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Completion:
-    """A reply with what it took to get it.
-
-    Attributes:
-        reply: The reply.
-        usage: What it cost.
+            ``garbage`` and ``out_of_time`` stand for replies that can't be read or did not come.
+        usage: What it used; a protocol leaves the price to the client.
         latency_s: Time until it was there, retries included.
         attempts: Requests that it took.
         provider_request_id: The provider's own id of it, if it gave one.
+        sequence: Its place in the session's journal, from 0; known to the session's host.
     """
 
-    reply: Reply
-    usage: Usage
-    latency_s: float
+    text: str
+    calls: Sequence[ToolCall] = ()
+    finish: str = "stop"
+    usage: Usage = ONE_REQUEST
+    latency_s: float = 0.0
     attempts: int = 1
     provider_request_id: str | None = None
+    sequence: int = 0
+
+    def to_json(self) -> dict[str, Any]:
+        """The reply as journals store it."""
+        return {"text": self.text, "calls": _plain_calls(self.calls), "finish": self.finish}
+
+    @staticmethod
+    def from_entry(entry: JournalEntry) -> Completion:
+        """The completion of an entry in a journal."""
+        return Completion(
+            text=entry.reply["text"],
+            calls=tuple(
+                ToolCall(id=id_, name=name, arguments=arguments)
+                for id_, name, arguments in entry.reply["calls"]
+            ),
+            finish=entry.reply["finish"],
+            usage=entry.usage,
+            latency_s=entry.latency_s,
+            attempts=entry.tries,
+            provider_request_id=entry.provider_request_id,
+            sequence=entry.sequence,
+        )
 
 
 class ModelClient(Protocol):
@@ -165,5 +158,8 @@ class ModelClient(Protocol):
 
 
 def _plain(message: Message) -> list[Any]:
-    calls = [[call.id, call.name, call.arguments] for call in message.calls]
-    return [message.role, message.text, calls, message.call_id]
+    return [message.role, message.text, _plain_calls(message.calls), message.call_id]
+
+
+def _plain_calls(calls: Sequence[ToolCall]) -> list[list[Any]]:
+    return [[call.id, call.name, call.arguments] for call in calls]

@@ -6,15 +6,15 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from buildarena_benchmark import Task, broken_constraint
-from buildarena_geometry import Machine
+from buildarena_geometry import Machine, ToolDefinition
 from buildarena_pipeline.catalog.prompt_packs import PromptPack
 from buildarena_pipeline.transcript import ActionResult, ModelTurn, Transcript
-from buildarena_store import JournalEntry
 from buildarena_worker.session.host import SessionHost
-from buildarena_worker.session.messages import Message, Reply, Request, Tool
+from buildarena_worker.session.messages import Completion, Message, Request
 from buildarena_worker.session.results import ConstructionFailedError
 
-OnTurn = Callable[[ModelTurn, JournalEntry], None]
+OnTurn = Callable[[ModelTurn, int], None]
+"""Takes a turn, and the place of its reply in the journal."""
 
 MAX_CONVERSATION = 2_000_000
 """Characters of all messages together, some 500,000 tokens: with 40 sessions in a process, their
@@ -30,7 +30,7 @@ class Session:
         model_config: The job's model configuration.
         pack: The sentences to use.
         host: Where answers come from.
-        on_turn: Hears of every turn, those of kept answers included.
+        on_turn: Takes every turn, those of stored replies included.
 
     Attributes:
         additions: What follows the task's statement: an example, results of rounds.
@@ -76,8 +76,8 @@ class Session:
         return self.machine
 
     def ask(
-        self, messages: Sequence[Message], tools: Sequence[Tool], *, phase: str, role: str
-    ) -> tuple[Reply, JournalEntry]:
+        self, messages: Sequence[Message], tools: Sequence[ToolDefinition], *, phase: str, role: str
+    ) -> Completion:
         """The model's reply to a conversation.
 
         Raises:
@@ -92,13 +92,12 @@ class Session:
         request = Request(
             model_config=self._model_config, messages=messages, tools=tools, seed=self.seed
         )
-        entry = self.host.ask(request, phase=phase, role=role)
-        reply = Reply.from_json(entry.reply)
-        if reply.finish == "context_overflow":
+        completion = self.host.ask(request, phase=phase, role=role)
+        if completion.finish == "context_overflow":
             raise ConstructionFailedError(
                 "context_overflow", f"the {role}'s conversation outgrew the model's context"
             )
-        return reply, entry
+        return completion
 
     def record(
         self,
@@ -106,8 +105,7 @@ class Session:
         phase: str,
         sub_structure: str | None,
         role: str,
-        reply: Reply,
-        entry: JournalEntry,
+        completion: Completion,
         actions: Sequence[ActionResult] = (),
     ) -> None:
         """Adds a turn to the transcript."""
@@ -116,18 +114,18 @@ class Session:
             stage=phase,
             sub_structure=sub_structure,
             role=role,
-            text=reply.text,
+            text=completion.text,
             actions=tuple(actions),
-            finish=reply.finish,
-            input_tokens=entry.usage.input_tokens,
-            output_tokens=entry.usage.output_tokens,
-            cost_usd=f"{entry.usage.cost_usd:.6f}",
-            latency_s=entry.latency_s,
-            tries=entry.tries,
+            finish=completion.finish,
+            input_tokens=completion.usage.input_tokens,
+            output_tokens=completion.usage.output_tokens,
+            cost_usd=f"{completion.usage.cost_usd:.6f}",
+            latency_s=completion.latency_s,
+            tries=completion.attempts,
         )
         self.transcript.turns.append(turn)
         if self._on_turn is not None:
-            self._on_turn(turn, entry)
+            self._on_turn(turn, completion.sequence)
 
     def breaks_rules(self, machine: Machine) -> bool:
         """Whether a machine breaks one of the task's constraints."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from buildarena_pipeline.transcript import ModelTurn
-from buildarena_store import JournalEntry, Lease, TurnResult, Turns
+from buildarena_store import Lease, TurnResult, Turns
 from buildarena_worker.session.concurrency_gate import ConcurrencyGate
 
 
@@ -22,16 +22,16 @@ class TurnKeeper:
         self._lease = lease
         self._kept = 0 if lease.first else turns.count(lease.job.id)
 
-    def __call__(self, turn: ModelTurn, entry: JournalEntry) -> None:
+    def __call__(self, turn: ModelTurn, sequence: int) -> None:
         """Keeps a turn, unless an earlier run of the session did."""
         if turn.index < self._kept:
             return
         results = [(action.ok, action.reason, action.feedback) for action in turn.actions]
-        taken = TurnResult(
+        result = TurnResult(
             index=turn.index,
-            sequence=entry.sequence,
+            sequence=sequence,
             sub_structure=turn.sub_structure,
             results=results,
         )
         with self._gate.released():
-            self._turns.append(self._lease, taken)
+            self._turns.append(self._lease, result)

@@ -7,47 +7,47 @@ from typing import Any
 
 import numpy as np
 
-from buildarena_geometry import Machine
-from buildarena_pipeline.transcript import ActionResult, Turn
+from buildarena_geometry import (
+    Accepted,
+    Cause,
+    Machine,
+    Outcome,
+    Refused,
+    ToolDefinition,
+    object_schema,
+)
+from buildarena_pipeline.transcript import Turn
 from buildarena_simulation import Trajectory
 from buildarena_store import RolloutRecord
 from buildarena_worker.session.dialogue import Act, Dialogue, Role
-from buildarena_worker.session.messages import Tool, ToolCall
 from buildarena_worker.session.session import Session
-from buildarena_worker.workflow.machine_tools import QUERIES, acting_on, tools_named
+from buildarena_worker.workflow.machine_tools import QUERIES, tools_named
 
 ANALYST_TURNS = 20
 ROWS = 60
 """Rows that one look at transcript or trajectory returns at most."""
 
-TRANSCRIPT = Tool(
+TRANSCRIPT = ToolDefinition(
     name="read_transcript",
     description=f"Read turns of the session, at most {ROWS} from the given one on.",
-    parameters={
-        "type": "object",
-        "properties": {"first_turn": {"type": "integer", "minimum": 0}},
-        "required": ["first_turn"],
-        "additionalProperties": False,
-    },
+    parameters=object_schema({"first_turn": {"type": "integer", "minimum": 0}}, ["first_turn"]),
 )
-TRAJECTORY = Tool(
+TRAJECTORY = ToolDefinition(
     name="read_trajectory",
     description=(
         "Read positions over time (seconds; x east, y north, z up) of a block, or of the cargo "
         f"with block 'cargo'; at most {ROWS} rows."
     ),
-    parameters={
-        "type": "object",
-        "properties": {
+    parameters=object_schema(
+        {
             "block": {"type": "string"},
             "from_s": {"type": "number", "minimum": 0},
             "to_s": {"type": "number", "minimum": 0},
         },
-        "required": ["block", "from_s", "to_s"],
-        "additionalProperties": False,
-    },
+        ["block", "from_s", "to_s"],
+    ),
 )
-BREAKS = Tool(
+BREAKS = ToolDefinition(
     name="read_breaks",
     description="Read which joints broke in the trial, and when.",
     parameters={"type": "object", "properties": {}, "additionalProperties": False},
@@ -95,30 +95,21 @@ def analyse(
 def _reading(session: Session, machine: Machine, record: RolloutRecord) -> Act:
     trajectory = session.host.trajectory(record)
     turns = list(session.transcript.turns)
-    on_machine = acting_on(machine)
     readers: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
         TRANSCRIPT.name: lambda given: _turns(turns, given),
         TRAJECTORY.name: lambda given: _positions(trajectory, given),
         BREAKS.name: lambda _: _breaks(trajectory),
     }
 
-    def act(call: ToolCall) -> ActionResult:
-        reader = readers.get(call.name)
+    def act(name: str, arguments: Any) -> Outcome:
+        reader = readers.get(name)
         if reader is None:
-            return on_machine(call)
-        reason = None
+            return machine.act(name, arguments)
         try:
-            given = call.arguments if isinstance(call.arguments, dict) else {}
-            text = reader(given)
+            text = reader(arguments if isinstance(arguments, dict) else {})
         except (KeyError, TypeError, ValueError, OverflowError) as error:
-            reason, text = "malformed_arguments", f"That can't be read: {error}."
-        return ActionResult(
-            name=call.name,
-            arguments=call.arguments,
-            ok=reason is None,
-            reason=reason,
-            feedback=text,
-        )
+            return Refused(cause=Cause.MALFORMED_ARGUMENTS, text=f"That can't be read: {error}.")
+        return Accepted(changed=(), render=lambda: text)
 
     return act
 

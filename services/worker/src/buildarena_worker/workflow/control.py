@@ -72,14 +72,14 @@ def drive(session: Session, machine: Machine, *, final: bool) -> RolloutRecord:
         record = session.host.simulate(program.machine, program.presses, final=final and last)
         records.append(record)
         if not last:
-            again = pack.say(
+            result = pack.say(
                 "control_again",
                 trial=str(attempt),
                 trials=str(ATTEMPTS),
                 trajectory=rendered_trace(record.trace or ()),
                 result=_result(session, record),
             )
-            dialogue.remark(controller, again)
+            dialogue.remark(controller, result)
     return best_rollout(records)
 
 
@@ -94,8 +94,8 @@ def _program(dialogue: Dialogue, controller: Role, machine: Machine, session: Se
         text = dialogue.turn(controller).text
         try:
             return _read_program(machine, text)
-        except _ProgramError as found:
-            error = found
+        except _ProgramError as unusable:
+            error = unusable
             dialogue.remark(controller, session.pack.say("program_again", error=str(error)))
     raise error
 
@@ -118,18 +118,18 @@ def _powered(machine: Machine) -> str:
     """Each block that keys can move, with its actions and their keys."""
     lines = machine.act("review_powered_blocks", {}).text.splitlines()
     blocks = {block.id: block for block in machine.blocks.values() if block.module.actions}
-    told = []
+    rows = []
     for line in lines:
         block = blocks.get(line.split(" ", 1)[0])
         if block is None:
-            told.append(line)
+            rows.append(line)
             continue
         actions = (
             f"{action} ({', '.join(block.bindings.get(action, ())) or 'no key'})"
             for action in block.module.actions
         )
-        told.append(f"{line}; actions: {', '.join(actions)}")
-    return "\n".join(told)
+        rows.append(f"{line}; actions: {', '.join(actions)}")
+    return "\n".join(rows)
 
 
 def _read_program(machine: Machine, text: str) -> _Program:

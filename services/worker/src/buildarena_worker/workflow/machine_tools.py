@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Final
 
 from buildarena_benchmark import Task
 from buildarena_environment.briefing import modules_told
+from buildarena_environment.tools import LOOKUPS
 from buildarena_geometry import (
     GROUPS,
     LOOKUP,
-    Machine,
-    Refused,
+    ToolDefinition,
     catalogue_of,
     modules_named,
     tool_definitions,
@@ -19,11 +20,7 @@ from buildarena_geometry import (
 from buildarena_geometry.feedback.modules import lookup_text
 from buildarena_geometry.feedback.modules import modules_in_short as catalogue_in_short
 from buildarena_geometry.feedback.modules import modules_text as catalogue_text
-from buildarena_pipeline.transcript import ActionResult
-from buildarena_worker.session.dialogue import Act
-from buildarena_worker.session.messages import Tool, ToolCall
 
-LOOKUPS = tuple(tool.name for tool in tool_definitions([LOOKUP]))
 QUERIES = ("get_machine_summary", "get_block_details")
 BUILD = (
     "start",
@@ -52,17 +49,10 @@ ASSEMBLE = (
 )
 
 
-def tools_named(names: Sequence[str]) -> list[Tool]:
+def tools_named(names: Sequence[str]) -> list[ToolDefinition]:
     """The library's tool definitions with these names, in this order."""
     known = {tool.name: tool for tool in tool_definitions((*GROUPS, LOOKUP))}
-    return [
-        Tool(
-            name=name,
-            description=known[name].description,
-            parameters=_in_short(known[name].parameters),
-        )
-        for name in names
-    ]
+    return [replace(known[name], parameters=_in_short(known[name].parameters)) for name in names]
 
 
 _TOLD: Final = frozenset({"init_rotation", "rotation", "machine_id", "machine_index"})
@@ -82,23 +72,7 @@ def _in_short(schema: Mapping[str, Any]) -> dict[str, Any]:
     return {"type": "object", "properties": properties, "required": schema["required"]}
 
 
-def acting_on(machine: Machine) -> Act:
-    """Carries out tool calls on a machine."""
-
-    def act(call: ToolCall) -> ActionResult:
-        outcome = machine.act(call.name, call.arguments)
-        return ActionResult(
-            name=call.name,
-            arguments=call.arguments,
-            ok=outcome.ok,
-            reason=outcome.reason.value if isinstance(outcome, Refused) else None,
-            feedback=outcome.text,
-        )
-
-    return act
-
-
-def lookups(task: Task) -> list[Tool]:
+def lookups(task: Task) -> list[ToolDefinition]:
     """The tools that modules are looked up with; none where they are told."""
     return tools_named(LOOKUPS) if task.constraints.on_demand else []
 

@@ -5,17 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from buildarena_environment.tools import LOOKUPS, OBJECTION
 from buildarena_geometry import Machine
-from buildarena_worker.session.dialogue import OBJECTION, Dialogue, Role, is_lookup_only, terminates
-from buildarena_worker.session.messages import Reply
+from buildarena_worker.session.dialogue import Dialogue, Role, is_lookup_only, terminates
+from buildarena_worker.session.messages import Completion
 from buildarena_worker.session.results import ConstructionFailedError
 from buildarena_worker.session.session import Session
 from buildarena_worker.workflow.machine_tools import (
     ASSEMBLE,
     BUILD,
-    LOOKUPS,
     REFINE,
-    acting_on,
     connectors_of,
     lookups,
     modules_of,
@@ -57,8 +56,8 @@ def plan_phase(session: Session) -> Plan:
         try:
             plan = read_plan(text)
             _check_plan(session, plan)
-        except PlanError as found:
-            error = found
+        except PlanError as unusable:
+            error = unusable
             dialogue.remark(planner, pack.say("plan_again", error=str(error)))
         else:
             session.plan = plan.text
@@ -223,7 +222,7 @@ def solo_phase(session: Session) -> Machine:
         name="builder",
         system=pack.roles["solo"],
         tools=[*tools_named(BUILD), *lookups(task), OBJECTION],
-        act=acting_on(machine),
+        act=machine.act,
     )
     _alternate(dialogue, (role,), ends=role, what="building")
     return machine
@@ -234,7 +233,7 @@ def _builder(session: Session, machine: Machine, names: Sequence[str]) -> Role:
         name="builder",
         system=session.pack.roles["builder"],
         tools=tools_named(names),
-        act=acting_on(machine),
+        act=machine.act,
     )
 
 
@@ -250,10 +249,10 @@ def _looking_up(session: Session, role: Role) -> Role:
     if not tools:
         return role
     offered = Machine(catalogue=session.task.constraints.catalogue)
-    return replace(role, tools=[*role.tools, *tools], act=acting_on(offered))
+    return replace(role, tools=[*role.tools, *tools], act=offered.act)
 
 
-def _speak(dialogue: Dialogue, role: Role) -> Reply:
+def _speak(dialogue: Dialogue, role: Role) -> Completion:
     """A role's turn, and further ones while it looks modules up instead of speaking."""
     reply = dialogue.turn(role)
     may_look = any(tool.name in LOOKUPS for tool in role.tools)

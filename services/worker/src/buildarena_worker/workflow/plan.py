@@ -72,17 +72,17 @@ def read_plan(text: str) -> Plan:
     if overall is None:
         raise PlanError("there is no <overall_structure> … </overall_structure> in it")
     whole = _outside(body, blocks)
-    found = []
+    parts = []
     for number, block in enumerate(blocks, start=1):
         name = _last(block, "name")
         if not name:
             raise PlanError(f"sub-structure {number} has no <name>")
-        parts = [(part, _last(block, part)) for part in PARTS]
-        lines = [f"- {part.replace('_', ' ')}: {text}" for part, text in parts if text]
+        texts = [(part, _last(block, part)) for part in PARTS]
+        lines = [f"- {part.replace('_', ' ')}: {text}" for part, text in texts if text]
         if not lines:
             raise PlanError(f"sub-structure {name!r} says nothing but its name")
-        found.append(SubStructure(name=name, text="\n".join(lines)))
-    names = Counter(sub_structure.name for sub_structure in found)
+        parts.append(SubStructure(name=name, text="\n".join(lines)))
+    names = Counter(sub_structure.name for sub_structure in parts)
     twice = sorted(name for name, times in names.items() if times > 1)
     if twice:
         raise PlanError(f"the name {twice[0]!r} stands for several sub-structures")
@@ -90,16 +90,16 @@ def read_plan(text: str) -> Plan:
         overall=_without_tags(overall),
         assembly=_last(whole, "assembly") or "",
         motion_control=_last(whole, "motion_control") or "",
-        sub_structures=tuple(found),
+        sub_structures=tuple(parts),
     )
 
 
 def _numbered(body: str) -> list[str]:
     """Parts whose tags carry numbers, as in the published form."""
-    found: list[str] = []
-    while blocks := _all(body, f"sub_structure_{len(found) + 1}"):
-        found.append(blocks[-1])
-    return found
+    parts: list[str] = []
+    while blocks := _all(body, f"sub_structure_{len(parts) + 1}"):
+        parts.append(blocks[-1])
+    return parts
 
 
 def _outside(body: str, blocks: Sequence[str]) -> str:
@@ -112,13 +112,13 @@ def _outside(body: str, blocks: Sequence[str]) -> str:
 def _without_tags(overall: str) -> str:
     """The overall structure; in the published form it has parts of its own."""
     inner = [_last(overall, part) for part in ("description", "functionality")]
-    told = "\n".join(text for text in inner if text)
-    return told or overall
+    description = "\n".join(text for text in inner if text)
+    return description or overall
 
 
 def _last(text: str, tag: str) -> str | None:
-    found = _all(text, tag)
-    return found[-1].strip() if found else None
+    texts = _all(text, tag)
+    return texts[-1].strip() if texts else None
 
 
 def _all(text: str, tag: str) -> list[str]:
@@ -127,12 +127,12 @@ def _all(text: str, tag: str) -> list[str]:
     Not a regular expression: openings without an end would take it the square of their number.
     """
     opening, ending = f"<{tag}>", f"</{tag}>"
-    found, place = [], 0
+    texts, place = [], 0
     while (start := text.find(opening, place)) >= 0:
         start += len(opening)
         end = text.find(ending, start)
         if end < 0:
             break
-        found.append(text[start:end])
+        texts.append(text[start:end])
         place = end + len(ending)
-    return found
+    return texts

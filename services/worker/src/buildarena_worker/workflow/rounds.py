@@ -12,7 +12,7 @@ from functools import partial
 from typing import TypeVar
 
 from buildarena_benchmark import Score
-from buildarena_environment.trials import told
+from buildarena_environment.trials import score_text
 from buildarena_geometry import Machine
 from buildarena_pipeline.runtime.scoring import best_rollout
 from buildarena_store import RolloutRecord
@@ -115,4 +115,4 @@ def describe(session: Session, record: RolloutRecord) -> str:
         metrics=record.metrics or {},
         flags=tuple(record.flags or ()),
     )
-    return told(session.task, measured)
+    return score_text(session.task, measured)

@@ -141,9 +141,9 @@ class Draft:
         raise ValueError(f"block {block} cannot point towards {way}")
 
     def _face(self, block: str, way: Direction) -> str:
-        found = self.machine.blocks[block]
-        for face in found.module.faces:
-            if np.dot(found.face_normal(face.label), way) > ALIGNED:
+        base = self.machine.blocks[block]
+        for face in base.module.faces:
+            if np.dot(base.face_normal(face.label), way) > ALIGNED:
                 return face.label
         raise ValueError(f"block {block} has no side towards {way}")
 

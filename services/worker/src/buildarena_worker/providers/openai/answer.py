@@ -9,21 +9,22 @@ from __future__ import annotations
 import uuid
 from collections.abc import Mapping
 from contextlib import suppress
+from dataclasses import replace
 from http import HTTPStatus
 from typing import Any
 
 from genai_prices.data_snapshot import get_snapshot
 
 from buildarena_geometry.json_texts import read_json
-from buildarena_worker.providers.bounds import MAX_CALLS, MAX_NAME, arguments_of, bounded
+from buildarena_store import Usage
+from buildarena_worker.providers.bounds import MAX_CALLS, arguments_of, bounded, usage_of
 from buildarena_worker.providers.failures import (
     Failure,
     ProviderError,
     failure_of_status,
     redirected,
 )
-from buildarena_worker.providers.response import ProviderResponse, TokenCounts
-from buildarena_worker.session.messages import Reply, ToolCall
+from buildarena_worker.session.messages import ONE_REQUEST, Completion, ToolCall
 
 UNREADABLE = (ValueError, KeyError, IndexError, TypeError, AttributeError)
 FINISH = {"length": "length", "content_filter": "content_filter"}
@@ -66,7 +67,7 @@ class AnswerReader:
         with suppress(LookupError):
             self._counters.insert(0, snapshot.find_provider(None, None, url))
 
-    def read(self, status: int, headers: Mapping[str, str], text: bytes) -> ProviderResponse:
+    def read(self, status: int, headers: Mapping[str, str], text: bytes) -> Completion:
         """What an answer means.
 
         Raises:
@@ -79,33 +80,29 @@ class AnswerReader:
         answer = None
         try:
             answer = read_json(text)
-            return self._answered(answer)
+            return self._completion(answer)
         except UNREADABLE as error:
             raise ProviderError(
                 f"the answer (HTTP {status}) is not a chat completion: "
                 f"{type(error).__name__}: {error}",
                 Failure.GARBAGE,
-                tokens=self._used_in(answer),
+                usage=self._usage_in(answer),
             ) from error
 
-    def _answered(self, answer: Any) -> ProviderResponse:
+    def _completion(self, answer: Any) -> Completion:
         if "model" not in answer:
             raise KeyError("model")
-        response_id = answer["id"]
-        return ProviderResponse(
-            reply=bounded(_reply(answer["choices"][0])),
-            tokens=self._used_in(answer),
-            response_id=None if response_id is None else str(response_id)[:MAX_NAME],
-        )
+        id_, reply = answer["id"], _reply(answer["choices"][0])
+        return bounded(replace(reply, usage=self._usage_in(answer), provider_request_id=id_))
 
-    def _used_in(self, answer: Any) -> TokenCounts:
+    def _usage_in(self, answer: Any) -> Usage:
         usage = answer.get("usage") if isinstance(answer, dict) else None
         try:
-            return self._tokens(usage) if isinstance(usage, dict) else TokenCounts()
+            return self._counted(usage) if isinstance(usage, dict) else ONE_REQUEST
         except UNREADABLE:
-            return TokenCounts()
+            return ONE_REQUEST
 
-    def _tokens(self, usage: Mapping[str, Any]) -> TokenCounts:
+    def _counted(self, usage: Mapping[str, Any]) -> Usage:
         """What was used; nothing where the provider's figures can't be read."""
         details = usage.get("completion_tokens_details")
         reasoning = details.get("reasoning_tokens") if isinstance(details, dict) else 0
@@ -114,10 +111,10 @@ class AnswerReader:
             # Not every provider that is known is known to speak this wire.
             with suppress(ValueError, LookupError, TypeError):
                 _, used = counter.extract_usage(given, api_flavor="chat")
-                return TokenCounts.bounded(
+                return usage_of(
                     used.input_tokens, used.output_tokens, used.cache_read_tokens, reasoning
                 )
-        return TokenCounts()
+        return ONE_REQUEST
 
 
 def _without_nulls(usage: Mapping[str, Any]) -> dict[str, Any]:
@@ -128,14 +125,14 @@ def _without_nulls(usage: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def _reply(choice: Mapping[str, Any]) -> Reply:
+def _reply(choice: Mapping[str, Any]) -> Completion:
     message, finish = choice["message"], choice.get("finish_reason")
     refusal = message.get("refusal")
     if finish == "" or not isinstance(finish, str | None) or not isinstance(refusal, str | None):
         raise TypeError(f"finish_reason is {finish!r} and refusal {refusal!r}")
     if refusal:
-        return Reply(text="", finish="content_filter")
-    return Reply(
+        return Completion(text="", finish="content_filter")
+    return Completion(
         text=_spoken(_content(message.get("content") or "")),
         calls=tuple(_call(call) for call in (message.get("tool_calls") or ())[:MAX_CALLS]),
         finish=FINISH.get(finish or "stop", "stop"),

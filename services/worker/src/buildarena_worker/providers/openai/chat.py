@@ -18,8 +18,7 @@ from buildarena_worker.providers.bounds import MAX_BODY
 from buildarena_worker.providers.failures import Failure, ProviderError
 from buildarena_worker.providers.openai.answer import AnswerReader
 from buildarena_worker.providers.openai.request import RequestWriter
-from buildarena_worker.providers.response import ProviderResponse
-from buildarena_worker.session.messages import Request
+from buildarena_worker.session.messages import Completion, Request
 
 OPENAI_URL = "https://api.openai.com/v1"
 CONNECT_S = 10.0
@@ -58,7 +57,7 @@ class OpenAIChat:
         }
         self._http: aiohttp.ClientSession | None = None
 
-    async def send(self, request: Request) -> ProviderResponse:
+    async def send(self, request: Request) -> Completion:
         """The model's answer to a conversation.
 
         Raises:

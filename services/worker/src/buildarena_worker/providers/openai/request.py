@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from typing import Any
 
 from buildarena_worker.providers.openai.schema import function_tool
-from buildarena_worker.providers.response import arguments_text
 from buildarena_worker.session.messages import Message, Request
 
 MAX_FRAMES = 256
@@ -118,7 +117,7 @@ def _message(message: Message, system_role: str) -> dict[str, Any]:
             {
                 "id": call.id,
                 "type": "function",
-                "function": {"name": call.name, "arguments": arguments_text(call)},
+                "function": {"name": call.name, "arguments": call.arguments_json},
             }
             for call in message.calls
         ]

@@ -10,7 +10,7 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from buildarena_worker.session.messages import Tool
+from buildarena_geometry import ToolDefinition
 
 DROPPED = ("title", "$schema", "discriminator")
 """Keywords that say nothing about the arguments."""
@@ -43,7 +43,7 @@ LOOKAROUND = re.compile(r"(?:^|[^\\])(?:\\\\)*\(\?<?[=!]")
 UNIONS = ("allOf", "anyOf", "oneOf")
 
 
-def function_tool(tool: Tool) -> dict[str, Any]:
+def function_tool(tool: ToolDefinition) -> dict[str, Any]:
     """The tool as a function of the wire's ``tools``."""
     parameters = _written(tool.parameters)
     definitions = tool.parameters.get("$defs")

@@ -1,0 +1,64 @@
+"""What models may call: the actions of the geometry library, and what ends the work."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Final
+
+from buildarena_geometry import GROUPS, LOOKUP, ToolDefinition, object_schema, tool_definitions
+
+MAIN: Final = "main"
+"""What a machine is called where no name is given."""
+ASSEMBLY: Final = "assembly"
+"""The machine that is put together from copies of all others."""
+SUBMIT: Final = ToolDefinition(
+    name="submit",
+    description="End the building: the machine is simulated and scored.",
+    parameters=object_schema({}),
+    group="submit",
+)
+OBJECTION: Final = ToolDefinition(
+    name="raise_objection",
+    description="End the work as a failure because it cannot be done within the task's rules.",
+    parameters=object_schema(
+        {"reason": {"type": "string", "description": "Why it cannot be done."}}, ["reason"]
+    ),
+)
+"""What a role of a workflow calls to give up."""
+MACHINE: Final = {
+    "type": "string",
+    "description": "Sub-structure it is meant for, a new one if there is none of this name; "
+    f"{ASSEMBLY!r} joins copies of all others.",
+    "default": MAIN,
+}
+"""Schema of the argument that says which machine a call is meant for."""
+LOOKUPS: Final = tuple(tool.name for tool in tool_definitions([LOOKUP]))
+"""Names of the tools that modules are looked up with."""
+
+
+def building_tools(*, on_demand: bool = False) -> tuple[ToolDefinition, ...]:
+    """All actions of the geometry library, as they are.
+
+    Args:
+        on_demand: Whether the task has its modules looked up, and there are tools for that.
+    """
+    return tool_definitions((*GROUPS, LOOKUP) if on_demand else GROUPS)
+
+
+def tools_of_models(*, on_demand: bool = False) -> tuple[ToolDefinition, ...]:
+    """The actions with one more argument, `machine`, and the tool that submits.
+
+    Args:
+        on_demand: As for `building_tools`.
+    """
+    building = [
+        replace(
+            tool,
+            parameters={
+                **tool.parameters,
+                "properties": {**tool.parameters["properties"], "machine": MACHINE},
+            },
+        )
+        for tool in building_tools(on_demand=on_demand)
+    ]
+    return (*building, SUBMIT)
