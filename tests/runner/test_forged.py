@@ -18,6 +18,7 @@ from support.servers.runner_rig import (
     VERSIONS,
     Caller,
     ended,
+    pause_ends,
     runner_key,
     true_trajectory,
     waiting,
@@ -286,7 +287,7 @@ def test_an_outcome_counts_once(context, caller) -> None:
         answer = caller.ask("POST", caller.at(lease, "/outcome"), json=again)
         assert answer.json() == {"status": "already_done"}
     for path, more in (
-        ("/fault", {"json": {"reason": "a", "detail": "b", "permanent": True}}),
+        ("/fault", {"json": {"reason": "simulator_fault", "detail": "b", "permanent": True}}),
         ("/hand-back", {}),
     ):
         assert caller.ask("POST", caller.at(lease, path), **more).status_code == 409
@@ -301,11 +302,12 @@ def test_an_outcome_counts_once(context, caller) -> None:
 def test_faults_and_hand_backs_count_once(context, caller) -> None:
     job = waiting(context)
     lease = caller.lease()
-    fault = {"reason": "simulator_fault", "detail": "it hangs", "delay_s": 0}
+    fault = {"reason": "simulator_fault", "detail": "it hangs"}
     for status in ("done", "already_done"):
         answer = caller.ask("POST", caller.at(lease, "/fault"), json=fault)
         assert answer.json() == {"status": status}
     assert context.store.jobs.get(job.id).faults == 1
+    pause_ends(context)
     lease = caller.lease()
     for status in ("done", "already_done"):
         assert caller.ask("POST", caller.at(lease, "/hand-back")).json() == {"status": status}
@@ -322,6 +324,7 @@ def test_stale_tokens_are_refused(context, url, caller) -> None:
     with context.store.database.transaction() as connection:
         connection.execute(text("UPDATE jobs SET lease_expires_at = now() - interval '1 hour'"))
     context.store.leases.recover()
+    pause_ends(context)
     new = Caller(url, caller.secret, name="another").lease()
     assert new["token"] == old["token"] + 1
     before = everything(context.store.database)

@@ -29,6 +29,12 @@ LONG += "constraints: {max_blocks: 30}\n"
 UNNEEDED = {"celery", "kombu", "sqlalchemy", "redis", "psycopg", "obstore", "alembic", "fastapi"}
 
 
+@pytest.fixture
+def lease_s() -> float:
+    """Leases run out while a test waits for that."""
+    return 8.0
+
+
 @contextmanager
 def runner(folder: Path, url: str, secret: str, *more: str) -> Iterator[subprocess.Popen[bytes]]:
     """A runner's process; it is gone afterwards, with its children."""

@@ -159,7 +159,7 @@ def test_another_keys_lease_can_neither_be_read_nor_written(context, url) -> Non
     sent = holder.upload(lease, data)
     before = everything(context.store.database)
     outcome = {"trajectory": sent, "versions": {}, "wall_s": 1}
-    fault = {"reason": "a", "detail": "b", "permanent": True}
+    fault = {"reason": "simulator_fault", "detail": "b", "permanent": True}
     upload = f"/uploads/{sent['sha256']}"
     for method, path, options in (
         ("GET", "", {}),

@@ -61,6 +61,19 @@ class NameTakenError(StoreError):
         super().__init__(f"the {kind} name {name!r} {whose}: choose another name")
 
 
+class TooManyLeasesError(StoreError):
+    """A key's runners have as many leases as they may.
+
+    Attributes:
+        number: How many they have.
+        most: How many they may have.
+    """
+
+    def __init__(self, number: int, most: int) -> None:
+        super().__init__(f"the key's runners have {number} leases, of {most} that they may have")
+        self.number, self.most = number, most
+
+
 class StaleLeaseError(StoreError):
     """A write came from an owner whose lease on the job is over; nothing was written."""
 

@@ -89,6 +89,7 @@ class AttemptResult(StrEnum):
     Attributes:
         DONE: The stage was done.
         FAULT: Infrastructure failed.
+        PERMANENT_FAULT: A runner said that it never will be able to do it.
         HANDED_BACK: The worker shut down.
         LOST: The worker sent no heartbeat.
         BUDGET_EXHAUSTED: No budget was left for the next model request.
@@ -97,6 +98,7 @@ class AttemptResult(StrEnum):
 
     DONE = "done"
     FAULT = "fault"
+    PERMANENT_FAULT = "permanent_fault"
     HANDED_BACK = "handed_back"
     LOST = "lost"
     BUDGET_EXHAUSTED = "budget_exhausted"

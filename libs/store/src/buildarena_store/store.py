@@ -61,7 +61,7 @@ def open_store(database: Database, *, lease_s: float, max_faults: int) -> Store:
         database=database,
         jobs=Jobs(database),
         leases=leases,
-        runner_leases=RunnerLeases(database, duration_s=lease_s),
+        runner_leases=RunnerLeases(database, leases),
         journal=Journal(database),
         rollouts=Rollouts(database),
         results=Results(database, leases),

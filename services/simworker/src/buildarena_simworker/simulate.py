@@ -59,7 +59,7 @@ class _LeasedInDatabase:
         self._trials.complete(self._active.lease, self._due, outcome)
 
     def keep_evidence(self, files: dict[str, File]) -> None:
-        self._trials.keep_evidence(self._active.lease.job.id, files)
+        self._trials.keep_evidence(self._active.lease.job, files)
 
     def _require(self) -> None:
         if self._active.lost:

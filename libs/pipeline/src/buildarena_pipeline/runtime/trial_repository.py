@@ -151,12 +151,16 @@ class TrialRepository:
             values["annotations"] = dict(outcome.annotations)
         self._write(lease, due, values, kept | self._put(outcome.files))
 
-    def keep_evidence(self, job_id: str, files: Mapping[str, File]) -> None:
-        """Keeps what shows a fault with the job."""
+    def keep_evidence(self, job: Job, files: Mapping[str, File]) -> None:
+        """Stores what shows a fault with the job, in place of what showed the fault before.
+
+        Raises:
+            PermanentError: The job waits for no trial.
+        """
         if files:
-            kept = self._put(files)
+            stored, number = self._put(files), self.due(job).request.number
             with self._store.database.transaction() as connection:
-                self._store.results.attach(job_id, kept, connection=connection)
+                self._store.results.replace_evidence(job.id, number, stored, connection=connection)
 
     def _write(
         self,

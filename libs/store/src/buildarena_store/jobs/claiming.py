@@ -9,6 +9,7 @@ from __future__ import annotations
 from sqlalchemy import Boolean, column, text
 
 from buildarena_store.jobs.job import JOB_COLUMNS
+from buildarena_store.jobs.misses import MISSED_LATELY
 from buildarena_store.states import JobState
 
 OPERATOR = ""
@@ -21,6 +22,7 @@ _ROOM = (
     f"{_OWNER} <> ALL(CAST(:full AS text[]))"
     f" AND (CAST(:only AS text[]) IS NULL OR {_OWNER} = ANY(CAST(:only AS text[])))"
     " AND (CAST(:version AS text) IS NULL OR track_config ->> 'simulation_version' = :version)"
+    f" AND (CAST(:prefix AS text) IS NULL OR NOT EXISTS ({MISSED_LATELY}))"
 )
 CLAIM = text(
     f"""
@@ -78,6 +80,20 @@ CLAIM = text(
 """Takes a job of ``:queue`` for ``:owner``, and returns it with whether a budget pays for it.
 
 Owners in ``:full`` are passed over, and all but those in ``:only`` if it is given, as are jobs for
-another version of the simulator than ``:version`` if it is given; the owner in ``:last`` comes
-after the others, but for its recovered jobs.
+another version of the simulator than ``:version`` if it is given, and those that the key of the
+runners whose names begin with ``:prefix`` missed lately; the owner in ``:last`` comes after the
+others, but for its recovered jobs.
 """
+
+# In steps along the index, one probe for each queue, however many jobs it has.
+WAITING_QUEUES = text(
+    f"""
+    WITH RECURSIVE queues (name) AS (
+        (SELECT queue FROM jobs WHERE state = '{JobState.QUEUED}' ORDER BY queue LIMIT 1)
+        UNION ALL
+        SELECT (SELECT queue FROM jobs WHERE state = '{JobState.QUEUED}' AND queue > queues.name
+            ORDER BY queue LIMIT 1) FROM queues WHERE queues.name IS NOT NULL
+    )
+    SELECT name FROM queues WHERE name IS NOT NULL
+    """  # noqa: S608 - made of our own names
+)

@@ -13,13 +13,15 @@ from datetime import timedelta
 from typing import Any
 
 from sqlalchemy import (
+    Boolean,
     ColumnElement,
     Connection,
     and_,
     case,
+    func,
     literal,
+    literal_column,
     select,
-    text,
     tuple_,
     update,
 )
@@ -28,8 +30,9 @@ from buildarena_store import events
 from buildarena_store.account_tables import budgets
 from buildarena_store.database import Database
 from buildarena_store.jobs.attempts import Ending, end_attempts, move_on
-from buildarena_store.jobs.claiming import CLAIM
+from buildarena_store.jobs.claiming import CLAIM, WAITING_QUEUES
 from buildarena_store.jobs.job import Job
+from buildarena_store.jobs.misses import MIN_KEYS, MISSED_BEFORE, RUNNER, require_fewer_leases
 from buildarena_store.rows import value_of
 from buildarena_store.states import AttemptResult, JobState, Outcome, Stage
 from buildarena_store.tables import jobs
@@ -76,7 +79,7 @@ class Leases:
     ) -> None:
         self._database = database
         self.duration = timedelta(seconds=duration_s)
-        self._max_faults = max_faults
+        self.max_faults = max_faults
 
     def claim(
         self,
@@ -88,6 +91,8 @@ class Leases:
         last: str | None = None,
         only: Sequence[str] | None = None,
         version: str | None = None,
+        prefix: str | None = None,
+        most: int = 0,
     ) -> Lease | None:
         """Takes a waiting job of a queue: a recovered one first, then the hinted, then the oldest.
 
@@ -102,9 +107,15 @@ class Leases:
             last: The owner whose job was taken last.
             only: Owners whose jobs may be taken; None for everybody's.
             version: The simulator's version that jobs must have been submitted for, if given.
+            prefix: Of a key's runners, what their ids begin with: jobs that they missed lately are
+                passed over.
+            most: Leases that these may have at once.
 
         Returns:
             The lease, or None when nothing waits.
+
+        Raises:
+            TooManyLeasesError: The key's runners have as many leases as they may.
         """
         given = {
             "queue": queue,
@@ -115,9 +126,15 @@ class Leases:
             "last": last,
             "only": None if only is None else list(only),
             "version": version,
+            "prefix": prefix,
         }
-        with self._database.statement() as connection:
-            row = connection.execute(CLAIM, given).first()
+        if prefix is None:
+            with self._database.statement() as connection:
+                row = connection.execute(CLAIM, given).first()
+        else:
+            with self._database.transaction() as connection:
+                require_fewer_leases(prefix, most, connection=connection)
+                row = connection.execute(CLAIM, given).first()
         if row is None:
             return None
         job = value_of(Job, row)
@@ -233,7 +250,7 @@ class Leases:
         with self._database.transaction() as connection:
             met = select(jobs.c.faults).where(jobs.c.id == lease.job.id)
             faults = int(connection.execute(met).scalar_one()) + 1
-            again = endless or faults < self._max_faults
+            again = endless or faults < self.max_faults
             wait_s = min(delay_s * 2 ** min(faults - 1, 20), LONGEST_DELAY_S)
             if again:
                 self.advance(
@@ -248,20 +265,29 @@ class Leases:
                     detail=detail,
                 )
             else:
-                self._give_up(lease, detail, reason, connection)
+                self.end_as_errored(lease, detail, reason=reason, connection=connection)
         return again
 
     def give_up(self, lease: Lease, detail: str, *, reason: str) -> None:
         """Ends the job as errored: outside every average, and kept in the dead-letter view."""
         with self._database.transaction() as connection:
-            self._give_up(lease, detail, reason, connection)
+            self.end_as_errored(lease, detail, reason=reason, connection=connection)
 
-    def _give_up(self, lease: Lease, detail: str, reason: str, connection: Connection) -> None:
+    def end_as_errored(
+        self,
+        lease: Lease,
+        detail: str,
+        *,
+        reason: str,
+        connection: Connection,
+        result: AttemptResult = AttemptResult.FAULT,
+    ) -> None:
+        """As `give_up`, in a transaction, with how the attempt ended."""
         self.advance(
             lease,
             to=JobState.DONE,
             connection=connection,
-            result=AttemptResult.FAULT,
+            result=result,
             note=detail,
             outcome=Outcome.ERRORED,
             reason=reason,
@@ -276,7 +302,12 @@ class Leases:
         Returns:
             Ids of the jobs that wait again.
         """
-        last = jobs.c.faults + 1 >= self._max_faults
+        # A key of runners counts once, and never ends a job alone.
+        is_runners = func.starts_with(jobs.c.lease_owner, RUNNER)
+        missed_before = and_(is_runners, literal_column(MISSED_BEFORE, Boolean))
+        faults = jobs.c.faults + case((missed_before, 0), else_=1)
+        limit = case((is_runners, max(self.max_faults, MIN_KEYS)), else_=self.max_faults)
+        last = faults >= limit
         with self._database.transaction() as connection:
             lost = (
                 select(jobs.c.id)
@@ -292,7 +323,7 @@ class Leases:
                     reason=case((last, literal("lost_worker")), else_=None),
                     detail=case((last, literal("it lost its workers again and again")), else_=None),
                     finished_at=case((last, events.now), else_=None),
-                    faults=jobs.c.faults + 1,
+                    faults=faults,
                     lease_owner=None,
                     lease_expires_at=None,
                     notified_at=None,
@@ -317,7 +348,7 @@ class Leases:
     def waiting_queues(self) -> list[str]:
         """Names of the queues that jobs wait in."""
         with self._database.statement() as connection:
-            return list(connection.execute(_WAITING_QUEUES).scalars())
+            return list(connection.execute(WAITING_QUEUES).scalars())
 
     def to_notify(self, queue: str, limit: int) -> list[str]:
         """Waiting jobs that no message names, oldest first; they are marked as notified.
@@ -357,18 +388,6 @@ class Leases:
         return [row.id for row in rows]
 
 
-# In steps along the index, one probe for each queue, however many jobs it has.
-_WAITING_QUEUES = text(
-    f"""
-    WITH RECURSIVE queues (name) AS (
-        (SELECT queue FROM jobs WHERE state = '{JobState.QUEUED}' ORDER BY queue LIMIT 1)
-        UNION ALL
-        SELECT (SELECT queue FROM jobs WHERE state = '{JobState.QUEUED}' AND queue > queues.name
-            ORDER BY queue LIMIT 1) FROM queues WHERE queues.name IS NOT NULL
-    )
-    SELECT name FROM queues WHERE name IS NOT NULL
-    """  # noqa: S608 - made of our own names
-)
 _BUDGETED = (
     select(budgets).where(budgets.c.id.in_([jobs.c.payer, jobs.c.owner])).exists().label("budgeted")
 )

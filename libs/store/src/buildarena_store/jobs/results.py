@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from sqlalchemy import Connection, text
+from sqlalchemy import Connection, delete, text
 
 from buildarena_store import events
 from buildarena_store.artifacts import ArtifactInfo
@@ -14,6 +14,7 @@ from buildarena_store.boards import Boards
 from buildarena_store.database import Database
 from buildarena_store.jobs.leases import Lease, Leases
 from buildarena_store.states import JobState, Outcome
+from buildarena_store.tables import job_artifacts
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,6 +87,25 @@ class Results:
         self, job_id: str, made: Mapping[str, ArtifactInfo], *, connection: Connection
     ) -> None:
         """Ties artifacts that the artifact store holds to a job, by their names."""
+        attach_artifacts(job_id, made, connection=connection)
+
+    def replace_evidence(
+        self, job_id: str, number: int, made: Mapping[str, ArtifactInfo], *, connection: Connection
+    ) -> None:
+        """Ties what shows the latest fault to a job, in place of what showed those before it.
+
+        Args:
+            job_id: The job.
+            number: The rollout that failed; evidence of others stays.
+            made: Artifacts that the artifact store holds, by their names.
+            connection: The transaction.
+        """
+        earlier = rf"^[a-z]+-{number}(-[0-9-]+)?\.[a-z]+$"
+        connection.execute(
+            delete(job_artifacts).where(
+                job_artifacts.c.job_id == job_id, job_artifacts.c.name.regexp_match(earlier)
+            )
+        )
         attach_artifacts(job_id, made, connection=connection)
 
 

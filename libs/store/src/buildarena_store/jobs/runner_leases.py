@@ -10,19 +10,21 @@ from collections.abc import Collection, Mapping, Sequence
 from datetime import timedelta
 from typing import Final
 
-from sqlalchemy import ColumnElement, and_, func, select, true, tuple_, update
+from sqlalchemy import ColumnElement, and_, func, literal_column, select, true, tuple_, update
 
 from buildarena_store import events
 from buildarena_store.database import Database
 from buildarena_store.errors import StaleLeaseError
 from buildarena_store.jobs.job import Job
-from buildarena_store.jobs.leases import Lease
+from buildarena_store.jobs.leases import Lease, Leases
+from buildarena_store.jobs.misses import MIN_KEYS, MISSED_BEFORE, OTHERS_REFUSED, RUNNER
 from buildarena_store.rows import columns_of, value_of
-from buildarena_store.states import JobState
+from buildarena_store.states import AttemptResult, JobState
 from buildarena_store.tables import attempts, jobs, workers
 
 OPERATOR_KEY: Final = "operator"
 """Stands for the key where none is asked for."""
+UNCONFIRMED: Final = "; it waits for a runner of another key, or a worker beside the database"
 LONGEST_TRIAL: Final = timedelta(hours=1)
 """A lease that is older is renewed no more: a runner must not keep a job forever."""
 
@@ -31,7 +33,12 @@ JobToken = tuple[str, int]
 
 def runner_prefix(key_id: str | None) -> str:
     """What the lease owners of a key's runners begin with."""
-    return f"runner@{key_id or OPERATOR_KEY}/"
+    return f"{RUNNER}{key_id or OPERATOR_KEY}/"
+
+
+def prefix_of(owner: str) -> str:
+    """What the lease owners of the same key's runners begin with."""
+    return owner[: owner.index("/") + 1]
 
 
 class RunnerLeases:
@@ -39,12 +46,12 @@ class RunnerLeases:
 
     Args:
         database: Where the jobs are.
-        duration_s: Seconds that a lease is valid without a heartbeat.
+        leases: All leases, of which these are some.
     """
 
-    def __init__(self, database: Database, *, duration_s: float) -> None:
+    def __init__(self, database: Database, leases: Leases) -> None:
         self._database = database
-        self._duration = timedelta(seconds=duration_s)
+        self._leases = leases
 
     def of(self, owner: str) -> Lease | None:
         """The live lease that a runner has under exactly this name, if any."""
@@ -105,11 +112,56 @@ class RunnerLeases:
         statement = (
             update(jobs)
             .where(_among(named), _begins(jobs.c.lease_owner, prefix), young)
-            .values(lease_expires_at=events.now + self._duration)
+            .values(lease_expires_at=events.now + self._leases.duration)
             .returning(jobs.c.id, jobs.c.lease_token)
         )
         with self._database.statement() as connection:
             return {(row.id, row.lease_token) for row in connection.execute(statement)}
+
+    def fault(self, lease: Lease, detail: str, *, reason: str, permanent: bool = False) -> bool:
+        """Records what a runner says against a job; its key counts once, however often it says so.
+
+        The job waits for others at once, and for the key longer each time, see `misses`. It ends
+        when runners of two keys say that it never can be done, or when as many keys and workers of
+        the house failed as may.
+
+        Args:
+            lease: The runner's lease, which ends.
+            detail: What happened, for people.
+            reason: The class of the fault, for the dead-letter view.
+            permanent: Whether no attempt of the key's runners can mend it.
+
+        Returns:
+            True when the job will be tried again.
+        """
+        with self._database.transaction() as connection:
+            standing = select(
+                jobs.c.faults,
+                literal_column(MISSED_BEFORE).label("missed_before"),
+                literal_column(OTHERS_REFUSED).label("others_refused"),
+            ).where(jobs.c.id == lease.job.id, jobs.c.lease_owner == lease.owner)
+            job = connection.execute(standing).first()
+            if job is None:
+                raise StaleLeaseError(lease.job.id, lease.token)
+            faults = job.faults + (not job.missed_before)
+            agreed = permanent and job.others_refused
+            result = AttemptResult.PERMANENT_FAULT if permanent else AttemptResult.FAULT
+            if agreed or faults >= max(self._leases.max_faults, MIN_KEYS):
+                self._leases.end_as_errored(
+                    lease, detail, reason=reason, connection=connection, result=result
+                )
+                return False
+            self._leases.advance(
+                lease,
+                to=JobState.QUEUED,
+                connection=connection,
+                result=result,
+                note=detail,
+                faults=faults,
+                notified_at=None,
+                detail=detail + UNCONFIRMED * permanent,
+            )
+        return True
 
     def alive(self, named: Collection[JobToken]) -> set[JobToken]:
         """Those of the leases, whoever's, that are not over."""

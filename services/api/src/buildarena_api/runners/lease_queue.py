@@ -14,7 +14,8 @@ from buildarena_pipeline.errors import PermanentError
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.simulators.known import find_simulator
 from buildarena_pipeline.runtime.trial_repository import DueTrial, TrialRepository
-from buildarena_store import Lease, StaleLeaseError
+from buildarena_store import Lease, StaleLeaseError, TooManyLeasesError
+from buildarena_store.jobs.runner_leases import prefix_of
 from buildarena_store.states import simulate_queue
 
 LOOK_EVERY_S: Final = 0.3
@@ -122,11 +123,9 @@ class LeaseQueue:
             return self._due(held)
         counts = leases.counts(prefix, besides=owner)
         if counts["leases"] >= MAX_LEASES or counts["names"] >= MAX_NAMES:
-            raise ProblemError(
-                429,
+            raise _too_many(
                 f"the key's runners have {counts['leases']} leases and {counts['names']} names, "
-                f"of {MAX_LEASES} and {MAX_NAMES} that they may have",
-                headers={"Retry-After": "5"},
+                f"of {MAX_LEASES} and {MAX_NAMES} that they may have"
             )
         return None
 
@@ -143,13 +142,18 @@ class LeaseQueue:
     def _claim(
         self, lease_request: LeaseQuery, turn: _Turn, owner: str, simulator: str, version: str
     ) -> Lease | None:
-        lease = self._context.store.leases.claim(
-            simulate_queue(simulator),
-            owner=owner,
-            last=turn.last,
-            only=lease_request.job_owners,
-            version=version,
-        )
+        try:
+            lease = self._context.store.leases.claim(
+                simulate_queue(simulator),
+                owner=owner,
+                last=turn.last,
+                only=lease_request.job_owners,
+                version=version,
+                prefix=prefix_of(owner),
+                most=MAX_LEASES,
+            )
+        except TooManyLeasesError as error:
+            raise _too_many(str(error)) from error
         if lease is not None:
             turn.last = lease.job.owner or ""
         return lease
@@ -175,3 +179,7 @@ class LeaseQueue:
 
     def _give_up(self, lease: Lease, error: PermanentError) -> None:
         self._context.store.leases.give_up(lease, str(error), reason=error.reason)
+
+
+def _too_many(detail: str) -> ProblemError:
+    return ProblemError(429, detail, headers={"Retry-After": "5"})

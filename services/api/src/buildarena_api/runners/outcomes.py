@@ -26,6 +26,8 @@ from buildarena_store.jobs.runner_leases import JobToken
 from buildarena_store.states import AttemptResult
 
 LONGEST_DETAIL: Final = 2000
+MAX_EVIDENCE_BYTES: Final = 16 << 20
+"""Of the latest fault of a job; what showed earlier ones goes."""
 Status = Literal["done", "already_done"]
 
 log = structlog.get_logger(__name__)
@@ -65,7 +67,7 @@ class Outcomes:
         return self._ended(named, prefix, AttemptResult.DONE, end)
 
     def fault(self, named: JobToken, prefix: str, said: Fault) -> Status:
-        """Records a failure of the runner or its simulator; the job is tried again, or ends.
+        """Records a failure of the runner or its simulator; see `RunnerLeases.fault`.
 
         Raises:
             ProblemError: As of `complete`.
@@ -74,23 +76,17 @@ class Outcomes:
         def end(lease: Lease) -> None:
             try:
                 number = self._trials.due(lease.job).request.number
-                self._trials.keep_evidence(named[0], self._files(named, number, said.files))
+                _require_small(said.files)
+                self._trials.keep_evidence(lease.job, self._files(named, number, said.files))
             except UploadError as error:
                 raise ProblemError(422, str(error)) from error
             detail = str(clean(said.detail))[:LONGEST_DETAIL]
-            leases = self._context.store.leases
-            if said.permanent:
-                leases.give_up(lease, detail, reason=said.reason)
-            else:
-                leases.fault(
-                    lease,
-                    detail,
-                    delay_s=said.delay_s,
-                    reason=said.reason,
-                    endless=said.endless,
-                )
+            self._context.store.runner_leases.fault(
+                lease, detail, reason=said.reason, permanent=said.permanent
+            )
 
-        return self._ended(named, prefix, AttemptResult.FAULT, end)
+        kind = AttemptResult.PERMANENT_FAULT if said.permanent else AttemptResult.FAULT
+        return self._ended(named, prefix, kind, end)
 
     def hand_back(self, named: JobToken, prefix: str) -> Status:
         """Gives the job back, without fault.
@@ -166,6 +162,14 @@ class Outcomes:
             data = self._uploads.take(named, UploadedFile(sha256=one.sha256, size=one.size))
             found[one.name] = File(data=data, media_type=EVIDENCE[ending])
         return found
+
+
+def _require_small(files: Sequence[NamedFile]) -> None:
+    size = sum(file.size for file in files)
+    if size > MAX_EVIDENCE_BYTES:
+        raise UploadError(
+            f"what shows a fault has at most {MAX_EVIDENCE_BYTES:,} bytes, these files {size:,}"
+        )
 
 
 def stale(named: JobToken) -> ProblemError:

@@ -196,17 +196,35 @@ class Outcome(_Document):
     annotations: Annotated[dict[EngineName, Annotation], Field(max_length=8)] | None = None
 
 
+FaultReason = Literal[
+    "simulator_fault",
+    "game_version",
+    "needs_script",
+    "unreadable_trial",
+    "outcome_refused",
+    "internal_error",
+]
+
+
 class Fault(_Document):
     """A failure of the runner or its simulator: the trial is not scored."""
 
-    reason: Annotated[str, Field(pattern=r"^[a-z][a-z_]{0,39}$", examples=["simulator_fault"])]
+    reason: FaultReason
     detail: Annotated[str, Field(min_length=1, max_length=4000, description="For people")]
     permanent: bool = Field(
-        default=False, description="Whether no other attempt can mend it: the job then ends"
+        default=False,
+        description="Whether no attempt of this key's runners can mend it: they get the job no "
+        "more, and it ends when a runner of another key says the same",
     )
-    delay_s: Annotated[float, Field(ge=0, le=300, allow_inf_nan=False)] = 2.0
+    delay_s: Annotated[float, Field(ge=0, le=300, allow_inf_nan=False, deprecated=True)] = Field(
+        default=2.0,
+        description="Without effect: the key gets the job again after 2 s, and twice "
+        "as long after each further fault, 300 s at most; others may have it at once",
+    )
     endless: bool = Field(
-        default=False, description="Whether the job waits for a person, however often it is met"
+        default=False,
+        deprecated=True,
+        description="Without effect: a key counts once against a job, however often it fails",
     )
     files: Files = []
 

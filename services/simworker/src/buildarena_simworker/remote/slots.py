@@ -36,6 +36,11 @@ WAIT_S: Final = 20.0
 PAUSE_S: Final = 1.0
 """After what nobody foresaw a slot pauses, so that it does not meet it again and again."""
 LONGEST_DETAIL: Final = 2000
+REASONS: Final = (
+    *("simulator_fault", "game_version", "needs_script"),
+    *("unreadable_trial", "outcome_refused", "internal_error"),
+)
+"""Reasons that the API knows; a simulator of one's own may have others."""
 
 log = structlog.get_logger(__name__)
 
@@ -262,13 +267,14 @@ class Slot:
             return  # it was broken off, and is nobody's fault
         log.warning("fault", reason=error.reason, detail=str(error))
         detail = str(error)[:LONGEST_DETAIL] or error.reason
-        body: dict[str, Any] = {"reason": error.reason, "detail": detail}
-        if isinstance(error, TransientError):
-            body |= {"delay_s": error.delay_s, "endless": error.endless}
-        else:
-            body["permanent"] = True
+        body = {
+            "reason": error.reason if error.reason in REASONS else "simulator_fault",
+            "detail": detail,
+            "permanent": isinstance(error, PermanentError),
+            "files": leased.evidence,
+        }
         with suppress(LeaseLostError):
-            self.api.end(active.lease, "fault", {**body, "files": leased.evidence})
+            self.api.end(active.lease, "fault", body)
 
     def _hand_back(self, lease: HeldLease) -> None:
         hand_back(self.api, lease)
