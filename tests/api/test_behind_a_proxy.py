@@ -5,19 +5,19 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 
 import httpx
 import pytest
 from support.clients.tenants import ADMIN, WITH_KEYS
-from support.servers.live_api import live_api
+from support.servers.live_api import changed, live_api
 from support.servers.reverse_proxy import ProxyRules, reverse_proxy
 from typer.testing import CliRunner
 
 from buildarena_api.dashboard.files import BASE_NAME, INDEX, read_pages
 from buildarena_cli.main import app
 from buildarena_pipeline.errors import StartupError
-from buildarena_pipeline.runtime.context import Context, open_context
+from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.settings import OWN_PATHS, load_settings
 
 BASE = "/tools/arena"
@@ -29,11 +29,12 @@ SWEEP = {"tasks": ["support-1"], "models": ["builtin/idle"], "seeds": [0]}
 @contextmanager
 def served(context: Context, rules: ProxyRules, **settings: object) -> Iterator[str]:
     """The address of a service through a proxy."""
-    own = open_context(context.settings.model_copy(update=settings))
-    with ExitStack() as stack:
-        stack.callback(own.close)
-        inner = stack.enter_context(live_api(own))
-        yield stack.enter_context(reverse_proxy(inner, rules))
+    with (
+        changed(context, **settings) as own,
+        live_api(own) as inner,
+        reverse_proxy(inner, rules) as url,
+    ):
+        yield url
 
 
 @pytest.fixture(params=[True, False], ids=["cut off", "passed on"])
@@ -221,15 +222,15 @@ def test_rate_limits_go_by_the_client_that_a_trusted_proxy_saw(
     context: Context, trusted: str, seen: str, least: int, most: int
 ) -> None:
     """Two an hour; a broker that is slow for a moment lets a process count two more alone."""
-    own = open_context(
-        context.settings.model_copy(update={"trusted_proxies": trusted, "rate_limit": "2/hour"})
-    )
-    with live_api(own) as url, httpx.Client(base_url=url) as client:
+    with (
+        changed(context, trusted_proxies=trusted, rate_limit="2/hour") as own,
+        live_api(own) as url,
+        httpx.Client(base_url=url) as client,
+    ):
         found = [
             client.get("/v1/models", headers={"X-Forwarded-For": seen.format(number)}).status_code
             for number in range(6)
             for _ in range(2)
         ]
-    own.close()
     assert set(found) <= {200, 429}
     assert least <= found.count(200) <= most

@@ -4,9 +4,9 @@ from collections.abc import Iterator
 
 import pytest
 from support.clients.tenants import WITH_KEYS
-from support.servers.live_api import live_api
+from support.servers.live_api import changed, live_api
 
-from buildarena_pipeline.runtime.context import Context, open_context
+from buildarena_pipeline.runtime.context import Context
 
 LEASE_S = 8.0
 
@@ -14,7 +14,5 @@ LEASE_S = 8.0
 @pytest.fixture
 def url(context: Context) -> Iterator[str]:
     """An API that asks for keys, and waits for late heartbeats longer than tests usually do."""
-    own = open_context(context.settings.model_copy(update={**WITH_KEYS, "lease_s": LEASE_S}))
-    with live_api(own) as found:
+    with changed(context, **WITH_KEYS, lease_s=LEASE_S) as own, live_api(own) as found:
         yield found
-    own.close()
