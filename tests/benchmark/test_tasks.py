@@ -1,5 +1,6 @@
 """The task catalogue: fifteen tasks, their versions, and errors in a user's own."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -30,6 +31,9 @@ indicator: {name: load, unit: mass units}
 """
 
 
+DIMENSIONS = {
+    *("quantification", "robustness", "magnitude", "compositionality", "precision", "ambiguity")
+}
 WORKSHOP = [*(f"mechanisms-{level}" for level in (1, 2, 3, 4)), "flight-1", "flight-2"]
 
 
@@ -39,14 +43,7 @@ def test_there_are_the_papers_nine_tasks_and_six_of_the_workshop(tasks: dict[str
     assert list(paper_tasks()) == paper
     for name, task in tasks.items():
         assert (task.category, task.level) == (name[:-2], int(name[-1]))
-        assert set(task.difficulty) == {
-            "quantification",
-            "robustness",
-            "magnitude",
-            "compositionality",
-            "precision",
-            "ambiguity",
-        }
+        assert set(task.difficulty) == DIMENSIONS
         assert all(1 <= weight <= 3 for weight in task.difficulty.values())
 
 
@@ -154,9 +151,9 @@ def test_what_cannot_change_a_score_keeps_the_version() -> None:
     ("old", "new", "parts"),
     [
         (
-            "  min_time_s: 3",
-            "  min_tim_s: 3",
-            ["task:18: scoring.min_tim_s: there is no such field", "min_time_s"],
+            "min_time_s: 3",
+            "min_tim_s: 3",
+            ["task:18: scoring.min_tim_s: there is", "min_time_s"],
         ),
         ("name: support\n", "name: suport\n", ["scoring", "'support', 'thrust', 'transport'"]),
         ("gap: 10}", "gap: -1}", ["task:15: scenario.placement.gap: ", "greater than 0"]),
@@ -203,9 +200,12 @@ def test_a_trial_that_is_out_of_bounds_is_refused(old: str, new: str, says: str)
     text = OWN.replace(old, new, 1)
     if new.startswith('title: "\\e'):
         text = text.replace("31m bridge", '31m bridge"')
-    with pytest.raises(TaskError) as caught:
+    with pytest.raises(TaskError, match=re.escape(says)):
         load_task(text)
-    assert says in str(caught.value)
+
+
+BLOCKS, SUPPORT = "max_blocks: 100", "name: support\n  min_time_s: 3"
+"""Lines of that task which others take the place of."""
 
 
 def test_more_terrain_than_is_simulated_is_refused() -> None:
@@ -217,49 +217,32 @@ def test_more_terrain_than_is_simulated_is_refused() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ("  max_blocks: 100", "  min_sub_structures: 6", "constraints.max_sub_structures: is 5"),
-        (
-            "  max_blocks: 100",
-            "  modules: [Winch, Roket]",
-            "8: constraints.modules[1]: there is no",
-        ),
-        ("  max_blocks: 100", "  modules: [Rocket]", "'Rocket' can be built, but is not simulated"),
-        (
-            "  max_blocks: 100",
-            "  modules: garage",
-            "no module set 'garage'; choose from basic, work",
-        ),
-        ("  max_blocks: 100", "  modules: all", "'all' has modules that are not simulated; choose"),
-        ("  max_blocks: 100", "  modules: 5", "constraints.modules: Input should be a valid tuple"),
-        ("  max_blocks: 100", "  min_modules: {Hinge: 1}", "Hinge is not among the task's modules"),
-        ("  max_blocks: 100", "  min_modules: {Rope: 2}", "min_modules.Rope: there is no module"),
-        ("  max_blocks: 100", "  modules: []", "constraints.modules"),
-        (
-            "  max_blocks: 100",
-            "  modules: [Brace]\n  min_modules: {Winch: 2}",
-            "Winch is not among the task's modules",
-        ),
+        (BLOCKS, "min_sub_structures: 6", "constraints.max_sub_structures: is 5"),
+        (BLOCKS, "modules: [Winch, Roket]", "8: constraints.modules[1]: there is no"),
+        (BLOCKS, "modules: [Rocket]", "'Rocket' can be built, but is not simulated"),
+        (BLOCKS, "modules: garage", "no module set 'garage'; choose from basic, work"),
+        (BLOCKS, "modules: all", "'all' has modules that are not simulated; choose"),
+        (BLOCKS, "modules: 5", "constraints.modules: Input should be a valid tuple"),
+        (BLOCKS, "min_modules: {Hinge: 1}", "Hinge is not among the task's modules"),
+        (BLOCKS, "min_modules: {Rope: 2}", "min_modules.Rope: there is no module"),
+        (BLOCKS, "modules: []", "constraints.modules"),
+        (BLOCKS, "modules: [Brace]\n  min_modules: {Winch: 2}", "Winch is not among the task's"),
         ("  duration_s: 10", "  duration_s: 10\n  tracked_blocks: []", "tracked_blocks"),
         ("  cargo: {", "  # cargo: {", "scoring: the cargo is judged, but scenario has no cargo"),
         ("  min_time_s: 3", "  min_time_s: 11", "longer than the trial"),
+        (SUPPORT, "name: transport\n  subject: cargo", "scenario.control.mode must be agent"),
+        (SUPPORT, "name: height", "nothing fires"),
         (
-            "  name: support\n  min_time_s: 3",
-            "  name: transport\n  subject: cargo",
-            "scenario.control.mode must be agent",
-        ),
-        ("  name: support\n  min_time_s: 3", "  name: height", "nothing fires"),
-        (
-            "  placement: {kind: span, gap: 10}\nscoring:\n  name: support\n  min_time_s: 3",
-            "  control: {mode: held}\nscoring:\n  name: height",
+            f"placement: {{kind: span, gap: 10}}\nscoring:\n  {SUPPORT}",
+            "control: {mode: held}\nscoring:\n  name: height",
             "windows within the trial",
         ),
     ],
 )
 def test_a_task_that_nobody_can_pass_is_refused(old: str, new: str, says: str) -> None:
     assert old in OWN
-    with pytest.raises(TaskError) as caught:
+    with pytest.raises(TaskError, match=re.escape(says)):
         load_task(OWN.replace(old, new))
-    assert says in str(caught.value)
 
 
 def test_a_tasks_document_is_the_task_again(tasks: dict[str, Task]) -> None:

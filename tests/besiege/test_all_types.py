@@ -5,6 +5,7 @@ from __future__ import annotations
 from xml.etree import ElementTree as ET
 
 import pytest
+from support.machines.building import attach
 from tests.besiege.test_reading_files import assert_alike, contents
 
 from buildarena_benchmark import builtin_tasks
@@ -28,15 +29,11 @@ def built_with(module: Module) -> Machine:
     machine = Machine(catalogue=ALL)
     assert machine.act("start").ok
     if module.kind == "connector":
-        assert machine.act(
-            "attach_block_to",
-            {"base_block": "1", "face": "E", "new_block": "Small Wooden Block"},
-        ).ok
+        assert attach(machine, "1", "E").ok
         ends = {"block_a": "1", "face_a": "A", "block_b": "2", "face_b": "A"}
         outcome = machine.act("connect_blocks", {**ends, "connector": module.name})
     else:
-        place = {"base_block": "1", "face": "E", "new_block": module.name}
-        outcome = machine.act("attach_block_to", place)
+        outcome = attach(machine, "1", "E", module.name)
     assert outcome.ok, outcome.text
     number = next(reversed([*machine.blocks, *machine.connectors]))
     for key, action in enumerate(module.actions, 1):

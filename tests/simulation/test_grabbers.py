@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.machines.building import attach
 from support.machines.drafts import KeyedDraft
 
 from buildarena_geometry import KeyPress, Machine
@@ -132,8 +133,7 @@ def test_a_grabber_holds_the_ground(engine: str) -> None:
 
 def test_a_grabber_holds_a_block_of_another_piece(engine: str) -> None:
     machine, grabber = _stool()
-    below = {"base_block": grabber, "face": "A", "new_block": "Small Wooden Block"}
-    assert machine.act("attach_block_to", below).ok
+    assert attach(machine, grabber, "A").ok
     loose = list(machine.blocks)[-1]
     for _ in range(2):
         away = {"block_id": loose, "shift_real": [0.3, 0.0, 0.0]}

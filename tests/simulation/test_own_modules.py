@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support.machines.building import attach, connect
 
 from buildarena_geometry import Catalogue, Machine, load_catalogue
 from buildarena_simulation import Scenario, simulate
@@ -33,8 +34,7 @@ def _built(catalogue: Catalogue | None, *parts: tuple[str, str, str]) -> Machine
     machine = Machine(catalogue=catalogue)
     assert machine.act("start").ok
     for base, face, module in parts:
-        arguments = {"base_block": base, "face": face, "new_block": module}
-        assert machine.act("attach_block_to", arguments).ok
+        assert attach(machine, base, face, module).ok
     return machine
 
 
@@ -108,8 +108,7 @@ def test_a_cannon_pushes_and_is_heated_as_its_entry_says(tmp_path: Path) -> None
 def test_a_ropes_module_is_known_by_what_it_is_and_not_by_its_name(tmp_path: Path) -> None:
     catalogue = _catalogue(tmp_path, _other("Brace", link="rope", mass=0.2))
     machine = _built(catalogue, ("1", "A", "Small Wooden Block"))
-    ends = {"block_a": "1", "face_a": "C", "block_b": "2", "face_b": "E", "connector": "Other"}
-    assert machine.act("connect_blocks", ends).ok
+    assert connect(machine, "1", "C", "2", "E", connector="Other").ok
     structure = structure_of(machine)
     assert structure.ropes.names == ("Other 3",)
     assert structure.masses.sum() == pytest.approx(0.25 + 0.3 + 0.2)

@@ -1,11 +1,11 @@
 """Trials whose machine is let go in the air, whose cargo has a place, whose keys end."""
 
 import json
-from collections.abc import Callable
 
 import numpy as np
 import pytest
 from pydantic import ValidationError
+from support.machines.building import BLOCK, built
 
 from buildarena_geometry import KeyPress, Machine
 from buildarena_simulation import MachineNotSimulable, Scenario, simulate
@@ -22,12 +22,7 @@ def scenario(**fields: object) -> Scenario:
 
 @pytest.fixture
 def beam() -> Machine:
-    machine = Machine()
-    machine.act("start", {})
-    machine.act(
-        "attach_block_to", {"base_block": "1", "face": "E", "new_block": "Small Wooden Block"}
-    )
-    return machine
+    return built(("1", "E", BLOCK))
 
 
 def test_unused_additions_leave_a_scenario_as_it_was() -> None:
@@ -69,10 +64,7 @@ WALL = {"center": [0, 2.2, 1], "size": [4, 1, 2]}
 @pytest.mark.parametrize(
     ("given", "named"),
     [
-        (
-            {"cargo": BOX | {"at": [0, 1.6, 0]}},
-            r"block 2 \(Small Wooden Block\) overlaps the cargo",
-        ),
+        ({"cargo": BOX | {"at": [0, 1.6, 0]}}, r"2 \(Small Wooden Block\) overlaps the cargo"),
         ({"cargo": BOX | {"at": [0.2, 0, 0]}}, r"block 1 \(Starting Block\) overlaps the cargo"),
         ({"terrain": [WALL | {"center": [0, 1.9, 1]}]}, r"block 2 .* overlaps terrain 1"),
         ({"terrain": [WALL | {"center": [0, 2.5, 0.2], "slope_deg": 45}]}, "terrain 1"),
@@ -101,9 +93,7 @@ def test_what_is_only_near_is_not(beam: Machine, given: dict[str, object]) -> No
 
 
 def test_a_wheel_is_round_to_a_ridge() -> None:
-    machine = Machine()
-    machine.act("start", {})
-    machine.act("attach_block_to", {"base_block": "1", "face": "A", "new_block": "Powered Wheel"})
+    machine = built(("1", "A", "Powered Wheel"))
     # A ridge half a unit high: its box's corner lies inside the square around the wheel only.
     ridge = {"size": [9, 0.8, 0.8], "slope_deg": 45}
     peak = 0.5 - 0.4 * np.sqrt(2)
@@ -113,18 +103,12 @@ def test_a_wheel_is_round_to_a_ridge() -> None:
         simulate(machine, scenario(clear_start=True, terrain=[ridge | {"center": [0, 0.8, peak]}]))
 
 
-def test_keys_end_when_the_control_says_so(make_presses: Callable[..., list[KeyPress]]) -> None:
-    presses = make_presses((1.0, 2.0), (4.0, 9.0), (5.5, 1.0), (5.0, 0.0))
+def test_keys_end_when_the_control_says_so() -> None:
+    times = ((1.0, 2.0), (4.0, 9.0), (5.5, 1.0), (5.0, 0.0))
+    presses = [KeyPress(time_s=begin, key="UpArrow", hold_for_s=hold) for begin, hold in times]
     ended = ended_presses(presses, Control(mode="agent", until_s=5.0))
     assert [(press.time_s, press.hold_for_s) for press in ended] == [(1.0, 2.0), (4.0, 1.0)]
     assert ended_presses(presses, Control(mode="agent")) is presses
-
-
-@pytest.fixture
-def make_presses() -> Callable[..., list[KeyPress]]:
-    return lambda *times: [
-        KeyPress(time_s=begin, key="UpArrow", hold_for_s=hold) for begin, hold in times
-    ]
 
 
 @pytest.mark.parametrize(

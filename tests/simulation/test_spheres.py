@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.machines.building import attach
 
 from buildarena_geometry import Machine, load_catalogue
 from buildarena_simulation import Scenario, simulate
@@ -32,8 +33,7 @@ def on_a_ball(tmp_path: Path) -> Machine:
     file.write_text(json.dumps({"version": 1, "modules": [ball]}))
     machine = Machine(catalogue=load_catalogue(file))
     assert machine.act("start", {"init_rotation": [0, 0, 40]}).ok
-    arguments = {"base_block": "1", "face": "D", "new_block": "Ball"}
-    assert machine.act("attach_block_to", arguments).ok
+    assert attach(machine, "1", "D", "Ball").ok
     return machine
 
 

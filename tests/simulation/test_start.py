@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from support.machines.building import attach
 
 from buildarena_geometry import Machine
 from buildarena_simulation import Scenario, simulate
@@ -21,9 +22,7 @@ LOADED = Scenario(duration_s=0.4, cargo=Cargo(size=(1, 1, 1), final_mass=6, ramp
 def beam() -> Machine:
     machine = Machine()
     machine.act("start", {})
-    machine.act(
-        "attach_block_to", {"base_block": "1", "face": "E", "new_block": "Small Wooden Block"}
-    )
+    attach(machine, "1", "E")
     return machine
 
 

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import pytest
+from support.jobs import claim
 
 from buildarena_pipeline.runtime.context import Context
 from buildarena_store import UnknownIdError
@@ -47,8 +48,7 @@ def test_only_errored_jobs_are_retried(context: Context, add) -> None:
     (job_id,) = add(1)
     with context.store.database.transaction() as connection:
         assert not context.store.jobs.retry(jobs.c.id == job_id, connection=connection)
-    lease = context.store.leases.claim("construct", owner="w")
-    assert lease is not None
+    lease = claim(context)
     context.store.leases.give_up(lease, "no key", reason="missing_key")
     assert context.store.jobs.get(job_id).outcome == "errored"
     with context.store.database.transaction() as connection:
@@ -58,8 +58,7 @@ def test_only_errored_jobs_are_retried(context: Context, add) -> None:
 
 def test_what_happened_to_a_job_is_reported_in_order(context: Context, add) -> None:
     (job_id,) = add(1)
-    lease = context.store.leases.claim("construct", owner="w")
-    assert lease is not None
+    lease = claim(context)
     context.store.leases.hand_back(lease)
     kinds = [event.kind for event in context.store.events.after(0, job_id=job_id)]
     assert kinds == ["queued", "running", "queued"]

@@ -21,7 +21,7 @@ def test_a_key_is_found_by_its_secret_alone(context: Context) -> None:
 
 def test_a_secret_is_nowhere_in_the_database(context: Context) -> None:
     _, secret = context.store.keys.create(name="ada", scopes=["read"])
-    with context.store.database.transaction() as connection:
+    with context.store.database.statement() as connection:
         rows = connection.execute(text("SELECT api_keys::text FROM api_keys")).scalars().all()
     assert len(rows) == 1
     assert secret.removeprefix("ba_") not in rows[0]

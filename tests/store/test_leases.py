@@ -6,23 +6,10 @@ from datetime import timedelta
 
 import pytest
 from sqlalchemy import text
+from support.jobs import cancel, claim, execute, expire_leases, finish, journal_entry
 
 from buildarena_pipeline.runtime.context import Context
-from buildarena_store import JobScore, JournalEntry, Leases, StaleLeaseError, Usage
-from buildarena_store.jobs.leases import Lease
-
-SCORE = JobScore(outcome="success", success=True, indicator=7.5)
-
-
-def claim(context: Context, owner: str = "w", hint: str | None = None) -> Lease:
-    lease = context.store.leases.claim("construct", owner=owner, hint=hint)
-    assert lease is not None
-    return lease
-
-
-def expire(context: Context) -> None:
-    with context.store.database.transaction() as connection:
-        connection.exec_driver_sql("UPDATE jobs SET lease_expires_at = now() - interval '1 s'")
+from buildarena_store import Leases, StaleLeaseError
 
 
 def test_a_job_is_leased_to_one_worker_at_a_time(context: Context, add) -> None:
@@ -46,7 +33,7 @@ def test_the_hinted_job_is_taken_first_and_a_recovered_one_before_it(context, ad
     first, second, third = add(1, 2, 3)
     assert claim(context, hint=third).job.id == third
     lost = claim(context, hint=second)
-    expire(context)
+    expire_leases(context)
     assert set(context.store.leases.recover()) == {second, third}
     assert claim(context, hint=first).job.id in {lost.job.id, third}
 
@@ -61,28 +48,19 @@ def test_a_hint_that_is_gone_still_brings_another_job(context: Context, add) -> 
 def test_a_stale_lease_can_write_nothing(context: Context, add) -> None:
     (job_id,) = add(1)
     stale = claim(context, "slow")
-    expire(context)
+    expire_leases(context)
     context.store.leases.recover()
     fresh = claim(context, "quick")
     assert fresh.token > stale.token
-    entry = JournalEntry(
-        sequence=0,
-        stage="plan",
-        role="planner",
-        request_hash="h",
-        reply={},
-        usage=Usage(),
-        latency_s=0,
-    )
-    with pytest.raises(StaleLeaseError):
-        context.store.journal.append(stale, entry)
-    with pytest.raises(StaleLeaseError), context.store.database.transaction() as connection:
-        context.store.results.finish(stale, SCORE, connection=connection)
-    with pytest.raises(StaleLeaseError):
-        context.store.leases.hand_back(stale)
+    for write in (
+        lambda: context.store.journal.append(stale, journal_entry()),
+        lambda: finish(context, stale),
+        lambda: context.store.leases.hand_back(stale),
+    ):
+        with pytest.raises(StaleLeaseError):
+            write()
     assert context.store.journal.read(job_id) == []
-    with context.store.database.transaction() as connection:
-        context.store.results.finish(fresh, SCORE, connection=connection)
+    finish(context, fresh, indicator=7.5)
     job = context.store.jobs.get(job_id)
     assert (job.outcome, job.indicator) == ("success", 7.5)
 
@@ -90,18 +68,16 @@ def test_a_stale_lease_can_write_nothing(context: Context, add) -> None:
 def test_a_scored_job_cannot_be_scored_again(context: Context, add) -> None:
     add(1)
     lease = claim(context)
-    with context.store.database.transaction() as connection:
-        context.store.results.finish(lease, SCORE, connection=connection)
-    with pytest.raises(StaleLeaseError), context.store.database.transaction() as connection:
-        context.store.results.finish(lease, SCORE, connection=connection)
+    finish(context, lease)
+    with pytest.raises(StaleLeaseError):
+        finish(context, lease)
     assert context.store.leases.claim("construct", owner="w") is None
 
 
 def test_heartbeats_keep_a_lease_and_say_of_lost_ones(context: Context, add) -> None:
     add(1, 2)
     kept, lost = claim(context), claim(context)
-    with context.store.database.transaction() as connection:
-        context.store.jobs.cancel([lost.job.id], connection=connection)
+    cancel(context, lost.job.id)
     assert context.store.leases.heartbeat([kept, lost]) == {kept.job.id: False}
     context.store.leases.duration = timedelta(seconds=0.05)
     context.store.leases.heartbeat([kept])
@@ -114,7 +90,7 @@ def test_a_job_that_keeps_losing_its_workers_is_given_up(context: Context, add) 
     leases = Leases(context.store.database, duration_s=1, max_faults=2)
     for _ in range(2):
         assert leases.claim("construct", owner="w") is not None
-        expire(context)
+        expire_leases(context)
         leases.recover()
     job = context.store.jobs.get(job_id)
     assert (job.outcome, job.reason, job.success) == ("errored", "lost_worker", None)
@@ -145,10 +121,9 @@ def test_workers_are_notified_of_waiting_jobs_once(context: Context, add) -> Non
 def test_a_cancelled_job_frees_its_worker(context: Context, add) -> None:
     (job_id,) = add(1)
     lease = claim(context)
-    with context.store.database.transaction() as connection:
-        context.store.jobs.cancel([job_id], connection=connection)
-    with pytest.raises(StaleLeaseError), context.store.database.transaction() as connection:
-        context.store.results.finish(lease, SCORE, connection=connection)
+    cancel(context, job_id)
+    with pytest.raises(StaleLeaseError):
+        finish(context, lease)
     assert context.store.jobs.get(job_id).outcome == "cancelled"
 
 
@@ -158,29 +133,16 @@ def test_a_job_that_gets_on_is_not_given_up(context: Context, add) -> None:
     for sequence in range(4):
         lease = leases.claim("construct", owner="w")
         assert lease is not None
-        entry = JournalEntry(
-            sequence=sequence,
-            stage="build",
-            role="builder",
-            request_hash="h",
-            reply={},
-            usage=Usage(),
-            latency_s=0,
-        )
-        context.store.journal.append(lease, entry)
-        expire(context)
+        context.store.journal.append(lease, journal_entry(sequence))
+        expire_leases(context)
         leases.recover()
     assert context.store.jobs.get(job_id).state == "queued"
 
 
 def owned(context: Context, add, owners: list[str | None]) -> list[str]:
     ids: list[str] = add(*range(len(owners)))
-    with context.store.database.transaction() as connection:
-        for job_id, owner in zip(ids, owners, strict=True):
-            connection.execute(
-                text("UPDATE jobs SET owner = :owner WHERE id = :id"),
-                {"owner": owner, "id": job_id},
-            )
+    values = [{"owner": owner, "id": id_} for id_, owner in zip(ids, owners, strict=True)]
+    execute(context, "UPDATE jobs SET owner = :owner WHERE id = :id", values)
     return ids
 
 
@@ -207,8 +169,7 @@ def test_a_hint_does_not_jump_the_turn_of_another_owner(context: Context, add) -
 @pytest.mark.parametrize("faults", [0, 1])
 def test_jobs_of_full_owners_wait_whatever_names_them(context: Context, add, faults) -> None:
     a, b, operators = owned(context, add, ["a", "b", None])
-    with context.store.database.transaction() as connection:
-        connection.execute(text("UPDATE jobs SET faults = :faults"), {"faults": faults})
+    execute(context, "UPDATE jobs SET faults = :faults", {"faults": faults})
     claim = context.store.leases.claim
     assert claim("construct", owner="w", hint=a, full=["a", ""]).job.id == b
     assert claim("construct", owner="w", hint=operators, full=["a", ""]) is None
@@ -218,8 +179,7 @@ def test_jobs_of_full_owners_wait_whatever_names_them(context: Context, add, fau
 def test_looking_at_leases_says_what_a_heartbeat_says_and_renews_nothing(context, add) -> None:
     add(1, 2)
     first, second = claim(context), claim(context)
-    with context.store.database.transaction() as connection:
-        context.store.jobs.cancel([second.job.id], connection=connection)
+    cancel(context, second.job.id)
     expires = text("SELECT lease_expires_at FROM jobs WHERE id = :id")
     with context.store.database.transaction() as connection:
         before = connection.execute(expires, {"id": first.job.id}).scalar_one()

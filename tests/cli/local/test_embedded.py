@@ -12,17 +12,11 @@ from pathlib import Path
 import psutil
 import pytest
 from redis import Redis
+from support.servers.stacks import wait_until
 
 from buildarena_cli.local import EmbeddedValkey, ManagedProcess, Supervisor
 from buildarena_cli.local.supervisor import LOOK_EVERY_S
 from buildarena_pipeline.errors import StartupError
-
-
-def wait_until(condition, within_s: float = 10.0) -> None:
-    deadline = time.monotonic() + within_s
-    while not condition():
-        assert time.monotonic() < deadline, "it did not happen in time"
-        time.sleep(0.02)
 
 
 def test_a_killed_broker_is_started_again_with_its_data(tmp_path: Path) -> None:
@@ -35,7 +29,7 @@ def test_a_killed_broker_is_started_again_with_its_data(tmp_path: Path) -> None:
         time.sleep(1.2)  # appendfsync everysec
         first = managed.process
         first.kill()
-        wait_until(lambda: managed.process is not first)
+        wait_until(lambda: managed.process is not first, 10, "it is started again")
         assert client.get("k") == b"v"
         pid = managed.process.pid
     assert not psutil.pid_exists(pid)
@@ -48,7 +42,7 @@ def test_a_process_that_keeps_dying_is_given_up() -> None:
     with Supervisor() as supervisor:
         supervisor.launch(ManagedProcess(name="mayfly", start=start))
         supervisor.watch()
-        wait_until(lambda: supervisor.failed is not None)
+        wait_until(lambda: supervisor.failed is not None, 10, "it is given up")
     assert "mayfly died 6 times" in supervisor.failed
     assert "exit code 3" in supervisor.failed
 
@@ -131,4 +125,4 @@ def test_children_do_not_outlive_a_killed_parent(tmp_path: Path) -> None:
     os.kill(parent.pid, signal.SIGKILL)
     parent.wait()
     parent.stdout.close()
-    wait_until(lambda: not psutil.pid_exists(child))
+    wait_until(lambda: not psutil.pid_exists(child), 10, "the child ends")

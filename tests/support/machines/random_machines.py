@@ -9,6 +9,7 @@ from types import MappingProxyType
 from typing import Final
 
 import numpy as np
+from support.machines.building import attach, connect
 from support.machines.families import beam, car, deck, rocket, rocket_assembly
 
 from buildarena_geometry import Machine
@@ -103,25 +104,9 @@ def _with_extras(machine: Machine, draw: Draw, most: int = 6) -> Machine:
         first, second = (blocks[int(k)] for k in draw.integers(0, len(blocks), size=2))
         faces = [str(draw.choice([face.label for face in b.module.faces])) for b in (first, second)]
         if draw.random() < 0.7:
-            machine.act(
-                "attach_block_to",
-                {
-                    "base_block": first.id,
-                    "face": faces[0],
-                    "new_block": "Small Wooden Block",
-                },
-            )
+            attach(machine, first.id, faces[0])
         elif first.id != second.id:
-            machine.act(
-                "connect_blocks",
-                {
-                    "block_a": first.id,
-                    "face_a": faces[0],
-                    "block_b": second.id,
-                    "face_b": faces[1],
-                    "connector": BRACE,
-                },
-            )
+            connect(machine, first.id, faces[0], second.id, faces[1], connector=BRACE)
     return machine
 
 

@@ -11,6 +11,7 @@ from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
+from support.machines.building import attach
 
 from buildarena_benchmark import builtin_tasks
 from buildarena_geometry import Machine
@@ -108,8 +109,7 @@ def _add_parts(machine: Machine, draw: Draw) -> None:
         base = blocks[int(draw.integers(0, len(blocks)))]
         face = str(draw.choice([face.label for face in base.module.faces]))
         module = str(draw.choice(offered))
-        place = {"base_block": base.id, "face": face, "new_block": module}
-        machine.act("attach_block_to", place)
+        attach(machine, base.id, face, module)
 
 
 def _bind(machine: Machine, control: Mapping[str, Any], draw: Draw) -> None:

@@ -11,6 +11,7 @@ from typing import Any
 
 import httpx
 from support.clients.tenants import ADMIN
+from support.machines.building import built
 
 from buildarena_benchmark.tasks.loading import parse_custom_task
 from buildarena_geometry import Machine
@@ -73,10 +74,7 @@ MISSING = SHORT.replace("name: short", "name: missing").replace(
 
 def two_blocks() -> Machine:
     """A starting block with one more on it."""
-    machine = Machine()
-    machine.act("start", {})
-    machine.act("attach_block_to", {"base_block": "1", "face": "C", "new_block": "Torch"})
-    return machine
+    return built(("1", "C", "Torch"))
 
 
 def waiting(context: Context, text: str = SHORT, *, seed: int = 0, owner: str | None = None) -> Job:

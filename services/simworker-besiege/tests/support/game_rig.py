@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from support.machines.building import BLOCK, built
 from support.player import Player
 
 from buildarena_benchmark import Task, builtin_tasks
@@ -105,10 +106,7 @@ def experts_machine(task: str) -> Machine:
 
 def tried_machine() -> tuple[Machine, Scenario]:
     """What `calibrate` plays to see whether the positions are right."""
-    machine = Machine()
-    machine.act("start", {})
-    block = {"base_block": "1", "face": "A", "new_block": "Small Wooden Block", "note": ""}
-    machine.act("attach_block_to", block)
+    machine = built(("1", "A", BLOCK))
     scenario = {"duration_s": TRIAL_S, "control": {"mode": "agent"}}
     return machine, Scenario.model_validate(scenario)
 
