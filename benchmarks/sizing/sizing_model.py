@@ -89,12 +89,7 @@ class Need:
 
 
 def need(load: Load, costs: dict[str, Any]) -> Need:
-    """Multiplies costs.
-
-    Args:
-        load: What is planned for.
-        costs: As `costs.py` printed them.
-    """
+    """Multiplies costs."""
     turn, second = costs["per_turn"], costs["per_session_s"]
     own_s = (turn["construct worker cpu_ms"] + turn["postgres cpu_ms"]) / 1000
     turns_s = load.sessions / (load.reply_s + own_s)

@@ -38,14 +38,7 @@ class Cut:
 
 @dataclass
 class Cuts:
-    """Cuts links from a thread until it is stopped; then all links are up.
-
-    Attributes:
-        network: Whose links.
-        watch: Who was heard of.
-        rng: Chooses.
-        made: The cuts.
-    """
+    """Cuts links from a thread until it is stopped; then all links are up."""
 
     network: Network
     watch: Watch

@@ -15,15 +15,7 @@ from buildarena_benchmark import builtin_tasks
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Child:
-    """A genome to make and try, as a worker process gets it.
-
-    Attributes:
-        task: Name of the task.
-        parents: One to mutate, or two to cross and mutate.
-        seed: Of everything that is drawn.
-        scorer: Judges it.
-        changed: Whether it is mutated at all; seeds are not.
-    """
+    """A genome to make and try, as a worker process gets it."""
 
     task: str
     parents: tuple[Genome, ...]

@@ -57,13 +57,7 @@ class Confirmed:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Order:
-    """What a worker process is to confirm.
-
-    Attributes:
-        task: Name of the task.
-        genome: What builds the machine.
-        picture: Where its picture goes; None for no picture.
-    """
+    """What a worker process is to confirm."""
 
     task: str
     genome: Genome

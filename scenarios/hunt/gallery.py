@@ -25,11 +25,7 @@ _HEAD: Final = "| machine | task | parts | MuJoCo | PyBullet | seeds | flags | c
 
 @dataclass(frozen=True, slots=True)
 class Gallery:
-    """A gallery's folder.
-
-    Attributes:
-        folder: Where it is.
-    """
+    """A gallery's folder."""
 
     folder: Path
 

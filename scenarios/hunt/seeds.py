@@ -43,11 +43,7 @@ class Exploit:
 
     @property
     def machine(self) -> Machine:
-        """The machine, with every action that its file has.
-
-        Raises:
-            ValueError: An action is refused.
-        """
+        """The machine, with every action that its file has."""
         machine, kept = grown(self.genome, most=sys.maxsize)
         if kept.as_json() != self.genome.as_json():
             raise ValueError(f"{self.name}: not all of its actions are accepted")

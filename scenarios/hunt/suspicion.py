@@ -31,14 +31,7 @@ _UPRIGHT: Final = 0.866
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """What is known of a success.
-
-    Attributes:
-        task: The task.
-        machine: The machine.
-        trials: Score and trajectory by engine.
-        robust_share: Share of the seeds it succeeded with; None if it was tried with none.
-    """
+    """What is known of a success."""
 
     task: Task
     machine: Machine

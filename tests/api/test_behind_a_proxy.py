@@ -45,7 +45,7 @@ def below(context: Context, request: pytest.FixtureRequest) -> Iterator[str]:
         yield url
 
 
-def test_the_api_works_below_a_path(below: str) -> None:
+def test_the_api_works_below_a_path(below) -> None:
     assert below.endswith(BASE)
     with httpx.Client(timeout=20) as client:
         made = client.post(f"{below}/v1/sweeps", json=SWEEP)
@@ -60,7 +60,7 @@ def test_the_api_works_below_a_path(below: str) -> None:
         assert client.get(f"{below}/v1/nothing").status_code == 404
 
 
-def test_the_contract_and_its_page_name_the_path(below: str) -> None:
+def test_the_contract_and_its_page_name_the_path(below) -> None:
     contract = httpx.get(f"{below}/openapi.json").json()
     assert contract["servers"] == [{"url": BASE}]
     page = httpx.get(f"{below}/docs")
@@ -70,7 +70,7 @@ def test_the_contract_and_its_page_name_the_path(below: str) -> None:
     assert httpx.get(httpx.URL(below).join(script)).status_code == 200
 
 
-def test_the_path_without_its_slash_is_the_first_page(context: Context) -> None:
+def test_the_path_without_its_slash_is_the_first_page(context) -> None:
     with served(context, ProxyRules(prefix=BASE), base_path=BASE) as url:
         assert httpx.get(url).content == httpx.get(f"{url}/").content
         assert httpx.get(url).status_code == 200
@@ -78,7 +78,7 @@ def test_the_path_without_its_slash_is_the_first_page(context: Context) -> None:
         assert rebound.status_code == 421
 
 
-def test_events_come_through_as_they_happen(below: str) -> None:
+def test_events_come_through_as_they_happen(below) -> None:
     """A proxy that is told nothing may keep them back; ours would show that they come late."""
     with httpx.Client(timeout=20) as client:
         sweep = client.post(f"{below}/v1/sweeps", json=SWEEP).json()["id"]
@@ -94,7 +94,7 @@ def test_events_come_through_as_they_happen(below: str) -> None:
             assert time.monotonic() - asked < 10
 
 
-def test_a_large_upload_comes_through(context: Context) -> None:
+def test_a_large_upload_comes_through(context) -> None:
     rules = ProxyRules(prefix=BASE)
     with served(context, rules, base_path=BASE) as url, httpx.Client(timeout=60) as client:
 
@@ -109,7 +109,7 @@ def test_a_large_upload_comes_through(context: Context) -> None:
     assert "zip" in answer.text.lower() or "archive" in answer.text.lower()
 
 
-def test_commands_work_with_an_address_that_has_a_path(below: str) -> None:
+def test_commands_work_with_an_address_that_has_a_path(below) -> None:
     for words in (["model", "list", "--json"], ["doctor"], ["task", "list"]):
         done = CliRunner().invoke(app, [*words, "--url", below])
         assert "builtin/" in done.stdout or done.stdout.strip(), (words, done.output)
@@ -120,7 +120,7 @@ def test_commands_work_with_an_address_that_has_a_path(below: str) -> None:
     assert made.exit_code == 0, made.output
 
 
-def test_a_service_with_a_base_path_still_answers_at_its_root(context: Context) -> None:
+def test_a_service_with_a_base_path_still_answers_at_its_root(context) -> None:
     """As probes ask, who know of no proxy."""
     with served(context, ProxyRules(), base_path=BASE) as url:
         assert httpx.get(f"{url}/v1/health").status_code == 200
@@ -146,7 +146,7 @@ def test_the_first_page_names_its_files_below_the_path(tmp_path) -> None:
 @pytest.mark.parametrize(
     ("given", "kept"), [("", ""), ("/", ""), ("/arena/", "/arena"), ("/a/b-c.d_~", "/a/b-c.d_~")]
 )
-def test_a_base_path_is_kept_without_its_last_slash(given: str, kept: str) -> None:
+def test_a_base_path_is_kept_without_its_last_slash(given, kept) -> None:
     assert load_settings(base_path=given).base_path == kept
 
 
@@ -158,7 +158,7 @@ def test_a_base_path_is_kept_without_its_last_slash(given: str, kept: str) -> No
         *(f"/{name}" for name in sorted(OWN_PATHS)),
     ],
 )
-def test_what_is_no_base_path_is_refused(bad: str) -> None:
+def test_what_is_no_base_path_is_refused(bad) -> None:
     with pytest.raises(StartupError, match=r"BUILDARENA_BASE_PATH: .*(must begin|of its own)"):
         load_settings(base_path=bad)
 
@@ -176,19 +176,19 @@ def outer(
 FORWARDED = {"X-Forwarded-Proto": "https", "X-Forwarded-Host": "arena.example.org"}
 
 
-def test_addresses_have_the_outer_scheme_and_host_behind_a_trusted_proxy(context: Context) -> None:
+def test_addresses_have_the_outer_scheme_and_host_behind_a_trusted_proxy(context) -> None:
     answer = outer(context, PROXIES, FORWARDED)
     assert answer.status_code == 307, answer.text
     assert answer.headers["Location"] == "https://arena.example.org/v1/models"
 
 
-def test_addresses_have_scheme_host_and_path_of_the_outside(context: Context) -> None:
+def test_addresses_have_scheme_host_and_path_of_the_outside(context) -> None:
     answer = outer(context, PROXIES, FORWARDED, base_path=BASE)
     assert answer.headers["Location"] == f"https://arena.example.org{BASE}/v1/models"
 
 
 @pytest.mark.parametrize("trusted", ["", "10.0.0.0/8", "::1"])
-def test_what_others_forward_is_ignored(context: Context, trusted: str) -> None:
+def test_what_others_forward_is_ignored(context, trusted) -> None:
     answer = outer(context, trusted, FORWARDED)
     assert answer.headers["Location"] == "http://inner:8000/v1/models"
 
@@ -196,12 +196,12 @@ def test_what_others_forward_is_ignored(context: Context, trusted: str) -> None:
 @pytest.mark.parametrize(
     "host", ["a b", "a/b", "evil@host", "a,b", "x" * 300, "[::1", "host:port", "host:999999"]
 )
-def test_a_forwarded_host_that_is_none_is_ignored(context: Context, host: str) -> None:
+def test_a_forwarded_host_that_is_none_is_ignored(context, host) -> None:
     answer = outer(context, PROXIES, {"X-Forwarded-Host": host})
     assert answer.headers["Location"] == "http://inner:8000/v1/models"
 
 
-def test_without_keys_a_forwarded_host_makes_no_foreign_name_ours(context: Context) -> None:
+def test_without_keys_a_forwarded_host_makes_no_foreign_name_ours(context) -> None:
     """A rebound name's page could send the header; its browser is as near as a local proxy."""
     rules = ProxyRules(headers={"X-Forwarded-Host": "localhost"}, host="rebound.example")
     with served(context, rules, trusted_proxies=PROXIES) as url:
@@ -219,7 +219,7 @@ def test_without_keys_a_forwarded_host_makes_no_foreign_name_ours(context: Conte
     ids=["a proxy", "a stranger", "a made up chain"],
 )
 def test_rate_limits_go_by_the_client_that_a_trusted_proxy_saw(
-    context: Context, trusted: str, seen: str, least: int, most: int
+    context, trusted, seen, least, most
 ) -> None:
     """Two an hour; a broker that is slow for a moment lets a process count two more alone."""
     with (

@@ -1,12 +1,11 @@
 """The task catalogue: fifteen tasks, their versions, and errors in a user's own."""
 
 import re
-from pathlib import Path
 
 import pytest
 import yaml
 
-from buildarena_benchmark import Task, TaskError, load_task, paper_tasks
+from buildarena_benchmark import TaskError, load_task, paper_tasks
 
 OWN = """\
 name: tower-bridge
@@ -37,7 +36,7 @@ DIMENSIONS = {
 WORKSHOP = [*(f"mechanisms-{level}" for level in (1, 2, 3, 4)), "flight-1", "flight-2"]
 
 
-def test_there_are_the_papers_nine_tasks_and_six_of_the_workshop(tasks: dict[str, Task]) -> None:
+def test_there_are_the_papers_nine_tasks_and_six_of_the_workshop(tasks) -> None:
     paper = [f"{c}-{n}" for c in ("transport", "support", "lift") for n in (1, 2, 3)]
     assert list(tasks) == [*paper, *WORKSHOP]
     assert list(paper_tasks()) == paper
@@ -64,7 +63,7 @@ def test_each_task_has_the_papers_scenario() -> None:
     assert tasks["transport-3"].scenario.cargo.size == (4, 8, 1.5)
 
 
-def test_a_statement_tells_what_the_scorer_measures(tasks: dict[str, Task]) -> None:
+def test_a_statement_tells_what_the_scorer_measures(tasks) -> None:
     for task in tasks.values():
         text = task.statement
         for heading in ("**Goal.**", "**Rules.**", "**Trial.**", "**Measure.**"):
@@ -83,7 +82,7 @@ def test_a_statement_tells_what_the_scorer_measures(tasks: dict[str, Task]) -> N
 
 
 @pytest.mark.parametrize("name", WORKSHOP)
-def test_a_statement_tells_every_threshold(tasks: dict[str, Task], name: str) -> None:
+def test_a_statement_tells_every_threshold(tasks, name) -> None:
     task = tasks[name]
     text = " ".join(task.statement.split())
     for field, value in task.scoring.model_dump().items():
@@ -118,7 +117,7 @@ def test_the_papers_tasks_are_what_they_were() -> None:
     }
 
 
-def test_a_users_own_task_loads_from_text_and_file(tmp_path: Path) -> None:
+def test_a_users_own_task_loads_from_text_and_file(tmp_path) -> None:
     task = load_task(OWN)
     assert (task.name, task.scorer, task.control) == ("tower-bridge", "support", "none")
     file = tmp_path / "own.yaml"
@@ -136,7 +135,7 @@ def test_a_users_own_task_loads_from_text_and_file(tmp_path: Path) -> None:
         ("duration_s: 10", "duration_s: 11"),
     ],
 )
-def test_what_can_change_a_score_changes_the_version(old: str, new: str) -> None:
+def test_what_can_change_a_score_changes_the_version(old, new) -> None:
     assert load_task(OWN.replace(old, new)).version != load_task(OWN).version
 
 
@@ -164,7 +163,7 @@ def test_what_cannot_change_a_score_keeps_the_version() -> None:
         ("indicator: {", "indicator: [", ["not valid YAML"]),
     ],
 )
-def test_an_error_names_line_field_and_choices(old: str, new: str, parts: list[str]) -> None:
+def test_an_error_names_line_field_and_choices(old, new, parts) -> None:
     assert old in OWN
     with pytest.raises(TaskError) as caught:
         load_task(OWN.replace(old, new))
@@ -195,7 +194,7 @@ def test_an_error_names_line_field_and_choices(old: str, new: str, parts: list[s
         ("title: A suspended bridge", 'title: "\\ud800"', "title: "),
     ],
 )
-def test_a_trial_that_is_out_of_bounds_is_refused(old: str, new: str, says: str) -> None:
+def test_a_trial_that_is_out_of_bounds_is_refused(old, new, says) -> None:
     assert old in OWN
     text = OWN.replace(old, new, 1)
     if new.startswith('title: "\\e'):
@@ -239,13 +238,13 @@ def test_more_terrain_than_is_simulated_is_refused() -> None:
         ),
     ],
 )
-def test_a_task_that_nobody_can_pass_is_refused(old: str, new: str, says: str) -> None:
+def test_a_task_that_nobody_can_pass_is_refused(old, new, says) -> None:
     assert old in OWN
     with pytest.raises(TaskError, match=re.escape(says)):
         load_task(OWN.replace(old, new))
 
 
-def test_a_tasks_document_is_the_task_again(tasks: dict[str, Task]) -> None:
+def test_a_tasks_document_is_the_task_again(tasks) -> None:
     for task in (*tasks.values(), load_task(OWN)):
         assert load_task(yaml.safe_dump(dict(task.as_document()))) == task
 

@@ -45,7 +45,7 @@ def built_with(module: Module) -> Machine:
 
 
 @pytest.mark.parametrize("name", [*BLOCKS, *CONNECTORS])
-def test_every_type_comes_back_as_it_was(name: str) -> None:
+def test_every_type_comes_back_as_it_was(name) -> None:
     machine = built_with(ALL[name])
     imported = read_machine_file(plain_machine_file(machine, name="m"))
     assert imported.not_understood == ()
@@ -54,7 +54,7 @@ def test_every_type_comes_back_as_it_was(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", BLOCKS)
-def test_the_keys_of_every_action_stand_in_the_file(name: str) -> None:
+def test_the_keys_of_every_action_stand_in_the_file(name) -> None:
     module = ALL[name]
     file = ET.fromstring(plain_machine_file(built_with(module), name="m"))
     block = next(one for one in file.iter("Block") if one.get("id") == str(module.besiege_id))
@@ -92,13 +92,13 @@ def test_in_files_of_others_the_ballast_that_sits_on_nothing_is_cargo() -> None:
 
 
 @pytest.mark.parametrize("task", ["flight-2", "mechanisms-3", "mechanisms-4"])
-def test_trials_that_a_machine_file_cannot_say_are_refused(task: str) -> None:
+def test_trials_that_a_machine_file_cannot_say_are_refused(task) -> None:
     scenario = builtin_tasks()[task].scenario
     with pytest.raises(MachineNotPlayableError, match="use another engine"):
         prepare_run(built_with(ALL["Log"]), scenario, name="m", run_id="r")
 
 
 @pytest.mark.parametrize("task", ["mechanisms-1", "mechanisms-2", "flight-1"])
-def test_the_other_trials_of_the_workshop_are_written(task: str) -> None:
+def test_the_other_trials_of_the_workshop_are_written(task) -> None:
     run = prepare_run(built_with(ALL["Log"]), builtin_tasks()[task].scenario, name="m", run_id="r")
     assert b"<Machine" in run.machine_file

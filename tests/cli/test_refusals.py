@@ -6,7 +6,6 @@ import os
 import socket
 import subprocess
 import sys
-from pathlib import Path
 
 import psutil
 import pytest
@@ -21,7 +20,7 @@ def assert_refused(done: subprocess.CompletedProcess[str], *words: str) -> None:
 
 
 @pytest.mark.parametrize("command", ["up", "demo"])
-def test_a_taken_port(tmp_path: Path, command: str) -> None:
+def test_a_taken_port(tmp_path, command) -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
@@ -33,13 +32,13 @@ def test_a_taken_port(tmp_path: Path, command: str) -> None:
 
 
 @pytest.mark.parametrize("command", ["up", "demo"])
-def test_an_unwritable_data_folder(tmp_path: Path, command: str) -> None:
+def test_an_unwritable_data_folder(tmp_path, command) -> None:
     (tmp_path / "file").write_text("in the way")
     done = piped(command, "--data", str(tmp_path / "file" / "data"))
     assert_refused(done, "can't be written", "choose another with --data")
 
 
-def test_a_data_folder_in_use(tmp_path: Path) -> None:
+def test_a_data_folder_in_use(tmp_path) -> None:
     import fcntl
 
     (tmp_path / "lock").touch()
@@ -63,7 +62,7 @@ def test_a_port_that_is_no_port() -> None:
     ("text", "says"),
     [("tasks: [", "not valid YAML"), ("- 1", "must be a mapping"), (None, "No such")],
 )
-def test_a_bad_sweep_file(tmp_path: Path, text: str | None, says: str) -> None:
+def test_a_bad_sweep_file(tmp_path, text, says) -> None:
     file = tmp_path / "sweep.yaml"
     if text is not None:
         file.write_text(text)
@@ -73,7 +72,7 @@ def test_a_bad_sweep_file(tmp_path: Path, text: str | None, says: str) -> None:
 
 
 @pytest.mark.parametrize("words", [["fly"], ["job"], ["job", "show"], ["leaderboard", "--fast"]])
-def test_wrong_words_end_with_code_2(words: list[str]) -> None:
+def test_wrong_words_end_with_code_2(words) -> None:
     assert piped(*words).returncode == 2
 
 
@@ -83,7 +82,7 @@ def test_help_names_every_command() -> None:
         assert command in text
 
 
-def test_a_worker_refuses_a_foreign_schema(database_url: str, broker_url: str) -> None:
+def test_a_worker_refuses_a_foreign_schema(database_url, broker_url) -> None:
     from buildarena_store import Database
     from buildarena_store.database import expected_schema
 

@@ -11,7 +11,7 @@ from support.clients.tenants import ADMIN, WITH_KEYS
 from support.servers.live_api import live_api
 from support.stages import work
 
-from buildarena_pipeline.runtime.context import Context, open_context
+from buildarena_pipeline.runtime.context import open_context
 
 NEW_ADMIN = "another-operator-secret-as-long"
 SWEEP = {
@@ -26,7 +26,7 @@ def bearer(secret: str) -> dict[str, str]:
     return {"Authorization": f"Bearer {secret}"}
 
 
-def test_keys_are_replaced_under_a_running_sweep(context: Context) -> None:
+def test_keys_are_replaced_under_a_running_sweep(context) -> None:
     with ExitStack() as stack:
 
         def api(**changes: object) -> httpx.Client:

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import copy
 import json
-from importlib import resources
 
 import jsonschema
 import pytest
 import yaml
 from support.machines.building import attach, built
+from support.machines.module_files import FILES, SCHEMA, module_file
 
 from buildarena_geometry import CatalogueError, Machine, RefusalClass, load_catalogue
 
-FILES = resources.files("buildarena_geometry.modules")
 BASIC = json.loads(FILES.joinpath("modules.yaml").read_text())
-SCHEMA = json.loads(FILES.joinpath("modules.schema.json").read_text())
 CRATE = {
     "name": "Crate",
     "kind": "block",
@@ -29,12 +27,6 @@ CRATE = {
     "description": "A large crate.",
     "besiege": {"id": 15, "data": []},
 }
-
-
-def write(tmp_path, *modules, name="more.json"):
-    file = tmp_path / name
-    file.write_text(json.dumps({"version": 1, "modules": list(modules)}))
-    return file
 
 
 @pytest.mark.parametrize(
@@ -107,7 +99,7 @@ def test_a_file_without_them_gives_a_module_what_its_kind_does(tmp_path, name):
     entry["name"] = "Spare"
     for mark in entry["landmarks"]:
         mark.pop("heats", None)
-    catalogue = load_catalogue(write(tmp_path, entry))
+    catalogue = load_catalogue(module_file(tmp_path, entry))
     spare, basic = catalogue["Spare"], catalogue[name]
     assert (spare.motor, spare.thrust) == (basic.motor, basic.thrust)
     assert (spare.physics, spare.flames) == (basic.physics, basic.flames)
@@ -118,7 +110,7 @@ def test_a_connector_that_does_not_say_so_is_rigid(tmp_path):
     strut = {**BASIC["modules"][5], "name": "Strut"}
     del strut["link"]
     rope = {**strut, "name": "Rope", "link": "rope"}
-    catalogue = load_catalogue(write(tmp_path, strut, rope))
+    catalogue = load_catalogue(module_file(tmp_path, strut, rope))
     assert [catalogue[name].link for name in ("Strut", "Rope")] == ["rigid", "rope"]
 
 
@@ -126,7 +118,7 @@ def test_a_users_module_says_what_it_does_itself(tmp_path):
     wheel = copy.deepcopy(BASIC["modules"][2])
     wheel |= {"name": "Slow Wheel", "motor": {**wheel["motor"], "speed_rpm": 30}}
     wheel["motor"]["forward_sense"] = "counterclockwise"
-    catalogue = load_catalogue(write(tmp_path, wheel))
+    catalogue = load_catalogue(module_file(tmp_path, wheel))
     assert catalogue["Slow Wheel"].motor.speed_rpm == 30
     machine = built(catalogue=catalogue)
     assert "forward rolls it <South>" in attach(machine, "1", "A", "Slow Wheel").text
@@ -134,7 +126,7 @@ def test_a_users_module_says_what_it_does_itself(tmp_path):
 
 
 def test_a_users_file_adds_modules_that_can_be_built_with(tmp_path):
-    catalogue = load_catalogue(write(tmp_path, CRATE))
+    catalogue = load_catalogue(module_file(tmp_path, CRATE))
     assert catalogue.attachable[-1] == "Crate"
     machine = built(("1", "C", "Crate"), catalogue=catalogue)
     assert tuple(machine.blocks["2"].center) == pytest.approx((0, 0, 2.5))
@@ -142,7 +134,7 @@ def test_a_users_file_adds_modules_that_can_be_built_with(tmp_path):
 
 
 def test_a_block_inside_another_overlaps_it(tmp_path):
-    catalogue = load_catalogue(write(tmp_path, CRATE))
+    catalogue = load_catalogue(module_file(tmp_path, CRATE))
     outer, inner = built(("1", "C", "Crate"), catalogue=catalogue), built(catalogue=catalogue)
     assembly = Machine(catalogue=catalogue, available={"outer": outer, "inner": inner})
     assembly.act("add_machine", {"machine_id": "outer"})
@@ -161,14 +153,14 @@ def test_a_users_file_may_use_the_old_names_of_fields(tmp_path):
     del physics["joint_type"]
     servo = {"kind": "speed", "rate": 9, "force": 2, "forward": "turn", "idle": "free"}
     old = edit(physics=physics, joint={"drive": servo}, actions=["turn"], tether={"length": 2})
-    module = load_catalogue(write(tmp_path, old))["Crate"]
+    module = load_catalogue(module_file(tmp_path, old))["Crate"]
     assert module.physics.joint_type == "hinge"
     assert module.joint.drive.default_mode == "free"
     assert module.rope_mount.length == 2
 
 
 def test_a_whole_number_may_be_written_with_a_point(tmp_path):
-    assert load_catalogue(write(tmp_path, edit(cost=3.0)))["Crate"].cost == 3
+    assert load_catalogue(module_file(tmp_path, edit(cost=3.0)))["Crate"].cost == 3
 
 
 def edit(**fields):
@@ -230,7 +222,7 @@ SENSELESS = [
 @pytest.mark.parametrize(("module", "message"), [*BROKEN, *SENSELESS])
 def test_a_bad_module_is_refused_with_its_place_and_what_belongs_there(tmp_path, module, message):
     with pytest.raises(CatalogueError, match=message):
-        load_catalogue(write(tmp_path, module))
+        load_catalogue(module_file(tmp_path, module))
 
 
 @pytest.mark.parametrize("module", [module for module, _ in BROKEN])

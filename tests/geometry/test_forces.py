@@ -1,22 +1,17 @@
 """What module files say of fans, wings, balloons, springs and what lets go."""
 
 import copy
-import json
-from importlib import resources
 
 import jsonschema
 import pytest
 from support.machines.building import BLOCK, built, connect
+from support.machines.module_files import SCHEMA, entries, module_file
 
 from buildarena_geometry import CatalogueError, Machine, load_catalogue
 from buildarena_geometry.modules.forces import FORCE_FIELDS
 from buildarena_geometry.modules.sets import module_set
 
-FILES = resources.files("buildarena_geometry.modules")
-FURTHER = {
-    one["name"]: one for one in json.loads(FILES.joinpath("extended.yaml").read_text())["modules"]
-}
-SCHEMA = json.loads(FILES.joinpath("modules.schema.json").read_text())
+FURTHER = entries("extended.yaml")
 
 
 def other(name, field, **changes):
@@ -27,9 +22,7 @@ def other(name, field, **changes):
 
 
 def read(tmp_path, entry):
-    file = tmp_path / "more.json"
-    file.write_text(json.dumps({"version": 1, "modules": [entry]}))
-    return load_catalogue(file)["Other"]
+    return load_catalogue(module_file(tmp_path, entry))["Other"]
 
 
 def test_a_wings_flow_is_its_normal_turned_by_the_pitch(tmp_path):

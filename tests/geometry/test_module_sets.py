@@ -6,12 +6,12 @@ import itertools
 import json
 import math
 import re
-from importlib import resources
 
 import fcl
 import numpy as np
 import pytest
-from support.machines.building import attach, built
+from support.machines.building import BLOCK, attach, built
+from support.machines.module_files import BASIC, like, module_file
 
 from buildarena_geometry import (
     MODULE_SETS,
@@ -26,20 +26,12 @@ from buildarena_geometry import (
 )
 from buildarena_geometry.modules.catalogue import read_modules
 
-FILE = resources.files("buildarena_geometry.modules").joinpath("modules.yaml")
-BLOCK = next(
-    module
-    for module in json.loads(FILE.read_text())["modules"]
-    if module["name"] == "Small Wooden Block"
-)
 EXTENDED = [name for name in module_set("all") if name not in load_catalogue()]
 
 
 def own(tmp_path, **fields):
     """The basic modules and one of our own, "Own", like the small block but for some fields."""
-    file = tmp_path / "modules.json"
-    file.write_text(json.dumps({"version": 1, "modules": [{**BLOCK, "name": "Own", **fields}]}))
-    return load_catalogue(file)
+    return load_catalogue(module_file(tmp_path, like(BLOCK, "Own", **fields)))
 
 
 def test_sets_hold_each_other():
@@ -239,7 +231,7 @@ def test_a_shape_that_reaches_into_its_base_is_compared_with_the_others_alone():
 
 def test_what_reaches_into_its_base_still_meets_it_after_that_base_was_exchanged(tmp_path):
     rod = {"shape": "cylinder", "radius": 0.2, "from": [0, 0, -0.4], "to": [0, 0, 0]}
-    catalogue = own(tmp_path, overlaps_base=True, colliders=[*BLOCK["colliders"], rod])
+    catalogue = own(tmp_path, overlaps_base=True, colliders=[*BASIC[BLOCK]["colliders"], rod])
     machine = built(("1", "A", "Small Wooden Block"), ("2", "E", "Own"), catalogue=catalogue)
     assert machine.act("remove_block", {"block_id": "2"}).ok
     outcome = attach(machine, "1", "A")
@@ -249,7 +241,7 @@ def test_what_reaches_into_its_base_still_meets_it_after_that_base_was_exchanged
 
 def test_what_reaches_into_its_base_may_be_met_from_either_side(tmp_path):
     rod = {"shape": "cylinder", "radius": 0.2, "from": [0, 0, -0.4], "to": [0, 0, 0]}
-    catalogue = own(tmp_path, overlaps_base=True, colliders=[*BLOCK["colliders"], rod])
+    catalogue = own(tmp_path, overlaps_base=True, colliders=[*BASIC[BLOCK]["colliders"], rod])
     machine = built(("1", "A", "Small Wooden Block"), ("2", "E", "Own"), catalogue=catalogue)
     # The base is what moves here: the two are compared the other way round.
     assert machine.act("twist_block", {"block_id": "2", "angle": 20}).ok
@@ -296,6 +288,6 @@ def test_balls_meet_as_balls(tmp_path):
     ],
 )
 def test_bad_fields_are_named(fields, complaint):
-    content = {"version": 1, "modules": [{**BLOCK, "name": "Own", **fields}]}
+    content = {"version": 1, "modules": [like(BLOCK, "Own", **fields)]}
     with pytest.raises(CatalogueError, match=complaint):
         read_modules(content, where="file")

@@ -1,28 +1,22 @@
 """What module files say of joints, drives and teeth, and how senseless ones are refused."""
 
-import copy
-import json
 import math
-from importlib import resources
 
 import pytest
-from support.machines.building import built
+from support.machines.building import BLOCK, built
+from support.machines.module_files import like, module_file
 
 from buildarena_geometry import load_catalogue, module_set
 from buildarena_geometry.errors import CatalogueError
 from buildarena_geometry.modules.joints import MOVING_JOINTS
 
-FILE = resources.files("buildarena_geometry.modules").joinpath("modules.yaml")
-WOOD = next(m for m in json.loads(FILE.read_text())["modules"] if m["name"] == "Small Wooden Block")
 SERVO = {"kind": "position", "rate": 90, "force": 20, "forward": "left", "backward": "right"}
 
 
 def _loaded(tmp_path, seat, *, actions=("left", "right"), **fields):
-    module = {**copy.deepcopy(WOOD), "name": "Part", "actions": list(actions), **fields}
+    module = like(BLOCK, "Part", actions=list(actions), **fields)
     module["physics"]["joint_type"] = seat
-    file = tmp_path / "parts.json"
-    file.write_text(json.dumps({"version": 1, "modules": [module]}))
-    return load_catalogue(file)["Part"]
+    return load_catalogue(module_file(tmp_path, module))["Part"]
 
 
 def test_angles_are_degrees_in_files_and_radians_inside(tmp_path):

@@ -5,9 +5,9 @@ import json
 import numpy as np
 import pytest
 from pydantic import ValidationError
-from support.machines.building import BLOCK, built
+from support.machines.building import built
 
-from buildarena_geometry import KeyPress, Machine
+from buildarena_geometry import KeyPress
 from buildarena_simulation import MachineNotSimulable, Scenario, simulate
 from buildarena_simulation.constants import GRAVITY
 from buildarena_simulation.control import ended_presses
@@ -18,11 +18,6 @@ BOX = {"size": [1, 1, 1], "initial_mass": 2, "final_mass": 2, "ramp_s": 1}
 
 def scenario(**fields: object) -> Scenario:
     return Scenario.model_validate({"duration_s": 0.4, **fields})
-
-
-@pytest.fixture
-def beam() -> Machine:
-    return built(("1", "E", BLOCK))
 
 
 def test_unused_additions_leave_a_scenario_as_it_was() -> None:
@@ -41,7 +36,7 @@ def test_unused_additions_leave_a_scenario_as_it_was() -> None:
 
 
 @pytest.mark.parametrize("seed", [None, 3])
-def test_a_released_machine_flies_a_parabola(engine: str, beam: Machine, seed: int | None) -> None:
+def test_a_released_machine_flies_a_parabola(engine, beam, seed) -> None:
     given = scenario(placement={"kind": "released", "height": 40, "velocity": [3, 15, 2]})
     trial = simulate(beam, given, engine, seed=seed)
     start, t = trial.positions[0, 0].astype(float), 0.4
@@ -52,7 +47,7 @@ def test_a_released_machine_flies_a_parabola(engine: str, beam: Machine, seed: i
     assert moved[2] == pytest.approx(2 * t - GRAVITY * t**2 / 2, rel=0.06)
 
 
-def test_a_cargo_stands_at_its_place(engine: str, beam: Machine) -> None:
+def test_a_cargo_stands_at_its_place(engine, beam) -> None:
     trial = simulate(beam, scenario(cargo=BOX | {"at": [3, 4, 0]}), engine)
     assert trial.cargo_position is not None
     assert np.abs(trial.cargo_position - [3, 4, 0.5]).max() < 0.02
@@ -71,9 +66,7 @@ WALL = {"center": [0, 2.2, 1], "size": [4, 1, 2]}
         ({"terrain": [WALL | {"center": [5, 9, 9]}, WALL | {"center": [0, 0, 0]}]}, "terrain 2"),
     ],
 )
-def test_a_place_that_is_taken_is_refused(
-    beam: Machine, given: dict[str, object], named: str
-) -> None:
+def test_a_place_that_is_taken_is_refused(beam, given, named) -> None:
     with pytest.raises(MachineNotSimulable, match=named):
         simulate(beam, scenario(clear_start=True, **given))
     simulate(beam, scenario(**given))  # only where the scenario asks for it
@@ -88,7 +81,7 @@ def test_a_place_that_is_taken_is_refused(
         {"terrain": [WALL | {"center": [0, 3.1, 0], "slope_deg": 45}]},
     ],
 )
-def test_what_is_only_near_is_not(beam: Machine, given: dict[str, object]) -> None:
+def test_what_is_only_near_is_not(beam, given) -> None:
     simulate(beam, scenario(clear_start=True, **given))
 
 
@@ -122,7 +115,7 @@ def test_keys_end_when_the_control_says_so() -> None:
         ({"marks": [{"name": "a\x00", "center": [0, 0, 0], "radius": 1}]}, "pattern"),
     ],
 )
-def test_what_makes_no_sense_is_refused(fields: dict[str, object], said: str) -> None:
+def test_what_makes_no_sense_is_refused(fields, said) -> None:
     with pytest.raises(ValidationError, match=said):
         scenario(**fields)
 

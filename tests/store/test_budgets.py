@@ -39,7 +39,7 @@ def sweep(context: Context, new_job) -> Callable[..., str]:
     return make
 
 
-def test_what_is_reserved_can_not_be_reserved_again(context: Context, sweep) -> None:
+def test_what_is_reserved_can_not_be_reserved_again(context, sweep) -> None:
     sweep(0, 1, 2, max_cost_usd=Decimal("0.70"))
     first, second, third = (claim(context) for _ in range(3))
     assert context.store.budgets.reserve(first, NEED) is None
@@ -54,7 +54,7 @@ def test_what_is_reserved_can_not_be_reserved_again(context: Context, sweep) -> 
 @pytest.mark.parametrize(
     "limits", [{"max_cost_usd": Decimal("0.5")}, {"max_tokens": 500}, {"max_requests": 1}]
 )
-def test_a_used_up_budget_says_what_is_lacking(context: Context, sweep, limits) -> None:
+def test_a_used_up_budget_says_what_is_lacking(context, sweep, limits) -> None:
     name = sweep(0, **limits)
     lease = claim(context)
     assert context.store.budgets.reserve(lease, NEED) is None
@@ -70,7 +70,7 @@ def test_a_used_up_budget_says_what_is_lacking(context: Context, sweep, limits) 
     assert budget.spent_requests == 1
 
 
-def test_a_key_pays_beside_its_sweep(context: Context, sweep) -> None:
+def test_a_key_pays_beside_its_sweep(context, sweep) -> None:
     sweep(0, owner="key_k", max_cost_usd=Decimal(10))
     set_budget(context, "key_k", max_requests=1)
     lease = claim(context)
@@ -85,7 +85,7 @@ def test_a_key_pays_beside_its_sweep(context: Context, sweep) -> None:
         assert budget.spent_requests == 1
 
 
-def test_a_budget_that_comes_later_counts_what_was_spent(context: Context, sweep) -> None:
+def test_a_budget_that_comes_later_counts_what_was_spent(context, sweep) -> None:
     name = sweep(0)
     context.store.journal.append(claim(context), reply())
     set_budget(context, name, max_requests=5)
@@ -94,7 +94,7 @@ def test_a_budget_that_comes_later_counts_what_was_spent(context: Context, sweep
     assert (budget.spent_requests, budget.spent_tokens) == (1, 250)
 
 
-def test_the_end_of_a_hold_gives_its_reservation_back(context: Context, sweep) -> None:
+def test_the_end_of_a_hold_gives_its_reservation_back(context, sweep) -> None:
     sweep(0, 1, max_requests=1)
     first, second = claim(context), claim(context)
     assert context.store.budgets.reserve(first, NEED) is None
@@ -105,7 +105,7 @@ def test_the_end_of_a_hold_gives_its_reservation_back(context: Context, sweep) -
     assert context.store.budgets.reserve(claim(context), NEED) is None
 
 
-def test_a_reply_that_came_too_late_was_paid_for(context: Context, sweep) -> None:
+def test_a_reply_that_came_too_late_was_paid_for(context, sweep) -> None:
     name = sweep(0, max_requests=5)
     lease = claim(context)
     cancel(context, lease.job.id)
@@ -117,9 +117,7 @@ def test_a_reply_that_came_too_late_was_paid_for(context: Context, sweep) -> Non
     assert budget.spent_requests == 1
 
 
-def test_a_stopped_sweep_passes_on_what_another_wants_and_holds_the_rest(
-    context: Context, sweep
-) -> None:
+def test_a_stopped_sweep_passes_on_what_another_wants_and_holds_the_rest(context, sweep) -> None:
     sweep(0, 1, max_requests=1)
     sweep(1, 2, name="sweep_b", owner="key_b")
     with context.store.lifecycle.command() as connection:
@@ -137,7 +135,7 @@ def test_a_stopped_sweep_passes_on_what_another_wants_and_holds_the_rest(
     assert context.store.jobs.get(jobs[0].id).state == "queued"
 
 
-def test_a_held_job_that_is_wanted_again_is_paid_by_who_wants_it(context: Context, sweep) -> None:
+def test_a_held_job_that_is_wanted_again_is_paid_by_who_wants_it(context, sweep) -> None:
     sweep(0, max_requests=1)
     with context.store.lifecycle.command() as connection:
         context.store.lifecycle.exhaust("sweep_a", "used up", connection=connection)
@@ -146,7 +144,7 @@ def test_a_held_job_that_is_wanted_again_is_paid_by_who_wants_it(context: Contex
     assert (job.state, job.payer) == ("queued", "sweep_b")
 
 
-def test_many_workers_together_never_reserve_more_than_there_is(context: Context, sweep) -> None:
+def test_many_workers_together_never_reserve_more_than_there_is(context, sweep) -> None:
     name = sweep(*range(8), owner="key_k", max_requests=20)
     set_budget(context, "key_k", max_requests=25)
     leases = [claim(context) for _ in range(8)]

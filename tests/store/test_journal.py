@@ -7,7 +7,6 @@ import pytest
 from sqlalchemy.exc import IntegrityError
 from support.jobs import claim, execute, journal_entry, set_budget
 
-from buildarena_pipeline.runtime.context import Context
 from buildarena_store import JournalEntry, Usage
 from buildarena_store.jobs.journal import MAX_USD
 
@@ -20,7 +19,7 @@ def entry(sequence: int) -> JournalEntry:
     return journal_entry(sequence, reply={"text": "ü"}, usage=USAGE, tries=2)
 
 
-def test_a_reply_and_its_cost_are_written_together(context: Context, add) -> None:
+def test_a_reply_and_its_cost_are_written_together(context, add) -> None:
     (job_id,) = add(1)
     lease = claim(context)
     context.store.journal.append(lease, entry(0))
@@ -36,7 +35,7 @@ def test_a_reply_and_its_cost_are_written_together(context: Context, add) -> Non
 
 
 @pytest.mark.parametrize("finish", ["garbage", "out_of_time"])
-def test_what_is_no_answer_is_paid_for_and_no_progress(context: Context, add, finish) -> None:
+def test_what_is_no_answer_is_paid_for_and_no_progress(context, add, finish) -> None:
     (job_id,) = add(1)
     lease = claim(context)
     execute(context, "UPDATE jobs SET faults = 3")
@@ -47,7 +46,7 @@ def test_what_is_no_answer_is_paid_for_and_no_progress(context: Context, add, fi
     assert context.store.jobs.get(job_id).faults == 0
 
 
-def test_sums_that_a_provider_claims_never_overflow(context: Context, add) -> None:
+def test_sums_that_a_provider_claims_never_overflow(context, add) -> None:
     (job_id,) = add(1)
     execute(context, "UPDATE jobs SET payer = 'sweep_x'")
     set_budget(context, "sweep_x", max_requests=99)

@@ -12,7 +12,7 @@ from buildarena_pipeline.runtime.context import Context
 from buildarena_store import Leases, StaleLeaseError
 
 
-def test_a_job_is_leased_to_one_worker_at_a_time(context: Context, add) -> None:
+def test_a_job_is_leased_to_one_worker_at_a_time(context, add) -> None:
     add(*range(20))
     taken: list[str] = []
 
@@ -38,14 +38,14 @@ def test_the_hinted_job_is_taken_first_and_a_recovered_one_before_it(context, ad
     assert claim(context, hint=first).job.id in {lost.job.id, third}
 
 
-def test_a_hint_that_is_gone_still_brings_another_job(context: Context, add) -> None:
+def test_a_hint_that_is_gone_still_brings_another_job(context, add) -> None:
     (only,) = add(1)
     assert claim(context, hint="job_gone").job.id == only
     assert context.store.leases.claim("construct", owner="w") is None
     assert context.store.leases.claim("simulate.mujoco", owner="w") is None
 
 
-def test_a_stale_lease_can_write_nothing(context: Context, add) -> None:
+def test_a_stale_lease_can_write_nothing(context, add) -> None:
     (job_id,) = add(1)
     stale = claim(context, "slow")
     expire_leases(context)
@@ -65,7 +65,7 @@ def test_a_stale_lease_can_write_nothing(context: Context, add) -> None:
     assert (job.outcome, job.indicator) == ("success", 7.5)
 
 
-def test_a_scored_job_cannot_be_scored_again(context: Context, add) -> None:
+def test_a_scored_job_cannot_be_scored_again(context, add) -> None:
     add(1)
     lease = claim(context)
     finish(context, lease)
@@ -74,7 +74,7 @@ def test_a_scored_job_cannot_be_scored_again(context: Context, add) -> None:
     assert context.store.leases.claim("construct", owner="w") is None
 
 
-def test_heartbeats_keep_a_lease_and_say_of_lost_ones(context: Context, add) -> None:
+def test_heartbeats_keep_a_lease_and_say_of_lost_ones(context, add) -> None:
     add(1, 2)
     kept, lost = claim(context), claim(context)
     cancel(context, lost.job.id)
@@ -85,7 +85,7 @@ def test_heartbeats_keep_a_lease_and_say_of_lost_ones(context: Context, add) -> 
     assert context.store.leases.recover() == [kept.job.id]
 
 
-def test_a_job_that_keeps_losing_its_workers_is_given_up(context: Context, add) -> None:
+def test_a_job_that_keeps_losing_its_workers_is_given_up(context, add) -> None:
     (job_id,) = add(1)
     leases = Leases(context.store.database, duration_s=1, max_faults=2)
     for _ in range(2):
@@ -97,7 +97,7 @@ def test_a_job_that_keeps_losing_its_workers_is_given_up(context: Context, add) 
     assert [attempt.result for attempt in context.store.jobs.attempts(job_id)] == ["lost", "lost"]
 
 
-def test_a_fault_waits_before_the_next_attempt(context: Context, add) -> None:
+def test_a_fault_waits_before_the_next_attempt(context, add) -> None:
     add(1)
     lease = claim(context)
     assert context.store.leases.fault(lease, "outage", delay_s=30, reason="provider_outage")
@@ -105,20 +105,20 @@ def test_a_fault_waits_before_the_next_attempt(context: Context, add) -> None:
     assert context.store.leases.to_notify("construct", 10) == []
 
 
-def test_handing_back_is_no_fault(context: Context, add) -> None:
+def test_handing_back_is_no_fault(context, add) -> None:
     (job_id,) = add(1)
     context.store.leases.hand_back(claim(context))
     job = context.store.jobs.get(job_id)
     assert (job.state, job.faults) == ("queued", 0)
 
 
-def test_workers_are_notified_of_waiting_jobs_once(context: Context, add) -> None:
+def test_workers_are_notified_of_waiting_jobs_once(context, add) -> None:
     ids = add(1, 2, 3)
     assert set(context.store.leases.to_notify("construct", 10)) == set(ids)
     assert context.store.leases.to_notify("construct", 10) == []
 
 
-def test_a_cancelled_job_frees_its_worker(context: Context, add) -> None:
+def test_a_cancelled_job_frees_its_worker(context, add) -> None:
     (job_id,) = add(1)
     lease = claim(context)
     cancel(context, job_id)
@@ -127,7 +127,7 @@ def test_a_cancelled_job_frees_its_worker(context: Context, add) -> None:
     assert context.store.jobs.get(job_id).outcome == "cancelled"
 
 
-def test_a_job_that_gets_on_is_not_given_up(context: Context, add) -> None:
+def test_a_job_that_gets_on_is_not_given_up(context, add) -> None:
     (job_id,) = add(1)
     leases = Leases(context.store.database, duration_s=1, max_faults=2)
     for sequence in range(4):
@@ -146,7 +146,7 @@ def owned(context: Context, add, owners: list[str | None]) -> list[str]:
     return ids
 
 
-def test_owners_take_turns(context: Context, add) -> None:
+def test_owners_take_turns(context, add) -> None:
     owned(context, add, ["a"] * 4 + ["b"] * 2 + [None, "c"])
     taken, last = [], None
     for _ in range(8):
@@ -158,7 +158,7 @@ def test_owners_take_turns(context: Context, add) -> None:
     assert context.store.leases.claim("construct", owner="w", last="a") is None
 
 
-def test_a_hint_does_not_jump_the_turn_of_another_owner(context: Context, add) -> None:
+def test_a_hint_does_not_jump_the_turn_of_another_owner(context, add) -> None:
     mine = owned(context, add, ["a", "a", "a", "b"])
     claim = context.store.leases.claim
     assert claim("construct", owner="w", hint=mine[2], last="b").job.id == mine[2]
@@ -167,7 +167,7 @@ def test_a_hint_does_not_jump_the_turn_of_another_owner(context: Context, add) -
 
 
 @pytest.mark.parametrize("faults", [0, 1])
-def test_jobs_of_full_owners_wait_whatever_names_them(context: Context, add, faults) -> None:
+def test_jobs_of_full_owners_wait_whatever_names_them(context, add, faults) -> None:
     a, b, operators = owned(context, add, ["a", "b", None])
     execute(context, "UPDATE jobs SET faults = :faults", {"faults": faults})
     claim = context.store.leases.claim

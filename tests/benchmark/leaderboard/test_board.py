@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import random
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 
@@ -248,7 +247,7 @@ changes = st.lists(
 
 @settings(suppress_health_check=[HealthCheck.too_slow], deadline=None, max_examples=30)
 @given(changes, st.randoms(use_true_random=False))
-def test_a_board_kept_up_to_date_equals_one_made_anew(steps, rng: random.Random) -> None:
+def test_a_board_kept_up_to_date_equals_one_made_anew(steps, rng) -> None:
     pool = [
         *trials("lift-1", "a", 4, 10),
         *trials("lift-1", "b", 6, 10),

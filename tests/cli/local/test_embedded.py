@@ -7,7 +7,6 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
-from pathlib import Path
 
 import psutil
 import pytest
@@ -19,7 +18,7 @@ from buildarena_cli.local.supervisor import LOOK_EVERY_S
 from buildarena_pipeline.errors import StartupError
 
 
-def test_a_killed_broker_is_started_again_with_its_data(tmp_path: Path) -> None:
+def test_a_killed_broker_is_started_again_with_its_data(tmp_path) -> None:
     valkey = EmbeddedValkey(tmp_path / "valkey", tmp_path / "log")
     managed = ManagedProcess(name="valkey", start=valkey.start, stop=valkey.stop)
     with Supervisor() as supervisor, Redis.from_url(valkey.url, retry=None) as client:
@@ -99,7 +98,7 @@ def test_what_dies_while_all_is_stopped_is_not_started_again(started) -> None:
     assert [process.returncode for process in started] == [-signal.SIGKILL] * 2
 
 
-def test_a_server_that_ends_at_once_is_reported(tmp_path: Path) -> None:
+def test_a_server_that_ends_at_once_is_reported(tmp_path) -> None:
     valkey = EmbeddedValkey(tmp_path / "valkey", tmp_path / "log")
     process = valkey.start()
     try:
@@ -109,7 +108,7 @@ def test_a_server_that_ends_at_once_is_reported(tmp_path: Path) -> None:
         valkey.stop(process)
 
 
-def test_children_do_not_outlive_a_killed_parent(tmp_path: Path) -> None:
+def test_children_do_not_outlive_a_killed_parent(tmp_path) -> None:
     program = (
         "import sys, time, pathlib\n"
         "from buildarena_cli.local import EmbeddedValkey\n"

@@ -24,13 +24,7 @@ WITH_KEYS = {
 
 @dataclass(frozen=True)
 class Tenant:
-    """A key's holder.
-
-    Attributes:
-        client: The API.
-        secret: The key.
-        id: Its id.
-    """
+    """A key's holder."""
 
     client: Client
     secret: str

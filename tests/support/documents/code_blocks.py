@@ -33,19 +33,7 @@ def shown_in(document: Path) -> Iterator[Shown]:
 
 
 def run_document(document: Path, *, environment: Mapping[str, str], folder: Path) -> int:
-    """Runs all blocks of Python, in one namespace, and of bash, in a folder, in their order.
-
-    Args:
-        document: Markdown.
-        environment: Environment variables for commands.
-        folder: Where commands run.
-
-    Returns:
-        How many blocks were run.
-
-    Raises:
-        AssertionError: A block prints something else than the document shows, or a command fails.
-    """
+    """Runs all blocks of Python, in one namespace, and of bash, in a folder, in their order."""
     names: dict[str, Any] = {"__name__": "__main__"}
     count = 0
     for language, code, output in shown_in(document):

@@ -21,12 +21,7 @@ _KEYS: Final = ("UpArrow", "DownArrow", "LeftArrow", "RightArrow")
 
 
 def random_machine(task: str, seed: int) -> Machine:
-    """A machine for a task.
-
-    Args:
-        task: Name of a built-in task.
-        seed: Of the draw; equal seeds give equal machines.
-    """
+    """A machine for a task."""
     names = sorted(_DESIGNS)
     draw = np.random.default_rng([seed, names.index(task)])
     while True:

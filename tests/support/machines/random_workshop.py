@@ -57,12 +57,7 @@ _SWAPPED, _TWIST_DEG = 0.04, 4.0
 
 
 def random_workshop_machine(task: str, seed: int) -> Machine:
-    """A machine for a task of the workshop, its keys bound and its presses written.
-
-    Args:
-        task: Its name.
-        seed: Of the draw; equal seeds give equal machines.
-    """
+    """A machine for a task of the workshop, its keys bound and its presses written."""
     draw = np.random.default_rng([seed, TASKS.index(task)])
     while True:
         machine = _drawn(task, draw)

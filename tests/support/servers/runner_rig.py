@@ -133,13 +133,7 @@ def slot(
 
 @dataclass
 class Caller:
-    """Somebody who speaks the protocol by hand.
-
-    Attributes:
-        url: The API.
-        secret: The key; None for none.
-        name: What it calls itself.
-    """
+    """Somebody who speaks the protocol by hand."""
 
     url: str
     secret: str | None = None

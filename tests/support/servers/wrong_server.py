@@ -13,12 +13,7 @@ WITHIN_S = 5.0
 
 @dataclass
 class WrongServer:
-    """A server.
-
-    Attributes:
-        url: Where it is.
-        received: Every request, with its body.
-    """
+    """A server."""
 
     url: str
     received: list[bytes] = field(default_factory=list)

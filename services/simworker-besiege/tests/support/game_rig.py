@@ -12,10 +12,11 @@ from typing import Any
 from support.machines.building import BLOCK, built
 from support.player import Player
 
-from buildarena_benchmark import Task, builtin_tasks
+from buildarena_benchmark import Score, Task, builtin_tasks, score
+from buildarena_besiege import game_start
 from buildarena_geometry import Machine
 from buildarena_pipeline.runtime.simulators.simulator import Trial
-from buildarena_simulation import Scenario
+from buildarena_simulation import Scenario, simulate
 from buildarena_simworker_besiege.calibrate import TRIAL_S
 
 HERE = Path(__file__).parent
@@ -118,6 +119,13 @@ def short_trial(name: str) -> tuple[Task, Machine]:
     cargo = task.scenario.cargo and task.scenario.cargo.model_copy(update=changes)
     scenario = task.scenario.model_copy(update={"duration_s": duration_s, "cargo": cargo})
     return replace(task, scenario=scenario), experts_machine(name)
+
+
+def our_score(task: Task, machine: Machine, **more: Any) -> Score:
+    """What our engine gives the machine where it starts as in the game."""
+    start = game_start(machine, task.scenario)
+    trajectory = simulate(machine, task.scenario, "mujoco", start=start, **more)
+    return score(task, machine, trajectory)
 
 
 def trial_of(task: Task, machine: Machine, *, job_id: str = "job_0001") -> Trial:

@@ -30,11 +30,7 @@ def missing_packages() -> str:
 
 @contextmanager
 def virtual_screen(size: tuple[int, int] = (1400, 900)) -> Iterator[dict[str, str]]:
-    """A screen of a size in pixels; gives the environment of the programs that are shown there.
-
-    Raises:
-        NoScreenError: a program is missing, or the server does not start.
-    """
+    """A screen of a size in pixels; gives the environment of the programs that are shown there."""
     lacking = missing_packages()
     if lacking:
         raise NoScreenError(lacking)

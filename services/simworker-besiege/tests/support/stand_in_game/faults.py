@@ -93,11 +93,7 @@ class Fault:
 
 
 class Faults:
-    """The faults still to come.
-
-    Args:
-        faults: them, in the order in which they strike at one point.
-    """
+    """The faults still to come."""
 
     def __init__(self, faults: Iterable[Fault] = ()) -> None:
         self._faults = list(faults)
@@ -124,11 +120,7 @@ class Faults:
 
 
 def read_faults(path: Path) -> list[Fault]:
-    """The faults of a file: a JSON list of objects with "fault" and what else is told.
-
-    Raises:
-        FaultError: an entry is not one.
-    """
+    """The faults of a file: a JSON list of objects with "fault" and what else is told."""
     entries = json.loads(path.read_text())
     if not isinstance(entries, list):
         raise FaultError("a file of faults is a list of objects")

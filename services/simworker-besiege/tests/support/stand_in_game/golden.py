@@ -58,11 +58,7 @@ class Run:
 
 
 def read_run(path: Path, games: Path) -> Run:
-    """The run of a machine file.
-
-    Raises:
-        GameFileError: It is no machine file, has no script, or none that was recorded.
-    """
+    """The run of a machine file."""
     try:
         root = ET.fromstring(path.read_bytes())
     except (OSError, ET.ParseError) as error:

@@ -15,11 +15,7 @@ KEPT: Final = 400
 
 
 class LogWindow:
-    """What the log window shows.
-
-    Args:
-        file: where every line is written as well, as by a mod that keeps a log.
-    """
+    """What the log window shows."""
 
     def __init__(self, file: Path | None = None) -> None:
         self._file = file
