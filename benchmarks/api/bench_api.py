@@ -5,8 +5,6 @@ percentile below 100 ms; 500 listeners of one sweep's events; at most 15 ms of p
 job for everything but session and simulation.
 """
 
-from __future__ import annotations
-
 import argparse
 import asyncio
 import json

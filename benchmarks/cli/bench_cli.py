@@ -6,8 +6,6 @@ connection of its own, sent by this process. All are measured in turns, so that 
 the machine meets all alike.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

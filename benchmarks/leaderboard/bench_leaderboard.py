@@ -5,8 +5,6 @@ ended, and with filters that were never asked for before. A process of its own m
 and memory of a full recomputation.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import random

@@ -4,8 +4,6 @@ Everything is asked over HTTP, but for claims and the reaper's statements, which
 themselves. The database is made in a temporary folder and is gone afterwards.
 """
 
-from __future__ import annotations
-
 import argparse
 import itertools
 import json

@@ -3,8 +3,6 @@
 Prints its figures as JSON. How it is measured: `benchmarks/api/overhead.py`.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

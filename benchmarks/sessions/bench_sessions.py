@@ -5,8 +5,6 @@ latency. A turn's milliseconds are processor time of the construct process, all 
 together, over all turns; the database, the broker and the model are other processes.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import math

@@ -4,8 +4,6 @@ Runs a whole service whose models answer after a while, and counts what its proc
 Valkey used for the jobs of one sweep. The sizing model (sizing_model.py) multiplies these costs.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

@@ -5,8 +5,6 @@ turns and its trials. Costs are means on processors like the ones that were meas
 planned for the share of a processor in USED, so that queues stay short. Print it: `make sizing`.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import math

@@ -5,8 +5,6 @@ many boards of models that are alike call one of them better; and how often a mo
 is called so.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

@@ -1,7 +1,5 @@
 """How usable a sweep's page is at 10,000 jobs while they end: load, long tasks, clicks, memory."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

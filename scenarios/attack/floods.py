@@ -4,8 +4,6 @@
 attacker is a process of its own, so that it does not slow the measurement itself.
 """
 
-from __future__ import annotations
-
 import asyncio
 import statistics
 import subprocess

@@ -1,7 +1,5 @@
 """Fire: processes are killed and restarted at random, and messages come twice."""
 
-from __future__ import annotations
-
 import contextlib
 import math
 import os

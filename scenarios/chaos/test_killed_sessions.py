@@ -1,7 +1,5 @@
 """A construct worker is killed again and again; no reply is paid for twice."""
 
-from __future__ import annotations
-
 import os
 import random
 import signal

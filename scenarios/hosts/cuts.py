@@ -1,7 +1,5 @@
 """Links that are taken down at random, and how long it takes until all is well again."""
 
-from __future__ import annotations
-
 import random
 import threading
 import time

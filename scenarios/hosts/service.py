@@ -1,7 +1,5 @@
 """A whole service, each of whose programs runs on a host of its own."""
 
-from __future__ import annotations
-
 import logging
 import os
 import subprocess

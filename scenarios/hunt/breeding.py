@@ -1,7 +1,5 @@
 """Children of genomes: made and tried in worker processes, which need not load the archive."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

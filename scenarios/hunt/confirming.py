@@ -1,7 +1,5 @@
 """Confirming what the search found: full length, both engines, and a few seeds."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The gallery: a folder with the archives, the confirmed machines and an index of them."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass

@@ -3,8 +3,6 @@
 See docs/hunting.md. Run as `make hunt`, or `python -m scenarios.hunt.run --help`.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import sys

@@ -1,7 +1,5 @@
 """The search: per task an archive that keeps the best of every kind of machine (MAP-Elites)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from multiprocessing import get_context
 from typing import Final, Self, TypeVar

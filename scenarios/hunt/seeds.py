@@ -1,7 +1,5 @@
 """What the search starts from: the reference machines and the past exploits of a category."""
 
-from __future__ import annotations
-
 import json
 import sys
 from collections.abc import Iterator

@@ -4,8 +4,6 @@ A check may be wrong: it says that somebody should look. Where a machine was tri
 or with several seeds, all trials are looked at.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The search finds what can be found, says so, and does the same again."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 

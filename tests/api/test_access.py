@@ -1,7 +1,5 @@
 """Keys, scopes, owners and rate limits."""
 
-from __future__ import annotations
-
 import pytest
 from pydantic import SecretStr
 from support.clients.tenants import ADMIN, WITH_KEYS

@@ -1,7 +1,5 @@
 """The service behind a reverse proxy: below a path, under an outer name, and over slow pieces."""
 
-from __future__ import annotations
-
 import json
 import time
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Boards that processes share equal boards that are made from every ended job in the plain way."""
 
-from __future__ import annotations
-
 import json
 import random
 from contextlib import ExitStack

@@ -1,7 +1,5 @@
 """The whole OpenAPI contract under generated requests: no 5xx, no undocumented answer."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path

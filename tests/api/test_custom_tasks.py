@@ -1,7 +1,5 @@
 """Custom tasks on the leaderboard and in exports: beside the built-in ones, never mixed in."""
 
-from __future__ import annotations
-
 import csv
 import io
 

@@ -1,7 +1,5 @@
 """The dashboard's pages as the API serves them, and what they may never stand in the place of."""
 
-from __future__ import annotations
-
 import gzip
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Metrics of a board as data: the page and the report never differ."""
 
-from __future__ import annotations
-
 import pytest
 from support.jobs import claim, execute, finish, journal_entry
 

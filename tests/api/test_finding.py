@@ -1,7 +1,5 @@
 """Finding jobs and sweeps: filters, beginnings of ids, and the artifacts of a job."""
 
-from __future__ import annotations
-
 import hashlib
 
 import pytest

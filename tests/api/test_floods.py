@@ -1,7 +1,5 @@
 """One caller cannot take the API down: bounds per key, through real HTTP with two keys."""
 
-from __future__ import annotations
-
 import json
 import threading
 import time

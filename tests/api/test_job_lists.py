@@ -1,7 +1,5 @@
 """Lists of jobs: sorted, filtered, and paged without losing or doubling any."""
 
-from __future__ import annotations
-
 import base64
 import json
 

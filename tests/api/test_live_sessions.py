@@ -1,7 +1,5 @@
 """Sessions under way: their turns as events, their transcript and their replay."""
 
-from __future__ import annotations
-
 import json
 import threading
 import time

@@ -1,7 +1,5 @@
 """Machines that come as files: looked at, checked, tried; hostile ones refused in words."""
 
-from __future__ import annotations
-
 import gzip
 import json
 import zlib

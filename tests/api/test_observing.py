@@ -1,7 +1,5 @@
 """Metrics, the request log and health: what an operator sees."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from datetime import UTC, datetime, timedelta

@@ -1,7 +1,5 @@
 """How machines came about: replays of models' and agents' sessions."""
 
-from __future__ import annotations
-
 import pytest
 from support.jobs import attach
 from support.stages import work

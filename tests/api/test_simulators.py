@@ -1,7 +1,5 @@
 """What jobs can name as their simulator, as the API lists it."""
 
-from __future__ import annotations
-
 import pytest
 from support.jobs import report_worker
 

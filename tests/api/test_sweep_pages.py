@@ -1,7 +1,5 @@
 """What pages about sweeps are made of: who asks, what went wrong, what changed, two in pairs."""
 
-from __future__ import annotations
-
 import pytest
 from support.clients.tenants import new_tenant, operator
 from support.jobs import claim, execute, finish

@@ -1,7 +1,5 @@
 """Trajectories as Arrow, and scenes: a page can draw a trial without knowing physics."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

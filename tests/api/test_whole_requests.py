@@ -1,7 +1,5 @@
 """Requests are whole and meant: bodies, names, pages, depth, methods, proxies."""
 
-from __future__ import annotations
-
 import json
 import re
 import socket

@@ -1,7 +1,5 @@
 """What a task allows is checked on the finished machine."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import pytest

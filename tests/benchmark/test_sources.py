@@ -1,7 +1,5 @@
 """YAML texts of strangers: nothing in them makes reading costly, and every fault has its line."""
 
-from __future__ import annotations
-
 import time
 
 import pytest

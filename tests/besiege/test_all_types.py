@@ -1,7 +1,5 @@
 """Every module type goes out to the game's files and comes back."""
 
-from __future__ import annotations
-
 from xml.etree import ElementTree as ET
 
 import pytest

@@ -1,7 +1,5 @@
 """Scripts do in every Lua what the published ones do, and what the control sequence says."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st

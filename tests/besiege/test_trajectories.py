@@ -1,7 +1,5 @@
 """Logs become trajectories in our world frame; what is missing is said."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

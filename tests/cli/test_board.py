@@ -1,7 +1,5 @@
 """The leaderboard's commands against a live API with a sweep of made-up results."""
 
-from __future__ import annotations
-
 import csv
 import json
 import random

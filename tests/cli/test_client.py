@@ -1,7 +1,5 @@
 """What commands say to a server that is not BuildArena, breaks off, or is none at all."""
 
-from __future__ import annotations
-
 import pytest
 from support.servers.wrong_server import answer, wrong_server
 

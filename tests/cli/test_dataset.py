@@ -1,7 +1,5 @@
 """Jobs as a dataset: what the `datasets` library loads is what the service keeps, row by row."""
 
-from __future__ import annotations
-
 import json
 import re
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Ids: a unique prefix is enough, nonsense never becomes part of a path, files come whole."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """What the command line says of results that were imported, and of limits."""
 
-from __future__ import annotations
-
 from support.clients.commands import printed
 from support.servers.databases import empty
 from support.stages import work

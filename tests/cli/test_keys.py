@@ -1,7 +1,5 @@
 """Keys and budgets as an operator and a researcher use them, against a real API."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterator
 

@@ -1,7 +1,5 @@
 """A real MCP client builds a bridge over stdio and gets its score."""
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import json

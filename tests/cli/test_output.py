@@ -1,7 +1,5 @@
 """Tables: whole through a pipe; on a terminal, columns give way in their order and ids never do."""
 
-from __future__ import annotations
-
 import pytest
 from support.clients.commands import printed
 from support.clients.terminals import on_terminal, piped

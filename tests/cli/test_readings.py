@@ -1,7 +1,5 @@
 """Both readings of flags, and what is only known to be at least, wherever figures are shown."""
 
-from __future__ import annotations
-
 import csv
 import json
 

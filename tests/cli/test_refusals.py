@@ -1,7 +1,5 @@
 """What cannot work is refused with one clear sentence, the right exit code and nothing left."""
 
-from __future__ import annotations
-
 import os
 import socket
 import subprocess

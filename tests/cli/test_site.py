@@ -1,7 +1,5 @@
 """A published site holds exactly what the service answers, and is whole or not there."""
 
-from __future__ import annotations
-
 import errno
 import json
 import re

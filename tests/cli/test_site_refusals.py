@@ -1,7 +1,5 @@
 """What a site is refused for, and which jobs it keeps whole."""
 
-from __future__ import annotations
-
 import fcntl
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Sweep files: every mistake named with line and field, flags, and the published schema."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The commands of tasks: check without a server, add, list, show."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What an external agent did not report is a dash, and null for programs: never 0."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json

@@ -1,7 +1,5 @@
 """What only the asynchronous client does: many requests at once, and being cancelled."""
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 

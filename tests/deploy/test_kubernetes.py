@@ -1,7 +1,5 @@
 """The manifests for Kubernetes: valid, and as closed as they say."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

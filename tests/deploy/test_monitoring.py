@@ -1,7 +1,5 @@
 """Alert rules, their runbook and the dashboards: well formed, and of metrics that there are."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Prometheus itself reads a service with our configuration, and evaluates every rule and panel."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import subprocess

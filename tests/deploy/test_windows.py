@@ -1,7 +1,5 @@
 """The scripts for a Windows machine: PowerShell, and of commands and functions that there are."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

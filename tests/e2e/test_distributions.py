@@ -1,7 +1,5 @@
 """What users install: wheels of one version, and a demo, a report and pages from them alone."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

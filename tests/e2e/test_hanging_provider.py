@@ -1,7 +1,5 @@
 """A whole service with two keys: the sessions of one hang, those of the other go on."""
 
-from __future__ import annotations
-
 import time
 
 import httpx

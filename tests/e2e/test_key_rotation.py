@@ -1,7 +1,5 @@
 """The operator's key and a researcher's are replaced while a sweep runs; no job is lost by it."""
 
-from __future__ import annotations
-
 import threading
 from contextlib import ExitStack
 

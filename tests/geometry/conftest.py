@@ -1,7 +1,5 @@
 """What the geometry tests share: where their data is, and a way to build machines in one line."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Answers tell what is: what holds, what heats what, which face looks where, what was meant."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

@@ -1,7 +1,5 @@
 """Whole machines as parts of an assembly."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

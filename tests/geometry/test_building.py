@@ -1,7 +1,5 @@
 """Attaching, connecting and removing."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from support.machines.building import BLOCK, attach, connect

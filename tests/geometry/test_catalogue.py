@@ -1,7 +1,5 @@
 """The module catalogue, and files that extend it."""
 
-from __future__ import annotations
-
 import copy
 import json
 

@@ -5,8 +5,6 @@ a change needs a new FEEDBACK_VERSION, and then `BUILDARENA_WRITE_GOLDENS=1 pyte
 writes the golden file anew.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -1,7 +1,5 @@
 """What holds for every machine, whatever was done to it."""
 
-from __future__ import annotations
-
 import itertools
 import json
 

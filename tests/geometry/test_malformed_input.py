@@ -1,7 +1,5 @@
 """Whatever arrives, the dispatcher answers and the machine stays sound."""
 
-from __future__ import annotations
-
 import json
 import math
 import random

@@ -1,7 +1,5 @@
 """Mass, centre of mass, bounds."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from support.machines.building import connect

@@ -1,7 +1,5 @@
 """The sets of modules, and the rules that further types bring."""
 
-from __future__ import annotations
-
 import itertools
 import json
 import math

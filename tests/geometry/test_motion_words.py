@@ -1,7 +1,5 @@
 """What builders read of the free axes, wings and fans of further types."""
 
-from __future__ import annotations
-
 import pytest
 from support.machines.building import built
 

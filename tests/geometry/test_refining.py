@@ -1,7 +1,5 @@
 """Twisting, shifting, flipping, and what it does to joints."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from support.machines.building import connect

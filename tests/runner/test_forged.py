@@ -1,7 +1,5 @@
 """Nothing that a runner sends is believed: forged, stale and repeated outcomes change nothing."""
 
-from __future__ import annotations
-
 import io
 import json
 from collections.abc import Callable

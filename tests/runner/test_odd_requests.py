@@ -1,7 +1,5 @@
 """The runner protocol's part of the contract under generated requests of one who may."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """What the JSON columns of an archive's rows may hold."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A sweep out of one service and into another."""
 
-from __future__ import annotations
-
 import json
 import tracemalloc
 import zipfile

@@ -1,7 +1,5 @@
 """Garbage collection removes what nothing refers to, late, and never anything else."""
 
-from __future__ import annotations
-
 import os
 import time
 from datetime import timedelta

@@ -1,7 +1,5 @@
 """Histories leave the tables and come back as they were, to the byte."""
 
-from __future__ import annotations
-
 from datetime import timedelta
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Another login of the database's owner: how its password is changed while processes run."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 

@@ -1,7 +1,5 @@
 """A database of the version before: it is migrated, and its jobs stay as they were and verify."""
 
-from __future__ import annotations
-
 import json
 import os
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Jobs that are brought to a point of their lives by hand, without a worker."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from sqlalchemy import text

@@ -1,7 +1,5 @@
 """The job's page against what really happens: random machines, live sessions, processes killed."""
 
-from __future__ import annotations
-
 import json
 
 import httpx

@@ -1,7 +1,5 @@
 """The dashboard in a real browser, against the whole service."""
 
-from __future__ import annotations
-
 import subprocess
 
 import httpx

@@ -1,7 +1,5 @@
 """A published site in a real browser, from a plain file server, under a sub-path."""
 
-from __future__ import annotations
-
 import subprocess
 import threading
 from collections.abc import Iterator

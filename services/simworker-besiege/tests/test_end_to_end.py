@@ -1,7 +1,5 @@
 """From a submission over the queue and the window of the game to a score that can be verified."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """A game without a window, driven over TCP."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """A runner killed at any step: the next one cleans up and plays the run again."""
 
-from __future__ import annotations
-
 import json
 import os
 import random

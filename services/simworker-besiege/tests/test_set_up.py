@@ -1,7 +1,5 @@
 """Calibration, examination and refusals of a machine that is not set up."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

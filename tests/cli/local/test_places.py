@@ -1,7 +1,5 @@
 """The servers start wherever a clone lies, whoever uses it, and leave nothing behind."""
 
-from __future__ import annotations
-
 import dataclasses
 import signal
 

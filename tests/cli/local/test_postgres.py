@@ -1,7 +1,5 @@
 """What goes wrong around the embedded Postgres, and what it leaves behind."""
 
-from __future__ import annotations
-
 import fcntl
 import os
 import subprocess

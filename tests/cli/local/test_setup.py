@@ -1,7 +1,5 @@
 """Set-up with a uv that only notes what it is asked and fails as wished."""
 
-from __future__ import annotations
-
 import os
 import shlex
 import shutil

@@ -1,7 +1,5 @@
 """Machine documents: what they hold, and what they refuse."""
 
-from __future__ import annotations
-
 import copy
 import json
 import math

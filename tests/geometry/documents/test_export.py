@@ -1,7 +1,5 @@
 """Machines as GLB files and SVG drawings."""
 
-from __future__ import annotations
-
 import json
 import struct
 import xml.etree.ElementTree as ET

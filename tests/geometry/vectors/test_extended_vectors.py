@@ -1,7 +1,5 @@
 """Records of the further types replay in the words of the interface they were made with."""
 
-from __future__ import annotations
-
 import gzip
 import json
 import math

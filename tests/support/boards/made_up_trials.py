@@ -1,7 +1,5 @@
 """Made-up trials of models whose true figures are known: what intervals and claims are tried on."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations

@@ -1,7 +1,5 @@
 """Boards made in the plain way, from all ended jobs one by one: what the kept ones must equal."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Both clients behind one face, so that one test speaks of both."""
 
-from __future__ import annotations
-
 import asyncio
 import inspect
 from collections.abc import AsyncIterator, Iterator

@@ -1,7 +1,5 @@
 """Tenants of a service that asks for keys: each a key with its own requests."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Runs what a document shows, word for word, and compares what it says it prints."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import re

@@ -4,8 +4,6 @@ Each is a design that answers its task, with other parts here and there, parts m
 a little off, and keys that are pressed sooner, later, longer or shorter.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, Final

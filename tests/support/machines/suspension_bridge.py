@@ -1,7 +1,5 @@
 """A suspension bridge of our own design: a deck that hangs by ropes from two towers."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from buildarena_worker.builtin.designs.drafting import (

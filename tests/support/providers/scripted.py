@@ -1,7 +1,5 @@
 """Models for session tests: some reply as scripted, some remember what they were asked."""
 
-from __future__ import annotations
-
 from buildarena_store import Usage
 from buildarena_worker.builtin import BuiltinClient
 from buildarena_worker.session.messages import Completion, Reply, Request, ToolCall

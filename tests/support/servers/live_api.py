@@ -1,7 +1,5 @@
 """The API in the test's process: over real HTTP in a thread, or called as a function."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Runners of tests: real ones, and those that say what they like."""
 
-from __future__ import annotations
-
 import hashlib
 import threading
 from collections.abc import Iterator

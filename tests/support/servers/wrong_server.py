@@ -1,7 +1,5 @@
 """A server that answers as it is told, rightly or wrongly, and keeps what it was sent."""
 
-from __future__ import annotations
-
 import socket
 import threading
 from collections.abc import Iterator, Sequence

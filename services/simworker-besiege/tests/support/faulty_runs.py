@@ -3,8 +3,6 @@
 A program of its own, because PyAutoGUI takes the screen that its process was started with.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

@@ -1,7 +1,5 @@
 """A runner of the game and the stand-in that it plays, in a folder and on a screen of their own."""
 
-from __future__ import annotations
-
 import json
 import os
 import sys

@@ -1,7 +1,5 @@
 """A screen without a monitor: Xvfb on a display of its own."""
 
-from __future__ import annotations
-
 import os
 import select
 import shutil

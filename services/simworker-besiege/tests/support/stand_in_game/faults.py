@@ -1,7 +1,5 @@
 """Faults on demand: what goes wrong, when, and how often."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """The game behind the window: what is loaded, what runs, what the log says."""
 
-from __future__ import annotations
-
 import random
 from dataclasses import dataclass
 from pathlib import Path

@@ -4,8 +4,6 @@ A golden log has each line once, without the run's mark in front and the check s
 a game without a window stand below them.
 """
 
-from __future__ import annotations
-
 import gzip
 import re
 from dataclasses import dataclass

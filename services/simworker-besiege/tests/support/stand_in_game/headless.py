@@ -5,8 +5,6 @@ are lines on standard output, "[Info   :BesiegeAgent] SendMessage: <message>". A
 command is told on standard output too and otherwise passed over, as are commands at a wrong time.
 """
 
-from __future__ import annotations
-
 import os
 import selectors
 import socket

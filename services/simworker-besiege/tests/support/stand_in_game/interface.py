@@ -1,7 +1,5 @@
 """What the window's panels and the keyboard do, apart from any toolkit."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Where everything is in the window, in fractions of its width and height."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Final
 

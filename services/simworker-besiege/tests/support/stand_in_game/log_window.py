@@ -1,7 +1,5 @@
 """The mod's log window: newest line first, a limited number of lines."""
 
-from __future__ import annotations
-
 import random
 from collections import deque
 from collections.abc import Sequence

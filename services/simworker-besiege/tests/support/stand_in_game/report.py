@@ -1,7 +1,5 @@
 """The report: a file that says what the game is doing, for whoever watches it."""
 
-from __future__ import annotations
-
 import json
 import os
 from pathlib import Path
