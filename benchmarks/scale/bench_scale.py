@@ -6,7 +6,6 @@ themselves. The database is made in a temporary folder and is gone afterwards.
 
 import argparse
 import itertools
-import json
 import os
 import shutil
 import statistics
@@ -20,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import httpx
+from benchmarks.figures import keep
 from benchmarks.scale.filling import TRACKS, Amount, fill
 from sqlalchemy import text
 
@@ -282,9 +282,7 @@ def main() -> None:
         shutil.rmtree(folder, ignore_errors=True)
     for name, value in result.items():
         sys.stdout.write(f"{name:<34} {value}\n")
-    if given.json:
-        given.json.parent.mkdir(parents=True, exist_ok=True)
-        given.json.write_text(json.dumps(result, indent=2) + "\n")
+    keep(result, given.json)
 
 
 if __name__ == "__main__":

@@ -6,13 +6,13 @@ is called so.
 """
 
 import argparse
-import json
 import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from benchmarks.figures import keep
 from scipy.stats import binom
 from support.boards.made_up_trials import (
     LOADS,
@@ -171,9 +171,7 @@ def main() -> None:
         for rise in (0.1, 0.2, 0.3, 0.4)
     ]
     show("One model better than eleven: how often it is called so", result["power"])  # type: ignore[arg-type]
-    if given.json:
-        given.json.parent.mkdir(parents=True, exist_ok=True)
-        given.json.write_text(json.dumps(result, indent=2) + "\n")
+    keep(result, given.json)
 
 
 if __name__ == "__main__":
