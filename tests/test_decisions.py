@@ -1,7 +1,5 @@
 """Decisions have one form, and their index tells of each."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What documents name exists: links, files, modules, make targets and commands."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """docs/extending.md, word for word: each of its distributions is installed and used."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -5,14 +5,10 @@ percentile below 100 ms; 500 listeners of one sweep's events; at most 15 ms of p
 job for everything but session and simulation.
 """
 
-from __future__ import annotations
-
 import argparse
 import asyncio
-import json
 import os
 import statistics
-import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -20,6 +16,7 @@ from typing import Any
 import httpx
 import psutil
 from benchmarks.api.overhead import measure_overhead
+from benchmarks.figures import tell
 from support.servers.api_process import api_process
 
 MEBIBYTE = 1024 * 1024
@@ -44,11 +41,7 @@ def main() -> None:
         figures["submitting"] = asyncio.run(_submit_steadily(url, given.rate, given.seconds))
         figures["listeners"] = asyncio.run(_listen(url, given.listeners, psutil.Process(pid)))
     figures["overhead"] = measure_overhead(given.overhead_jobs)
-    text = json.dumps(figures, indent=2) + "\n"
-    sys.stdout.write(text)
-    if given.json is not None:
-        given.json.parent.mkdir(parents=True, exist_ok=True)
-        given.json.write_text(text)
+    tell(figures, given.json)
 
 
 def _large_sweeps(url: str, jobs: int) -> dict[str, Any]:

@@ -1,7 +1,5 @@
 """A workflow that asks its model once and attaches one block: next to nothing but pipeline."""
 
-from __future__ import annotations
-
 from buildarena_geometry import Machine
 from buildarena_worker.session.dialogue import Dialogue, Role
 from buildarena_worker.session.session import Session

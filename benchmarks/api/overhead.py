@@ -4,8 +4,6 @@ The jobs have a session of one request and a trial of 0.4 s, so that little is t
 off. What further turns cost is measured by bench-sessions.
 """
 
-from __future__ import annotations
-
 import tempfile
 import time
 from collections import Counter

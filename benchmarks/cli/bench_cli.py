@@ -6,10 +6,7 @@ connection of its own, sent by this process. All are measured in turns, so that 
 the machine meets all alike.
 """
 
-from __future__ import annotations
-
 import argparse
-import json
 import os
 import statistics
 import subprocess
@@ -20,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import httpx
+from benchmarks.figures import tell
 from support.servers.api_process import api_process
 
 BUILDARENA = str(Path(sys.executable).parent / "buildarena")
@@ -42,11 +40,7 @@ def main() -> None:
     given = parser.parse_args()
     with api_process() as (url, _):
         figures = measured(url, given.rounds)
-    text = json.dumps(figures, indent=2) + "\n"
-    sys.stdout.write(text)
-    if given.json is not None:
-        given.json.parent.mkdir(parents=True, exist_ok=True)
-        given.json.write_text(text)
+    tell(figures, given.json)
 
 
 def measured(url: str, rounds: int) -> dict[str, Any]:

@@ -13,6 +13,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from benchmarks.figures import keep
+
 from buildarena_environment import Environment, Evaluator
 from buildarena_geometry import Machine
 from buildarena_worker.builtin.designs.drafting import EAST, NORTH, SOUTH, UP, Draft
@@ -45,9 +47,7 @@ def main() -> int:
         bar = f"  [{BARS[name]:g}]" if name in BARS else ""
         shown = json.dumps(value) if isinstance(value, dict) else f"{value:,.3f}"
         print(f"{name:36} {shown}{bar}")  # noqa: T201
-    if options.json:
-        options.json.parent.mkdir(parents=True, exist_ok=True)
-        options.json.write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
+    keep(figures, options.json)
     return 0
 
 

@@ -6,7 +6,6 @@ Run it with `make bench-geometry`. Exit code 1 says that a figure missed its bar
 from __future__ import annotations
 
 import argparse
-import json
 import random
 import statistics
 import subprocess
@@ -15,6 +14,8 @@ import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from benchmarks.figures import keep
 
 from buildarena_geometry import Machine, module_set, replay
 
@@ -218,10 +219,7 @@ def main() -> int:
         verdict = "ok  " if figure.met else "MISS"
         rendered = f"{figure.value:.3g} {figure.unit}, bar {figure.bar:g}{beside}"
         sys.stdout.write(f"{verdict} {figure.name}: {rendered}\n")
-    if options.json:
-        options.json.parent.mkdir(parents=True, exist_ok=True)
-        entries = [{**asdict(figure), "met": figure.met} for figure in figures]
-        options.json.write_text(json.dumps(entries, indent=1) + "\n")
+    keep([{**asdict(figure), "met": figure.met} for figure in figures], options.json)
     return 0 if all(figure.met for figure in figures) else 1
 
 

@@ -5,8 +5,6 @@ ended, and with filters that were never asked for before. A process of its own m
 and memory of a full recomputation.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import random
@@ -21,6 +19,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from benchmarks.figures import keep
 from sqlalchemy import insert, text, update
 from starlette.testclient import TestClient
 from support.servers.live_api import LOOPBACK
@@ -208,9 +207,7 @@ def main() -> None:
     result = {"jobs": given.jobs, **json.loads(done.stdout)}
     for name, value in result.items():
         sys.stdout.write(f"{name:<30} {value}\n")
-    if given.json:
-        given.json.parent.mkdir(parents=True, exist_ok=True)
-        given.json.write_text(json.dumps(result, indent=2) + "\n")
+    keep(result, given.json)
 
 
 if __name__ == "__main__":

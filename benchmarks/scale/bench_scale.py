@@ -4,11 +4,8 @@ Everything is asked over HTTP, but for claims and the reaper's statements, which
 themselves. The database is made in a temporary folder and is gone afterwards.
 """
 
-from __future__ import annotations
-
 import argparse
 import itertools
-import json
 import os
 import shutil
 import statistics
@@ -22,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import httpx
+from benchmarks.figures import keep
 from benchmarks.scale.filling import TRACKS, Amount, fill
 from sqlalchemy import text
 
@@ -284,9 +282,7 @@ def main() -> None:
         shutil.rmtree(folder, ignore_errors=True)
     for name, value in result.items():
         sys.stdout.write(f"{name:<34} {value}\n")
-    if given.json:
-        given.json.parent.mkdir(parents=True, exist_ok=True)
-        given.json.write_text(json.dumps(result, indent=2) + "\n")
+    keep(result, given.json)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,5 @@
 """Fills a database with very many jobs, as fast as the database can make them up."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass

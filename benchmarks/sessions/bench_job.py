@@ -3,15 +3,12 @@
 Prints its figures as JSON. How it is measured: `benchmarks/api/overhead.py`.
 """
 
-from __future__ import annotations
-
 import argparse
-import json
 import os
-import sys
 from pathlib import Path
 
 from benchmarks.api.overhead import measure_overhead
+from benchmarks.figures import tell
 
 
 def main() -> None:
@@ -21,11 +18,7 @@ def main() -> None:
     parser.add_argument("--json", type=Path, help="also write the figures to this file")
     given = parser.parse_args()
     figures = {**measure_overhead(given.jobs), "load_average": round(os.getloadavg()[0], 1)}
-    text = json.dumps(figures, indent=2) + "\n"
-    sys.stdout.write(text)
-    if given.json is not None:
-        given.json.parent.mkdir(parents=True, exist_ok=True)
-        given.json.write_text(text)
+    tell(figures, given.json)
 
 
 if __name__ == "__main__":

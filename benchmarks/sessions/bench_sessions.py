@@ -5,10 +5,7 @@ latency. A turn's milliseconds are processor time of the construct process, all 
 together, over all turns; the database, the broker and the model are other processes.
 """
 
-from __future__ import annotations
-
 import argparse
-import json
 import math
 import os
 import signal
@@ -21,6 +18,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import psutil
+from benchmarks.figures import tell
 
 from buildarena_cli.local import EmbeddedPostgres, EmbeddedValkey
 from buildarena_pipeline.catalog.models import load_registry
@@ -66,11 +64,7 @@ def main() -> None:
         os.kill(provider.pid, signal.SIGUSR1)
         figures = _measure(service, provider.pid, given.sessions, given.latency)
         figures["warm_up_s"] = round(warm_up_s, 2)
-    text = json.dumps(figures, indent=2) + "\n"
-    sys.stdout.write(text)
-    if given.json is not None:
-        given.json.parent.mkdir(parents=True, exist_ok=True)
-        given.json.write_text(text)
+    tell(figures, given.json)
 
 
 class Service:

@@ -7,8 +7,6 @@ millisecond a request, which leaves the machine to the service that is measured.
 Until it is sent SIGUSR1 it answers soon, so that nobody waits long while a service warms up.
 """
 
-from __future__ import annotations
-
 import asyncio
 import json
 import signal

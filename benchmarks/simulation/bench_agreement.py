@@ -6,13 +6,13 @@ right, as far as steps decide.
 """
 
 import argparse
-import json
 import sys
 import time
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from benchmarks.figures import keep
 from support.machines import random_machines, random_workshop
 
 from buildarena_benchmark import builtin_tasks, score
@@ -112,11 +112,7 @@ def main() -> int:
         results = list(pool.map(_compared, wanted, chunksize=1))
     figures = _figures(results)
     _print(results, figures, time.monotonic() - started, bar)
-    if options.json:
-        options.json.parent.mkdir(parents=True, exist_ok=True)
-        rows = [asdict(result) for result in results]
-        text = json.dumps({**figures, "machines": rows}, indent=1)
-        options.json.write_text(text + "\n", encoding="utf-8")
+    keep({**figures, "machines": [asdict(result) for result in results]}, options.json)
     return 0 if figures["same_verdict"] >= bar and figures["close"] >= CLOSE else 1
 
 

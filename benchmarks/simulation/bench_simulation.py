@@ -6,7 +6,6 @@ cargo grows to a mass that nothing breaks under.
 """
 
 import argparse
-import json
 import resource
 import statistics
 import sys
@@ -16,6 +15,7 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
+from benchmarks.figures import keep
 from support.machines.families import airship, beam, deck, lattice, mechanism
 from support.machines.references import REFERENCES, load_machine, outcome
 
@@ -70,9 +70,7 @@ def main() -> int:
         figures["sweep"] = _sweep()
     figures["peak_memory_mb"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     _say(f"\npeak memory {figures['peak_memory_mb']:.0f} MB (bar 400)")
-    if options.json:
-        options.json.parent.mkdir(parents=True, exist_ok=True)
-        options.json.write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
+    keep(figures, options.json)
     return 0 if agreement is None or agreement["passed"] else 1
 
 

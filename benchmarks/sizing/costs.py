@@ -4,11 +4,7 @@ Runs a whole service whose models answer after a while, and counts what its proc
 Valkey used for the jobs of one sweep. The sizing model (sizing_model.py) multiplies these costs.
 """
 
-from __future__ import annotations
-
 import argparse
-import json
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Mapping
@@ -19,6 +15,7 @@ from typing import Any
 import httpx
 import psutil
 import psycopg
+from benchmarks.figures import tell
 from redis import Redis
 from support.providers.stand_in import ProviderStandIn
 from support.servers.stacks import running_stack
@@ -60,11 +57,7 @@ def main() -> None:
                 first = 100 + number * given.jobs
                 runs.append(one_run(stack, list(range(first, first + given.jobs)), idle))
     figures = {"jobs": given.jobs, "lease_s": LEASE_S, "idle_per_s": idle, **fitted(*runs)}
-    text = json.dumps(figures, indent=2)
-    sys.stdout.write(text + "\n")
-    if given.json:
-        given.json.parent.mkdir(parents=True, exist_ok=True)
-        given.json.write_text(text + "\n")
+    tell(figures, given.json)
 
 
 def idling(_: Stack) -> None:

@@ -5,8 +5,6 @@ turns and its trials. Costs are means on processors like the ones that were meas
 planned for the share of a processor in USED, so that queues stay short. Print it: `make sizing`.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import math
@@ -89,12 +87,7 @@ class Need:
 
 
 def need(load: Load, costs: dict[str, Any]) -> Need:
-    """Multiplies costs.
-
-    Args:
-        load: What is planned for.
-        costs: As `costs.py` printed them.
-    """
+    """Multiplies costs."""
     turn, second = costs["per_turn"], costs["per_session_s"]
     own_s = (turn["construct worker cpu_ms"] + turn["postgres cpu_ms"]) / 1000
     turns_s = load.sessions / (load.reply_s + own_s)

@@ -5,16 +5,14 @@ many boards of models that are alike call one of them better; and how often a mo
 is called so.
 """
 
-from __future__ import annotations
-
 import argparse
-import json
 import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from benchmarks.figures import keep
 from scipy.stats import binom
 from support.boards.made_up_trials import (
     LOADS,
@@ -173,9 +171,7 @@ def main() -> None:
         for rise in (0.1, 0.2, 0.3, 0.4)
     ]
     show("One model better than eleven: how often it is called so", result["power"])  # type: ignore[arg-type]
-    if given.json:
-        given.json.parent.mkdir(parents=True, exist_ok=True)
-        given.json.write_text(json.dumps(result, indent=2) + "\n")
+    keep(result, given.json)
 
 
 if __name__ == "__main__":

@@ -13,6 +13,7 @@ from collections import defaultdict
 from dataclasses import replace
 from pathlib import Path
 
+from benchmarks.figures import keep
 from support.player import Player
 from support.providers.scripted import Recording
 
@@ -97,9 +98,7 @@ def main() -> int:
     figures = {task: measured(task) for task in options.tasks}
     for task, stages in figures.items():
         _print(task, stages)
-    if options.json:
-        options.json.parent.mkdir(parents=True, exist_ok=True)
-        options.json.write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
+    keep(figures, options.json)
     for workflow, (told, on_demand) in lookups.items():
         _say(
             f"{LOOKED_UP_TASK} with 40 modules, {workflow}: {told:,} tokens told, "

@@ -1,7 +1,5 @@
 """How usable a sweep's page is at 10,000 jobs while they end: load, long tasks, clicks, memory."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import os
@@ -12,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import httpx
+from benchmarks.figures import tell
 from support.servers.stacks import running_stack
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -29,11 +28,7 @@ def main() -> None:
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder, running_stack(Path(folder), lease_s=30.0) as up:
         figures = measured(up.url, given.jobs, given.seconds)
-    text = json.dumps(figures, indent=2)
-    print(text)  # noqa: T201 - its output
-    if given.json is not None:
-        given.json.parent.mkdir(parents=True, exist_ok=True)
-        given.json.write_text(text + "\n")
+    tell(figures, given.json)
 
 
 def measured(url: str, jobs: int, seconds: int) -> dict[str, Any]:

@@ -4,8 +4,6 @@ Run by `make bench-web`. A machine of 100 blocks and its trial, a transcript of 
 page; each beside its bar. Frames are those the page gets done, on however busy a machine.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -29,12 +29,7 @@ ASK_EVERY_S = 0.02
 
 @dataclass
 class Arena:
-    """What scenarios work on.
-
-    Attributes:
-        provider: What the hostile model's requests reach.
-        sizes: How much of everything, by name.
-    """
+    """What scenarios work on."""
 
     stack: Stack
     database: Database
@@ -65,13 +60,7 @@ class Arena:
 
 @dataclass
 class Tried:
-    """What came of a scenario.
-
-    Attributes:
-        tried: What was tried, in words.
-        refused: What came of it, in words.
-        wrong: What should not be.
-    """
+    """What came of a scenario."""
 
     tried: str
     refused: str = ""
@@ -118,13 +107,7 @@ class Bystander(threading.Thread):
 
 @contextmanager
 def arena(folder: Path, sizes: Mapping[str, float], **settings: Any) -> Iterator[Arena]:
-    """A running service with all of it.
-
-    Args:
-        folder: Where its data lies.
-        sizes: How much of everything, by name.
-        settings: Further settings of the service.
-    """
+    """A running service with all of it."""
     with ExitStack() as running:
         provider = running.enter_context(ProviderStandIn())
         models = folder / "models.yaml"

@@ -4,8 +4,6 @@
 attacker is a process of its own, so that it does not slow the measurement itself.
 """
 
-from __future__ import annotations
-
 import asyncio
 import statistics
 import subprocess
@@ -110,14 +108,7 @@ def score_all(tenants: Tenants) -> None:
 
 
 def flood(tenants: Tenants, kind: str, count: int, *, for_s: float) -> Measured:
-    """Lets the attacker loose and asks as the innocent meanwhile.
-
-    Args:
-        tenants: Where.
-        kind: A name of FLOODS.
-        count: Requests open at once.
-        for_s: How long.
-    """
+    """Lets the attacker loose and asks as the innocent meanwhile."""
     words = [kind, str(count), str(for_s), tenants.service.url, tenants.attacker, tenants.sweep]
     with subprocess.Popen(
         [sys.executable, __file__, *words], stdout=subprocess.PIPE, text=True

@@ -1,7 +1,5 @@
 """Outages as scenarios of the attack: a full disk, a stopped broker, a killed supervisor."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

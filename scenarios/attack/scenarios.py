@@ -1,7 +1,5 @@
 """What an adversary tries: each scenario says what was tried, what came of it, what is wrong."""
 
-from __future__ import annotations
-
 import io
 import json
 import socket

@@ -1,7 +1,5 @@
 """The attack at a small size; `make attack` does it at full size."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What the database must say after a fire, in queries: each returns what is wrong."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Fire: processes are killed and restarted at random, and messages come twice."""
 
-from __future__ import annotations
-
 import contextlib
 import math
 import os
@@ -38,15 +36,7 @@ class Strike:
 
 @dataclass
 class Fire:
-    """Strikes a running stack every now and then, from a thread; use as a context manager.
-
-    Attributes:
-        stack: What is struck.
-        rng: Chooses victims.
-        every_s: Mean time between strikes.
-        most: After how many strikes it goes out by itself.
-        strikes: Those that were made.
-    """
+    """Strikes a running stack every now and then, from a thread; use as a context manager."""
 
     stack: Stack
     rng: random.Random

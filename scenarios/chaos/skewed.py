@@ -1,7 +1,5 @@
 """Runs a worker whose clock is wrong: ``python skewed.py HOURS MODULE [ARGUMENT ...]``."""
 
-from __future__ import annotations
-
 import runpy
 import sys
 from datetime import UTC, datetime, timedelta

@@ -1,7 +1,5 @@
 """A sweep while everything around it is killed again and again: nothing is lost or done twice."""
 
-from __future__ import annotations
-
 import json
 import math
 import os

@@ -1,7 +1,5 @@
 """A construct worker is killed again and again; no reply is paid for twice."""
 
-from __future__ import annotations
-
 import os
 import random
 import signal
@@ -50,7 +48,7 @@ def worker(environment: dict[str, str]) -> Iterator[subprocess.Popen[bytes]]:
 
 
 def test_a_session_that_is_killed_again_and_again_builds_the_same_machine(
-    play, context, settings, tmp_path: Path
+    play, context, settings, tmp_path
 ) -> None:
     undisturbed = play("builtin/expert", task=TASK)
     rng = random.Random(os.environ.get("CHAOS_SEED", "1"))

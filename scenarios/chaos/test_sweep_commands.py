@@ -1,7 +1,5 @@
 """Commands over shared sweeps from many threads at once: only legal histories, no server error."""
 
-from __future__ import annotations
-
 import itertools
 import os
 import random

@@ -1,7 +1,5 @@
 """The Docker engine and Compose, as commands; and everything they made, gone at the end."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

@@ -1,7 +1,5 @@
 """What containers may do, and where no secret may stand."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -6,8 +6,6 @@ a running sweep; backs up, destroys, restores into another project whose artifac
 verifies every job there. At the end nothing is left.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import random

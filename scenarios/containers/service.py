@@ -1,7 +1,5 @@
 """The service as people outside see it: HTTPS through the proxy, with a key."""
 
-from __future__ import annotations
-
 import ssl
 import time
 from collections import Counter

@@ -1,7 +1,5 @@
 """What must be true when all links are up again, and what it took."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections import Counter

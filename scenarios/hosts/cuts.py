@@ -1,7 +1,5 @@
 """Links that are taken down at random, and how long it takes until all is well again."""
 
-from __future__ import annotations
-
 import random
 import threading
 import time
@@ -38,14 +36,7 @@ class Cut:
 
 @dataclass
 class Cuts:
-    """Cuts links from a thread until it is stopped; then all links are up.
-
-    Attributes:
-        network: Whose links.
-        watch: Who was heard of.
-        rng: Chooses.
-        made: The cuts.
-    """
+    """Cuts links from a thread until it is stopped; then all links are up."""
 
     network: Network
     watch: Watch

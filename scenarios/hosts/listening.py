@@ -1,7 +1,5 @@
 """A listener to a sweep's events, as a page is one: it goes on from where it was cut off."""
 
-from __future__ import annotations
-
 import json
 import threading
 from collections import Counter

@@ -4,8 +4,6 @@ All of it lies inside one private set of namespaces (network, mounts, processes)
 the program that made it, even by kill -9: nothing is left, and nothing outside can be reached.
 """
 
-from __future__ import annotations
-
 import ctypes
 import os
 import shutil

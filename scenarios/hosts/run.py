@@ -5,8 +5,6 @@ database; and a runner, which reaches the API alone. At the end the books are ex
 lost, and nothing was done or paid for twice.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import random

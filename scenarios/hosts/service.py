@@ -1,7 +1,5 @@
 """A whole service, each of whose programs runs on a host of its own."""
 
-from __future__ import annotations
-
 import logging
 import os
 import subprocess
@@ -56,14 +54,7 @@ class Forgetful(list[object]):
 
 
 class Service:
-    """Use as a context manager.
-
-    Attributes:
-        logs: Folder of the programs' logs.
-        standin: The provider, on loopback of the construct worker's host.
-        database: The database; to be used inside its host.
-        client: The API, for the operator, who stands at the switch.
-    """
+    """Use as a context manager."""
 
     def __init__(self, logs: Path) -> None:
         self.logs = logs

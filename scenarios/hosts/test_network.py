@@ -1,7 +1,5 @@
 """The network that `make test-hosts` makes: slow, cut without a word, and gone with its maker."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

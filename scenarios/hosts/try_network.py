@@ -1,7 +1,5 @@
 """Tries the network of hosts by itself; prints what was measured, and goes on until it is ended."""
 
-from __future__ import annotations
-
 import json
 import signal
 import socket

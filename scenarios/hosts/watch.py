@@ -1,7 +1,5 @@
 """Who was heard of when: how long a host takes to come back after its link was mended."""
 
-from __future__ import annotations
-
 import threading
 import time
 from contextlib import suppress

@@ -6,8 +6,6 @@ noticed by one side only. Frames leave both ends' TCP to themselves. Runs as a p
 ``python wires.py DELAY_S FD:FD …`` with two open TAP devices for each wire.
 """
 
-from __future__ import annotations
-
 import fcntl
 import os
 import select

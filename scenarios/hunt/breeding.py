@@ -1,7 +1,5 @@
 """Children of genomes: made and tried in worker processes, which need not load the archive."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,15 +13,7 @@ from buildarena_benchmark import builtin_tasks
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Child:
-    """A genome to make and try, as a worker process gets it.
-
-    Attributes:
-        task: Name of the task.
-        parents: One to mutate, or two to cross and mutate.
-        seed: Of everything that is drawn.
-        scorer: Judges it.
-        changed: Whether it is mutated at all; seeds are not.
-    """
+    """A genome to make and try, as a worker process gets it."""
 
     task: str
     parents: tuple[Genome, ...]

@@ -1,7 +1,5 @@
 """Confirming what the search found: full length, both engines, and a few seeds."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -57,13 +55,7 @@ class Confirmed:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Order:
-    """What a worker process is to confirm.
-
-    Attributes:
-        task: Name of the task.
-        genome: What builds the machine.
-        picture: Where its picture goes; None for no picture.
-    """
+    """What a worker process is to confirm."""
 
     task: str
     genome: Genome

@@ -1,7 +1,5 @@
 """The gallery: a folder with the archives, the confirmed machines and an index of them."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -25,11 +23,7 @@ _HEAD: Final = "| machine | task | parts | MuJoCo | PyBullet | seeds | flags | c
 
 @dataclass(frozen=True, slots=True)
 class Gallery:
-    """A gallery's folder.
-
-    Attributes:
-        folder: Where it is.
-    """
+    """A gallery's folder."""
 
     folder: Path
 

@@ -1,7 +1,5 @@
 """Genomes: action logs that still build something when actions are taken out or mixed in."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Iterable, Mapping

@@ -1,7 +1,5 @@
 """Mutations and crossovers of genomes; every draw comes from a generator that is given."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any, Final

@@ -3,8 +3,6 @@
 See docs/hunting.md. Run as `make hunt`, or `python -m scenarios.hunt.run --help`.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import sys
@@ -79,12 +77,7 @@ def _confirm(
 
 
 def chosen(elites: Sequence[Finding], most: int) -> list[Finding]:
-    """Which elites are confirmed: odd ones and good ones in turns, the best first.
-
-    Args:
-        elites: The best first.
-        most: How many.
-    """
+    """Which elites are confirmed: odd ones and good ones in turns, the best first."""
     good = [found for found in elites if found.success]
     odd = sorted(
         (found for found in good if found.suspicions), key=lambda found: -len(found.suspicions)

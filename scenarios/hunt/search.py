@@ -1,7 +1,5 @@
 """The search: per task an archive that keeps the best of every kind of machine (MAP-Elites)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from multiprocessing import get_context
 from typing import Final, Self, TypeVar
@@ -26,11 +24,7 @@ _GREEDY_SHARE: Final = 0.4
 
 
 class Crew:
-    """Worker processes; or none, and everything runs here.
-
-    Args:
-        workers: How many; 0 or 1 for none.
-    """
+    """Worker processes; or none, and everything runs here."""
 
     def __init__(self, workers: int) -> None:
         self._pool = get_context("spawn").Pool(workers) if workers > 1 else None
@@ -53,13 +47,7 @@ class Crew:
 
 
 class TaskSearch:
-    """The search on one task.
-
-    Args:
-        task: Name of the task.
-        seed: Of the whole search.
-        scorer: Judges machines; the benchmark's if left out.
-    """
+    """The search on one task."""
 
     def __init__(self, task: str, *, seed: int, scorer: Scorer = score) -> None:
         self.task, self.generation, self.trials = task, 0, 0

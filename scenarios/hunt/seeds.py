@@ -1,7 +1,5 @@
 """What the search starts from: the reference machines and the past exploits of a category."""
 
-from __future__ import annotations
-
 import json
 import sys
 from collections.abc import Iterator
@@ -43,11 +41,7 @@ class Exploit:
 
     @property
     def machine(self) -> Machine:
-        """The machine, with every action that its file has.
-
-        Raises:
-            ValueError: An action is refused.
-        """
+        """The machine, with every action that its file has."""
         machine, kept = grown(self.genome, most=sys.maxsize)
         if kept.as_json() != self.genome.as_json():
             raise ValueError(f"{self.name}: not all of its actions are accepted")

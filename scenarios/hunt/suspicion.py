@@ -4,8 +4,6 @@ A check may be wrong: it says that somebody should look. Where a machine was tri
 or with several seeds, all trials are looked at.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -31,14 +29,7 @@ _UPRIGHT: Final = 0.866
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """What is known of a success.
-
-    Attributes:
-        task: The task.
-        machine: The machine.
-        trials: Score and trajectory by engine.
-        robust_share: Share of the seeds it succeeded with; None if it was tried with none.
-    """
+    """What is known of a success."""
 
     task: Task
     machine: Machine

@@ -117,16 +117,7 @@ class Finding:
 
 
 def tried(task_name: str, genome: Genome, scorer: Scorer = score) -> Finding | None:
-    """Tries a genome once on the faster engine.
-
-    Args:
-        task_name: Name of a built-in task.
-        genome: What is tried.
-        scorer: Judges it; the benchmark's, or another to hold the search to.
-
-    Returns:
-        None for what no trial would be granted.
-    """
+    """Tries a genome once on the faster engine."""
     task = builtin_tasks()[task_name]
     machine, genome = grown(genome)
     if broken_constraint(task, machine) is not None:

@@ -3,8 +3,6 @@
 Run by ``make peer``; the proxy and all it needs are installed into .venv-peer.
 """
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

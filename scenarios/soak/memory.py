@@ -1,7 +1,5 @@
 """Memory of processes over hours: the most, and whether it grows beyond its own noise."""
 
-from __future__ import annotations
-
 import statistics
 import threading
 import time

@@ -3,8 +3,6 @@
 Beside the processes that are killed run some that never are, in which a leak would show.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

@@ -1,7 +1,5 @@
 """Whether growth is told from noise."""
 
-from __future__ import annotations
-
 import math
 import os
 

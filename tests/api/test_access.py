@@ -1,27 +1,18 @@
 """Keys, scopes, owners and rate limits."""
 
-from __future__ import annotations
-
 import pytest
 from pydantic import SecretStr
-from starlette.testclient import TestClient
 from support.clients.tenants import ADMIN, WITH_KEYS
-from support.servers.live_api import LOOPBACK
+from support.jobs import execute
+from support.servers.live_api import api_client, changed
 from support.servers.stacks import wait_until
 
-from buildarena_api.app import create_app
 from buildarena_api.http.access import check_binding
-from buildarena_pipeline.catalog.models import load_registry
-from buildarena_pipeline.runtime.context import open_context
 from buildarena_pipeline.runtime.settings import Settings
 
 CHANGES = [
-    ("POST", "/v1/sweeps/{sweep}/pause"),
-    ("POST", "/v1/sweeps/{sweep}/resume"),
-    ("POST", "/v1/sweeps/{sweep}/cancel"),
-    ("POST", "/v1/sweeps/{sweep}/retry"),
-    ("POST", "/v1/jobs/{job}/cancel"),
-    ("POST", "/v1/jobs/{job}/retry"),
+    *(f"/v1/sweeps/{{sweep}}/{what}" for what in ("pause", "resume", "cancel", "retry")),
+    *(f"/v1/jobs/{{job}}/{what}" for what in ("cancel", "retry")),
 ]
 
 
@@ -62,8 +53,7 @@ def test_malformed_and_unknown_keys_are_refused(guarded, secret) -> None:
 def test_expired_and_revoked_keys_are_refused_and_say_so(guarded, make_key, context) -> None:
     secret = make_key("submit", days=1)
     assert guarded.get("/v1/jobs", headers=bearer(secret)).status_code == 200
-    with context.store.database.transaction() as connection:
-        connection.exec_driver_sql("UPDATE api_keys SET expires_at = now()")
+    execute(context, "UPDATE api_keys SET expires_at = now()")
 
     def refused() -> str:
         return guarded.get("/v1/jobs", headers=bearer(secret)).json().get("detail", "")
@@ -97,9 +87,9 @@ def test_nobody_changes_what_another_submitted(guarded, make_key, sweep) -> None
     mine, other = make_key("submit"), make_key("submit")
     sweep_id = guarded.post("/v1/sweeps", json=sweep, headers=bearer(mine)).json()["id"]
     job_id = guarded.get("/v1/jobs", headers=bearer(mine)).json()["jobs"][0]["id"]
-    for method, path in CHANGES:
+    for path in CHANGES:
         url = path.format(sweep=sweep_id, job=job_id)
-        answer = guarded.request(method, url, headers=bearer(other))
+        answer = guarded.post(url, headers=bearer(other))
         assert answer.status_code == 403, url
         assert "another key" in answer.json()["detail"]
     shown = guarded.get(f"/v1/sweeps/{sweep_id}", headers=bearer(other)).json()
@@ -145,24 +135,20 @@ def test_settings_do_not_print_the_operators_key(context) -> None:
 
 
 def test_too_many_requests_are_reported_when_to_come_back(context) -> None:
-    own = open_context(context.settings.model_copy(update={"rate_limit": "5/minute"}))
-    with TestClient(create_app(own, load_registry()), base_url=LOOPBACK) as client:
+    with changed(context, rate_limit="5/minute") as own, api_client(own) as client:
         answers = [client.get("/v1/models") for _ in range(7)]
         assert [answer.status_code for answer in answers][:5] == [200] * 5
         assert answers[-1].status_code == 429
         assert 1 <= int(answers[-1].headers["retry-after"]) <= 60
         assert client.get("/v1/health").status_code == 200, "probes are not counted"
-    own.close()
 
 
 def test_guessing_keys_is_limited(context) -> None:
     changes = {**WITH_KEYS, "rate_limit": "3/minute"}
-    own = open_context(context.settings.model_copy(update=changes))
-    with TestClient(create_app(own, load_registry()), base_url=LOOPBACK) as client:
+    with changed(context, **changes) as own, api_client(own) as client:
         tried = [client.get("/v1/tasks", headers=bearer(f"ba_{n}")).status_code for n in range(5)]
         assert tried == [401, 401, 401, 429, 429]
         assert client.get("/v1/tasks", headers=bearer(ADMIN)).status_code == 200
-    own.close()
 
 
 @pytest.mark.parametrize(
@@ -181,8 +167,7 @@ def test_an_open_service_stays_on_loopback(changes, advice) -> None:
 def test_the_key_of_the_metrics_opens_them_alone(context) -> None:
     secret = "a-key-for-prometheus-alone"
     changes = {**WITH_KEYS, "metrics_key": SecretStr(secret), "base_path": "/arena"}
-    own = open_context(context.settings.model_copy(update=changes))
-    with TestClient(create_app(own, load_registry()), base_url=LOOPBACK) as client:
+    with changed(context, **changes) as own, api_client(own) as client:
         asked = {
             path: client.get(path, headers=bearer(secret)).status_code
             for path in ("/v1/metrics", "/arena/v1/metrics", "/v1/jobs", "/v1/keys", "/v1/tasks")
@@ -195,4 +180,3 @@ def test_the_key_of_the_metrics_opens_them_alone(context) -> None:
         assert client.get("/v1/metrics").status_code == 401
         assert client.get("/v1/metrics", headers=bearer(ADMIN)).status_code == 200
         assert client.post("/v1/metrics", headers=bearer(secret)).status_code == 405
-    own.close()

@@ -1,9 +1,8 @@
-from __future__ import annotations
-
 from datetime import UTC, datetime
 
 import pytest
 from sqlalchemy import insert, update
+from support.jobs import execute
 
 from buildarena_api.leaderboard.agreement import agreement_rows
 from buildarena_store.boards import Annotated
@@ -26,6 +25,10 @@ def said(success: bool, indicator: float, version: str = "2") -> dict[str, objec
     return {"success": success, "indicator": indicator, "flags": [], "simulation": version}
 
 
+def change(context, job: str, **values: object) -> None:
+    execute(context, update(jobs).where(jobs.c.id == job).values(**values))
+
+
 @pytest.fixture
 def tried(api, context):
     """Puts a finished trial in the game, with what engines say of it, into the database."""
@@ -34,21 +37,11 @@ def tried(api, context):
         job = api.post(
             "/v1/jobs", json={"task": "support-1", "model": "builtin/idle", "seed": seed}
         ).json()["id"]
-        with context.store.database.transaction() as connection:
-            connection.execute(update(jobs).where(jobs.c.id == job).values(track=TRACK, **ENDED))
-            connection.execute(
-                insert(rollouts).values(
-                    job_id=job,
-                    number=0,
-                    final=True,
-                    engine="besiege",
-                    machine_hash="0" * 64,
-                    success=success,
-                    indicator=indicator,
-                    annotations=engines or None,
-                    finished_at=datetime.now(UTC),
-                )
-            )
+        change(context, job, track=TRACK, **ENDED)
+        trial = {"number": 0, "final": True, "engine": "besiege", "machine_hash": "0" * 64}
+        trial |= {"success": success, "indicator": indicator, "annotations": engines or None}
+        finished = {"job_id": job, "finished_at": datetime.now(UTC)}
+        execute(context, insert(rollouts).values(**trial, **finished))
         return job
 
     return put
@@ -76,14 +69,9 @@ def test_each_engine_is_compared_with_the_game_on_each_task(api, tried) -> None:
 
 def test_an_import_counts_once_it_was_verified(api, context, tried) -> None:
     job = tried(0, success=True, indicator=1.0, mujoco=said(True, 1.0))
-
-    def change(**values: object) -> None:
-        with context.store.database.transaction() as connection:
-            connection.execute(update(jobs).where(jobs.c.id == job).values(**values))
-
-    change(imported_from="elsewhere")
+    change(context, job, imported_from="elsewhere")
     assert table(api)["rows"] == []
-    change(verified_at=datetime.now(UTC))
+    change(context, job, verified_at=datetime.now(UTC))
     assert len(table(api)["rows"]) == 1
 
 

@@ -1,23 +1,21 @@
 """The service behind a reverse proxy: below a path, under an outer name, and over slow pieces."""
 
-from __future__ import annotations
-
 import json
 import time
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 
 import httpx
 import pytest
 from support.clients.tenants import ADMIN, WITH_KEYS
-from support.servers.live_api import live_api
+from support.servers.live_api import changed, live_api
 from support.servers.reverse_proxy import ProxyRules, reverse_proxy
 from typer.testing import CliRunner
 
 from buildarena_api.dashboard.files import BASE_NAME, INDEX, read_pages
 from buildarena_cli.main import app
 from buildarena_pipeline.errors import StartupError
-from buildarena_pipeline.runtime.context import Context, open_context
+from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.settings import OWN_PATHS, load_settings
 
 BASE = "/tools/arena"
@@ -29,11 +27,12 @@ SWEEP = {"tasks": ["support-1"], "models": ["builtin/idle"], "seeds": [0]}
 @contextmanager
 def served(context: Context, rules: ProxyRules, **settings: object) -> Iterator[str]:
     """The address of a service through a proxy."""
-    own = open_context(context.settings.model_copy(update=settings))
-    with ExitStack() as stack:
-        stack.callback(own.close)
-        inner = stack.enter_context(live_api(own))
-        yield stack.enter_context(reverse_proxy(inner, rules))
+    with (
+        changed(context, **settings) as own,
+        live_api(own) as inner,
+        reverse_proxy(inner, rules) as url,
+    ):
+        yield url
 
 
 @pytest.fixture(params=[True, False], ids=["cut off", "passed on"])
@@ -44,7 +43,7 @@ def below(context: Context, request: pytest.FixtureRequest) -> Iterator[str]:
         yield url
 
 
-def test_the_api_works_below_a_path(below: str) -> None:
+def test_the_api_works_below_a_path(below) -> None:
     assert below.endswith(BASE)
     with httpx.Client(timeout=20) as client:
         made = client.post(f"{below}/v1/sweeps", json=SWEEP)
@@ -59,7 +58,7 @@ def test_the_api_works_below_a_path(below: str) -> None:
         assert client.get(f"{below}/v1/nothing").status_code == 404
 
 
-def test_the_contract_and_its_page_name_the_path(below: str) -> None:
+def test_the_contract_and_its_page_name_the_path(below) -> None:
     contract = httpx.get(f"{below}/openapi.json").json()
     assert contract["servers"] == [{"url": BASE}]
     page = httpx.get(f"{below}/docs")
@@ -69,7 +68,7 @@ def test_the_contract_and_its_page_name_the_path(below: str) -> None:
     assert httpx.get(httpx.URL(below).join(script)).status_code == 200
 
 
-def test_the_path_without_its_slash_is_the_first_page(context: Context) -> None:
+def test_the_path_without_its_slash_is_the_first_page(context) -> None:
     with served(context, ProxyRules(prefix=BASE), base_path=BASE) as url:
         assert httpx.get(url).content == httpx.get(f"{url}/").content
         assert httpx.get(url).status_code == 200
@@ -77,7 +76,7 @@ def test_the_path_without_its_slash_is_the_first_page(context: Context) -> None:
         assert rebound.status_code == 421
 
 
-def test_events_come_through_as_they_happen(below: str) -> None:
+def test_events_come_through_as_they_happen(below) -> None:
     """A proxy that is told nothing may keep them back; ours would show that they come late."""
     with httpx.Client(timeout=20) as client:
         sweep = client.post(f"{below}/v1/sweeps", json=SWEEP).json()["id"]
@@ -93,7 +92,7 @@ def test_events_come_through_as_they_happen(below: str) -> None:
             assert time.monotonic() - asked < 10
 
 
-def test_a_large_upload_comes_through(context: Context) -> None:
+def test_a_large_upload_comes_through(context) -> None:
     rules = ProxyRules(prefix=BASE)
     with served(context, rules, base_path=BASE) as url, httpx.Client(timeout=60) as client:
 
@@ -108,7 +107,7 @@ def test_a_large_upload_comes_through(context: Context) -> None:
     assert "zip" in answer.text.lower() or "archive" in answer.text.lower()
 
 
-def test_commands_work_with_an_address_that_has_a_path(below: str) -> None:
+def test_commands_work_with_an_address_that_has_a_path(below) -> None:
     for words in (["model", "list", "--json"], ["doctor"], ["task", "list"]):
         done = CliRunner().invoke(app, [*words, "--url", below])
         assert "builtin/" in done.stdout or done.stdout.strip(), (words, done.output)
@@ -119,7 +118,7 @@ def test_commands_work_with_an_address_that_has_a_path(below: str) -> None:
     assert made.exit_code == 0, made.output
 
 
-def test_a_service_with_a_base_path_still_answers_at_its_root(context: Context) -> None:
+def test_a_service_with_a_base_path_still_answers_at_its_root(context) -> None:
     """As probes ask, who know of no proxy."""
     with served(context, ProxyRules(), base_path=BASE) as url:
         assert httpx.get(f"{url}/v1/health").status_code == 200
@@ -145,7 +144,7 @@ def test_the_first_page_names_its_files_below_the_path(tmp_path) -> None:
 @pytest.mark.parametrize(
     ("given", "kept"), [("", ""), ("/", ""), ("/arena/", "/arena"), ("/a/b-c.d_~", "/a/b-c.d_~")]
 )
-def test_a_base_path_is_kept_without_its_last_slash(given: str, kept: str) -> None:
+def test_a_base_path_is_kept_without_its_last_slash(given, kept) -> None:
     assert load_settings(base_path=given).base_path == kept
 
 
@@ -157,7 +156,7 @@ def test_a_base_path_is_kept_without_its_last_slash(given: str, kept: str) -> No
         *(f"/{name}" for name in sorted(OWN_PATHS)),
     ],
 )
-def test_what_is_no_base_path_is_refused(bad: str) -> None:
+def test_what_is_no_base_path_is_refused(bad) -> None:
     with pytest.raises(StartupError, match=r"BUILDARENA_BASE_PATH: .*(must begin|of its own)"):
         load_settings(base_path=bad)
 
@@ -175,19 +174,19 @@ def outer(
 FORWARDED = {"X-Forwarded-Proto": "https", "X-Forwarded-Host": "arena.example.org"}
 
 
-def test_addresses_have_the_outer_scheme_and_host_behind_a_trusted_proxy(context: Context) -> None:
+def test_addresses_have_the_outer_scheme_and_host_behind_a_trusted_proxy(context) -> None:
     answer = outer(context, PROXIES, FORWARDED)
     assert answer.status_code == 307, answer.text
     assert answer.headers["Location"] == "https://arena.example.org/v1/models"
 
 
-def test_addresses_have_scheme_host_and_path_of_the_outside(context: Context) -> None:
+def test_addresses_have_scheme_host_and_path_of_the_outside(context) -> None:
     answer = outer(context, PROXIES, FORWARDED, base_path=BASE)
     assert answer.headers["Location"] == f"https://arena.example.org{BASE}/v1/models"
 
 
 @pytest.mark.parametrize("trusted", ["", "10.0.0.0/8", "::1"])
-def test_what_others_forward_is_ignored(context: Context, trusted: str) -> None:
+def test_what_others_forward_is_ignored(context, trusted) -> None:
     answer = outer(context, trusted, FORWARDED)
     assert answer.headers["Location"] == "http://inner:8000/v1/models"
 
@@ -195,12 +194,12 @@ def test_what_others_forward_is_ignored(context: Context, trusted: str) -> None:
 @pytest.mark.parametrize(
     "host", ["a b", "a/b", "evil@host", "a,b", "x" * 300, "[::1", "host:port", "host:999999"]
 )
-def test_a_forwarded_host_that_is_none_is_ignored(context: Context, host: str) -> None:
+def test_a_forwarded_host_that_is_none_is_ignored(context, host) -> None:
     answer = outer(context, PROXIES, {"X-Forwarded-Host": host})
     assert answer.headers["Location"] == "http://inner:8000/v1/models"
 
 
-def test_without_keys_a_forwarded_host_makes_no_foreign_name_ours(context: Context) -> None:
+def test_without_keys_a_forwarded_host_makes_no_foreign_name_ours(context) -> None:
     """A rebound name's page could send the header; its browser is as near as a local proxy."""
     rules = ProxyRules(headers={"X-Forwarded-Host": "localhost"}, host="rebound.example")
     with served(context, rules, trusted_proxies=PROXIES) as url:
@@ -218,18 +217,18 @@ def test_without_keys_a_forwarded_host_makes_no_foreign_name_ours(context: Conte
     ids=["a proxy", "a stranger", "a made up chain"],
 )
 def test_rate_limits_go_by_the_client_that_a_trusted_proxy_saw(
-    context: Context, trusted: str, seen: str, least: int, most: int
+    context, trusted, seen, least, most
 ) -> None:
     """Two an hour; a broker that is slow for a moment lets a process count two more alone."""
-    own = open_context(
-        context.settings.model_copy(update={"trusted_proxies": trusted, "rate_limit": "2/hour"})
-    )
-    with live_api(own) as url, httpx.Client(base_url=url) as client:
+    with (
+        changed(context, trusted_proxies=trusted, rate_limit="2/hour") as own,
+        live_api(own) as url,
+        httpx.Client(base_url=url) as client,
+    ):
         found = [
             client.get("/v1/models", headers={"X-Forwarded-For": seen.format(number)}).status_code
             for number in range(6)
             for _ in range(2)
         ]
-    own.close()
     assert set(found) <= {200, 429}
     assert least <= found.count(200) <= most

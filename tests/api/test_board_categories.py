@@ -1,7 +1,5 @@
 """Boards of chosen categories, and what the ranking over all tasks is over."""
 
-from __future__ import annotations
-
 import pytest
 
 from buildarena_api.leaderboard.filters import _ranked_over

@@ -1,19 +1,17 @@
 """Boards that processes share equal boards that are made from every ended job in the plain way."""
 
-from __future__ import annotations
-
 import json
 import random
 from contextlib import ExitStack
 from datetime import UTC, datetime, timedelta
 
 import pytest
-from sqlalchemy import delete, func, insert, select, text, update
+from sqlalchemy import delete, event, func, insert, select, update
 from starlette.testclient import TestClient
 from support.boards.plain_boards import plain_board
-from support.servers.live_api import LOOPBACK
+from support.jobs import execute
+from support.servers.live_api import api_client
 
-from buildarena_api.app import create_app
 from buildarena_api.leaderboard.views import board_view
 from buildarena_benchmark import builtin_tasks
 from buildarena_benchmark.flags import ScoringPolicy
@@ -27,6 +25,7 @@ TRACKS = ("first/track-1", "second/track-1")
 START = datetime(2026, 1, 1, tzinfo=UTC)
 FLAGS = (None, [], ["unstable"], ["never_fell"], ["no_wheels", "never_fell"], ["of tomorrow"])
 TASKS = ("lift-1", "support-1", "somebodys-own")
+BOARD = {"track": TRACKS[0], "policy": ScoringPolicy.OURS}
 
 
 def random_job(rng: random.Random, number: int) -> dict[str, object]:
@@ -102,30 +101,22 @@ def disturb(context, rng: random.Random, number: int) -> None:
 
 def random_query(rng: random.Random) -> dict[str, object]:
     """Parameters of a board, as readers choose them."""
-    found: dict[str, object] = {
-        "track": rng.choice(TRACKS),
-        "policy": rng.choice([*ScoringPolicy]),
+    found = {"track": rng.choice(TRACKS), "policy": rng.choice([*ScoringPolicy])}
+    further = {
+        "task": rng.sample(sorted(builtin_tasks()), 8),
+        "model": ["made-up/0", "external/1"],
+        "since": START + timedelta(hours=rng.randrange(1000)),
+        "until": START + timedelta(hours=rng.randrange(1000)),
+        "sweep": "sweep_some",
     }
-    if rng.random() < 0.3:
-        found["task"] = rng.sample(sorted(builtin_tasks()), 8)
-    if rng.random() < 0.3:
-        found["model"] = ["made-up/0", "external/1"]
-    if rng.random() < 0.3:
-        found["since"] = START + timedelta(hours=rng.randrange(1000))
-    if rng.random() < 0.3:
-        found["until"] = START + timedelta(hours=rng.randrange(1000))
-    if rng.random() < 0.3:
-        found["sweep"] = "sweep_some"
-    return found
+    return found | {name: value for name, value in further.items() if rng.random() < 0.3}
 
 
 def expected(context, params: dict[str, object]) -> tuple[bytes, dict[str, object]] | None:
     """The board and the figures in the plain way; None when the track has no such job."""
     boards, registry = context.store.results.boards, load_registry()
     every = boards.trials(TrialFilter())
-    members = None
-    if "sweep" in params:
-        members = {*context.store.sweeps.job_ids("sweep_some")}
+    members = {*context.store.sweeps.job_ids("sweep_some")} if "sweep" in params else None
     tracks = sorted({t.track for t in every if members is None or t.job_id in members})
     if params["track"] not in tracks:
         return None
@@ -205,8 +196,7 @@ def process(context):
     with ExitStack() as stack:
 
         def start() -> TestClient:
-            app = create_app(context, load_registry())
-            return stack.enter_context(TestClient(app, base_url=LOOPBACK))
+            return stack.enter_context(api_client(context))
 
         yield start
 
@@ -215,15 +205,13 @@ def process(context):
 def test_boards_equal_boards_made_from_every_job(context, process, seed) -> None:
     rng = random.Random(seed)
     first, second = process(), process()
-    with context.store.database.transaction() as connection:
-        connection.execute(insert(jobs), [random_job(rng, number) for number in range(60)])
-        connection.execute(
-            insert(sweeps).values(id="sweep_some", name="some", spec={}, state="active")
-        )
-        connection.execute(
-            insert(sweep_jobs),
-            [{"sweep_id": "sweep_some", "job_id": f"job_{n:020d}"} for n in range(0, 60, 2)],
-        )
+    execute(context, insert(jobs), [random_job(rng, number) for number in range(60)])
+    execute(context, insert(sweeps).values(id="sweep_some", name="some", spec={}, state="active"))
+    execute(
+        context,
+        insert(sweep_jobs),
+        [{"sweep_id": "sweep_some", "job_id": f"job_{n:020d}"} for n in range(0, 60, 2)],
+    )
     for step in range(12):
         for api in rng.sample([first, second, process()], 2):
             params = random_query(rng)
@@ -233,8 +221,7 @@ def test_boards_equal_boards_made_from_every_job(context, process, seed) -> None
 
 def fill(context, count: int = 30) -> None:
     rng = random.Random(7)
-    with context.store.database.transaction() as connection:
-        connection.execute(insert(jobs), [random_job(rng, number) for number in range(count)])
+    execute(context, insert(jobs), [random_job(rng, number) for number in range(count)])
 
 
 def rows(context, table) -> int:
@@ -254,52 +241,45 @@ def test_a_process_that_starts_reads_cells_that_another_made(context, process, m
 def test_a_change_that_nobody_took_in_is_found_by_the_next_process(context, process) -> None:
     fill(context)
     process().get("/v1/leaderboard")
-    with context.store.database.transaction() as connection:
-        connection.execute(update(jobs).values(indicator=77.0))
-    params = {"track": TRACKS[0], "policy": ScoringPolicy.OURS}
-    assert asked(process(), params) == expected(context, params)
+    execute(context, update(jobs).values(indicator=77.0))
+    assert asked(process(), BOARD) == expected(context, BOARD)
 
 
 def test_a_change_in_an_open_transaction_is_found_once_it_ends(context, process) -> None:
     fill(context)
-    api, params = process(), {"track": TRACKS[0], "policy": ScoringPolicy.OURS}
+    api = process()
     with context.store.database.transaction() as slow:
         slow.execute(update(jobs).where(jobs.c.id == f"job_{0:020d}").values(indicator=999.0))
         # A later change is taken in, and kept, while the earlier one can't be seen.
-        with context.store.database.transaction() as connection:
-            later = update(jobs).where(jobs.c.id != f"job_{0:020d}")
-            connection.execute(later.values(indicator=1.0))
-        assert asked(api, params) == expected(context, params)
-    wanted = expected(context, params)
-    assert asked(api, params) == asked(process(), params) == wanted
+        later = update(jobs).where(jobs.c.id != f"job_{0:020d}")
+        execute(context, later.values(indicator=1.0))
+        assert asked(api, BOARD) == expected(context, BOARD)
+    assert asked(api, BOARD) == asked(process(), BOARD) == expected(context, BOARD)
 
 
 def test_cells_of_another_server_are_not_believed(context, process) -> None:
     """A database that was dumped here and loaded elsewhere has numbers that mean nothing there."""
     fill(context)
     process().get("/v1/leaderboard")
-    with context.store.database.transaction() as connection:
-        connection.execute(update(board_state).values(server="another", snapshot_end=2**60))
-        connection.execute(update(board_cells).values(tallies=[], figures=b"", snapshot_end=2**60))
-        connection.execute(update(board_changes).values(transaction=2**60))
-    params = {"track": TRACKS[0], "policy": ScoringPolicy.OURS}
+    execute(context, update(board_state).values(server="another", snapshot_end=2**60))
+    execute(context, update(board_cells).values(tallies=[], figures=b"", snapshot_end=2**60))
+    execute(context, update(board_changes).values(transaction=2**60))
     api = process()
-    assert asked(api, params) == expected(context, params)
+    assert asked(api, BOARD) == expected(context, BOARD)
     with context.store.database.transaction() as connection:
         assert connection.execute(select(func.max(board_changes.c.transaction))).scalar() == 0
-        connection.execute(update(jobs).values(indicator=78.0))
-    assert asked(api, params) == asked(process(), params) == expected(context, params)
+    execute(context, update(jobs).values(indicator=78.0))
+    assert asked(api, BOARD) == asked(process(), BOARD) == expected(context, BOARD)
 
 
 def test_a_database_that_went_back_in_time_is_read_anew(context, process) -> None:
     fill(context)
-    api, params = process(), {"track": TRACKS[0], "policy": ScoringPolicy.OURS}
-    asked(api, params)
+    api = process()
+    asked(api, BOARD)
     cells = api.app.state.boards._cells
     cells._mark = cells._mark._replace(end=10**9, snapshot=f"{10**9}:{10**9}:")
-    with context.store.database.transaction() as connection:
-        connection.execute(update(jobs).values(indicator=79.0))
-    assert asked(api, params) == expected(context, params)
+    execute(context, update(jobs).values(indicator=79.0))
+    assert asked(api, BOARD) == expected(context, BOARD)
 
 
 def test_a_cell_of_an_earlier_snapshot_never_replaces_a_later_one(context) -> None:
@@ -307,8 +287,7 @@ def test_a_cell_of_an_earlier_snapshot_never_replaces_a_later_one(context) -> No
     cells = context.store.results.boards.cells
     before = cells.feed(None)
     old = list(cells.read([r.id for r in before.cells]))
-    with context.store.database.transaction() as connection:
-        connection.execute(update(jobs).values(indicator=80.0))
+    execute(context, update(jobs).values(indicator=80.0))
     after = cells.feed(before.mark)
     cells._keep(old, before.mark, settled=True)
     (found,) = cells.read([after.cells[0].id])
@@ -322,8 +301,6 @@ def test_a_rest_costs_one_statement(context, process) -> None:
     api = process()
     api.get("/v1/leaderboard")
     boards, statements = api.app.state.boards, []
-    from sqlalchemy import event
-
     engine = context.store.database.engine
     listen = ("before_cursor_execute", lambda *args: statements.append(args[2]))
     event.listen(engine, *listen)
@@ -334,13 +311,9 @@ def test_a_rest_costs_one_statement(context, process) -> None:
 
 
 def test_a_file_that_was_tried_is_no_cell(context, process) -> None:
-    job = random_job(random.Random(1), 1)
-    job |= {"model_config": {"provider": "file"}}
-    with context.store.database.transaction() as connection:
-        connection.execute(insert(jobs).values(**job))
-        connection.execute(text("SELECT 1"))
+    job = random_job(random.Random(1), 1) | {"model_config": {"provider": "file"}}
+    execute(context, insert(jobs).values(**job))
     assert json.loads(process().get("/v1/leaderboard").content)["tracks"] == []
-    with context.store.database.transaction() as connection:
-        connection.execute(update(jobs).values(indicator=3.0))
+    execute(context, update(jobs).values(indicator=3.0))
     assert json.loads(process().get("/v1/leaderboard").content)["tracks"] == []
     assert rows(context, board_cells) == 0

@@ -1,20 +1,14 @@
 """Custom tasks on the leaderboard and in exports: beside the built-in ones, never mixed in."""
 
-from __future__ import annotations
-
 import csv
 import io
 
 import pytest
-from starlette.testclient import TestClient
 from support.clients.tenants import new_tenant
-from support.servers.live_api import LOOPBACK
+from support.jobs import finish
+from support.servers.live_api import api_client, changed
 
-from buildarena_api.app import create_app
 from buildarena_api.routes.tasks import EXAMPLE
-from buildarena_pipeline.catalog.models import load_registry
-from buildarena_pipeline.runtime.context import open_context
-from buildarena_store import JobScore
 
 YAML = {"Content-Type": "application/yaml"}
 OWN = EXAMPLE.replace("{name: load, unit: mass units}", "{name: worth, unit: points}")
@@ -29,14 +23,8 @@ def end_all(context):
     def work(indicator: float) -> None:
         while (lease := context.store.leases.claim("construct", owner="w")) is not None:
             won = lease.job.model == "builtin/expert"
-            score = JobScore(
-                outcome="success" if won else "unsuccessful",
-                success=won,
-                indicator=indicator if won else 0.0,
-                metrics={"parts": 7},
-            )
-            with context.store.database.transaction() as connection:
-                context.store.results.finish(lease, score, connection=connection)
+            score = ("success", indicator) if won else ("unsuccessful", 0.0)
+            finish(context, lease, *score, metrics={"parts": 7})
 
     return work
 
@@ -85,10 +73,8 @@ def test_results_of_two_versions_do_not_mix(api, end_all) -> None:
     end_all(250.0)
     after = board_of(api)["narrow-gap"]
     assert (after["version"], after["outdated"]) == (new["version"], 10)
-    assert [(row["trials"], row["indicator_mean"]) for row in after["rows"]] == [
-        (5, 250.0),
-        (5, 0.0),
-    ]
+    means = [(row["trials"], row["indicator_mean"]) for row in after["rows"]]
+    assert means == [(5, 250.0), (5, 0.0)]
 
 
 def test_a_task_that_is_added_later_is_known_at_once(api, context, end_all) -> None:
@@ -96,10 +82,8 @@ def test_a_task_that_is_added_later_is_known_at_once(api, context, end_all) -> N
     sweep(api, "support-1")
     end_all(1.0)
     assert list(board_of(api)) == ["support-1"]
-    other = open_context(context.settings)
-    with TestClient(create_app(other, load_registry()), base_url=LOOPBACK) as elsewhere:
+    with changed(context) as other, api_client(other) as elsewhere:
         upload(elsewhere, OWN)
-    other.close()
     assert api.get("/v1/leaderboard", params={"task": "narrow-gap"}).status_code == 200
     sweep(api, "narrow-gap")
     end_all(1.0)

@@ -1,7 +1,5 @@
 """The dashboard's pages as the API serves them, and what they may never stand in the place of."""
 
-from __future__ import annotations
-
 import gzip
 from collections.abc import Iterator
 from pathlib import Path
@@ -50,7 +48,7 @@ def pages(folder: Path) -> Iterator[TestClient]:
     "path",
     ["/", "/sweeps", "/sweeps/sweep_1", "/jobs/job_1?view=trial", "/tasks/lift-1", "/models/a/b"],
 )
-def test_addresses_of_pages_get_the_page(pages: TestClient, path: str) -> None:
+def test_addresses_of_pages_get_the_page(pages, path) -> None:
     answer = pages.get(path)
     assert answer.status_code == 200
     assert answer.content == INDEX
@@ -71,28 +69,28 @@ def test_addresses_of_pages_get_the_page(pages: TestClient, path: str) -> None:
         ),
     ],
 )
-def test_nothing_else_is_a_page(pages: TestClient, path: str) -> None:
+def test_nothing_else_is_a_page(pages, path) -> None:
     answer = pages.get(path)
     assert SECRET not in answer.text
     assert answer.status_code == 404
 
 
-def test_the_api_comes_first(pages: TestClient) -> None:
+def test_the_api_comes_first(pages) -> None:
     assert pages.get("/v1/health").text == "api"
 
 
 @pytest.mark.parametrize("method", ["POST", "PUT", "DELETE", "PATCH"])
-def test_pages_are_only_read(pages: TestClient, method: str) -> None:
+def test_pages_are_only_read(pages, method) -> None:
     assert pages.request(method, "/sweeps").status_code == 404
 
 
-def test_a_head_request_has_no_body(pages: TestClient) -> None:
+def test_a_head_request_has_no_body(pages) -> None:
     answer = pages.head("/")
     assert answer.status_code == 200
     assert answer.content == b""
 
 
-def test_hashed_files_stay_with_the_reader(pages: TestClient) -> None:
+def test_hashed_files_stay_with_the_reader(pages) -> None:
     answer = pages.get("/assets/main-abc123.js")
     assert answer.headers["cache-control"] == "public, max-age=31536000, immutable"
     assert answer.headers["content-type"].startswith("text/javascript")
@@ -114,9 +112,7 @@ def test_hashed_files_stay_with_the_reader(pages: TestClient) -> None:
         ("brotli", None),
     ],
 )
-def test_files_come_as_compressed_as_the_reader_takes_them(
-    folder: Path, accept: str, encoding: str | None
-) -> None:
+def test_files_come_as_compressed_as_the_reader_takes_them(folder, accept, encoding) -> None:
     file = read_pages(folder)["/assets/main-abc123.js"]
     with (
         served(folder) as client,
@@ -130,7 +126,7 @@ def test_files_come_as_compressed_as_the_reader_takes_them(
     assert body == (file.data if encoding is None else file.encoded[encoding])
 
 
-def test_each_encoding_has_a_tag_of_its_own(pages: TestClient) -> None:
+def test_each_encoding_has_a_tag_of_its_own(pages) -> None:
     path = "/assets/main-abc123.js"
     tags = {
         pages.head(path, headers={"Accept-Encoding": accept}).headers["etag"]
@@ -139,7 +135,7 @@ def test_each_encoding_has_a_tag_of_its_own(pages: TestClient) -> None:
     assert len(tags) == 3
 
 
-def test_pages_run_no_script_but_their_own(pages: TestClient) -> None:
+def test_pages_run_no_script_but_their_own(pages) -> None:
     policy = dict(
         part.strip().split(" ", 1)
         for part in pages.get("/").headers["content-security-policy"].split(";")
@@ -150,7 +146,7 @@ def test_pages_run_no_script_but_their_own(pages: TestClient) -> None:
     assert policy["frame-ancestors"] == "'none'"
 
 
-def test_without_a_build_the_start_says_how_to_make_one(tmp_path: Path) -> None:
+def test_without_a_build_the_start_says_how_to_make_one(tmp_path) -> None:
     with served(tmp_path / "none") as client:
         answer = client.get("/")
         assert "make web" in answer.text
@@ -158,7 +154,7 @@ def test_without_a_build_the_start_says_how_to_make_one(tmp_path: Path) -> None:
         assert client.get("/assets/main.js").status_code == 404
 
 
-def test_the_application_serves_it_beside_the_api(api: TestClient) -> None:
+def test_the_application_serves_it_beside_the_api(api) -> None:
     start = api.get("/")
     assert start.status_code == 200
     assert "BuildArena" in start.text
@@ -169,6 +165,6 @@ def test_the_application_serves_it_beside_the_api(api: TestClient) -> None:
     assert api.get("/openapi.json").json()["info"]["title"] == "BuildArena"
 
 
-def test_pages_need_no_key_and_figures_do(guarded: TestClient) -> None:
+def test_pages_need_no_key_and_figures_do(guarded) -> None:
     assert guarded.get("/jobs/job_1").status_code == 200
     assert guarded.get("/v1/leaderboard").status_code == 401

@@ -1,26 +1,19 @@
 """Metrics of a board as data: the page and the report never differ."""
 
-from __future__ import annotations
-
 import pytest
-from sqlalchemy import text
+from support.jobs import claim, execute, finish, journal_entry
 
 from buildarena_benchmark.flags import ScoringPolicy
 from buildarena_benchmark.leaderboard import EndedJob, cost_bins, failure_rows
-from buildarena_store import JobScore, JournalEntry, TrialFilter, Usage
+from buildarena_store import TrialFilter, Usage
 
 
 def end_next(context, outcome: str, indicator: float, tokens: int, **more: object) -> None:
-    lease = context.store.leases.claim("construct", owner="w")
-    entry = JournalEntry(
-        sequence=0, stage="plan", role="planner", request_hash="h", reply={},
-        usage=Usage(requests=1, output_tokens=tokens, cost_usd=1), latency_s=0.1,
-    )  # fmt: skip
-    context.store.journal.append(lease, entry)
-    score = JobScore(outcome=outcome, success=outcome == "success", indicator=indicator, **more)
-    with context.store.database.transaction() as connection:
-        counts = {"actions": 10, "refused_actions": 3, "refusals": {"overlap": 3}}
-        context.store.results.finish(lease, score, connection=connection, **counts)
+    lease = claim(context)
+    usage = Usage(requests=1, output_tokens=tokens, cost_usd=1)
+    context.store.journal.append(lease, journal_entry(usage=usage))
+    counts = {"actions": 10, "refused_actions": 3, "refusals": {"overlap": 3}}
+    finish(context, lease, outcome, indicator, columns=counts, **more)
 
 
 @pytest.fixture
@@ -81,10 +74,7 @@ def test_figures_follow_what_changed_and_what_is_chosen(api, context) -> None:
         return [row["model"] for row in rows]
 
     assert models() == ["builtin/idle"]
-    with context.store.database.transaction() as connection:
-        connection.execute(
-            text("UPDATE jobs SET outcome = 'cancelled' WHERE model = 'builtin/idle'")
-        )
+    execute(context, "UPDATE jobs SET outcome = 'cancelled' WHERE model = 'builtin/idle'")
     rows = api.get("/v1/leaderboard/figures").json()["failures"]
     idle = next(row for row in rows if row["model"] == "builtin/idle")
     assert next(iter(idle["outcomes"])).startswith("cancelled")

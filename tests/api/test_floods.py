@@ -1,7 +1,5 @@
 """One caller cannot take the API down: bounds per key, through real HTTP with two keys."""
 
-from __future__ import annotations
-
 import json
 import threading
 import time
@@ -12,6 +10,7 @@ import httpx
 import pytest
 from sqlalchemy import text
 from support.clients.tenants import WITH_KEYS
+from support.jobs import execute
 from support.servers.live_api import live_api
 from support.servers.stacks import wait_until
 
@@ -54,13 +53,11 @@ def sweep_id(submissions) -> str:
 
 
 def score_all(context) -> None:
-    with context.store.database.transaction() as connection:
-        connection.execute(
-            text(
-                "UPDATE jobs SET state = 'done', outcome = 'unsuccessful', success = false,"
-                " indicator = 0, metrics = '{}', finished_at = now()"
-            )
-        )
+    execute(
+        context,
+        "UPDATE jobs SET state = 'done', outcome = 'unsuccessful', success = false,"
+        " indicator = 0, metrics = '{}', finished_at = now()",
+    )
 
 
 def test_streams_are_bounded_per_key_and_share_what_they_read(as_key, sweep_id) -> None:
@@ -107,9 +104,8 @@ def test_the_stream_of_a_key_that_ended_ends(as_key, context, sweep_id, ending) 
         assert read_lines(staying, 4)
         time.sleep(0.3)
         assert not ended.is_set()
-        with context.store.database.transaction() as connection:
-            statement = f"UPDATE api_keys SET {ending} = now() WHERE id = :id"
-            connection.execute(text(statement), {"id": gone.key_id})
+        ends = f"UPDATE api_keys SET {ending} = now() WHERE id = :id"
+        execute(context, ends, {"id": gone.key_id})
         assert ended.wait(8)
         reading.result()
         assert staying.status_code == 200
@@ -188,20 +184,16 @@ def test_a_busy_database_pool_is_503(context, monkeypatch) -> None:
     engine = context.store.database.engine
     with live_api(context) as url, httpx.Client(base_url=url, timeout=20) as client:
         assert client.get("/v1/sweeps").status_code == 200
-        _check_busy_pool(client, engine, monkeypatch)
-
-
-def _check_busy_pool(client, engine, monkeypatch) -> None:
-    monkeypatch.setattr(engine.pool, "_timeout", 0.2)
-    with ExitStack() as taken:
-        for _ in range(engine.pool.size() + engine.pool._max_overflow):
-            taken.enter_context(engine.connect())
-        answer = client.get("/v1/sweeps")
-        assert answer.status_code == 503
-        assert int(answer.headers["retry-after"]) >= 1
-        # Key checks and streams have connections of their own.
-        assert client.get("/v1/models").status_code == 200
-    assert client.get("/v1/sweeps").status_code == 200
+        monkeypatch.setattr(engine.pool, "_timeout", 0.2)
+        with ExitStack() as taken:
+            for _ in range(engine.pool.size() + engine.pool._max_overflow):
+                taken.enter_context(engine.connect())
+            answer = client.get("/v1/sweeps")
+            assert answer.status_code == 503
+            assert int(answer.headers["retry-after"]) >= 1
+            # Key checks and streams have connections of their own.
+            assert client.get("/v1/models").status_code == 200
+        assert client.get("/v1/sweeps").status_code == 200
 
 
 @pytest.fixture

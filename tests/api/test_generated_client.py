@@ -1,7 +1,5 @@
 """A client that a public generator makes of the contract submits a job."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

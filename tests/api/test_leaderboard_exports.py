@@ -1,28 +1,17 @@
-from __future__ import annotations
-
 import csv
 import io
 
 import pyarrow.parquet as pq
 import pytest
-
-from buildarena_store import JobScore
+from support.jobs import claim, finish
 
 
 @pytest.fixture
 def ended(api, context, sweep) -> None:
     api.post("/v1/sweeps", json=sweep)
     for outcome in ("success", "unsuccessful"):
-        lease = context.store.leases.claim("construct", owner="w")
-        score = JobScore(
-            outcome=outcome,
-            success=outcome == "success",
-            indicator=3.0,
-            metrics={"parts": 7},
-            flags=["unstable"] if outcome == "unsuccessful" else [],
-        )
-        with context.store.database.transaction() as connection:
-            context.store.results.finish(lease, score, connection=connection, actions=4)
+        score = {"metrics": {"parts": 7}, "flags": ["unstable"] if outcome != "success" else []}
+        finish(context, claim(context), outcome, 3.0, columns={"actions": 4}, **score)
 
 
 def exported(api, kind: str) -> bytes:

@@ -1,7 +1,5 @@
 """Sessions under way: their turns as events, their transcript and their replay."""
 
-from __future__ import annotations
-
 import json
 import threading
 import time
@@ -11,12 +9,12 @@ from dataclasses import replace
 
 import httpx
 import pytest
-from sqlalchemy import text
+from support.jobs import claim, execute, journal_entry
 from support.servers.live_api import live_api
 from support.stages import work
 
 from buildarena_pipeline.turns import Transcripts
-from buildarena_store import JournalEntry, StaleLeaseError, TurnResult, Usage
+from buildarena_store import StaleLeaseError, TurnResult, Usage
 from buildarena_store.events import record_jobs
 from buildarena_worker.session.turn_keeper import TurnKeeper
 
@@ -41,20 +39,16 @@ def act(api, session: str, tool: str, arguments: object) -> None:
 
 def claimed(context):
     """A lease that nobody needs to renew, however slow the machine is."""
-    lease = context.store.leases.claim("construct", owner="w")
-    with context.store.database.transaction() as connection:
-        connection.execute(text("UPDATE jobs SET lease_expires_at = now() + interval '1 hour'"))
+    lease = claim(context)
+    execute(context, "UPDATE jobs SET lease_expires_at = now() + interval '1 hour'")
     return lease
 
 
 def take(context, lease, sequence: int, *calls: tuple[str, object], said: str = "") -> None:
     """Journals a reply and what came of it, as a worker does."""
     reply = {"text": said, "calls": [["c", *one] for one in calls], "finish": "stop"}
-    entry = JournalEntry(
-        sequence=sequence, stage="build", role="builder", request_hash="h", reply=reply,
-        usage=Usage(requests=1, input_tokens=5), latency_s=0.1,
-    )  # fmt: skip
-    context.store.journal.append(lease, entry)
+    usage = Usage(requests=1, input_tokens=5)
+    context.store.journal.append(lease, journal_entry(sequence, reply=reply, usage=usage))
     results = [(True, None, "done") for _ in calls]
     context.store.turns.append(
         lease, TurnResult(index=sequence, sequence=sequence, sub_structure=None, results=results)
@@ -215,8 +209,7 @@ def test_a_turn_that_was_journalled_and_not_told_is_told_when_the_session_resume
     assert context.store.turns.count(job) == 5
     assert len(context.store.journal.read(job)) == 6
     monkeypatch.undo()
-    with context.store.database.transaction() as connection:
-        connection.execute(text("UPDATE jobs SET available_at = now() - interval '1 hour'"))
+    execute(context, "UPDATE jobs SET available_at = now() - interval '1 hour'")
     work(context, steps=1)
     indices = [record.index for record in context.store.turns.read(job)]
     assert indices == list(range(len(indices)))
@@ -242,11 +235,7 @@ def test_texts_that_no_database_takes_are_kept_readable(api, context) -> None:
     take(context, lease, 0)
     result = (False, "malformed_arguments", "not \0 and \ud800")
     reply = {"text": "", "calls": [["c", "x", {}]], "finish": "stop"}
-    entry = JournalEntry(
-        sequence=1, stage="build", role="builder", request_hash="h", reply=reply, usage=Usage(),
-        latency_s=0.1,
-    )  # fmt: skip
-    context.store.journal.append(lease, entry)
+    context.store.journal.append(lease, journal_entry(1, reply=reply))
     turn = TurnResult(index=1, sequence=1, sub_structure="a\0b", results=[result])
     context.store.turns.append(lease, turn)
     shown = api.get(f"/v1/jobs/{job}/transcript").json()["turns"][1]

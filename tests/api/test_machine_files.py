@@ -1,7 +1,5 @@
 """Machines that come as files: looked at, checked, tried; hostile ones refused in words."""
 
-from __future__ import annotations
-
 import gzip
 import json
 import zlib
@@ -9,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from support.clients.tenants import new_tenant
+from support.machines.building import BLOCK, built
 
 from buildarena_api.machine_uploads import MAX_BYTES
 from buildarena_geometry import Machine
@@ -16,17 +15,10 @@ from buildarena_pipeline.agents import machine_trials
 
 BSG = Path(__file__).parents[1] / "data" / "besiege" / "bsg"
 TRIAL = {"task": "support-1", "simulator": "mujoco"}
-BRICK = "Small Wooden Block"
 
 
 def bridge(length: int = 4) -> Machine:
-    machine = Machine()
-    assert machine.act("start").ok
-    for block in range(1, length):
-        face = "E" if block == 1 else "A"
-        attach = {"base_block": str(block), "face": face, "new_block": BRICK}
-        assert machine.act("attach_block_to", attach).ok
-    return machine
+    return built(*((str(n), "E" if n == 1 else "A", BLOCK) for n in range(1, length)))
 
 
 def document(machine: Machine | None = None) -> bytes:

@@ -1,7 +1,5 @@
 """Metrics, the request log and health: what an operator sees."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from datetime import UTC, datetime, timedelta
@@ -9,10 +7,10 @@ from datetime import UTC, datetime, timedelta
 import pytest
 import structlog
 from prometheus_client.parser import text_string_to_metric_families
-from sqlalchemy import text
+from support.jobs import claim, execute, journal_entry, report_worker
 
 from buildarena_api.http.metrics import ServiceMetrics
-from buildarena_store import JournalEntry, Usage
+from buildarena_store import Usage
 
 
 def samples(api) -> dict[str, list[tuple[dict[str, str], float]]]:
@@ -26,15 +24,9 @@ def samples(api) -> dict[str, list[tuple[dict[str, str], float]]]:
 
 def test_metrics_say_what_the_jobs_say(api, context, sweep) -> None:
     api.post("/v1/sweeps", json={**sweep, "seeds": [0, 1, 2]})
-    first = context.store.leases.claim("construct", owner="w")
+    first = claim(context)
     usage = Usage(requests=1, input_tokens=70, output_tokens=7)
-    context.store.journal.append(
-        first,
-        JournalEntry(
-            sequence=0, stage="plan", role="planner", request_hash="h", reply={}, usage=usage,
-            latency_s=0.1,
-        ),
-    )  # fmt: skip
+    context.store.journal.append(first, journal_entry(usage=usage))
     context.store.leases.give_up(first, "no key", reason="missing_key")
     found = samples(api)
     queued = {"state": "queued", "stage": "construct", "outcome": ""}
@@ -103,12 +95,9 @@ def test_what_people_write_can_not_forge_lines_of_the_log(api, capfd, monkeypatc
 
 
 def test_health_names_a_worker_whose_clock_is_wrong(api, context) -> None:
-    report = {"kind": "construct", "queues": ["construct"], "host": "h", "versions": {}}
     now = datetime.now(UTC)
-    context.store.workers.report(worker_id="good", pid=1, own_time=now, **report)
-    context.store.workers.report(
-        worker_id="late", pid=2, own_time=now - timedelta(hours=1), **report
-    )
+    report_worker(context, "good", "construct", own_time=now)
+    report_worker(context, "late", "construct", own_time=now - timedelta(hours=1))
     checks = {check["name"]: check for check in api.get("/v1/health").json()["checks"]}
     clocks = checks["clocks"]
     assert not clocks["ok"]
@@ -118,15 +107,10 @@ def test_health_names_a_worker_whose_clock_is_wrong(api, context) -> None:
 
 
 def test_metrics_say_what_the_service_stands_on(api, context) -> None:
-    for name, queues in (("a", ["construct", "verify"]), ("b", ["simulate.mujoco"])):
-        context.store.workers.report(
-            worker_id=name, kind=queues[0].partition(".")[0], queues=queues, host="h", pid=1,
-            versions={}, peak_memory_bytes=7, own_time=datetime.now(UTC) + timedelta(hours=2),
-        )  # fmt: skip
-    with context.store.database.transaction() as connection:
-        connection.execute(
-            text("UPDATE workers SET seen_at = now() - interval '1 minute' WHERE id = 'b'")
-        )
+    facts = {"peak_memory_bytes": 7, "own_time": datetime.now(UTC) + timedelta(hours=2)}
+    report_worker(context, "a", "construct", "verify", **facts)
+    report_worker(context, "b", "simulate.mujoco", **facts)
+    execute(context, "UPDATE workers SET seen_at = now() - interval '1 minute' WHERE id = 'b'")
     found = samples(api)
     serving = {labels["queue"]: value for labels, value in found["buildarena_queue_workers"]}
     assert serving["construct"] == 1
@@ -141,12 +125,10 @@ def test_metrics_say_what_the_service_stands_on(api, context) -> None:
     ((_, free),) = found["buildarena_data_free_bytes"]
     ((_, size),) = found["buildarena_data_size_bytes"]
     assert 0 < free < size
-    used = {
-        labels["pool"]: value for labels, value in found["buildarena_database_connections_used"]
-    }
-    most = {
-        labels["pool"]: value for labels, value in found["buildarena_database_connections_limit"]
-    }
+    used, most = (
+        {pool["pool"]: value for pool, value in found[f"buildarena_database_connections_{name}"]}
+        for name in ("used", "limit")
+    )
     assert set(used) == set(most) == {"ordinary", "watching", "exporting"}
     assert all(used[pool] <= most[pool] for pool in most)
 
@@ -162,7 +144,7 @@ def test_metrics_say_how_many_jobs_are_at_hand_in_each_queue(api, context, sweep
     api.post("/v1/sweeps", json={**sweep, "seeds": [0, 1, 2]})
     assert "buildarena_queue_running" not in samples(api)
     for _ in range(2):
-        assert context.store.leases.claim("construct", owner="w")
+        claim(context)
     fresh = ServiceMetrics(context)
     (family,) = [each for each in fresh.collect() if each.name == "buildarena_queue_running"]
     assert [(s.labels, s.value) for s in family.samples] == [({"queue": "construct"}, 2)]

@@ -1,7 +1,5 @@
 """Cancelling, retrying, pausing, watching."""
 
-from __future__ import annotations
-
 import json
 from concurrent.futures import ThreadPoolExecutor
 

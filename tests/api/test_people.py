@@ -1,7 +1,5 @@
 """People who build by hand over the tools API: names, and the workbench with every face."""
 
-from __future__ import annotations
-
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest

@@ -1,7 +1,5 @@
 """GLB files and thumbnails."""
 
-from __future__ import annotations
-
 import io
 import json
 import struct

@@ -1,7 +1,5 @@
 """Whose X-Forwarded-For counts: asked of real API processes, where rate limits go by address."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,27 +1,19 @@
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path
 
 import pytest
-
-from buildarena_store import JobScore
+from support.jobs import claim, finish, report_worker
 
 GOLDEN = Path(__file__).parent.parent / "data" / "openapi.json"
 
 
-def end_job(context, *, outcome: str = "success", indicator: float = 100.0) -> str:
-    lease = context.store.leases.claim("construct", owner="w")
-    score = JobScore(
-        outcome=outcome, success=outcome == "success", indicator=indicator, metrics={"parts": 7}
-    )
+def end_job(context, outcome: str) -> None:
+    lease = claim(context)
     if outcome == "errored":
         context.store.leases.give_up(lease, "gone", reason="lost_worker")
     else:
-        with context.store.database.transaction() as connection:
-            context.store.results.finish(lease, score, connection=connection)
-    return lease.job.id
+        finish(context, lease, outcome, 100.0, metrics={"parts": 7})
 
 
 def test_an_empty_leaderboard_is_an_empty_page(api) -> None:
@@ -34,7 +26,7 @@ def test_an_empty_leaderboard_is_an_empty_page(api) -> None:
 def test_the_leaderboard_counts_scored_jobs_and_shows_errored_ones(api, context, sweep) -> None:
     api.post("/v1/sweeps", json={**sweep, "seeds": [0, 1, 2]})
     for outcome in ("success", "unsuccessful", "errored"):
-        end_job(context, outcome=outcome)
+        end_job(context, outcome)
     board = api.get("/v1/leaderboard").json()
     (task,) = board["tasks"]
     (row,) = task["rows"]
@@ -46,7 +38,7 @@ def test_the_leaderboard_counts_scored_jobs_and_shows_errored_ones(api, context,
 
 def test_a_board_of_errors_alone_has_no_numbers_and_no_nan(api, context, sweep) -> None:
     api.post("/v1/sweeps", json={**sweep, "seeds": [0]})
-    end_job(context, outcome="errored")
+    end_job(context, "errored")
     answer = api.get("/v1/leaderboard")
     row = answer.json()["tasks"][0]["rows"][0]
     assert (row["trials"], row["errored"], row["success_rate"]) == (0, 1, None)
@@ -75,9 +67,7 @@ def test_health_tells_which_workers_are_missing(api, context) -> None:
     assert checks["database"]["ok"]
     assert checks["broker"]["ok"]
     assert checks["workers of construct"]["advice"] == "start a worker for the queue construct"
-    context.store.workers.report(
-        worker_id="w", kind="construct", queues=["construct"], host="h", pid=1, versions={}
-    )
+    report_worker(context, "w", "construct")
     checks = {check["name"]: check for check in api.get("/v1/health").json()["checks"]}
     assert checks["workers of construct"]["ok"]
 

@@ -1,20 +1,12 @@
 """How machines came about: replays of models' and agents' sessions."""
 
-from __future__ import annotations
-
-import json
-
 import pytest
+from support.jobs import attach
 from support.stages import work
 
 from buildarena_api.replays.making import Replays
 from buildarena_pipeline.replays import chapters
 
-ASSEMBLED = {
-    "machine_id": "left",
-    "init_shift": [0, 0, 0],
-    "init_rotation": [0, 0, 0],
-}
 START = {"init_shift": [0, 0, 0], "init_rotation": [0, 0, 0], "note": ""}
 ATTACH = {"base_block": "1", "face": "A", "new_block": "Small Wooden Block", "note": ""}
 
@@ -52,11 +44,9 @@ def assert_ends_in(replay: dict, document: dict) -> None:
     kept = {one["id"]: one for one in (*document["blocks"], *document["connectors"])}
     assert found.keys() == kept.keys()
     for id_, part in kept.items():
-        assert found[id_]["module"] == part["module"]
-        assert found[id_]["position"] == part["position"]
-        assert found[id_]["quaternion"] == part["quaternion"]
-        assert found[id_]["bindings"] == part.get("bindings", {})
-        assert found[id_]["flipped"] == part.get("flipped", False)
+        told = {"bindings": {}, "flipped": False, **part}
+        for name in ("module", "position", "quaternion", "bindings", "flipped"):
+            assert found[id_][name] == told[name]
 
 
 @pytest.mark.parametrize("model", ["builtin/expert", "builtin/random"])
@@ -91,22 +81,17 @@ def test_an_agents_sub_structures_are_chapters_and_grow_while_it_builds(api) -> 
     act(api, job, "start", START, "right")
     act(api, job, "attach_block_to", ATTACH, "left")
     first = api.get(f"/v1/jobs/{job}/replay").json()
-    assert [(one["name"], len(one["steps"])) for one in first["chapters"]] == [
-        ("left", 2),
-        ("right", 1),
-    ]
+    steps = {one["name"]: len(one["steps"]) for one in first["chapters"]}
+    assert steps == {"left": 2, "right": 1}
     assert first["exact"] is None
     for machine, shift in (("left", [0, 0, 0]), ("right", [3, 0, 0])):
-        given = {**ASSEMBLED, "machine_id": machine, "init_shift": shift}
+        given = {"machine_id": machine, "init_shift": shift, "init_rotation": [0, 0, 0]}
         act(api, job, "add_machine", given, "assembly")
     act(api, job, "shift_machine", {"machine_index": "B", "position": [0, 1, 0]}, "assembly")
     assert api.post(f"/v1/sessions/{job}/submit").status_code == 202
     replay = api.get(f"/v1/jobs/{job}/replay").json()
-    assert [one["kind"] for one in replay["chapters"]] == [
-        "sub_structure",
-        "sub_structure",
-        "assembly",
-    ]
+    kinds = [one["kind"] for one in replay["chapters"]]
+    assert kinds == ["sub_structure", "sub_structure", "assembly"]
     assert replay["exact"]
     moved = replay["chapters"][-1]["steps"][-1]
     assert [part["id"] for part in moved["moved"]] == ["B_1"]
@@ -118,12 +103,7 @@ def test_an_agents_sub_structures_are_chapters_and_grow_while_it_builds(api) -> 
     ("tool", "arguments", "reason", "attempted"),
     [
         ("attach_block_to", ATTACH, "face_occupied", [("3", "Small Wooden Block")]),
-        (
-            "attach_block_to",
-            {**ATTACH, "base_block": "2", "face": "A", "new_block": "Nothing"},
-            "module_restriction",
-            [],
-        ),
+        ("attach_block_to", {**ATTACH, "new_block": "Nothing"}, "module_restriction", []),
         ("start", START, "multiple_initialization", []),
         ("no_such_tool", {}, "unknown_action", []),
         ("attach_block_to", "text", "malformed_arguments", []),
@@ -188,9 +168,7 @@ def test_a_machine_that_is_none_is_a_problem_and_no_failure(api, context) -> Non
     job = opened(api)
     act(api, job, "start", START)
     assert api.post(f"/v1/sessions/{job}/submit").status_code == 202
-    other = context.artifacts.put(json.dumps({"version": 99}).encode(), "application/json")
-    with context.store.database.transaction() as connection:
-        context.store.results.attach(job, {"machine": other}, connection=connection)
+    attach(context, job, {"machine": b'{"version": 99}'})
     answer = api.get(f"/v1/jobs/{job}/replay")
     assert answer.status_code == 404
     assert "does not read" in answer.json()["detail"]

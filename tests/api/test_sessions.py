@@ -1,7 +1,5 @@
 """External agents over the tools API."""
 
-from __future__ import annotations
-
 import json
 import re
 from concurrent.futures import ThreadPoolExecutor

@@ -1,8 +1,7 @@
 """What jobs can name as their simulator, as the API lists it."""
 
-from __future__ import annotations
-
 import pytest
+from support.jobs import report_worker
 
 from buildarena_store.states import simulate_queue
 
@@ -38,14 +37,8 @@ def test_what_a_worker_announces_is_listed_and_can_be_asked_for(context, api, li
     (error,) = refused.json()["errors"]
     assert error["choices"] == ["pybullet", "mujoco"]
     for number, name in enumerate(("unity", "unity", "mujoco")):
-        context.store.workers.report(
-            worker_id=f"simulate@here:{number}",
-            kind="simulate",
-            queues=[simulate_queue(name)],
-            host="here",
-            pid=number,
-            versions={"simulation": "7.1", "kind": "game", "repeatable": False},
-        )
+        versions = {"simulation": "7.1", "kind": "game", "repeatable": False}
+        report_worker(context, f"worker-{number}", simulate_queue(name), versions=versions)
     unity = listed()["unity"]
     assert (unity["version"], unity["kind"], unity["default"]) == ("7.1", "game", False)
     assert (unity["workers"], unity["served"]) == (2, True)

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import pytest
 
 JOB = {"task": "support-1", "model": "builtin/idle", "seed": 3}

@@ -1,11 +1,9 @@
 """What pages about sweeps are made of: who asks, what went wrong, what changed, two in pairs."""
 
-from __future__ import annotations
-
 import pytest
 from support.clients.tenants import new_tenant, operator
+from support.jobs import claim, execute, finish
 
-from buildarena_store import JobScore
 from buildarena_store.states import AttemptResult, JobState
 
 
@@ -16,20 +14,17 @@ def submitted(api, **changes: object) -> str:
     return answer.json()["id"]
 
 
-def score(context, outcomes: dict[tuple[str, int], bool | None], simulator: str = "") -> None:
-    """Ends waiting jobs as told by model and seed; None ends them without a score."""
+def score(context, outcomes: dict[tuple[str, int], bool], simulator: str = "") -> None:
+    """Ends waiting jobs as told by model and seed."""
     left = []
     while (lease := context.store.leases.claim("construct", owner="w")) is not None:
-        wanted = outcomes.get((lease.job.model, lease.job.seed))
-        if simulator not in lease.job.track or (lease.job.model, lease.job.seed) not in outcomes:
+        won = outcomes.get((lease.job.model, lease.job.seed))
+        if won is None or simulator not in lease.job.track:
             left.append(lease)
-            continue
-        result = JobScore(
-            outcome="errored" if wanted is None else "success" if wanted else "unsuccessful",
-            success=bool(wanted), indicator=5.0 if wanted else 1.0,
-        )  # fmt: skip
-        with context.store.database.transaction() as connection:
-            context.store.results.finish(lease, result, connection=connection)
+        elif won:
+            finish(context, lease, "success", 5.0)
+        else:
+            finish(context, lease, "unsuccessful", 1.0)
     for lease in left:
         with context.store.database.transaction() as connection:
             context.store.leases.advance(lease, to=JobState.QUEUED, connection=connection)
@@ -43,23 +38,18 @@ def test_who_asks_without_keys_is_admin(api) -> None:
 
 def test_who_asks_with_keys_is_told_their_scope(guarded) -> None:
     assert guarded.get("/v1/caller").status_code == 401
-    reader, builder = (
-        new_tenant(guarded, "ada", "read"),
-        new_tenant(guarded, "bob", "read", "submit"),
-    )
+    reader = new_tenant(guarded, "ada", "read")
+    builder = new_tenant(guarded, "bob", "read", "submit")
     for who, scope in ((reader, "read"), (builder, "submit"), (operator(guarded), "admin")):
-        assert who.ask("GET", "/v1/caller").json() == {
-            "key": who.id,
-            "scope": scope,
-            "keys_required": True,
-        }
+        told = {"key": who.id, "scope": scope, "keys_required": True}
+        assert who.get("/v1/caller") == told
 
 
 def test_troubles_are_counted_by_what_they_are(api, context) -> None:
     sweep, other = submitted(api), submitted(api, seeds=[7])
     assert api.get(f"/v1/sweeps/{sweep}/troubles").json() == []
     for number in range(5):
-        lease = context.store.leases.claim("construct", owner=f"w{number}")
+        lease = claim(context, f"w{number}")
         with context.store.database.transaction() as connection:
             context.store.leases.advance(
                 lease,
@@ -86,8 +76,7 @@ def test_whoever_has_read_the_jobs_hears_only_what_happened_since(api, context) 
     sweep = submitted(api)
     assert api.get(f"/v1/sweeps/{sweep}").json()["last_event"] == 0
     events = context.store.events.after(0, sweep_id=sweep)
-    with context.store.database.transaction() as connection:
-        connection.exec_driver_sql("UPDATE events SET at = at - interval '6 seconds'")
+    execute(context, "UPDATE events SET at = at - interval '6 seconds'")
     seen = api.get(f"/v1/sweeps/{sweep}").json()["last_event"]
     assert seen == events[-1].id
     assert api.get("/v1/sweeps").json()["sweeps"][0]["last_event"] == seen
@@ -120,12 +109,10 @@ def test_two_sweeps_are_compared_in_pairs(api, two_sweeps) -> None:
     assert (task["successes"], task["trials"]) == ([3, 1], [4, 2])
     assert task["success"]["pairs"] == 2
     [differing] = pair["differing"]
-    assert (differing["seed"], differing["first"]["success"], differing["second"]["success"]) == (
-        0, True, False,
-    )  # fmt: skip
-    assert [(one["kind"], one["name"]) for one in found["left_out"]] == [
-        ("model", "builtin/random")
-    ]
+    sides = [differing[side]["success"] for side in ("first", "second")]
+    assert (differing["seed"], sides) == (0, [True, False])
+    (left,) = found["left_out"]
+    assert (left["kind"], left["name"]) == ("model", "builtin/random")
 
 
 def test_a_sweep_against_itself_differs_in_nothing(api, two_sweeps) -> None:

@@ -1,7 +1,5 @@
 """Custom tasks over HTTP: uploaded, refused with line and field, versioned, listed."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

@@ -1,7 +1,5 @@
 """Shared jobs without shared harm: two keys, A and B, that want the same jobs."""
 
-from __future__ import annotations
-
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 

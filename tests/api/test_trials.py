@@ -1,12 +1,11 @@
 """Trajectories as Arrow, and scenes: a page can draw a trial without knowing physics."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np
 import pyarrow as pa
 import pytest
+from support.jobs import attach
 from support.stages import work
 
 from buildarena_api.http.negotiation import prefers
@@ -17,11 +16,9 @@ from buildarena_simulation.arrow import MEDIA_TYPE as ARROW
 PARQUET = trials.PARQUET
 
 
-def simulated(api, context, task: str = "support-1") -> str:
-    body = {"task": task, "model": "builtin/expert", "simulator": "mujoco"}
-    job = api.post("/v1/jobs", json=body).json()["id"]
-    work(context)
-    return job
+def submitted(api) -> str:
+    body = {"task": "support-1", "model": "builtin/expert", "simulator": "mujoco"}
+    return api.post("/v1/jobs", json=body).json()["id"]
 
 
 def turned(quaternion, vector) -> np.ndarray:
@@ -33,7 +30,8 @@ def turned(quaternion, vector) -> np.ndarray:
 
 
 def test_arrow_says_what_parquet_says_and_the_scene_draws_it(api, context, monkeypatch) -> None:
-    job = simulated(api, context)
+    job = submitted(api)
+    work(context)
     path = f"/v1/jobs/{job}/trajectory"
     kept = api.get(path)
     assert kept.headers["content-type"] == PARQUET
@@ -106,8 +104,7 @@ def _check_scene(api, job, trajectory, count, blocks) -> None:
 
 
 def test_a_scene_is_there_before_anything_is_built(api, context) -> None:
-    body = {"task": "support-1", "model": "builtin/expert", "simulator": "mujoco"}
-    job = api.post("/v1/jobs", json=body).json()["id"]
+    job = submitted(api)
     before = api.get(f"/v1/jobs/{job}/scene").json()
     assert before["machine"] is None
     assert before["scenario"]["terrain"]
@@ -117,11 +114,8 @@ def test_a_scene_is_there_before_anything_is_built(api, context) -> None:
 
 
 def test_bytes_that_are_no_trajectory_are_a_problem(api, context) -> None:
-    body = {"task": "support-1", "model": "builtin/expert", "simulator": "mujoco"}
-    job = api.post("/v1/jobs", json=body).json()["id"]
-    other = context.artifacts.put(b"nothing", PARQUET)
-    with context.store.database.transaction() as connection:
-        context.store.results.attach(job, {"trajectory-0": other}, connection=connection)
+    job = submitted(api)
+    attach(context, job, {"trajectory-0": b"nothing"}, PARQUET)
     answer = api.get(f"/v1/jobs/{job}/trajectory", headers={"Accept": ARROW})
     assert answer.status_code == 404
     assert "can be read" in answer.json()["detail"]

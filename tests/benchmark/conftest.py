@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.machines.building import BLOCK, built
 
 from buildarena_benchmark import Task, builtin_tasks
 from buildarena_geometry import Machine
@@ -23,17 +24,7 @@ def make_trajectory(
     heated: Sequence[bool] = (),
     settings: Mapping[str, float | int | str] | None = None,
 ) -> Trajectory:
-    """A trajectory in which all blocks move alike.
-
-    Args:
-        machine: Whose blocks.
-        duration_s: Its length, seconds.
-        moved: Displacement of every block (T, 3) from times (T,).
-        cargo: Position of the cargo (T, 3) from times.
-        cargo_mass: Mass of the cargo (T,) from times.
-        heated: Per cannon, whether it is heated all the time.
-        settings: The trajectory's settings.
-    """
+    """A trajectory in which all blocks move alike; paths are (T, 3), masses (T,), from times."""
     time_s = np.arange(round(duration_s * 25) + 1) / 25
     start = np.array([block.center for block in machine.blocks.values()])
     path = np.zeros((len(time_s), 3)) if moved is None else moved(time_s)
@@ -58,6 +49,21 @@ def make_trajectory(
         simulation_version="1",
         settings=settings or {},
     )
+
+
+def wheels_of(machine: Machine) -> list[str]:
+    return [block.id for block in machine.blocks.values() if block.module.spins]
+
+
+def rolled(machine: Machine, trial: Trajectory, turned: Path) -> Trajectory:
+    """The trajectory with its wheels turned by angles (T,); positive ones roll north."""
+    half = -turned(trial.time_s) / 2
+    w, x = np.cos(half), np.sin(half)
+    rows = np.sqrt(0.5) * np.column_stack([w, x, w, x])  # block z axis towards east
+    quaternions = trial.quaternions.copy()
+    for wheel in wheels_of(machine):
+        quaternions[:, trial.block_ids.index(wheel)] = rows
+    return replace(trial, quaternions=quaternions.astype(np.float32))
 
 
 def with_bearing(
@@ -103,48 +109,23 @@ def tasks() -> dict[str, Task]:
 
 
 @pytest.fixture
-def trajectory_of() -> Callable[..., Trajectory]:
-    return make_trajectory
-
-
-@pytest.fixture
 def car() -> Machine:
     """Starting block, four wheels with keys, and a key press."""
-    machine = Machine()
-    machine.act("start", {})
-    for face in ("E", "F"):
-        machine.act(
-            "attach_block_to", {"base_block": "1", "face": face, "new_block": "Small Wooden Block"}
-        )
-    wheels = []
-    for base in ("2", "3"):
-        for face in ("A", "B"):
-            machine.act(
-                "attach_block_to",
-                {"base_block": base, "face": face, "new_block": "Small Wooden Block"},
-            )
-            end = list(machine.blocks)[-1]
-            machine.act(
-                "attach_block_to", {"base_block": end, "face": "E", "new_block": "Powered Wheel"}
-            )
-            wheels.append(list(machine.blocks)[-1])
-    for wheel in wheels:
-        machine.act(
-            "add_control_key",
-            {"block_id": wheel, "action": "spinning_forward", "new_key": "UpArrow"},
-        )
+    corners = (("2", "A", "4"), ("2", "B", "6"), ("3", "A", "8"), ("3", "B", "10"))
+    corner_parts = [
+        part
+        for base, face, end in corners
+        for part in ((base, face, BLOCK), (end, "E", "Powered Wheel"))
+    ]
+    machine = built(("1", "E", BLOCK), ("1", "F", BLOCK), *corner_parts)
+    for wheel in wheels_of(machine):
+        key = {"block_id": wheel, "action": "spinning_forward", "new_key": "UpArrow"}
+        assert machine.act("add_control_key", key).ok
     machine.act("add_control_sequence", {"time": 1.0, "key": "UpArrow", "hold_for": 5.0})
-    assert len(wheels) == 4
     return machine
 
 
 @pytest.fixture
 def engine_machine() -> Machine:
     """Starting block and two cannons."""
-    machine = Machine()
-    machine.act("start", {})
-    for face in ("A", "B"):
-        machine.act(
-            "attach_block_to", {"base_block": "1", "face": face, "new_block": "Water Cannon"}
-        )
-    return machine
+    return built(("1", "A", "Water Cannon"), ("1", "B", "Water Cannon"))

@@ -1,11 +1,10 @@
 """What a task allows is checked on the finished machine."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import pytest
 import yaml
+from support.machines.building import BLOCK, built, connect
 
 from buildarena_benchmark import Task, broken_constraint, load_task
 from buildarena_geometry import Machine
@@ -18,15 +17,7 @@ def task_with(tasks: dict[str, Task], **constraints: object) -> Task:
 
 def row(length: int) -> Machine:
     """Blocks in a row to the north, the starting block included."""
-    machine = Machine()
-    assert machine.act("start").ok
-    for number in range(1, length):
-        done = machine.act(
-            "attach_block_to",
-            {"base_block": str(number), "face": "E", "new_block": "Small Wooden Block"},
-        )
-        assert done.ok, done.text
-    return machine
+    return built(*((str(number), "E", BLOCK) for number in range(1, length)))
 
 
 def assembly(*lengths: int, joined: bool = True, connector: str = "Brace") -> Machine:
@@ -54,24 +45,19 @@ def test_a_machine_without_anything_built_is_empty(tasks) -> None:
 def test_each_sub_structure_may_have_its_blocks(tasks) -> None:
     task = task_with(tasks, max_sub_structures=2, max_blocks=4)
     assert broken_constraint(task, assembly(4, 4)) is None
-    assert broken_constraint(task, assembly(3, 5)) == (
-        "constraint_violated",
-        "sub-structure B has 5 blocks, the task allows 4 in one",
-    )
+    says = "sub-structure B has 5 blocks, the task allows 4 in one"
+    assert broken_constraint(task, assembly(3, 5)) == ("constraint_violated", says)
 
 
 def test_copies_count_against_the_blocks_of_all(tasks) -> None:
     task = task_with(tasks, max_sub_structures=2, max_blocks=4)
-    assert broken_constraint(task, assembly(4, 4, 3)) == (
-        "constraint_violated",
-        "the machine has 11 blocks, the task allows 8 in all",
-    )
+    says = "the machine has 11 blocks, the task allows 8 in all"
+    assert broken_constraint(task, assembly(4, 4, 3)) == ("constraint_violated", says)
 
 
 def test_connectors_are_no_blocks(tasks) -> None:
     machine = row(4)
-    ends = {"block_a": "2", "face_a": "A", "block_b": "4", "face_b": "A", "connector": "Winch"}
-    done = machine.act("connect_blocks", ends)
+    done = connect(machine, "2", "A", "4", "A", connector="Winch")
     assert done.ok, done.text
     assert broken_constraint(task_with(tasks, max_blocks=4), machine) is None
     assert broken_constraint(task_with(tasks, max_blocks=3), machine) is not None
@@ -95,37 +81,26 @@ def test_modules_are_those_that_the_task_names(tasks, constraints, says) -> None
 
 
 @pytest.mark.parametrize(
-    ("limits", "lengths", "says"),
+    ("least", "most", "lengths", "says"),
     [
-        ({"max_sub_structures": 1}, (3,), None),
-        ({"max_sub_structures": 1}, (3, 4), "has 2 sub-structures, the task asks for 1"),
+        (1, 1, (3,), None),
+        (1, 1, (3, 4), "has 2 sub-structures, the task asks for 1"),
         # One piece means one, however often it is copied.
-        ({"max_sub_structures": 1}, (3, 3), "has 2 sub-structures, the task asks for 1"),
-        ({"max_sub_structures": 3}, (3, 4, 5), None),
-        ({"max_sub_structures": 3}, (3, 3, 4, 4), None),  # copies count once
-        (
-            {"max_sub_structures": 3},
-            (2, 3, 4, 5),
-            "has 4 sub-structures, the task asks for 1 to 3",
-        ),
-        ({"min_sub_structures": 2, "max_sub_structures": 2}, (3, 4), None),
+        (1, 1, (3, 3), "has 2 sub-structures, the task asks for 1"),
+        (1, 3, (3, 4, 5), None),
+        (1, 3, (3, 3, 4, 4), None),  # copies count once
+        (1, 3, (2, 3, 4, 5), "has 4 sub-structures, the task asks for 1 to 3"),
+        (2, 2, (3, 4), None),
         # An engine and three copies of a frame, or two copies of one thing.
-        ({"min_sub_structures": 2, "max_sub_structures": 2}, (3, 4, 4, 4), None),
-        ({"min_sub_structures": 2, "max_sub_structures": 2}, (3, 3), None),
-        (
-            {"min_sub_structures": 2, "max_sub_structures": 2},
-            (3, 4, 5),
-            "has 3 sub-structures, the task asks for 2",
-        ),
-        (
-            {"min_sub_structures": 2, "max_sub_structures": 2},
-            (3, 1),
-            "sub-structure B is nothing but its starting block",
-        ),
+        (2, 2, (3, 4, 4, 4), None),
+        (2, 2, (3, 3), None),
+        (2, 2, (3, 4, 5), "has 3 sub-structures, the task asks for 2"),
+        (2, 2, (3, 1), "sub-structure B is nothing but its starting block"),
     ],
 )
-def test_sub_structures_are_counted_on_the_machine(tasks, limits, lengths, says) -> None:
-    broken = broken_constraint(task_with(tasks, **limits), assembly(*lengths))
+def test_sub_structures_are_counted_on_the_machine(tasks, least, most, lengths, says) -> None:
+    task = task_with(tasks, min_sub_structures=least, max_sub_structures=most)
+    broken = broken_constraint(task, assembly(*lengths))
     if says is None:
         assert broken is None
     else:
@@ -136,11 +111,8 @@ def test_sub_structures_are_counted_on_the_machine(tasks, limits, lengths, says)
 
 def test_a_machine_built_in_one_go_is_one_sub_structure(tasks) -> None:
     assert broken_constraint(tasks["support-1"], row(4)) is None
-    broken = broken_constraint(tasks["lift-3"], row(4))
-    assert broken == (
-        "constraint_violated",
-        "the machine has 1 sub-structure, the task asks for 2",
-    )
+    says = "the machine has 1 sub-structure, the task asks for 2"
+    assert broken_constraint(tasks["lift-3"], row(4)) == ("constraint_violated", says)
 
 
 def test_a_sub_structure_that_was_removed_does_not_count(tasks) -> None:
@@ -187,16 +159,14 @@ def test_a_block_that_was_shifted_off_its_place_is_unjoined(tasks, shifts) -> No
             assert broken is not None
             assert broken[0] == "unjoined_parts"
             assert broken[1].startswith("block 4 (Small Wooden Block) is not joined to the start")
-    ends = {"block_a": "4", "face_a": "C", "block_b": "3", "face_b": "C", "connector": "Brace"}
-    assert machine.act("connect_blocks", ends).ok
+    assert connect(machine, "4", "C", "3", "C").ok
     assert broken_constraint(tasks["support-1"], machine) is None
 
 
 def test_a_connector_from_a_block_to_itself_joins_nothing(tasks) -> None:
     machine = row(3)
     assert machine.act("remove_block", {"block_id": "2"}).ok
-    ends = {"block_a": "3", "face_a": "C", "block_b": "3", "face_b": "D", "connector": "Brace"}
-    assert machine.act("connect_blocks", ends).ok
+    assert connect(machine, "3", "C", "3", "D").ok
     broken = broken_constraint(tasks["support-1"], machine)
     assert broken is not None
     assert "block 3 (Small Wooden Block)" in broken[1]

@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.benchmark.conftest import with_pieces
+from support.machines.building import attach, built, connect
+from tests.benchmark.conftest import make_trajectory, with_pieces
 
 from buildarena_benchmark import score
 from buildarena_benchmark.scorers.measures.components import joined_to_start
@@ -14,12 +15,8 @@ from buildarena_simulation.trajectory import Break
 
 def _engine(*sprays: int) -> Machine:
     """A starting block with a cannon on each of its faces A, B, E, F, turned by quarter turns."""
-    machine = Machine()
-    assert machine.act("start", {}).ok
-    for face, turns in zip("ABEF", sprays, strict=False):
-        added = {"base_block": "1", "face": face, "new_block": "Water Cannon"}
-        assert machine.act("attach_block_to", added).ok
-        block = list(machine.blocks)[-1]
+    machine = built(*(("1", face, "Water Cannon") for face, _ in zip("ABEF", sprays, strict=False)))
+    for block, turns in zip([*machine.blocks][1:], sprays, strict=True):
         if turns:
             turned = machine.act("twist_block", {"block_id": block, "angle": 90.0 * turns})
             assert turned.ok, turned.text
@@ -40,49 +37,48 @@ def _turns_down() -> list[int]:
 DOWN = _turns_down()
 
 
-def test_cannons_that_push_against_each_other_cancel(tasks, trajectory_of) -> None:
+def test_cannons_that_push_against_each_other_cancel(tasks) -> None:
     together = _engine(*DOWN)
     against = _engine(*(turn + 2 * (place % 2) for place, turn in enumerate(DOWN)))
     three = _engine(*(turn + 2 * (place == 0) for place, turn in enumerate(DOWN)))
     for machine, net in ((together, 4.0), (against, 0.0), (three, 2.0)):
-        trial = trajectory_of(machine, 10.0, heated=[True] * 4)
+        trial = make_trajectory(machine, 10.0, heated=[True] * 4)
         result = score(tasks["lift-1"], machine, trial)
         assert result.indicator == pytest.approx(net * 13.76 / 6.25, abs=1e-5)
         assert result.success == (net > 0)
 
 
-def test_cannons_at_a_right_angle_add_as_arrows(tasks, trajectory_of) -> None:
+def test_cannons_at_a_right_angle_add_as_arrows(tasks) -> None:
     machine = _engine(DOWN[0], DOWN[1] + 1)
-    result = score(tasks["lift-1"], machine, trajectory_of(machine, 10.0, heated=[True, False]))
+    result = score(tasks["lift-1"], machine, make_trajectory(machine, 10.0, heated=[True, False]))
     assert result.indicator == pytest.approx(np.hypot(13.76, 1.6) / 3.25, abs=1e-5)
 
 
-def test_an_order_of_cannons_changes_nothing(tasks, trajectory_of) -> None:
+def test_an_order_of_cannons_changes_nothing(tasks) -> None:
     machine = _engine(*DOWN)
     results = {
-        score(tasks["lift-1"], machine, trajectory_of(machine, 10.0, heated=hot)).indicator
+        score(tasks["lift-1"], machine, make_trajectory(machine, 10.0, heated=hot)).indicator
         for hot in ([True, False, True, True], [True, True, True, False])
     }
     assert len(results) == 1
 
 
-def test_a_cannon_that_breaks_off_no_longer_counts(tasks, trajectory_of) -> None:
+def test_a_cannon_that_breaks_off_no_longer_counts(tasks) -> None:
     machine = _engine(*DOWN)
-    whole = trajectory_of(machine, 10.0, heated=[True] * 4)
+    whole = make_trajectory(machine, 10.0, heated=[True] * 4)
     broken = with_pieces(whole, ["2"], since_s=5.0)
     result = score(tasks["lift-1"], machine, broken)
     # Its weight still counts, so that nothing is gained by parts that come off.
     assert result.indicator == pytest.approx(3 * 13.76 / 6.25, abs=1e-5)
     never = with_pieces(whole, ["2"])
-    assert score(tasks["lift-1"], machine, never).indicator == pytest.approx(
-        3 * 13.76 / 4.75, abs=1e-5
-    )
+    left = score(tasks["lift-1"], machine, never).indicator
+    assert left == pytest.approx(3 * 13.76 / 4.75, abs=1e-5)
     alone = with_pieces(whole, ["2"], ["3"], ["4"], ["5"])
     assert score(tasks["lift-1"], machine, alone).indicator == 0.0
 
 
-def _flight(make, machine: Machine, flying: set[str], heated: int):
-    trial = make(machine, 30.0, heated=[True] * heated)
+def _flight(machine: Machine, flying: set[str], heated: int):
+    trial = make_trajectory(machine, 30.0, heated=[True] * heated)
     positions = trial.positions.copy()
     for column, block in enumerate(trial.block_ids):
         if block in flying:
@@ -90,33 +86,29 @@ def _flight(make, machine: Machine, flying: set[str], heated: int):
     return replace(trial, positions=positions)
 
 
-def test_a_cannon_that_flies_alone_lifts_nothing(tasks, trajectory_of) -> None:
+def test_a_cannon_that_flies_alone_lifts_nothing(tasks) -> None:
     machine = _engine(*DOWN)
-    torn = with_pieces(_flight(trajectory_of, machine, {"2"}, 4), ["2"], since_s=2.0)
+    torn = with_pieces(_flight(machine, {"2"}, 4), ["2"], since_s=2.0)
     result = score(tasks["lift-2"], machine, torn)
     assert not result.success
     assert result.indicator < 3.0
     assert score(tasks["lift-2"], machine, replace(torn, pieces=None)).indicator > 200.0
 
 
-def test_a_rocket_that_loses_a_part_goes_on(tasks, trajectory_of) -> None:
+def test_a_rocket_that_loses_a_part_goes_on(tasks) -> None:
     machine = _engine(*DOWN)
-    flight = _flight(trajectory_of, machine, {"1", "2", "3", "4"}, 4)
+    flight = _flight(machine, {"1", "2", "3", "4"}, 4)
     result = score(tasks["lift-2"], machine, with_pieces(flight, ["5"], since_s=2.0))
     assert result.success
     assert result.flags == ()
 
 
-def test_parts_on_a_rope_belong_to_the_piece_until_it_gives_way(trajectory_of) -> None:
+def test_parts_on_a_rope_belong_to_the_piece_until_it_gives_way() -> None:
     machine = _engine(*DOWN)
-    ends = {"block_a": "6", "face_a": "C", "block_b": "1", "face_b": "C", "connector": "Winch"}
-    added = {"base_block": "1", "face": "C", "new_block": "Small Wooden Block"}
-    assert machine.act("attach_block_to", added).ok
-    far = {"base_block": "6", "face": "E", "new_block": "Small Wooden Block"}
-    assert machine.act("attach_block_to", far).ok
-    ends = {"block_a": "7", "face_a": "A", "block_b": "1", "face_b": "D", "connector": "Winch"}
-    assert machine.act("connect_blocks", ends).ok
-    trial = with_pieces(trajectory_of(machine, 4.0, heated=[True] * 4), ["7"])
+    assert attach(machine, "1", "C").ok
+    assert attach(machine, "6", "E").ok
+    assert connect(machine, "7", "A", "1", "D", connector="Winch").ok
+    trial = with_pieces(make_trajectory(machine, 4.0, heated=[True] * 4), ["7"])
     column = trial.block_ids.index("7")
     assert joined_to_start(machine, trial).all()
     event = Break(time_s=2.0, joint="Winch 8", kind="rope", ratio=1.1, cargo_mass=None)

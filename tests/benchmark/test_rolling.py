@@ -5,21 +5,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.benchmark.conftest import with_bearing, with_pieces
+from tests.benchmark.conftest import make_trajectory, rolled, wheels_of, with_bearing, with_pieces
 
-from buildarena_benchmark import Task, score
+from buildarena_benchmark import score
 from buildarena_geometry import Machine
 from buildarena_simulation import Trajectory
 
 Path = Callable[[np.ndarray], np.ndarray]
 
 
-def _wheels(machine: Machine) -> list[str]:
-    return [block.id for block in machine.blocks.values() if block.module.spins]
-
-
 def _driven(
-    make: Callable[..., Trajectory],
     machine: Machine,
     *,
     moved: Path,
@@ -28,15 +23,12 @@ def _driven(
     cargo: Path | None = None,
     cargo_borne: object = 50.0,
 ) -> Trajectory:
-    """A machine that moves by (east, north), its wheels turned by angles about the axis west.
-
-    A positive angle rolls them north; they turn about east-west, as the fixture's wheels sit.
-    """
+    """A machine that moves by (east, north), its wheels turned by angles; positive ones north."""
 
     def path(t: np.ndarray) -> np.ndarray:
         return np.column_stack([moved(t), np.zeros_like(t)])
 
-    trial = make(
+    trial = make_trajectory(
         machine,
         30.0,
         moved=path,
@@ -44,25 +36,9 @@ def _driven(
         cargo_mass=None if cargo is None else lambda t: np.full_like(t, 50.0),
         settings={"effective_key_presses": 1},
     )
-    quaternions = trial.quaternions.copy()
-    half = -turned(trial.time_s) / 2  # about east: rolls south if positive
-    spin = np.column_stack([np.cos(half), np.sin(half), np.zeros((len(half), 2))])
-    across = np.array([np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0])  # block z axis towards east
-    w, x = spin[:, 0], spin[:, 1]
-    rows = np.column_stack(
-        [
-            w * across[0],
-            x * across[0],
-            w * across[2],
-            x * across[2],
-        ]
-    )
-    for wheel in _wheels(machine):
-        quaternions[:, trial.block_ids.index(wheel)] = rows
-    trial = replace(trial, quaternions=quaternions.astype(np.float32))
-    return with_bearing(
-        trial, wheels=borne, wheel_ids=_wheels(machine), cargo=cargo_borne if cargo else 0.0
-    )
+    trial = rolled(machine, trial, turned)
+    carried = cargo_borne if cargo else 0.0
+    return with_bearing(trial, wheels=borne, wheel_ids=wheels_of(machine), cargo=carried)
 
 
 def _north(speed: float) -> Path:
@@ -77,9 +53,12 @@ def _turn(rate: float) -> Path:
     return lambda t: rate * t
 
 
-def test_a_car_that_rolls_counts_in_full(tasks, trajectory_of, car) -> None:
+ROLLING = {"moved": _north(1.0), "turned": _turn(1.0)}
+
+
+def test_a_car_that_rolls_counts_in_full(tasks, car) -> None:
     for rate in (1.0, -1.0):
-        trial = _driven(trajectory_of, car, moved=_north(rate), turned=_turn(rate))
+        trial = _driven(car, moved=_north(rate), turned=_turn(rate))
         result = score(tasks["transport-1"], car, trial)
         assert (result.success, result.flags) == (True, ())
         assert result.indicator == pytest.approx(30.0, abs=1e-3)
@@ -96,31 +75,30 @@ def test_a_car_that_rolls_counts_in_full(tasks, trajectory_of, car) -> None:
         {"moved": _north(3.0), "turned": _turn(0.2)},  # farther than the wheels rolled
     ],
 )
-def test_what_wheels_did_not_drive_does_not_count(tasks, trajectory_of, car, motion) -> None:
-    result = score(tasks["transport-1"], car, _driven(trajectory_of, car, **motion))
+def test_what_wheels_did_not_drive_does_not_count(tasks, car, motion) -> None:
+    result = score(tasks["transport-1"], car, _driven(car, **motion))
     assert not result.success
     assert result.indicator < 8.0
     assert result.flags == ("not_driven",)
 
 
-def test_wheels_that_burn_out_in_place_earn_nothing_for_a_throw(tasks, trajectory_of, car) -> None:
+def test_wheels_that_burn_out_in_place_earn_nothing_for_a_throw(tasks, car) -> None:
     def thrown(t: np.ndarray) -> np.ndarray:
         return np.column_stack([np.zeros_like(t), np.where(t > 20.0, 18.0, 0.0)])
 
-    result = score(
-        tasks["transport-1"], car, _driven(trajectory_of, car, moved=thrown, turned=_turn(10.0))
-    )
+    trial = _driven(car, moved=thrown, turned=_turn(10.0))
+    result = score(tasks["transport-1"], car, trial)
     assert (result.success, result.flags) == (False, ("not_driven",))
     assert result.indicator < 1.0
 
 
-def test_a_wheel_that_bounces_drives(tasks, trajectory_of, car) -> None:
+def test_a_wheel_that_bounces_drives(tasks, car) -> None:
     touches = (np.arange(751) % 8 == 0).astype(float)[:, None]
-    trial = _driven(trajectory_of, car, moved=_north(1.0), turned=_turn(1.0), borne=touches)
+    trial = _driven(car, **ROLLING, borne=touches)
     assert score(tasks["transport-1"], car, trial).indicator == pytest.approx(30.0, abs=0.1)
 
 
-def test_a_skid_after_a_drive_counts(tasks, trajectory_of, car) -> None:
+def test_a_skid_after_a_drive_counts(tasks, car) -> None:
     def skids(t: np.ndarray) -> np.ndarray:
         braked = np.clip(t - 1.0, 0.0, 0.5)
         length = 10.0 * np.minimum(t, 1.0) + 10.0 * braked - 10.0 * braked**2
@@ -132,84 +110,55 @@ def test_a_skid_after_a_drive_counts(tasks, trajectory_of, car) -> None:
     def turned(t: np.ndarray) -> np.ndarray:
         return 10.0 * np.minimum(t, 1.0)
 
-    skid = _driven(trajectory_of, car, moved=skids, turned=turned)
+    skid = _driven(car, moved=skids, turned=turned)
     assert score(tasks["transport-1"], car, skid).indicator == pytest.approx(12.5, abs=0.01)
     # A slide that does not slow down is no skid: something else pushes.
-    slide = _driven(trajectory_of, car, moved=slides, turned=turned)
+    slide = _driven(car, moved=slides, turned=turned)
     assert score(tasks["transport-1"], car, slide).indicator < 10.0 * 1.05 + 0.5 + 3.5
 
 
-def test_one_good_wheel_is_enough(tasks, trajectory_of, car) -> None:
+def test_one_good_wheel_is_enough(tasks, car) -> None:
     borne = np.zeros((751, 4))
     borne[:, 2] = 5.0
-    trial = _driven(trajectory_of, car, moved=_north(1.0), turned=_turn(1.0), borne=borne)
+    trial = _driven(car, **ROLLING, borne=borne)
     assert score(tasks["transport-1"], car, trial).success
 
 
-def test_wheels_that_came_off_drive_nothing(tasks, trajectory_of, car) -> None:
-    trial = _driven(trajectory_of, car, moved=_north(1.0), turned=_turn(1.0))
-    apart = with_pieces(trial, *([wheel] for wheel in _wheels(car)), since_s=4.0)
+def test_wheels_that_came_off_drive_nothing(tasks, car) -> None:
+    trial = _driven(car, **ROLLING)
+    apart = with_pieces(trial, *([wheel] for wheel in wheels_of(car)), since_s=4.0)
     result = score(tasks["transport-1"], car, apart)
     assert result.indicator == pytest.approx(4.0 * 1.05 + 0.5, abs=0.1)
     assert result.flags == ("not_driven",)
 
 
-@pytest.mark.parametrize(
-    ("borne", "counts"),
-    [(50.0, 30.0), (30.0, 30.0), (20.0, 0.0), (0.0, 0.0)],
-)
-def test_a_cargo_counts_while_the_machine_bears_it(
-    tasks: dict[str, Task], trajectory_of, car, borne, counts
-) -> None:
-    trial = _driven(
-        trajectory_of,
-        car,
-        moved=_north(1.0),
-        turned=_turn(1.0),
-        cargo=_north(1.0),
-        cargo_borne=borne,
-    )
+@pytest.mark.parametrize(("borne", "counts"), [(50.0, 30.0), (30.0, 30.0), (20.0, 0.0), (0.0, 0.0)])
+def test_a_cargo_counts_while_the_machine_bears_it(tasks, car, borne, counts) -> None:
+    trial = _driven(car, **ROLLING, cargo=_north(1.0), cargo_borne=borne)
     result = score(tasks["transport-2"], car, trial)
     assert result.indicator == pytest.approx(counts, abs=1e-3)
     assert result.flags == (() if counts else ("not_driven",))
 
 
-def test_a_cargo_that_is_thrown_off_a_car_counts_until_then(tasks, trajectory_of, car) -> None:
+def test_a_cargo_that_is_thrown_off_a_car_counts_until_then(tasks, car) -> None:
     times = np.arange(751) / 25
 
     def flies(t: np.ndarray) -> np.ndarray:
         return np.column_stack([np.zeros_like(t), t + np.where(t > 6.0, 9.0, 0.0)])
 
-    trial = _driven(
-        trajectory_of,
-        car,
-        moved=_north(1.0),
-        turned=_turn(1.0),
-        cargo=flies,
-        cargo_borne=np.where(times <= 6.0, 50.0, 0.0),
-    )
+    borne = np.where(times <= 6.0, 50.0, 0.0)
+    trial = _driven(car, **ROLLING, cargo=flies, cargo_borne=borne)
     result = score(tasks["transport-2"], car, trial)
     assert not result.success
     assert result.indicator < 7.5
     hops = np.where(np.arange(751) % 6 == 0, 300.0, 0.0)
-    carried = _driven(
-        trajectory_of,
-        car,
-        moved=_north(1.0),
-        turned=_turn(1.0),
-        cargo=_north(1.0),
-        cargo_borne=hops,
-    )
+    carried = _driven(car, **ROLLING, cargo=_north(1.0), cargo_borne=hops)
     assert score(tasks["transport-2"], car, carried).success
 
 
-def test_wheels_that_are_not_tracked_are_not_measured(tasks, trajectory_of, car) -> None:
-    trial = _driven(trajectory_of, car, moved=_north(1.0), turned=_turn(0.0))
-    first = replace(
-        trial,
-        block_ids=trial.block_ids[:1],
-        positions=trial.positions[:, :1],
-        quaternions=trial.quaternions[:, :1],
-    )
+def test_wheels_that_are_not_tracked_are_not_measured(tasks, car) -> None:
+    trial = _driven(car, moved=_north(1.0), turned=_turn(0.0))
+    poses = {"positions": trial.positions[:, :1], "quaternions": trial.quaternions[:, :1]}
+    first = replace(trial, block_ids=trial.block_ids[:1], **poses)
     result = score(tasks["transport-1"], car, first)
     assert (result.success, result.flags) == (True, ("drive_not_measured",))

@@ -1,19 +1,25 @@
 """Scorers, on trajectories made by hand."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.benchmark.conftest import make_trajectory, wheels_of
 
-from buildarena_benchmark import Task, failed_score, score
+from buildarena_benchmark import failed_score, score
 from buildarena_geometry import Machine
 from buildarena_simulation import Trajectory
 
-Make = Callable[..., Trajectory]
+Path = Callable[[np.ndarray], np.ndarray]
 
 
 def _columns(*columns: np.ndarray | float, like: np.ndarray) -> np.ndarray:
     return np.stack([np.broadcast_to(c, like.shape) for c in columns], axis=1)
+
+
+def _upwards(height: Path) -> Path:
+    return lambda t: _columns(0.0, 0.0, height(t), like=t)
 
 
 def _ramp(t: np.ndarray) -> np.ndarray:
@@ -23,14 +29,12 @@ def _ramp(t: np.ndarray) -> np.ndarray:
 # Transport
 
 
-def _north_east(speed: float) -> Callable[[np.ndarray], np.ndarray]:
+def _north_east(speed: float) -> Path:
     return lambda t: _columns(speed * t / np.sqrt(2), speed * t / np.sqrt(2), 0.0, like=t)
 
 
-def test_a_vehicle_that_goes_far_enough_passes(
-    tasks: dict[str, Task], trajectory_of: Make, car: Machine
-) -> None:
-    result = score(tasks["transport-1"], car, trajectory_of(car, 30.0, moved=_north_east(1.0)))
+def test_a_vehicle_that_goes_far_enough_passes(tasks, car) -> None:
+    result = score(tasks["transport-1"], car, make_trajectory(car, 30.0, moved=_north_east(1.0)))
     assert result.success
     assert result.indicator == pytest.approx(30.0, abs=1e-3)
     assert result.flags == ("drive_not_measured",)
@@ -45,17 +49,13 @@ def test_a_vehicle_that_goes_far_enough_passes(
     assert metrics["max_speed"] == pytest.approx(1.0, abs=1e-2)
 
 
-def test_the_distance_must_exceed_ten(
-    tasks: dict[str, Task], trajectory_of: Make, car: Machine
-) -> None:
-    short = trajectory_of(car, 10.0, moved=_north_east(0.99))
+def test_the_distance_must_exceed_ten(tasks, car) -> None:
+    short = make_trajectory(car, 10.0, moved=_north_east(0.99))
     assert not score(tasks["transport-1"], car, short).success
 
 
-def test_the_farthest_point_counts_not_the_last(
-    tasks: dict[str, Task], trajectory_of: Make, car: Machine
-) -> None:
-    there_and_back = trajectory_of(
+def test_the_farthest_point_counts_not_the_last(tasks, car) -> None:
+    there_and_back = make_trajectory(
         car, 30.0, moved=lambda t: _columns(0.0, 15 - np.abs(t - 15), 0.0, like=t)
     )
     result = score(tasks["transport-1"], car, there_and_back)
@@ -65,50 +65,40 @@ def test_the_farthest_point_counts_not_the_last(
     assert result.metrics["path_efficiency"] < 0.1
 
 
-def test_a_vehicle_without_wheels_enough_fails(
-    tasks: dict[str, Task], trajectory_of: Make, car: Machine
-) -> None:
-    wheel = next(b.id for b in car.blocks.values() if b.module.kind == "wheel")
-    assert car.act("remove_block", {"block_id": wheel}).ok
-    result = score(tasks["transport-1"], car, trajectory_of(car, 30.0, moved=_north_east(1.0)))
+def test_a_vehicle_without_wheels_enough_fails(tasks, car) -> None:
+    assert car.act("remove_block", {"block_id": wheels_of(car)[0]}).ok
+    result = score(tasks["transport-1"], car, make_trajectory(car, 30.0, moved=_north_east(1.0)))
     assert not result.success
     assert result.metrics["wheels"] == 3
 
 
-def test_a_vehicle_that_nothing_drives_scores_nothing(
-    tasks: dict[str, Task], trajectory_of: Make, car: Machine
-) -> None:
+def test_a_vehicle_that_nothing_drives_scores_nothing(tasks, car) -> None:
     assert car.act("reset_control_sequence", {}).ok
-    rolling = trajectory_of(car, 30.0, moved=_north_east(1.0))
+    rolling = make_trajectory(car, 30.0, moved=_north_east(1.0))
     result = score(tasks["transport-1"], car, rolling)
     assert (result.success, result.indicator) == (False, 0.0)
-    driven = trajectory_of(car, 30.0, moved=_north_east(1.0), settings={"effective_key_presses": 2})
+    driven = make_trajectory(
+        car, 30.0, moved=_north_east(1.0), settings={"effective_key_presses": 2}
+    )
     assert score(tasks["transport-1"], car, driven).success
 
 
-def test_success_without_wheels_is_flagged(
-    tasks: dict[str, Task], trajectory_of: Make, engine_machine: Machine
-) -> None:
-    result = score(
-        tasks["transport-2"],
+def test_success_without_wheels_is_flagged(tasks, engine_machine) -> None:
+    pushed = make_trajectory(
         engine_machine,
-        trajectory_of(
-            engine_machine,
-            30.0,
-            cargo=lambda t: _columns(t, 0.0, 2.0, like=t),
-            cargo_mass=lambda t: np.full_like(t, 50.0),
-            heated=(False, False),
-            settings={"effective_key_presses": 1},
-        ),
+        30.0,
+        cargo=lambda t: _columns(t, 0.0, 2.0, like=t),
+        cargo_mass=lambda t: np.full_like(t, 50.0),
+        heated=(False, False),
+        settings={"effective_key_presses": 1},
     )
+    result = score(tasks["transport-2"], engine_machine, pushed)
     assert result.success
     assert result.flags == ("no_wheels", "drive_not_measured")
 
 
-def test_a_start_too_high_fails_and_is_flagged(
-    tasks: dict[str, Task], trajectory_of: Make, car: Machine
-) -> None:
-    high = trajectory_of(
+def test_a_start_too_high_fails_and_is_flagged(tasks, car) -> None:
+    high = make_trajectory(
         car, 30.0, moved=lambda t: _columns(t, 0.0, np.maximum(20.0 - 10 * t, 0.0), like=t)
     )
     result = score(tasks["transport-1"], car, high)
@@ -116,45 +106,30 @@ def test_a_start_too_high_fails_and_is_flagged(
     assert result.flags == ("start_too_high", "drive_not_measured")
 
 
-def test_wheels_that_drift_apart_are_not_intact(
-    tasks: dict[str, Task], trajectory_of: Make, car: Machine
-) -> None:
-    trajectory = trajectory_of(car, 30.0, moved=_north_east(1.0))
+def test_wheels_that_drift_apart_are_not_intact(tasks, car) -> None:
+    trajectory = make_trajectory(car, 30.0, moved=_north_east(1.0))
     positions = trajectory.positions.copy()
-    wheel = list(car.blocks).index(
-        next(b.id for b in car.blocks.values() if b.module.kind == "wheel")
-    )
+    wheel = trajectory.block_ids.index(wheels_of(car)[0])
     positions[:, wheel, 0] += np.linspace(0, 2, len(positions))
-    import dataclasses
-
-    broken = dataclasses.replace(trajectory, positions=positions)
+    broken = replace(trajectory, positions=positions)
     assert score(tasks["transport-1"], car, broken).metrics["intact"] is False
 
 
 # Support
 
 
-def _carried(
-    make: Make, machine: Machine, fall_at: float | None, *, start: float = 10.0
-) -> Trajectory:
+def _carried(machine: Machine, fall_at: float | None, *, start: float = 10.0) -> Trajectory:
     def height(t: np.ndarray) -> np.ndarray:
         settled = np.maximum(start - 20 * t, 6.75)
         if fall_at is None:
             return settled
         return np.where(t < fall_at, settled, np.maximum(settled - 20 * (t - fall_at), 0.8))
 
-    return make(
-        machine,
-        17.0,
-        cargo=lambda t: _columns(0.0, 0.0, height(t), like=t),
-        cargo_mass=_ramp,
-    )
+    return make_trajectory(machine, 17.0, cargo=_upwards(height), cargo_mass=_ramp)
 
 
-def test_the_load_is_the_cargos_mass_when_it_sinks(
-    tasks: dict[str, Task], trajectory_of: Make, car: Machine
-) -> None:
-    result = score(tasks["support-1"], car, _carried(trajectory_of, car, 8.0))
+def test_the_load_is_the_cargos_mass_when_it_sinks(tasks, car) -> None:
+    result = score(tasks["support-1"], car, _carried(car, 8.0))
     assert result.success
     below = 8.0 + 2.75 / 20  # from 6.75 to 4 at 20 units/s
     sample = np.ceil(below * 25) / 25
@@ -163,28 +138,22 @@ def test_the_load_is_the_cargos_mass_when_it_sinks(
     assert result.flags == ("span_not_measured",)
 
 
-def test_a_cargo_that_never_falls_counts_in_full_and_is_flagged(
-    tasks: dict[str, Task], trajectory_of: Make, car: Machine
-) -> None:
-    result = score(tasks["support-1"], car, _carried(trajectory_of, car, None))
+def test_a_cargo_that_never_falls_counts_in_full_and_is_flagged(tasks, car) -> None:
+    result = score(tasks["support-1"], car, _carried(car, None))
     assert result.success
     assert result.indicator == 1500.0
     assert result.flags == ("never_fell", "span_not_measured")
 
 
-def test_a_cargo_that_is_not_up_for_two_seconds_scores_nothing(
-    tasks: dict[str, Task], trajectory_of: Make, car: Machine
-) -> None:
-    early = score(tasks["support-1"], car, _carried(trajectory_of, car, 1.5))
+def test_a_cargo_that_is_not_up_for_two_seconds_scores_nothing(tasks, car) -> None:
+    early = score(tasks["support-1"], car, _carried(car, 1.5))
     assert (early.success, early.indicator) == (False, 0.0)
-    later = score(tasks["support-1"], car, _carried(trajectory_of, car, 2.1))
+    later = score(tasks["support-1"], car, _carried(car, 2.1))
     assert later.success
 
 
-def test_a_cargo_that_starts_too_high_scores_nothing(
-    tasks: dict[str, Task], trajectory_of: Make, car: Machine
-) -> None:
-    result = score(tasks["support-1"], car, _carried(trajectory_of, car, 8.0, start=20.5))
+def test_a_cargo_that_starts_too_high_scores_nothing(tasks, car) -> None:
+    result = score(tasks["support-1"], car, _carried(car, 8.0, start=20.5))
     assert (result.success, result.indicator) == (False, 0.0)
     assert result.flags == ("start_too_high", "span_not_measured")
 
@@ -196,31 +165,21 @@ def test_a_cargo_that_starts_too_high_scores_nothing(
     ("heated", "thrust"), [((True, True), 2 * 13.76), ((True, False), 15.36), ((False, False), 3.2)]
 )
 def test_thrust_over_weight_counts_heated_and_cold_cannons(
-    tasks: dict[str, Task],
-    trajectory_of: Make,
-    engine_machine: Machine,
-    heated: tuple[bool, bool],
-    thrust: float,
+    tasks, engine_machine, heated, thrust
 ) -> None:
-    trajectory = trajectory_of(engine_machine, 10.0, heated=heated)
+    trajectory = make_trajectory(engine_machine, 10.0, heated=heated)
     result = score(tasks["lift-1"], engine_machine, trajectory)
     assert result.indicator == pytest.approx(thrust / 3.25, rel=1e-6)
     assert result.success == (thrust > 3.25)
     assert result.metrics["heated_cannons"] == sum(heated)
 
 
-def _climb(
-    make: Make, machine: Machine, height: Callable[[np.ndarray], np.ndarray], **more: object
-) -> Trajectory:
-    return make(machine, 30.0, moved=lambda t: _columns(0.0, 0.0, height(t), like=t), **more)
+def _climb(machine: Machine, height: Path, **more: object) -> Trajectory:
+    return make_trajectory(machine, 30.0, moved=_upwards(height), **more)
 
 
-def test_a_rocket_that_keeps_rising_passes(
-    tasks: dict[str, Task], trajectory_of: Make, engine_machine: Machine
-) -> None:
-    rising = _climb(
-        trajectory_of, engine_machine, lambda t: np.maximum(t - 2, 0) * 4, heated=(True, True)
-    )
+def test_a_rocket_that_keeps_rising_passes(tasks, engine_machine) -> None:
+    rising = _climb(engine_machine, lambda t: np.maximum(t - 2, 0) * 4, heated=(True, True))
     result = score(tasks["lift-2"], engine_machine, rising)
     assert result.success
     assert result.indicator == pytest.approx(28 * 4, abs=0.01)
@@ -228,26 +187,17 @@ def test_a_rocket_that_keeps_rising_passes(
     assert result.metrics["rise"] == pytest.approx(20.0, abs=0.1)
 
 
-def test_a_rocket_that_only_hops_fails(
-    tasks: dict[str, Task], trajectory_of: Make, engine_machine: Machine
-) -> None:
+def test_a_rocket_that_only_hops_fails(tasks, engine_machine) -> None:
     hop = _climb(
-        trajectory_of,
-        engine_machine,
-        lambda t: np.maximum(40 - 4 * np.abs(t - 5) * 4, 0.0),
-        heated=(True, True),
+        engine_machine, lambda t: np.maximum(40 - 16 * np.abs(t - 5), 0.0), heated=(True, True)
     )
     result = score(tasks["lift-2"], engine_machine, hop)
     assert result.indicator > 30
     assert not result.success
 
 
-def test_a_success_with_less_thrust_than_weight_is_flagged(
-    tasks: dict[str, Task], trajectory_of: Make, engine_machine: Machine
-) -> None:
-    miracle = _climb(
-        trajectory_of, engine_machine, lambda t: np.maximum(t - 2, 0) * 4, heated=(False, False)
-    )
+def test_a_success_with_less_thrust_than_weight_is_flagged(tasks, engine_machine) -> None:
+    miracle = _climb(engine_machine, lambda t: np.maximum(t - 2, 0) * 4, heated=(False, False))
     result = score(tasks["lift-2"], engine_machine, miracle)
     assert result.success
     assert result.flags == ("twr_below_one",)
@@ -256,23 +206,19 @@ def test_a_success_with_less_thrust_than_weight_is_flagged(
 # Every task
 
 
-def test_a_blow_up_is_never_a_success(
-    tasks: dict[str, Task], trajectory_of: Make, car: Machine
-) -> None:
-    thrown = trajectory_of(car, 30.0, moved=lambda t: _columns(1e4 * t**2, 0.0, 0.0, like=t))
+def test_a_blow_up_is_never_a_success(tasks, car) -> None:
+    thrown = make_trajectory(car, 30.0, moved=lambda t: _columns(1e4 * t**2, 0.0, 0.0, like=t))
     result = score(tasks["transport-1"], car, thrown)
     assert not result.success
     assert result.indicator == 0.0
     assert "unstable" in result.flags
-    lost = trajectory_of(
+    lost = make_trajectory(
         car, 30.0, moved=lambda t: _columns(np.where(t > 3, np.nan, 0.0), 0.0, 0.0, like=t)
     )
     assert "unstable" in score(tasks["transport-1"], car, lost).flags
 
 
-def test_a_machine_never_finished_scores_nothing_but_tells_its_parts(
-    tasks: dict[str, Task], car: Machine
-) -> None:
+def test_a_machine_never_finished_scores_nothing_but_tells_its_parts(tasks, car) -> None:
     for task in tasks.values():
         assert (failed_score(task).success, failed_score(task).indicator) == (False, 0.0)
         assert failed_score(task, car).metrics["parts"] == car.part_count

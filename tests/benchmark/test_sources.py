@@ -1,7 +1,5 @@
 """YAML texts of strangers: nothing in them makes reading costly, and every fault has its line."""
 
-from __future__ import annotations
-
 import time
 
 import pytest
@@ -51,7 +49,7 @@ class Outer(BaseModel):
         ("a: " + "x" * MAX_BYTES, "file: 65,539 bytes; at most 65,536 are read"),
     ],
 )
-def test_what_is_not_read_is_reported_with_its_line(text: str, says: str) -> None:
+def test_what_is_not_read_is_reported_with_its_line(text, says) -> None:
     start = time.process_time()
     with pytest.raises(SourceError) as caught:
         read_source(text, origin="file")
@@ -77,7 +75,7 @@ def test_what_is_not_read_is_reported_with_its_line(text: str, says: str) -> Non
         ("name: [1]\nitems: 2\n", ["file:1: name: ", "file:2: items: "]),
     ],
 )
-def test_what_a_model_does_not_take_is_reported_with_its_line(text: str, says: list[str]) -> None:
+def test_what_a_model_does_not_take_is_reported_with_its_line(text, says) -> None:
     with pytest.raises(SourceError) as caught:
         read_model(text, Outer, origin="file")
     for part in says:

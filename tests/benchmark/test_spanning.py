@@ -4,14 +4,14 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from tests.benchmark.conftest import with_bearing
+from tests.benchmark.conftest import make_trajectory, with_bearing
 
-from buildarena_benchmark import Task, score
+from buildarena_benchmark import score
+from buildarena_benchmark.scorers.measures.spanning import terrain_sides
 from buildarena_geometry import Machine
-from buildarena_simulation import Trajectory
+from buildarena_simulation import Scenario, Trajectory
 from buildarena_simulation.constants import GRAVITY
 
-Make = Callable[..., Trajectory]
 Series = np.ndarray
 
 
@@ -20,7 +20,6 @@ def _mass(t: Series) -> Series:
 
 
 def _carried(
-    make: Make,
     machine: Machine,
     *,
     fall_at: float | None = None,
@@ -34,7 +33,7 @@ def _carried(
             height -= GRAVITY / 2 * np.maximum(t - fall_at, 0.0) ** 2
         return np.column_stack([np.zeros_like(t), north(t), np.maximum(height, 0.75)])
 
-    return make(machine, 17.0, cargo=path, cargo_mass=_mass)
+    return make_trajectory(machine, 17.0, cargo=path, cargo_mass=_mass)
 
 
 def _shared(
@@ -59,15 +58,15 @@ def _shared(
     )
 
 
-def test_a_bridge_on_both_terrains_spans(tasks, trajectory_of, car) -> None:
-    result = score(tasks["support-1"], car, _shared(_carried(trajectory_of, car)))
+def test_a_bridge_on_both_terrains_spans(tasks, car) -> None:
+    result = score(tasks["support-1"], car, _shared(_carried(car)))
     assert (result.success, result.indicator, result.flags) == (True, 1500.0, ("never_fell",))
     assert result.metrics["floor_share"] == pytest.approx(0.0, abs=1e-6)
     assert result.metrics["carried_share"] == pytest.approx(1.0, abs=0.02)
 
 
-def test_a_bridge_that_breaks_spans_until_then(tasks, trajectory_of, car) -> None:
-    trial = _shared(_carried(trajectory_of, car, fall_at=6.0), until=6.0)
+def test_a_bridge_that_breaks_spans_until_then(tasks, car) -> None:
+    trial = _shared(_carried(car, fall_at=6.0), until=6.0)
     result = score(tasks["support-1"], car, trial)
     assert result.success
     assert result.flags == ()
@@ -94,8 +93,8 @@ def test_a_bridge_that_breaks_spans_until_then(tasks, trajectory_of, car) -> Non
         {"held": 0.0},
     ],
 )
-def test_a_load_that_goes_elsewhere_does_not_count(tasks, trajectory_of, car, shares) -> None:
-    result = score(tasks["support-1"], car, _shared(_carried(trajectory_of, car), **shares))
+def test_a_load_that_goes_elsewhere_does_not_count(tasks, car, shares) -> None:
+    result = score(tasks["support-1"], car, _shared(_carried(car), **shares))
     assert (result.success, result.indicator) == (False, 0.0)
     assert result.flags == ("does_not_span",)
 
@@ -108,23 +107,23 @@ def test_a_load_that_goes_elsewhere_does_not_count(tasks, trajectory_of, car, sh
         {"dead": (0.0, 30.0, 300.0)},  # a heavy end
     ],
 )
-def test_an_odd_bridge_may_span(tasks, trajectory_of, car, shares) -> None:
-    assert score(tasks["support-1"], car, _shared(_carried(trajectory_of, car), **shares)).success
+def test_an_odd_bridge_may_span(tasks, car, shares) -> None:
+    assert score(tasks["support-1"], car, _shared(_carried(car), **shares)).success
 
 
 @pytest.mark.parametrize(("sinks_at", "spans"), [(8.0, False), (12.0, False), (15.3, True)])
-def test_a_bridge_that_sinks_onto_a_tower(tasks, trajectory_of, car, sinks_at, spans) -> None:
-    trial = _carried(trajectory_of, car)
+def test_a_bridge_that_sinks_onto_a_tower(tasks, car, sinks_at, spans) -> None:
+    trial = _carried(car)
     floor = np.where(trial.time_s > sinks_at, 1.0, 0.0)
-    short = _carried(trajectory_of, car, fall_at=15.6)
+    short = _carried(car, fall_at=15.6)
     task = tasks["support-1"]
     until = 15.6 if spans else np.inf
     sunk = _shared(short if spans else trial, floor=floor, south=(1 - floor) / 2, until=until)
     assert score(task, car, sunk).success == spans
 
 
-def test_a_cargo_that_slides_onto_a_terrain_is_no_longer_carried(tasks, trajectory_of, car) -> None:
-    trial = _carried(trajectory_of, car, north=lambda t: np.maximum(t - 4.0, 0.0))
+def test_a_cargo_that_slides_onto_a_terrain_is_no_longer_carried(tasks, car) -> None:
+    trial = _carried(car, north=lambda t: np.maximum(t - 4.0, 0.0))
     result = score(tasks["support-1"], car, _shared(trial))
     assert result.success
     assert result.indicator == pytest.approx(float(_mass(np.array([6.52]))[0]), abs=4.1)
@@ -133,28 +132,23 @@ def test_a_cargo_that_slides_onto_a_terrain_is_no_longer_carried(tasks, trajecto
     assert wide.indicator == pytest.approx(float(_mass(np.array([9.04]))[0]), abs=4.1)
 
 
-def test_a_cargo_that_slides_off_at_once_was_not_carried(tasks, trajectory_of, car) -> None:
-    slid = _carried(trajectory_of, car, north=lambda t: -np.maximum(t - 0.5, 0.0) * 3.0)
+def test_a_cargo_that_slides_off_at_once_was_not_carried(tasks, car) -> None:
+    slid = _carried(car, north=lambda t: -np.maximum(t - 0.5, 0.0) * 3.0)
     for trial in (slid, _shared(slid)):
         result = score(tasks["support-1"], car, trial)
         assert (result.success, result.indicator) == (False, 0.0)
-    aside = _carried(trajectory_of, car, north=lambda t: np.full_like(t, 9.0))
+    aside = _carried(car, north=lambda t: np.full_like(t, 9.0))
     assert not score(tasks["support-1"], car, _shared(aside)).success
 
 
-def test_without_contact_forces_the_rule_is_not_measured(tasks, trajectory_of, car) -> None:
-    result = score(tasks["support-1"], car, _carried(trajectory_of, car))
+def test_without_contact_forces_the_rule_is_not_measured(tasks, car) -> None:
+    result = score(tasks["support-1"], car, _carried(car))
     assert result.success
     assert result.flags == ("never_fell", "span_not_measured")
     assert result.metrics["floor_share"] is None
 
 
-def test_islands_in_the_gap_and_boxes_behind_belong_to_the_scenario(
-    tasks: dict[str, Task],
-) -> None:
-    from buildarena_benchmark.scorers.measures.spanning import terrain_sides
-    from buildarena_simulation import Scenario
-
+def test_islands_in_the_gap_and_boxes_behind_belong_to_the_scenario(tasks) -> None:
     content = tasks["support-2"].scenario.model_dump()
     south, north = content["terrain"]
     island = {"center": (0.0, 0.0, 2.0), "size": (4.0, 4.0, 4.0)}

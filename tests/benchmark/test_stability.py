@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.benchmark.conftest import with_pieces
+from tests.benchmark.conftest import make_trajectory, with_pieces
 
 from buildarena_benchmark import score
 from buildarena_simulation.constants import GRAVITY
@@ -14,7 +14,7 @@ def _ramp(t: np.ndarray) -> np.ndarray:
     return 5 + 1495 * np.clip((t - 0.5) / 15, 0.005, 1)
 
 
-def _bridge(make, machine, *, falls_at: float = 8.0):
+def _bridge(machine, *, falls_at: float = 8.0):
     """A cargo that is carried at 6.75 and falls freely from a time on."""
 
     def path(t: np.ndarray) -> np.ndarray:
@@ -22,7 +22,7 @@ def _bridge(make, machine, *, falls_at: float = 8.0):
         height = np.maximum(np.minimum(9.0 - GRAVITY / 2 * t**2, 9.0), 6.75) - sunk
         return np.column_stack([np.zeros_like(t), np.zeros_like(t), np.maximum(height, 0.75)])
 
-    return make(machine, 17.0, cargo=path, cargo_mass=_ramp)
+    return make_trajectory(machine, 17.0, cargo=path, cargo_mass=_ramp)
 
 
 def _kicked(trial, blocks, *, at: float, speed: float, samples: int):
@@ -36,8 +36,8 @@ def _kicked(trial, blocks, *, at: float, speed: float, samples: int):
     return replace(trial, positions=positions)
 
 
-def test_debris_of_a_collapse_is_not_unstable(tasks, trajectory_of, car) -> None:
-    trial = with_pieces(_bridge(trajectory_of, car), ["4", "5"], since_s=7.9)
+def test_debris_of_a_collapse_is_not_unstable(tasks, car) -> None:
+    trial = with_pieces(_bridge(car), ["4", "5"], since_s=7.9)
     for at in (7.96, 8.2, 9.0):
         debris = _kicked(trial, ["4", "5"], at=at, speed=69.0, samples=10)
         assert "unstable" not in score(tasks["support-1"], car, debris).flags
@@ -52,15 +52,15 @@ def test_debris_of_a_collapse_is_not_unstable(tasks, trajectory_of, car) -> None
         ((500.0, 10), True),
     ],
 )
-def test_a_blow_up_lasts(tasks, trajectory_of, car, kick, unstable) -> None:
+def test_a_blow_up_lasts(tasks, car, kick, unstable) -> None:
     speed, samples = kick
-    trial = _bridge(trajectory_of, car)
+    trial = _bridge(car)
     kicked = _kicked(trial, car.blocks, at=4.0, speed=speed, samples=samples)
     assert ("unstable" in score(tasks["support-1"], car, kicked).flags) == unstable
 
 
-def test_what_happens_after_the_fall_decides_nothing(tasks, trajectory_of, car) -> None:
-    trial = _bridge(trajectory_of, car)
+def test_what_happens_after_the_fall_decides_nothing(tasks, car) -> None:
+    trial = _bridge(car)
     late = _kicked(trial, car.blocks, at=9.0, speed=2000.0, samples=20)
     assert "unstable" not in score(tasks["support-1"], car, late).flags
     positions = trial.positions.copy()
@@ -73,28 +73,26 @@ def test_what_happens_after_the_fall_decides_nothing(tasks, trajectory_of, car) 
     assert "unstable" in lost.flags
 
 
-def test_a_cargo_that_is_shot_away_is_unstable(tasks, trajectory_of, car) -> None:
-    trial = _bridge(trajectory_of, car, falls_at=99.0)
+def test_a_cargo_that_is_shot_away_is_unstable(tasks, car) -> None:
+    trial = _bridge(car, falls_at=99.0)
     cargo = trial.cargo_position.copy()
     cargo[trial.time_s > 6.0, 2] += 40.0 * np.arange((trial.time_s > 6.0).sum())
     shot = score(tasks["support-1"], car, replace(trial, cargo_position=cargo))
     assert "unstable" in shot.flags
 
 
-def test_a_part_that_came_off_decides_nothing(tasks, trajectory_of, engine_machine) -> None:
+def test_a_part_that_came_off_decides_nothing(tasks, engine_machine) -> None:
     def climb(t: np.ndarray) -> np.ndarray:
         return np.column_stack([np.zeros((len(t), 2)), 40.0 * np.maximum(t - 2.0, 0.0)])
 
-    flight = trajectory_of(engine_machine, 30.0, moved=climb, heated=(True, True))
+    flight = make_trajectory(engine_machine, 30.0, moved=climb, heated=(True, True))
     shot = _kicked(flight, ["3"], at=6.0, speed=20_000.0, samples=200)
     assert "unstable" in score(tasks["lift-2"], engine_machine, shot).flags
     off = with_pieces(shot, ["3"], since_s=5.9)
     assert score(tasks["lift-2"], engine_machine, off).flags == ()
 
 
-def test_a_rocket_may_be_as_fast_as_its_thrust_makes_it(
-    tasks, trajectory_of, engine_machine
-) -> None:
+def test_a_rocket_may_be_as_fast_as_its_thrust_makes_it(tasks, engine_machine) -> None:
     push = (2 * 13.76 / 3.25 - 1.0) * GRAVITY
 
     def flight(factor: float):
@@ -102,7 +100,7 @@ def test_a_rocket_may_be_as_fast_as_its_thrust_makes_it(
             up = factor * push / 2 * np.maximum(t - 2.0, 0.0) ** 2
             return np.column_stack([np.zeros((len(t), 2)), up])
 
-        trial = trajectory_of(engine_machine, 30.0, moved=climb, heated=(True, True))
+        trial = make_trajectory(engine_machine, 30.0, moved=climb, heated=(True, True))
         return score(tasks["lift-2"], engine_machine, trial)
 
     assert flight(1.0).success

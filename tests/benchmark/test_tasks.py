@@ -1,11 +1,11 @@
 """The task catalogue: fifteen tasks, their versions, and errors in a user's own."""
 
-from pathlib import Path
+import re
 
 import pytest
 import yaml
 
-from buildarena_benchmark import Task, TaskError, load_task, paper_tasks
+from buildarena_benchmark import TaskError, load_task, paper_tasks
 
 OWN = """\
 name: tower-bridge
@@ -30,23 +30,19 @@ indicator: {name: load, unit: mass units}
 """
 
 
+DIMENSIONS = {
+    *("quantification", "robustness", "magnitude", "compositionality", "precision", "ambiguity")
+}
 WORKSHOP = [*(f"mechanisms-{level}" for level in (1, 2, 3, 4)), "flight-1", "flight-2"]
 
 
-def test_there_are_the_papers_nine_tasks_and_six_of_the_workshop(tasks: dict[str, Task]) -> None:
+def test_there_are_the_papers_nine_tasks_and_six_of_the_workshop(tasks) -> None:
     paper = [f"{c}-{n}" for c in ("transport", "support", "lift") for n in (1, 2, 3)]
     assert list(tasks) == [*paper, *WORKSHOP]
     assert list(paper_tasks()) == paper
     for name, task in tasks.items():
         assert (task.category, task.level) == (name[:-2], int(name[-1]))
-        assert set(task.difficulty) == {
-            "quantification",
-            "robustness",
-            "magnitude",
-            "compositionality",
-            "precision",
-            "ambiguity",
-        }
+        assert set(task.difficulty) == DIMENSIONS
         assert all(1 <= weight <= 3 for weight in task.difficulty.values())
 
 
@@ -67,7 +63,7 @@ def test_each_task_has_the_papers_scenario() -> None:
     assert tasks["transport-3"].scenario.cargo.size == (4, 8, 1.5)
 
 
-def test_a_statement_tells_what_the_scorer_measures(tasks: dict[str, Task]) -> None:
+def test_a_statement_tells_what_the_scorer_measures(tasks) -> None:
     for task in tasks.values():
         text = task.statement
         for heading in ("**Goal.**", "**Rules.**", "**Trial.**", "**Measure.**"):
@@ -86,7 +82,7 @@ def test_a_statement_tells_what_the_scorer_measures(tasks: dict[str, Task]) -> N
 
 
 @pytest.mark.parametrize("name", WORKSHOP)
-def test_a_statement_tells_every_threshold(tasks: dict[str, Task], name: str) -> None:
+def test_a_statement_tells_every_threshold(tasks, name) -> None:
     task = tasks[name]
     text = " ".join(task.statement.split())
     for field, value in task.scoring.model_dump().items():
@@ -121,7 +117,7 @@ def test_the_papers_tasks_are_what_they_were() -> None:
     }
 
 
-def test_a_users_own_task_loads_from_text_and_file(tmp_path: Path) -> None:
+def test_a_users_own_task_loads_from_text_and_file(tmp_path) -> None:
     task = load_task(OWN)
     assert (task.name, task.scorer, task.control) == ("tower-bridge", "support", "none")
     file = tmp_path / "own.yaml"
@@ -139,7 +135,7 @@ def test_a_users_own_task_loads_from_text_and_file(tmp_path: Path) -> None:
         ("duration_s: 10", "duration_s: 11"),
     ],
 )
-def test_what_can_change_a_score_changes_the_version(old: str, new: str) -> None:
+def test_what_can_change_a_score_changes_the_version(old, new) -> None:
     assert load_task(OWN.replace(old, new)).version != load_task(OWN).version
 
 
@@ -154,9 +150,9 @@ def test_what_cannot_change_a_score_keeps_the_version() -> None:
     ("old", "new", "parts"),
     [
         (
-            "  min_time_s: 3",
-            "  min_tim_s: 3",
-            ["task:18: scoring.min_tim_s: there is no such field", "min_time_s"],
+            "min_time_s: 3",
+            "min_tim_s: 3",
+            ["task:18: scoring.min_tim_s: there is", "min_time_s"],
         ),
         ("name: support\n", "name: suport\n", ["scoring", "'support', 'thrust', 'transport'"]),
         ("gap: 10}", "gap: -1}", ["task:15: scenario.placement.gap: ", "greater than 0"]),
@@ -167,7 +163,7 @@ def test_what_cannot_change_a_score_keeps_the_version() -> None:
         ("indicator: {", "indicator: [", ["not valid YAML"]),
     ],
 )
-def test_an_error_names_line_field_and_choices(old: str, new: str, parts: list[str]) -> None:
+def test_an_error_names_line_field_and_choices(old, new, parts) -> None:
     assert old in OWN
     with pytest.raises(TaskError) as caught:
         load_task(OWN.replace(old, new))
@@ -198,14 +194,17 @@ def test_an_error_names_line_field_and_choices(old: str, new: str, parts: list[s
         ("title: A suspended bridge", 'title: "\\ud800"', "title: "),
     ],
 )
-def test_a_trial_that_is_out_of_bounds_is_refused(old: str, new: str, says: str) -> None:
+def test_a_trial_that_is_out_of_bounds_is_refused(old, new, says) -> None:
     assert old in OWN
     text = OWN.replace(old, new, 1)
     if new.startswith('title: "\\e'):
         text = text.replace("31m bridge", '31m bridge"')
-    with pytest.raises(TaskError) as caught:
+    with pytest.raises(TaskError, match=re.escape(says)):
         load_task(text)
-    assert says in str(caught.value)
+
+
+BLOCKS, SUPPORT = "max_blocks: 100", "name: support\n  min_time_s: 3"
+"""Lines of that task which others take the place of."""
 
 
 def test_more_terrain_than_is_simulated_is_refused() -> None:
@@ -217,52 +216,35 @@ def test_more_terrain_than_is_simulated_is_refused() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ("  max_blocks: 100", "  min_sub_structures: 6", "constraints.max_sub_structures: is 5"),
-        (
-            "  max_blocks: 100",
-            "  modules: [Winch, Roket]",
-            "8: constraints.modules[1]: there is no",
-        ),
-        ("  max_blocks: 100", "  modules: [Rocket]", "'Rocket' can be built, but is not simulated"),
-        (
-            "  max_blocks: 100",
-            "  modules: garage",
-            "no module set 'garage'; choose from basic, work",
-        ),
-        ("  max_blocks: 100", "  modules: all", "'all' has modules that are not simulated; choose"),
-        ("  max_blocks: 100", "  modules: 5", "constraints.modules: Input should be a valid tuple"),
-        ("  max_blocks: 100", "  min_modules: {Hinge: 1}", "Hinge is not among the task's modules"),
-        ("  max_blocks: 100", "  min_modules: {Rope: 2}", "min_modules.Rope: there is no module"),
-        ("  max_blocks: 100", "  modules: []", "constraints.modules"),
-        (
-            "  max_blocks: 100",
-            "  modules: [Brace]\n  min_modules: {Winch: 2}",
-            "Winch is not among the task's modules",
-        ),
+        (BLOCKS, "min_sub_structures: 6", "constraints.max_sub_structures: is 5"),
+        (BLOCKS, "modules: [Winch, Roket]", "8: constraints.modules[1]: there is no"),
+        (BLOCKS, "modules: [Rocket]", "'Rocket' can be built, but is not simulated"),
+        (BLOCKS, "modules: garage", "no module set 'garage'; choose from basic, work"),
+        (BLOCKS, "modules: all", "'all' has modules that are not simulated; choose"),
+        (BLOCKS, "modules: 5", "constraints.modules: Input should be a valid tuple"),
+        (BLOCKS, "min_modules: {Hinge: 1}", "Hinge is not among the task's modules"),
+        (BLOCKS, "min_modules: {Rope: 2}", "min_modules.Rope: there is no module"),
+        (BLOCKS, "modules: []", "constraints.modules"),
+        (BLOCKS, "modules: [Brace]\n  min_modules: {Winch: 2}", "Winch is not among the task's"),
         ("  duration_s: 10", "  duration_s: 10\n  tracked_blocks: []", "tracked_blocks"),
         ("  cargo: {", "  # cargo: {", "scoring: the cargo is judged, but scenario has no cargo"),
         ("  min_time_s: 3", "  min_time_s: 11", "longer than the trial"),
+        (SUPPORT, "name: transport\n  subject: cargo", "scenario.control.mode must be agent"),
+        (SUPPORT, "name: height", "nothing fires"),
         (
-            "  name: support\n  min_time_s: 3",
-            "  name: transport\n  subject: cargo",
-            "scenario.control.mode must be agent",
-        ),
-        ("  name: support\n  min_time_s: 3", "  name: height", "nothing fires"),
-        (
-            "  placement: {kind: span, gap: 10}\nscoring:\n  name: support\n  min_time_s: 3",
-            "  control: {mode: held}\nscoring:\n  name: height",
+            f"placement: {{kind: span, gap: 10}}\nscoring:\n  {SUPPORT}",
+            "control: {mode: held}\nscoring:\n  name: height",
             "windows within the trial",
         ),
     ],
 )
-def test_a_task_that_nobody_can_pass_is_refused(old: str, new: str, says: str) -> None:
+def test_a_task_that_nobody_can_pass_is_refused(old, new, says) -> None:
     assert old in OWN
-    with pytest.raises(TaskError) as caught:
+    with pytest.raises(TaskError, match=re.escape(says)):
         load_task(OWN.replace(old, new))
-    assert says in str(caught.value)
 
 
-def test_a_tasks_document_is_the_task_again(tasks: dict[str, Task]) -> None:
+def test_a_tasks_document_is_the_task_again(tasks) -> None:
     for task in (*tasks.values(), load_task(OWN)):
         assert load_task(yaml.safe_dump(dict(task.as_document()))) == task
 

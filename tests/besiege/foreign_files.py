@@ -1,7 +1,5 @@
 """Machine files as other projects write them."""
 
-from __future__ import annotations
-
 from buildarena_besiege import read_machine_file
 
 FOREIGN = """<?xml version="1.0" encoding="utf-8"?>

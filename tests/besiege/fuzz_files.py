@@ -1,7 +1,5 @@
 """Reads many damaged machine files; `make fuzz-besiege`."""
 
-from __future__ import annotations
-
 import argparse
 import random
 import sys

@@ -1,7 +1,5 @@
 """The golden machines as machines of ours, and their exports."""
 
-from __future__ import annotations
-
 import gzip
 import json
 from dataclasses import dataclass

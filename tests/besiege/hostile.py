@@ -1,7 +1,5 @@
 """Machine files of strangers: damaged at random, and made to do harm."""
 
-from __future__ import annotations
-
 import random
 import re
 

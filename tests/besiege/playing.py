@@ -1,7 +1,5 @@
 """Prepared runs played in a real Lua, and what they print."""
 
-from __future__ import annotations
-
 from support.lua_game import LuaGame
 
 from buildarena_besiege import GameLog

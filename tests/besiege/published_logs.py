@@ -1,7 +1,5 @@
 """Logs as the published runner writes them, made up from paths."""
 
-from __future__ import annotations
-
 
 def sample(n: int, ids: dict[str, tuple[float, float, float]], state: dict[str, str]) -> list[str]:
     """The rows that one printing update leaves, in the order of printing."""

@@ -1,10 +1,9 @@
 """Every module type goes out to the game's files and comes back."""
 
-from __future__ import annotations
-
 from xml.etree import ElementTree as ET
 
 import pytest
+from support.machines.building import attach
 from tests.besiege.test_reading_files import assert_alike, contents
 
 from buildarena_benchmark import builtin_tasks
@@ -28,15 +27,11 @@ def built_with(module: Module) -> Machine:
     machine = Machine(catalogue=ALL)
     assert machine.act("start").ok
     if module.kind == "connector":
-        assert machine.act(
-            "attach_block_to",
-            {"base_block": "1", "face": "E", "new_block": "Small Wooden Block"},
-        ).ok
+        assert attach(machine, "1", "E").ok
         ends = {"block_a": "1", "face_a": "A", "block_b": "2", "face_b": "A"}
         outcome = machine.act("connect_blocks", {**ends, "connector": module.name})
     else:
-        place = {"base_block": "1", "face": "E", "new_block": module.name}
-        outcome = machine.act("attach_block_to", place)
+        outcome = attach(machine, "1", "E", module.name)
     assert outcome.ok, outcome.text
     number = next(reversed([*machine.blocks, *machine.connectors]))
     for key, action in enumerate(module.actions, 1):
@@ -48,7 +43,7 @@ def built_with(module: Module) -> Machine:
 
 
 @pytest.mark.parametrize("name", [*BLOCKS, *CONNECTORS])
-def test_every_type_comes_back_as_it_was(name: str) -> None:
+def test_every_type_comes_back_as_it_was(name) -> None:
     machine = built_with(ALL[name])
     imported = read_machine_file(plain_machine_file(machine, name="m"))
     assert imported.not_understood == ()
@@ -57,7 +52,7 @@ def test_every_type_comes_back_as_it_was(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", BLOCKS)
-def test_the_keys_of_every_action_stand_in_the_file(name: str) -> None:
+def test_the_keys_of_every_action_stand_in_the_file(name) -> None:
     module = ALL[name]
     file = ET.fromstring(plain_machine_file(built_with(module), name="m"))
     block = next(one for one in file.iter("Block") if one.get("id") == str(module.besiege_id))
@@ -95,13 +90,13 @@ def test_in_files_of_others_the_ballast_that_sits_on_nothing_is_cargo() -> None:
 
 
 @pytest.mark.parametrize("task", ["flight-2", "mechanisms-3", "mechanisms-4"])
-def test_trials_that_a_machine_file_cannot_say_are_refused(task: str) -> None:
+def test_trials_that_a_machine_file_cannot_say_are_refused(task) -> None:
     scenario = builtin_tasks()[task].scenario
     with pytest.raises(MachineNotPlayableError, match="use another engine"):
         prepare_run(built_with(ALL["Log"]), scenario, name="m", run_id="r")
 
 
 @pytest.mark.parametrize("task", ["mechanisms-1", "mechanisms-2", "flight-1"])
-def test_the_other_trials_of_the_workshop_are_written(task: str) -> None:
+def test_the_other_trials_of_the_workshop_are_written(task) -> None:
     run = prepare_run(built_with(ALL["Log"]), builtin_tasks()[task].scenario, name="m", run_id="r")
     assert b"<Machine" in run.machine_file

@@ -1,7 +1,5 @@
 """The commands `machine export`, `machine import` and `besiege`."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

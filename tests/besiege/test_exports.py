@@ -1,7 +1,5 @@
 """Machine files hold what the published library saves, for 60 machines in every setting."""
 
-from __future__ import annotations
-
 import json
 import math
 import subprocess

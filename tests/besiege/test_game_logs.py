@@ -1,7 +1,5 @@
 """A log counts whole lines of its run only, whatever the window or the stream made of them."""
 
-from __future__ import annotations
-
 import random
 import time
 

@@ -1,7 +1,5 @@
 """Machine files that were damaged, or made to do harm, are refused or sound."""
 
-from __future__ import annotations
-
 import re
 import time
 

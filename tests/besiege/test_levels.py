@@ -1,7 +1,5 @@
 """Levels hold the terrain of a scenario where the published ones do."""
 
-from __future__ import annotations
-
 import math
 from xml.etree import ElementTree as ET
 

@@ -1,7 +1,5 @@
 """Logs of the published runner become trajectories that our scorers take."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from tests.besiege.playing import vehicle

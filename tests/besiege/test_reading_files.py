@@ -1,7 +1,5 @@
 """Machine files come back: ours as they were, others as far as they can be, and nothing else."""
 
-from __future__ import annotations
-
 import gzip
 import random
 import re

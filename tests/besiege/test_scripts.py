@@ -1,11 +1,10 @@
 """Scripts do in every Lua what the published ones do, and what the control sequence says."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.lua_game import VERSIONS
+from support.machines.building import attach
 from tests.besiege.golden import goldens, scenario_of
 from tests.besiege.playing import log_of, played, press, vehicle
 
@@ -73,9 +72,7 @@ def test_lines_hold_their_sums_and_at_most_eight_blocks() -> None:
     for _ in range(12):
         last = str(machine.state.next_id - 1)
         face = "E"
-        assert machine.act(
-            "attach_block_to", {"base_block": last, "face": face, "new_block": "Small Wooden Block"}
-        ).ok
+        assert attach(machine, last, face).ok
     lines = played(machine, Scenario(duration_s=2.0)).lines
     samples = [line.split(",") for line in lines if ",s," in line]
     assert {(one[4], one[5]) for one in samples} == {("1", "2"), ("2", "2")}

@@ -1,7 +1,5 @@
 """The headless game's output becomes a trajectory with the turns it tells."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

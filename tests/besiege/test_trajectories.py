@@ -1,13 +1,12 @@
 """Logs become trajectories in our world frame; what is missing is said."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 import pytest
 from game_rig import experts_machine
 from scipy.spatial.transform import Rotation
+from support.machines.building import attach
 from tests.besiege.playing import RUN, log_of, played, press, vehicle
 
 from buildarena_benchmark import builtin_tasks, score
@@ -232,6 +231,5 @@ def tumbling(task: str) -> Machine:
 def rocket_with_a_weight_aside() -> Machine:
     machine = experts_machine("lift-2")
     for base, face in (("1", "C"), ("12", "A")):
-        given = {"base_block": base, "face": face, "new_block": "Small Wooden Block", "note": ""}
-        assert machine.act("attach_block_to", given).ok
+        assert attach(machine, base, face, "Small Wooden Block", note="").ok
     return machine

@@ -1,7 +1,5 @@
 """Backups: what is restored elsewhere is what was there, down to each figure and byte."""
 
-from __future__ import annotations
-
 import json
 import os
 import sys

@@ -1,7 +1,5 @@
 """The leaderboard's commands against a live API with a sweep of made-up results."""
 
-from __future__ import annotations
-
 import csv
 import json
 import random
@@ -12,7 +10,6 @@ import time
 import pytest
 from sqlalchemy import insert, select, update
 from support.clients.commands import printed, run_cli
-from support.servers.live_api import live_api
 
 from buildarena_benchmark.leaderboard import published_rows
 from buildarena_cli.commands.report import variant
@@ -25,18 +22,17 @@ MODELS = ["openai/gpt-5", "xai/grok-4", "anthropic/claude-sonnet-4", "builtin/ra
 
 
 @pytest.fixture
-def url(context):
-    with live_api(context) as url:
-        yield url
-
-
-@pytest.fixture
 def sweep(context, submissions) -> str:
     """A sweep whose results follow the paper's rates; one job has not ended, one errored."""
-    spec = SweepSpec(name="grid", tasks=TASKS, models=MODELS, samples=16)
-    done = submissions.submit_sweep(spec)
+    done = submissions.submit_sweep(SweepSpec(tasks=TASKS, models=MODELS, samples=16))
     end_jobs(context)
     return str(done.sweep.id)
+
+
+def add_rollout(connection, job, **values: object) -> None:
+    usual = {"job_id": job.id, "number": 0, "final": True, "engine": "pybullet"}
+    finished = {"finished_at": job.created_at}
+    connection.execute(insert(rollouts).values(**{**usual, **finished, **values}))
 
 
 def end_jobs(context, *, rounds: int = 1) -> None:
@@ -78,19 +74,9 @@ def end_jobs(context, *, rounds: int = 1) -> None:
                 )
             )
             for place, (won, value) in enumerate(zip(tries, values, strict=True)):
-                connection.execute(
-                    insert(rollouts).values(
-                        job_id=job.id,
-                        number=place,
-                        final=place == len(tries) - 1,
-                        engine="pybullet",
-                        machine_hash=f"machine {place}",
-                        success=won,
-                        indicator=value,
-                        metrics={"parts": 9},
-                        finished_at=job.created_at,
-                    )
-                )
+                trial = {"number": place, "machine_hash": f"machine {place}", "indicator": value}
+                last = place == len(tries) - 1
+                add_rollout(connection, job, **trial, final=last, success=won, metrics={"parts": 9})
 
 
 @pytest.mark.usefixtures("sweep")
@@ -160,15 +146,8 @@ def test_a_report_has_every_section_in_every_format(url, sweep, tmp_path) -> Non
 
 
 def test_a_closed_loop_beside_single_shots(url, sweep, context, submissions, tmp_path) -> None:
-    spec = SweepSpec.model_validate(
-        {
-            "name": "loop",
-            "tasks": ["support-2"],
-            "models": ["openai/gpt-5", "xai/grok-4"],
-            "samples": 16,
-            "closed_loop": {"rounds": 5, "analyst": True},
-        }
-    )
+    cell = {"tasks": ["support-2"], "models": ["openai/gpt-5", "xai/grok-4"], "samples": 16}
+    spec = SweepSpec.model_validate({**cell, "closed_loop": {"rounds": 5, "analyst": True}})
     loop = submissions.submit_sweep(spec).sweep.id
     end_jobs(context, rounds=5)
     out = tmp_path / "report.md"
@@ -203,18 +182,8 @@ def test_simulators_are_compared_on_the_same_machines(url, context, submissions,
                 .where(jobs.c.id == job.id)
                 .values(state="done", outcome="success", success=True, indicator=1.0)
             )
-            connection.execute(
-                insert(rollouts).values(
-                    job_id=job.id,
-                    number=0,
-                    final=True,
-                    engine="any",
-                    machine_hash=f"machine {job.seed}",
-                    success=won,
-                    indicator=float(job.seed),
-                    finished_at=job.created_at,
-                )
-            )
+            trial = {"machine_hash": f"machine {job.seed}", "indicator": float(job.seed)}
+            add_rollout(connection, job, success=won, **trial)
     printed(url, "report", *sweeps, "--out", str(tmp_path / "r.md"))
     text = (tmp_path / "r.md").read_text()
     assert "| support-1 | mujoco, pybullet | 3 | 66.7 % | 0.00 | 1.00 |" in text
@@ -247,9 +216,8 @@ def test_an_audit_tells_every_difference(url, context) -> None:
             while (claimed := context.store.verifications.claim_next()) is not None:
                 number += 1
                 check = {"name": "score: indicator", "ok": number % 2 == 0, "kept": 1, "found": 2}
-                context.store.verifications.finish(
-                    claimed.id, {"ok": check["ok"], "checks": [check]}
-                )
+                report = {"ok": check["ok"], "checks": [check]}
+                context.store.verifications.finish(claimed.id, report)
             time.sleep(0.05)
 
     worker = threading.Thread(target=verify)

@@ -1,7 +1,5 @@
 """The sweep files of the paper's experiments can be submitted as they are."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

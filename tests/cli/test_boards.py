@@ -1,7 +1,5 @@
 """The leaderboard's overview: models x tasks, as wide as there is room for, nothing left out."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,9 +1,5 @@
 """What commands say to a server that is not BuildArena, breaks off, or is none at all."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import pytest
 from support.servers.wrong_server import answer, wrong_server
 
@@ -31,7 +27,7 @@ def test_what_is_no_answer_of_an_api_is_one_sentence(said, error, says) -> None:
         Client(server.url).get("/v1/jobs")
 
 
-def test_a_download_is_there_whole_or_not_at_all(tmp_path: Path) -> None:
+def test_a_download_is_there_whole_or_not_at_all(tmp_path) -> None:
     target = tmp_path / "sweep.zip"
     with wrong_server(SHORT) as server, pytest.raises(UnreachableError):
         Client(server.url).download("/v1/x", target)

@@ -1,7 +1,5 @@
 """Jobs as a dataset: what the `datasets` library loads is what the service keeps, row by row."""
 
-from __future__ import annotations
-
 import json
 import re
 from dataclasses import replace
@@ -14,7 +12,8 @@ import pytest
 import yaml
 from support.clients.commands import printed, run_cli
 from support.clients.tenants import ADMIN, WITH_KEYS, new_tenant
-from support.servers.live_api import live_api
+from support.jobs import execute
+from support.servers.live_api import changed, live_api
 from support.stages import work
 
 from buildarena_cli.dataset import writing
@@ -29,16 +28,9 @@ from buildarena_cli.errors import CommandError
 from buildarena_geometry import Machine
 from buildarena_geometry import replay as done_again
 from buildarena_geometry.machine_files import machine_bytes
-from buildarena_pipeline.runtime.context import open_context
 
 MODELS = ["builtin/expert", "builtin/random", "builtin/idle"]
-SWEEP = {
-    "name": "small",
-    "tasks": ["support-1"],
-    "models": MODELS,
-    "simulator": "mujoco",
-    "seeds": [0],
-}
+SWEEP = {"tasks": ["support-1"], "models": MODELS, "simulator": "mujoco", "seeds": [0]}
 CALLS = [
     ("start", {"init_shift": [0, 0, 0], "init_rotation": [0, 0, 0]}),
     ("attach_block_to", {"base_block": 1, "face": "A", "new_block": "Small Wooden Block"}),
@@ -51,12 +43,6 @@ def offline(tmp_path, monkeypatch):
     monkeypatch.setenv("HF_HOME", str(tmp_path / "hf"))
     monkeypatch.setenv("HF_HUB_OFFLINE", "1")
     monkeypatch.setenv("HF_HUB_DISABLE_TELEMETRY", "1")
-
-
-@pytest.fixture
-def url(context):
-    with live_api(context) as url:
-        yield url
 
 
 def submitted(url: str, **more) -> str:
@@ -229,20 +215,13 @@ def test_filters_take_what_they_say(url, context, tmp_path):
 def test_disqualified_jobs_can_be_left_out(url, context, tmp_path):
     id_ = play(url)
     work(context)
-    flagged = "UPDATE jobs SET flags = '[\"unstable\"]' WHERE id = :id"
-    from sqlalchemy import text
-
-    with context.store.database.transaction() as connection:
-        connection.execute(text(flagged), {"id": id_})
+    execute(context, "UPDATE jobs SET flags = '[\"unstable\"]' WHERE id = :id", {"id": id_})
     printed(url, "export", "--dataset", "--out", str(tmp_path / "all"))
     assert rows(tmp_path / "all")[0]["disqualified"]
-    left = run_cli(
-        url, "export", "--dataset", "--out", str(tmp_path / "none"), "--not-disqualified"
-    )
-    assert (left.returncode, left.stderr) == (
-        1,
-        "no job that has ended is among those that were asked for",
-    )
+    words = ["export", "--dataset", "--out", str(tmp_path / "none"), "--not-disqualified"]
+    left = run_cli(url, *words)
+    assert left.returncode == 1
+    assert left.stderr == "no job that has ended is among those that were asked for"
     assert names(tmp_path) & {"none", ".none"} == set()
 
 
@@ -320,26 +299,19 @@ def test_a_damaged_machine_is_no_row(url, context, tmp_path, monkeypatch):
     assert not (tmp_path / "out").exists()
 
 
-def test_readers_export_others_jobs_and_no_key_stands_in_them(settings, tmp_path, monkeypatch):
-    context = open_context(settings.model_copy(update=WITH_KEYS))
-    from support.servers.databases import empty
-
-    empty(context.store.database)
-    try:
-        with live_api(context) as url:
-            with httpx.Client(base_url=url) as client:
-                owner, reader = new_tenant(client, "owner"), new_tenant(client, "reader", "read")
-            play(url, Authorization=f"Bearer {owner.secret}")
-            work(context)
-            out = tmp_path / "out"
-            nobody = run_cli(url, "export", "--dataset", "--out", str(out))
-            assert nobody.returncode == 1
-            assert "set BUILDARENA_KEY" in nobody.stderr
-            assert not out.exists()
-            monkeypatch.setenv(KEY_VARIABLE, reader.secret)
-            printed(url, "export", "--dataset", "--out", str(out))
-    finally:
-        context.close()
+def test_readers_export_others_jobs_and_no_key_stands_in_them(context, tmp_path, monkeypatch):
+    out = tmp_path / "out"
+    with changed(context, **WITH_KEYS) as own, live_api(own) as url:
+        with httpx.Client(base_url=url) as client:
+            owner, reader = new_tenant(client, "owner"), new_tenant(client, "reader", "read")
+        play(url, Authorization=f"Bearer {owner.secret}")
+        work(context)
+        nobody = run_cli(url, "export", "--dataset", "--out", str(out))
+        assert nobody.returncode == 1
+        assert "set BUILDARENA_KEY" in nobody.stderr
+        assert not out.exists()
+        monkeypatch.setenv(KEY_VARIABLE, reader.secret)
+        printed(url, "export", "--dataset", "--out", str(out))
     told = json.dumps([rows(out), rows(out, "actions")], default=str)
     told += (out / "README.md").read_text()
     assert "carpenter" in told
@@ -374,6 +346,8 @@ def test_the_card_says_what_is_there(url, context, tmp_path):
 
 
 def made_up(number: int) -> Fetched:
+    tokens = ("input_tokens", "output_tokens", "cached_tokens", "reasoning_tokens")
+    unknown = ("reason", "indicator", "flags", "metrics", "refusals", "manifest")
     job = {
         "id": f"job_{number:020x}",
         "task": "support-1",
@@ -383,24 +357,13 @@ def made_up(number: int) -> Fetched:
         "track": "five-role/mujoco-3/default-0-2",
         "seed": number,
         "outcome": "construction_failed",
-        "reason": None,
         "success": False,
-        "indicator": None,
         "censored": False,
-        "flags": None,
-        "metrics": None,
         "actions": 0,
         "refused_actions": 0,
-        "refusals": None,
-        "usage": dict.fromkeys(
-            ("requests", "input_tokens", "output_tokens", "cached_tokens", "reasoning_tokens")
-        )
-        | {"cost_usd": None},
+        "usage": dict.fromkeys(("requests", *tokens, "cost_usd")),
         "artifacts": {},
-        "manifest": None,
-        "imported_from": None,
-        "verified_at": None,
-        "finished_at": None,
+        **dict.fromkeys((*unknown, "imported_from", "verified_at", "finished_at")),
     }
     turn = {"index": 0, "stage": "plan", "role": "planner", "text": "x" * 100_000, "actions": []}
     transcript = json.dumps({"version": "1", "turns": [turn]}).encode()

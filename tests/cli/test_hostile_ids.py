@@ -1,7 +1,5 @@
 """No id that a person, a model or a server gives leads a request to another route."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 import threading

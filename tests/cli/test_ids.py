@@ -1,7 +1,5 @@
 """Ids: a unique prefix is enough, nonsense never becomes part of a path, files come whole."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess
@@ -11,20 +9,13 @@ from pathlib import Path
 import pytest
 from support.clients.commands import printed, run_cli
 from support.clients.terminals import piped
-from support.servers.live_api import live_api
+from support.jobs import attach, claim, finish
 
 from buildarena_cli.commands.job_files import file_name
 from buildarena_cli.suggestions import suggested_words
 from buildarena_pipeline.catalog.specs import SweepSpec
-from buildarena_store import JobScore
 
 JSON = "application/json"
-
-
-@pytest.fixture
-def url(context):
-    with live_api(context) as url:
-        yield url
 
 
 @pytest.fixture
@@ -148,18 +139,8 @@ def test_shells_are_offered_nothing_when_no_api_answers(url) -> None:
 
 
 def test_jobs_are_filtered_by_how_they_ended(url, ids, context) -> None:
-    lease = context.store.leases.claim("construct", owner="w")
-    score = JobScore(
-        outcome="unsuccessful",
-        success=False,
-        indicator=0.0,
-        metrics={},
-        reason="too_weak",
-        flags=("unstable", "odd"),
-    )
-    with context.store.database.transaction() as connection:
-        context.store.results.finish(lease, score, connection=connection)
-    found = lease.job.id
+    lease = claim(context)
+    found = finish(context, lease, "unsuccessful", reason="too_weak", flags=("unstable", "odd"))
     for words in (
         ["--reason", "too_weak"],
         ["--flag", "odd"],
@@ -204,14 +185,10 @@ def test_pages_follow_each_other(url, ids) -> None:
 def made(context, sweep) -> tuple[str, dict[str, bytes]]:
     """A job with three files."""
     assert sweep
-    lease = context.store.leases.claim("construct", owner="w")
+    lease = claim(context)
     files = {"machine": b"{}", "transcript": b"[]", "trajectory-0": b"PAR1"}
-    kept = {name: context.artifacts.put(data, JSON) for name, data in files.items()}
-    score = JobScore(outcome="unsuccessful", success=False, indicator=0.0, metrics={})
-    with context.store.database.transaction() as connection:
-        context.store.results.attach(lease.job.id, kept, connection=connection)
-        context.store.results.finish(lease, score, connection=connection)
-    return lease.job.id, files
+    attach(context, lease.job.id, files, JSON)
+    return finish(context, lease, "unsuccessful"), files
 
 
 def test_a_jobs_files_are_listed_and_fetched(url, made, tmp_path) -> None:

@@ -1,11 +1,7 @@
 """What the command line says of results that were imported, and of limits."""
 
-from __future__ import annotations
-
-import pytest
 from support.clients.commands import printed
 from support.servers.databases import empty
-from support.servers.live_api import live_api
 from support.stages import work
 
 from buildarena_pipeline.catalog.specs import Limits, SweepSpec
@@ -13,12 +9,6 @@ from buildarena_store.archives import write_archive
 from buildarena_worker.wiring import verification_runner
 
 SPEC = SweepSpec(tasks=["lift-1"], models=["builtin/expert"], seeds=[0, 1], simulator="mujoco")
-
-
-@pytest.fixture
-def url(context):
-    with live_api(context) as url:
-        yield url
 
 
 def test_imported_results_are_marked_until_and_after_they_count(

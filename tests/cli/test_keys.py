@@ -1,19 +1,16 @@
 """Keys and budgets as an operator and a researcher use them, against a real API."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterator
 
 import pytest
 import yaml
 from support.clients.tenants import ADMIN, WITH_KEYS
-from support.servers.live_api import live_api
+from support.servers.live_api import changed, live_api
 from typer.testing import CliRunner, Result
 
 from buildarena_cli.errors import CommandError
 from buildarena_cli.main import app
-from buildarena_pipeline.runtime.context import open_context
 
 Call = Callable[..., Result]
 
@@ -21,8 +18,7 @@ Call = Callable[..., Result]
 @pytest.fixture
 def call(context, monkeypatch) -> Iterator[Call]:
     """Runs commands with a key against an API that asks for one."""
-    own = open_context(context.settings.model_copy(update=WITH_KEYS))
-    with live_api(own) as url:
+    with changed(context, **WITH_KEYS) as own, live_api(own) as url:
         monkeypatch.setenv("BUILDARENA_URL", url)
 
         def run(*words: str, key: str | None = ADMIN) -> Result:
@@ -32,7 +28,6 @@ def call(context, monkeypatch) -> Iterator[Call]:
             return result
 
         yield run
-    own.close()
 
 
 def made(call: Call, *words: str) -> dict[str, str]:

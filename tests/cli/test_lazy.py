@@ -1,7 +1,5 @@
 """Help and completion load nothing that they do not need, and the table of commands is right."""
 
-from __future__ import annotations
-
 import inspect
 import json
 import os

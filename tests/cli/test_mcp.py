@@ -1,26 +1,21 @@
 """A real MCP client builds a bridge over stdio and gets its score."""
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import json
 import socket
 import subprocess
-import sys
-from pathlib import Path
 
+import pytest
 from mcp import ClientSession, StdioServerParameters, stdio_client
 from mcp.client.streamable_http import streamable_http_client
-from support.servers.live_api import live_api
+from support.clients.terminals import BUILDARENA
 from support.servers.stacks import wait_until
 from support.stages import work
 
 from buildarena_cli.local import free_port
 from buildarena_worker.builtin.designs import DESIGNS
 from buildarena_worker.wiring import verifier
-
-BUILDARENA = str(Path(sys.executable).parent / "buildarena")
 
 
 async def play(connected, simulate) -> dict[str, object]:
@@ -34,16 +29,8 @@ async def play(connected, simulate) -> dict[str, object]:
         )
         session_id = opened.split()[1]
         assert "gap" in opened
-        refused = await session.call_tool(
-            "attach_block_to",
-            {
-                "session": session_id,
-                "base_block": "1",
-                "face": "A",
-                "new_block": "Torch",
-                "note": "",
-            },
-        )
+        torch = {"base_block": "1", "face": "A", "new_block": "Torch", "note": ""}
+        refused = await session.call_tool("attach_block_to", {"session": session_id, **torch})
         assert refused.is_error
         for name, arguments in DESIGNS["support-1"](0).parts["bridge"].actions:
             await said(session, name, {"session": session_id, **arguments})
@@ -62,10 +49,13 @@ async def said(session: ClientSession, tool: str, arguments: dict[str, object]) 
     return result.content[0].text
 
 
-def test_an_agent_builds_a_bridge_and_gets_its_score(context) -> None:
-    with live_api(context) as url:
-        server = StdioServerParameters(command=BUILDARENA, args=["mcp", "--url", url])
-        result = asyncio.run(play(stdio_client(server), lambda: work(context)))
+@pytest.fixture
+def stdio(url):
+    return stdio_client(StdioServerParameters(command=BUILDARENA, args=["mcp", "--url", url]))
+
+
+def test_an_agent_builds_a_bridge_and_gets_its_score(context, stdio) -> None:
+    result = asyncio.run(play(stdio, lambda: work(context)))
     assert result["outcome"] == "success"
     assert result["indicator"] > 100
     (job,) = context.store.jobs.page(limit=2)
@@ -92,26 +82,22 @@ async def play_against_the_rules(connected) -> dict[str, object]:
         return json.loads(await said(session, "submit", here))
 
 
-def test_an_agent_reads_which_rule_its_machine_breaks(context) -> None:
-    with live_api(context) as url:
-        server = StdioServerParameters(command=BUILDARENA, args=["mcp", "--url", url])
-        result = asyncio.run(play_against_the_rules(stdio_client(server)))
+def test_an_agent_reads_which_rule_its_machine_breaks(stdio) -> None:
+    result = asyncio.run(play_against_the_rules(stdio))
     assert (result["outcome"], result["reason"]) == ("construction_failed", "unjoined_parts")
     assert result["detail"].startswith("sub-structure B is not joined to the starting block A_1")
 
 
-def test_an_agent_builds_over_streamable_http(context) -> None:
+def test_an_agent_builds_over_streamable_http(context, url) -> None:
     port = free_port()
-    with live_api(context) as url:
-        command = [BUILDARENA, "mcp", "--url", url, "--http", str(port)]
-        server = subprocess.Popen(command)
-        try:
-            wait_until(lambda: _answers(port), 60, "the MCP server answers")
-            connected = streamable_http_client(f"http://127.0.0.1:{port}/mcp")
-            result = asyncio.run(play(connected, lambda: work(context)))
-        finally:
-            server.terminate()
-            server.wait()
+    server = subprocess.Popen([BUILDARENA, "mcp", "--url", url, "--http", str(port)])
+    try:
+        wait_until(lambda: _answers(port), 60, "the MCP server answers")
+        connected = streamable_http_client(f"http://127.0.0.1:{port}/mcp")
+        result = asyncio.run(play(connected, lambda: work(context)))
+    finally:
+        server.terminate()
+        server.wait()
     assert result["outcome"] == "success"
 
 
@@ -138,9 +124,7 @@ async def side_by_side(connected) -> list[str]:
         return results
 
 
-def test_calls_sent_side_by_side_are_done_in_the_order_sent(context) -> None:
-    with live_api(context) as url:
-        server = StdioServerParameters(command=BUILDARENA, args=["mcp", "--url", url])
-        results = asyncio.run(side_by_side(stdio_client(server)))
+def test_calls_sent_side_by_side_are_done_in_the_order_sent(stdio) -> None:
+    results = asyncio.run(side_by_side(stdio))
     blocks = [result.split(",")[0] for result in results]
     assert blocks == [f"Attached. {number} Small Wooden Block" for number in range(2, 14)]

@@ -1,7 +1,5 @@
 """An MCP client that knows nothing but what the server sends builds three machines."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 import re

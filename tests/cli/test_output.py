@@ -1,11 +1,8 @@
 """Tables: whole through a pipe; on a terminal, columns give way in their order and ids never do."""
 
-from __future__ import annotations
-
 import pytest
 from support.clients.commands import printed
 from support.clients.terminals import on_terminal, piped
-from support.servers.live_api import live_api
 
 from buildarena_cli.commands.job_lists import COLUMNS
 from buildarena_cli.terminal.output import columns, print_table
@@ -18,8 +15,8 @@ WIDTHS = [200, 100, 80, 60, 40]
 LEAVING = [c.name for c in sorted(COLUMNS, key=lambda c: c.leaves) if c.leaves]
 
 
-@pytest.fixture
-def url(context, submissions):
+@pytest.fixture(autouse=True)
+def sweep(submissions) -> None:
     spec = SweepSpec(
         name="a sweep with a long name",
         tasks=["support-1", "transport-2"],
@@ -27,13 +24,10 @@ def url(context, submissions):
         samples=2,
     )
     submissions.submit_sweep(spec)
-    with live_api(context) as url:
-        yield url
 
 
 @pytest.fixture
-def ids(url, context) -> list[str]:
-    assert url
+def ids(context) -> list[str]:
     return [job.id for job in context.store.jobs.page(limit=100)]
 
 

@@ -1,23 +1,14 @@
 """Both readings of flags, and what is only known to be at least, wherever figures are shown."""
 
-from __future__ import annotations
-
 import csv
 import json
 
 import pytest
 from sqlalchemy import insert, select, update
 from support.clients.commands import printed, run_cli
-from support.servers.live_api import live_api
 
 from buildarena_pipeline.catalog.specs import SweepSpec
 from buildarena_store.tables import jobs, rollouts
-
-
-@pytest.fixture
-def url(context):
-    with live_api(context) as url:
-        yield url
 
 
 @pytest.fixture
@@ -39,17 +30,9 @@ def sweep(context, submissions) -> str:
                 .where(jobs.c.id == job.id)
                 .values(state="done", outcome="success", finished_at=job.created_at, **score)
             )
-            connection.execute(
-                insert(rollouts).values(
-                    job_id=job.id,
-                    number=0,
-                    final=True,
-                    engine="pybullet",
-                    machine_hash="machine",
-                    finished_at=job.created_at,
-                    **score,
-                )
-            )
+            trial = {"number": 0, "final": True, "engine": "pybullet", "machine_hash": "machine"}
+            ended = {"job_id": job.id, "finished_at": job.created_at}
+            connection.execute(insert(rollouts).values(**ended, **trial, **score))
     return str(done.sweep.id)
 
 

@@ -1,28 +1,13 @@
 """What cannot work is refused with one clear sentence, the right exit code and nothing left."""
 
-from __future__ import annotations
-
 import os
 import socket
 import subprocess
 import sys
-from pathlib import Path
 
 import psutil
 import pytest
-
-BUILDARENA = str(Path(sys.executable).parent / "buildarena")
-
-
-def run_cli(*words: str, **environment: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [BUILDARENA, *words],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=120,
-        env={**os.environ, **environment},
-    )
+from support.clients.terminals import piped
 
 
 def assert_refused(done: subprocess.CompletedProcess[str], *words: str) -> None:
@@ -33,41 +18,41 @@ def assert_refused(done: subprocess.CompletedProcess[str], *words: str) -> None:
 
 
 @pytest.mark.parametrize("command", ["up", "demo"])
-def test_a_taken_port(tmp_path: Path, command: str) -> None:
+def test_a_taken_port(tmp_path, command) -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         port = str(taken.getsockname()[1])
-        done = run_cli(command, "--data", str(tmp_path), "--port", port)
+        done = piped(command, "--data", str(tmp_path), "--port", port)
     assert_refused(done, port, "choose another port with --port")
     named = [p for p in psutil.process_iter(["cmdline"]) if str(tmp_path) in str(p.info["cmdline"])]
     assert named == []
 
 
 @pytest.mark.parametrize("command", ["up", "demo"])
-def test_an_unwritable_data_folder(tmp_path: Path, command: str) -> None:
+def test_an_unwritable_data_folder(tmp_path, command) -> None:
     (tmp_path / "file").write_text("in the way")
-    done = run_cli(command, "--data", str(tmp_path / "file" / "data"))
+    done = piped(command, "--data", str(tmp_path / "file" / "data"))
     assert_refused(done, "can't be written", "choose another with --data")
 
 
-def test_a_data_folder_in_use(tmp_path: Path) -> None:
+def test_a_data_folder_in_use(tmp_path) -> None:
     import fcntl
 
     (tmp_path / "lock").touch()
     with (tmp_path / "lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        done = run_cli("up", "--data", str(tmp_path), "--port", "0")
+        done = piped("up", "--data", str(tmp_path), "--port", "0")
     assert_refused(done, "another BuildArena runs on the data folder")
 
 
 def test_a_service_that_is_not_there() -> None:
-    done = run_cli("leaderboard", "--url", "http://127.0.0.1:1")
+    done = piped("leaderboard", "--url", "http://127.0.0.1:1")
     assert_refused(done, "no BuildArena answers at http://127.0.0.1:1", "buildarena up")
 
 
 def test_a_port_that_is_no_port() -> None:
-    done = run_cli("up", BUILDARENA_PORT="99999")
+    done = piped("up", BUILDARENA_PORT="99999")
     assert_refused(done, "BUILDARENA_PORT", "99999")
 
 
@@ -75,27 +60,27 @@ def test_a_port_that_is_no_port() -> None:
     ("text", "says"),
     [("tasks: [", "not valid YAML"), ("- 1", "must be a mapping"), (None, "No such")],
 )
-def test_a_bad_sweep_file(tmp_path: Path, text: str | None, says: str) -> None:
+def test_a_bad_sweep_file(tmp_path, text, says) -> None:
     file = tmp_path / "sweep.yaml"
     if text is not None:
         file.write_text(text)
-    done = run_cli("sweep", "run", str(file), "--url", "http://127.0.0.1:1")
+    done = piped("sweep", "run", str(file), "--url", "http://127.0.0.1:1")
     assert done.returncode == 1
     assert says in done.stderr
 
 
 @pytest.mark.parametrize("words", [["fly"], ["job"], ["job", "show"], ["leaderboard", "--fast"]])
-def test_wrong_words_end_with_code_2(words: list[str]) -> None:
-    assert run_cli(*words).returncode == 2
+def test_wrong_words_end_with_code_2(words) -> None:
+    assert piped(*words).returncode == 2
 
 
 def test_help_names_every_command() -> None:
-    text = run_cli("--help").stdout
+    text = piped("--help").stdout
     for command in ("up", "demo", "doctor", "sweep", "job", "leaderboard"):
         assert command in text
 
 
-def test_a_worker_refuses_a_foreign_schema(database_url: str, broker_url: str) -> None:
+def test_a_worker_refuses_a_foreign_schema(database_url, broker_url) -> None:
     from buildarena_store import Database
     from buildarena_store.database import expected_schema
 

@@ -1,7 +1,5 @@
 """Reports hold every figure in every format, and nothing in them is taken for markup."""
 
-from __future__ import annotations
-
 import html.parser
 import re
 from pathlib import Path

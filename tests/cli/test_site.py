@@ -1,7 +1,5 @@
 """A published site holds exactly what the service answers, and is whole or not there."""
 
-from __future__ import annotations
-
 import errno
 import json
 import re
@@ -13,7 +11,7 @@ import httpx
 import pytest
 from support.clients.commands import printed, run_cli
 from support.clients.tenants import ADMIN, WITH_KEYS
-from support.servers.live_api import live_api
+from support.servers.live_api import changed, live_api
 from support.stages import work
 
 from buildarena_cli.defaults import KEY_VARIABLE
@@ -21,7 +19,6 @@ from buildarena_cli.site import jobs as site_jobs
 from buildarena_cli.site import pages as site_pages
 from buildarena_cli.site import writing
 from buildarena_cli.site.folder import Folder
-from buildarena_pipeline.runtime.context import open_context
 from buildarena_simulation.arrow import MEDIA_TYPE as ARROW
 
 PAGE = (
@@ -44,12 +41,6 @@ def pages(tmp_path, monkeypatch) -> Path:
         (folder / name).write_text("0")
     monkeypatch.setattr(site_pages, "built_pages", lambda: folder)
     return folder
-
-
-@pytest.fixture
-def url(context):
-    with live_api(context) as url:
-        yield url
 
 
 def submitted(url: str, spec: dict, **headers: str) -> str:
@@ -164,8 +155,7 @@ def test_its_policy_is_the_services() -> None:
 
 
 def test_no_key_is_in_it(context, tmp_path, monkeypatch) -> None:
-    own = open_context(context.settings.model_copy(update=WITH_KEYS))
-    with live_api(own) as url:
+    with changed(context, **WITH_KEYS) as own, live_api(own) as url:
         sweep = submitted(url, {**IDLE, "seeds": [0]}, Authorization=f"Bearer {ADMIN}")
         work(context)
         site = tmp_path / "site"
@@ -173,7 +163,6 @@ def test_no_key_is_in_it(context, tmp_path, monkeypatch) -> None:
         assert not site.exists()
         monkeypatch.setenv(KEY_VARIABLE, ADMIN)
         printed(url, "site", sweep, "--out", str(site))
-    own.close()
     assert len(files_of(site)) > 20
     for name in files_of(site):
         assert ADMIN.encode() not in (site / name).read_bytes()

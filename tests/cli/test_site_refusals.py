@@ -1,13 +1,11 @@
 """What a site is refused for, and which jobs it keeps whole."""
 
-from __future__ import annotations
-
 import fcntl
 from pathlib import Path
 
 import pytest
 from support.clients.commands import run
-from tests.cli.test_site import files_of, idle, pages, url  # noqa: F401 - fixtures
+from tests.cli.test_site import files_of, idle, pages  # noqa: F401 - fixtures
 
 from buildarena_cli.commands import site as command
 from buildarena_cli.errors import CommandError
@@ -18,7 +16,7 @@ from buildarena_cli.site.scope import Scope, chosen_jobs, read_choice
 
 
 @pytest.fixture
-def refused(url, idle, tmp_path):  # noqa: F811 - fixtures
+def refused(url, idle, tmp_path):  # noqa: F811 - a fixture
     """Runs the command, and gives the words that it is refused with."""
 
     def work(*words: str, out: Path = tmp_path / "site", sweep: str = idle) -> str:

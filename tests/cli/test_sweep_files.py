@@ -1,7 +1,5 @@
 """Sweep files: every mistake named with line and field, flags, and the published schema."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -9,7 +7,6 @@ import pytest
 import yaml
 from jsonschema import Draft202012Validator
 from support.clients.commands import printed, run, run_cli
-from support.servers.live_api import live_api
 
 ROOT = Path(__file__).parents[2]
 SCHEMA = ROOT / "docs" / "sweep.schema.json"
@@ -24,12 +21,6 @@ decoding:
   temperature: 0.5
 simulator: mujoco
 """
-
-
-@pytest.fixture
-def url(context):
-    with live_api(context) as url:
-        yield url
 
 
 @pytest.fixture

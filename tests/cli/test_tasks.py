@@ -1,25 +1,16 @@
 """The commands of tasks: check without a server, add, list, show."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
 import pytest
 from support.clients.commands import printed, run, run_cli
-from support.servers.live_api import live_api
+from support.jobs import finish
 
 from buildarena_api.routes.tasks import EXAMPLE
-from buildarena_store import JobScore
 
 OTHER = EXAMPLE.replace("final_mass: 200", "final_mass: 300")
 WRONG = EXAMPLE.replace("gap: 3}", "gap: -3}").replace("{name: support}", "{name: suport}")
-
-
-@pytest.fixture
-def url(context):
-    with live_api(context) as url:
-        yield url
 
 
 @pytest.fixture
@@ -72,9 +63,8 @@ def test_an_added_task_is_listed_with_a_mark_and_shown(url, file) -> None:
     text = printed(url, "task", "list")
     assert "narrow-gap+" in text
     assert "support-1+" not in text
-    marks = {
-        task["name"]: task["custom"] for task in json.loads(printed(url, "task", "list", "--json"))
-    }
+    listed = json.loads(printed(url, "task", "list", "--json"))
+    marks = {task["name"]: task["custom"] for task in listed}
     assert (marks["narrow-gap"], marks["support-1"]) == (True, False)
     shown = printed(url, "task", "show", "narrow-gap")
     assert f"narrow-gap, version {first['version']}, added by a user" in shown
@@ -88,9 +78,8 @@ def test_versions_are_kept_and_shown(url, file) -> None:
     new = json.loads(printed(url, "task", "add", str(file), "--json"))
     newest = json.loads(printed(url, "task", "show", "narrow-gap", "--json"))
     assert newest["version"] == new["version"]
-    kept = json.loads(
-        printed(url, "task", "show", "narrow-gap", "--version", old["version"], "--json")
-    )
+    words = ["task", "show", "narrow-gap", "--version", old["version"], "--json"]
+    kept = json.loads(printed(url, *words))
     assert kept["document"]["scenario"]["cargo"]["final_mass"] == 200
     file.write_text(EXAMPLE)
     again = run_cli(url, "task", "add", str(file))
@@ -131,14 +120,8 @@ def sweep_of_own(url, context, file) -> str:
     assert old != new
     while (lease := context.store.leases.claim("construct", owner="w")) is not None:
         won = lease.job.model == "openai/gpt-5"
-        score = JobScore(
-            outcome="success" if won else "unsuccessful",
-            success=won,
-            indicator=150.0 if won else 0.0,
-            metrics={"parts": 7},
-        )
-        with context.store.database.transaction() as connection:
-            context.store.results.finish(lease, score, connection=connection)
+        score = ("success", 150.0) if won else ("unsuccessful", 0.0)
+        finish(context, lease, *score, metrics={"parts": 7})
     return f"{old} {new}"
 
 

@@ -1,7 +1,5 @@
 """What an external agent did not report is a dash, and null for programs: never 0."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json
@@ -10,7 +8,6 @@ from urllib.request import urlopen
 import pyarrow.parquet as pq
 import pytest
 from support.clients.commands import printed
-from support.servers.live_api import live_api
 from support.stages import work
 
 from buildarena_pipeline.agents.sessions import ExternalSessions
@@ -32,12 +29,6 @@ def ended(context) -> str:
     sessions.submit(job.id)
     work(context)
     return str(job.id)
-
-
-@pytest.fixture
-def url(context):
-    with live_api(context) as url:
-        yield url
 
 
 def fetched(url: str, path: str) -> bytes:

@@ -1,7 +1,5 @@
 """One service for each module, both clients, and pauses that take no time."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager

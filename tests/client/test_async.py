@@ -1,7 +1,5 @@
 """What only the asynchronous client does: many requests at once, and being cancelled."""
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 
@@ -14,13 +12,7 @@ SWEEP = "sweep_0a1b2c3d4e5f60718293"
 
 
 class CountingServer:
-    """Answers each request after a moment, and counts those that are open.
-
-    Attributes:
-        most: How many were open at once at most.
-        answered: How many were answered.
-        left: How many clients left before their answer.
-    """
+    """Answers each request after a moment, and counts those that are open."""
 
     def __init__(self, *, lasts_s: float) -> None:
         self._lasts_s = lasts_s

@@ -1,7 +1,5 @@
 """Both clients have the same methods, every route has one, and types follow the contract."""
 
-from __future__ import annotations
-
 import importlib.util
 import inspect
 import json

@@ -1,7 +1,5 @@
 """Keys in variables and files: the client reads them as the service reads its secrets."""
 
-from __future__ import annotations
-
 import pytest
 
 from buildarena_client.config import stored_key

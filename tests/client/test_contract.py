@@ -1,7 +1,5 @@
 """What both clients say of a real service."""
 
-from __future__ import annotations
-
 import zipfile
 from itertools import islice
 from pathlib import Path

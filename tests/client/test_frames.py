@@ -1,7 +1,5 @@
 """Answers as frames of both libraries."""
 
-from __future__ import annotations
-
 import json
 from datetime import UTC, datetime
 

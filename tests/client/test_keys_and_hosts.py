@@ -1,7 +1,5 @@
 """A key goes to the host that it was given for, and nowhere else."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import socket

@@ -1,7 +1,5 @@
 """The README's programs, word for word, against a real service that works."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

@@ -1,7 +1,5 @@
 """Servers that refuse, are busy, break off, or are none of ours: what both clients make of it."""
 
-from __future__ import annotations
-
 import inspect
 import json
 import time

@@ -1,7 +1,5 @@
 """The compose file and the images' recipe: valid, closed, and saying what the settings say."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

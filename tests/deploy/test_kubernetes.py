@@ -1,7 +1,5 @@
 """The manifests for Kubernetes: valid, and as closed as they say."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path
@@ -54,13 +52,13 @@ def check(document: dict) -> None:
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(KUBERNETES)))
-def test_each_file_is_valid_by_itself(path: Path) -> None:
+def test_each_file_is_valid_by_itself(path) -> None:
     for document in read(path.read_text()):
         check(document)
 
 
 @each_overlay
-def test_each_overlay_is_valid_as_a_whole(overlay: str) -> None:
+def test_each_overlay_is_valid_as_a_whole(overlay) -> None:
     documents = rendered(overlay)
     names = [(each["kind"], each["metadata"]["name"]) for each in documents]
     assert len(set(names)) == len(names)
@@ -78,7 +76,7 @@ def test_a_wrong_document_is_found() -> None:
 
 
 @each_overlay
-def test_no_pod_has_more_rights_than_it_needs(overlay: str) -> None:
+def test_no_pod_has_more_rights_than_it_needs(overlay) -> None:
     for name, pod in pods(rendered(overlay)).items():
         spec = pod["spec"]
         assert spec["automountServiceAccountToken"] is False, name
@@ -99,7 +97,7 @@ def test_no_pod_has_more_rights_than_it_needs(overlay: str) -> None:
 
 
 @each_overlay
-def test_pods_mount_what_they_name(overlay: str) -> None:
+def test_pods_mount_what_they_name(overlay) -> None:
     documents = rendered(overlay)
     claims = of_kind(documents, "PersistentVolumeClaim")
     for name, pod in pods(documents).items():
@@ -125,7 +123,7 @@ def test_pods_mount_what_they_name(overlay: str) -> None:
 
 
 @each_overlay
-def test_no_environment_holds_a_secret(overlay: str) -> None:
+def test_no_environment_holds_a_secret(overlay) -> None:
     documents = rendered(overlay)
     secret = {*(f"BUILDARENA_{name.upper()}" for name in SECRETS), *ARTIFACT_CREDENTIALS}
     secret -= {"BUILDARENA_ARTIFACTS_URL"}
@@ -142,7 +140,7 @@ def test_no_environment_holds_a_secret(overlay: str) -> None:
 
 
 @each_overlay
-def test_settings_are_ones_that_there_are(overlay: str) -> None:
+def test_settings_are_ones_that_there_are(overlay) -> None:
     documents = rendered(overlay)
     fields = {f"BUILDARENA_{name.upper()}" for name in Settings.model_fields}
     (config,) = of_kind(documents, "ConfigMap").values()
@@ -164,7 +162,7 @@ def test_settings_are_ones_that_there_are(overlay: str) -> None:
 
 
 @each_overlay
-def test_each_workload_has_its_image_and_program(overlay: str) -> None:
+def test_each_workload_has_its_image_and_program(overlay) -> None:
     found = pods(rendered(overlay))
     images = {name: found[name]["spec"]["containers"][0]["image"] for name in [*OURS, "migrate"]}
     assert images == {
@@ -179,7 +177,7 @@ def test_each_workload_has_its_image_and_program(overlay: str) -> None:
 
 
 @each_overlay
-def test_pods_are_stopped_and_moved_with_care(overlay: str) -> None:
+def test_pods_are_stopped_and_moved_with_care(overlay) -> None:
     documents = rendered(overlay)
     budgets = of_kind(documents, "PodDisruptionBudget")
     for name in OURS:
@@ -196,7 +194,7 @@ def test_pods_are_stopped_and_moved_with_care(overlay: str) -> None:
 
 
 @each_overlay
-def test_nothing_goes_in_or_out_that_is_not_named(overlay: str) -> None:
+def test_nothing_goes_in_or_out_that_is_not_named(overlay) -> None:
     documents = rendered(overlay)
     policies = of_kind(documents, "NetworkPolicy")
     closed = policies["nothing"]["spec"]
@@ -222,7 +220,7 @@ def test_nothing_goes_in_or_out_that_is_not_named(overlay: str) -> None:
 
 
 @each_overlay
-def test_services_and_ingress_lead_to_pods(overlay: str) -> None:
+def test_services_and_ingress_lead_to_pods(overlay) -> None:
     documents = rendered(overlay)
     services = of_kind(documents, "Service")
     for name, service in services.items():
@@ -253,7 +251,7 @@ def test_what_is_scaled_has_no_number_of_its_own() -> None:
 
 @needs_kubectl
 @needs_promtool
-def test_scaling_goes_by_figures_of_the_workers_own_queue(tmp_path: Path) -> None:
+def test_scaling_goes_by_figures_of_the_workers_own_queue(tmp_path) -> None:
     queues = {
         "construct": CONSTRUCT_QUEUE,
         **{f"simulate-{engine}": simulate_queue(engine) for engine in installed_engines()},

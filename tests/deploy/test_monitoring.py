@@ -1,7 +1,5 @@
 """Alert rules, their runbook and the dashboards: well formed, and of metrics that there are."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Iterator
@@ -95,7 +93,7 @@ def test_rules_and_configuration_are_prometheus_own() -> None:
 
 
 @needs_promtool
-def test_each_panels_expression_parses(tmp_path: Path) -> None:
+def test_each_panels_expression_parses(tmp_path) -> None:
     rules = [
         {"record": f"panel:{number}", "expr": expr}
         for number, (_, expr) in enumerate(expressions())
@@ -106,7 +104,7 @@ def test_each_panels_expression_parses(tmp_path: Path) -> None:
 
 
 @needs_promtool
-def test_an_expression_that_does_not_parse_is_found(tmp_path: Path) -> None:
+def test_an_expression_that_does_not_parse_is_found(tmp_path) -> None:
     file = tmp_path / "broken.yml"
     rule = {"record": "x:y", "expr": "sum by (queue (buildarena_queue_jobs)"}
     file.write_text(yaml.safe_dump({"groups": [{"name": "x", "rules": [rule]}]}))
@@ -115,7 +113,7 @@ def test_an_expression_that_does_not_parse_is_found(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("path", DASHBOARDS, ids=lambda path: path.stem)
-def test_dashboards_are_whole(path: Path) -> None:
+def test_dashboards_are_whole(path) -> None:
     board = read(path)
     assert board["uid"] == f"buildarena-{path.stem}"
     source = MONITORING / "grafana" / "provisioning" / "datasources" / "prometheus.yaml"

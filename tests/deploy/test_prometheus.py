@@ -1,7 +1,5 @@
 """Prometheus itself reads a service with our configuration, and evaluates every rule and panel."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import subprocess
@@ -91,9 +89,7 @@ def api(context: Context) -> Iterator[str]:
     own.close()
 
 
-def test_prometheus_reads_the_service_and_understands_every_expression(
-    api: str, tmp_path: Path
-) -> None:
+def test_prometheus_reads_the_service_and_understands_every_expression(api, tmp_path) -> None:
     with prometheus(tmp_path, api, KEY) as client:
         target_says(client, "up")
 
@@ -112,6 +108,6 @@ def test_prometheus_reads_the_service_and_understands_every_expression(
         assert [each["value"][1] for each in up.json()["data"]["result"]] == ["1"]
 
 
-def test_prometheus_without_the_key_is_refused(api: str, tmp_path: Path) -> None:
+def test_prometheus_without_the_key_is_refused(api, tmp_path) -> None:
     with prometheus(tmp_path, api, "no-such-key-anywhere") as client:
         target_says(client, "401")

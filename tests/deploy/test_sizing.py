@@ -1,7 +1,5 @@
 """The sizing model: more costs more, and the document says what the model says."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

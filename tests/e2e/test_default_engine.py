@@ -1,7 +1,5 @@
 """Whoever names no engine gets the same one, at every door; one that is missing is refused."""
 
-from __future__ import annotations
-
 import inspect
 import json
 

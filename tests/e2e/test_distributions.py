@@ -1,7 +1,5 @@
 """What users install: wheels of one version, and a demo, a report and pages from them alone."""
 
-from __future__ import annotations
-
 import json
 import os
 import re
@@ -87,7 +85,7 @@ def test_every_distribution_has_one_version_and_asks_for_its_siblings_of_the_sam
             assert said in ([], [version]), module
 
 
-def test_the_meta_distribution_installs_all_but_adapters(installed: Path) -> None:
+def test_the_meta_distribution_installs_all_but_adapters(installed) -> None:
     listed = _uv("pip", "list", "--format", "json", "--python", str(installed / "python"))
     ours = {p["name"] for p in json.loads(listed.stdout) if p["name"].startswith("buildarena")}
     assert ours == {project(path)["name"] for path in PROJECTS if path not in ADAPTERS}
@@ -112,7 +110,7 @@ def test_a_new_version_goes_everywhere(tmp_path) -> None:
     assert (refused.returncode, "'next' is no version" in refused.stderr) == (2, True)
 
 
-def test_wheels_and_sdists_say_what_they_are(dist: Path) -> None:
+def test_wheels_and_sdists_say_what_they_are(dist) -> None:
     wheels, sdists = sorted(dist.glob("*.whl")), sorted(dist.glob("*.tar.gz"))
     assert len(wheels) == len(sdists) == len(PROJECTS)
     for wheel in wheels:
@@ -132,7 +130,7 @@ def test_wheels_and_sdists_say_what_they_are(dist: Path) -> None:
         assert {"LICENSE", "README.md", "pyproject.toml", "PKG-INFO"} <= set(inside)
 
 
-def test_the_clients_types_are_written_when_it_is_built(dist: Path) -> None:
+def test_the_clients_types_are_written_when_it_is_built(dist) -> None:
     schemas = "buildarena_client/schemas.py"
     (wheel,) = dist.glob("buildarena_client-*.whl")
     (sdist,) = dist.glob("buildarena_client-*.tar.gz")
@@ -149,7 +147,7 @@ def test_each_licence_is_the_repositorys() -> None:
 
 
 @needs_pages
-def test_a_notebook_draws_from_an_empty_environment(installed: Path, tmp_path) -> None:
+def test_a_notebook_draws_from_an_empty_environment(installed, tmp_path) -> None:
     code = (
         "import buildarena as ba; machine = ba.Machine(); machine.start(); "
         "print(machine._repr_mimebundle_()['text/html'])"
@@ -164,7 +162,7 @@ def test_a_notebook_draws_from_an_empty_environment(installed: Path, tmp_path) -
 
 
 @needs_pages
-def test_demo_report_and_pages_run_from_an_empty_environment(installed: Path, tmp_path) -> None:
+def test_demo_report_and_pages_run_from_an_empty_environment(installed, tmp_path) -> None:
     data = tmp_path / "data"
     words = ["demo", "--task", "support-1", "--data", str(data), "--port", str(free_port())]
     demo = run(installed, tmp_path, *words)

@@ -1,9 +1,6 @@
 """A whole service with two keys: the sessions of one hang, those of the other go on."""
 
-from __future__ import annotations
-
 import time
-from pathlib import Path
 
 import httpx
 import pytest
@@ -15,7 +12,7 @@ SESSIONS = 8
 
 
 @pytest.mark.timeout(120)
-def test_hanging_sessions_of_one_key_leave_room_for_another_s(tmp_path: Path) -> None:
+def test_hanging_sessions_of_one_key_leave_room_for_another_s(tmp_path) -> None:
     for folder in (tmp_path, *tmp_path.parents[:3]):
         folder.chmod(folder.stat().st_mode | 0o055)  # Postgres runs as nobody under root
     with (

@@ -1,7 +1,5 @@
 """The whole road with its real parts: servers, API, workers and simulator as processes."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

@@ -1,7 +1,5 @@
 """Kept means kept: a failing artifact store costs time only, and every lost byte is noticed."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

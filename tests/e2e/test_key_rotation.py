@@ -1,7 +1,5 @@
 """The operator's key and a researcher's are replaced while a sweep runs; no job is lost by it."""
 
-from __future__ import annotations
-
 import threading
 from contextlib import ExitStack
 
@@ -11,7 +9,7 @@ from support.clients.tenants import ADMIN, WITH_KEYS
 from support.servers.live_api import live_api
 from support.stages import work
 
-from buildarena_pipeline.runtime.context import Context, open_context
+from buildarena_pipeline.runtime.context import open_context
 
 NEW_ADMIN = "another-operator-secret-as-long"
 SWEEP = {
@@ -26,7 +24,7 @@ def bearer(secret: str) -> dict[str, str]:
     return {"Authorization": f"Bearer {secret}"}
 
 
-def test_keys_are_replaced_under_a_running_sweep(context: Context) -> None:
+def test_keys_are_replaced_under_a_running_sweep(context) -> None:
     with ExitStack() as stack:
 
         def api(**changes: object) -> httpx.Client:

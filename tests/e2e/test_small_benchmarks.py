@@ -1,7 +1,5 @@
 """The benchmarks of sessions and jobs in small: that they count what happened, not how fast."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -1,13 +1,10 @@
 """What the geometry tests share: where their data is, and a way to build machines in one line."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
-
-from buildarena_geometry import Machine
+from support.machines.building import built
 
 # A slow machine must not make a law look broken.
 settings.register_profile("geometry", deadline=None, print_blob=True)
@@ -22,14 +19,4 @@ def data() -> Path:
 @pytest.fixture
 def build():
     """Builds a machine from (base, face, module) triples and fails if a step is refused."""
-
-    def build_machine(*parts, **start) -> Machine:
-        machine = Machine()
-        assert machine.act("start", start).ok
-        for base, face, module in parts:
-            arguments = {"base_block": base, "face": face, "new_block": module}
-            outcome = machine.act("attach_block_to", arguments)
-            assert outcome.ok, outcome.text
-        return machine
-
-    return build_machine
+    return built

@@ -1,10 +1,9 @@
 """Answers tell what is: what holds, what heats what, which face looks where, what was meant."""
 
-from __future__ import annotations
-
 import re
 
 import pytest
+from support.machines.building import attach, connect
 
 from buildarena_geometry import Cause, Machine, load_catalogue
 from buildarena_geometry.feedback.modules import modules_text
@@ -67,15 +66,7 @@ def test_a_parted_block_says_what_that_means(build):
 
 def test_a_parted_block_that_a_connector_holds_is_not_called_loose(build):
     machine = build(("1", "A", BLOCK))
-    act(
-        machine,
-        "connect_blocks",
-        block_a="1",
-        face_a="C",
-        block_b="2",
-        face_b="C",
-        connector="Brace",
-    )
+    assert connect(machine, "1", "C", "2", "C").ok
     moved = shift(machine, "2", 0, 0.5, 0.5)
     assert "no longer joined" in moved
     assert "Not connected" not in moved
@@ -179,14 +170,13 @@ def test_a_refusal_names_the_free_faces_as_successes_do(build, angle):
 
 def test_a_block_without_free_faces_says_so(build):
     machine = build(("1", "A", "Powered Wheel"), ("2", "E", "Torch"))
-    refused = machine.act("attach_block_to", {"base_block": "2", "face": "E", "new_block": BLOCK})
+    refused = attach(machine, "2", "E", BLOCK)
     assert refused.text.endswith("Its free faces: none.")
 
 
 def test_a_missing_face_of_a_connection_names_all_faces_with_their_sides(build):
     machine = build(("1", "A", BLOCK))
-    ends = {"block_a": "1", "face_a": "G", "block_b": "2", "face_b": "C", "connector": "Brace"}
-    refused = machine.act("connect_blocks", ends)
+    refused = connect(machine, "1", "G", "2", "C")
     assert "Its faces: A <East>, B <West>, C <Up>, D <Down>, E <North>, F <South>." in refused.text
 
 
@@ -206,8 +196,7 @@ def test_a_wheel_says_where_its_centre_is(build, face, centre):
 
 def test_an_added_machine_shows_its_blocks_faces_and_connectors(build):
     cart = build(("1", "A", BLOCK), ("2", "E", BLOCK))
-    ends = {"block_a": "1", "face_a": "C", "block_b": "3", "face_b": "C", "connector": "Winch"}
-    act(cart, "connect_blocks", **ends)
+    assert connect(cart, "1", "C", "3", "C", connector="Winch").ok
     assembly = Machine(available={"cart": cart})
     first = act(assembly, "add_machine", machine_id="cart")
     assert first.startswith("Added cart as sub-structure A: 3 blocks A_1 to A_3; connectors: A_4.")
@@ -240,7 +229,7 @@ def test_a_module_is_found_whatever_its_case(build, written):
 
 @pytest.mark.parametrize("written", ["Small Wooden", "Wooden Block", "smallwoodenblock", "", " "])
 def test_another_name_is_no_module(build, written):
-    refused = build().act("attach_block_to", {"base_block": "1", "face": "A", "new_block": written})
+    refused = attach(build(), "1", "A", written)
     assert refused.cause is Cause.UNKNOWN_MODULE
 
 
@@ -248,16 +237,10 @@ def test_connectors_actions_and_tools_are_found_whatever_their_case(build):
     machine = build(("1", "A", "powered wheel"), ("1", "B", BLOCK))
     ends = {"block_a": "1", "face_a": "C", "block_b": "3", "face_b": "C"}
     assert "4 Brace" in act(machine, "Connect_Blocks", **ends, connector="BRACE")
-    bound = act(
-        machine,
-        "change_control_key",
-        block_id="2",
-        action="Spinning_Forward",
-        new_key="UpArrow",
-    )
-    assert "spinning_forward: UpArrow" in bound
+    bound = {"block_id": "2", "action": "Spinning_Forward", "new_key": "UpArrow"}
+    assert "spinning_forward: UpArrow" in act(machine, "change_control_key", **bound)
     assert machine.blocks["2"].bindings["spinning_forward"] == ("UpArrow",)
-    misused = machine.act("attach_block_to", {"base_block": "1", "face": "C", "new_block": "brace"})
+    misused = attach(machine, "1", "C", "brace")
     assert misused.cause is Cause.CONNECTOR_MISUSE
     assert misused.text.startswith("A Brace")
     swapped = machine.act("connect_blocks", {**ends, "connector": "torch"})

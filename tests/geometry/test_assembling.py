@@ -1,11 +1,10 @@
 """Whole machines as parts of an assembly."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np
 import pytest
+from support.machines.building import attach, connect
 
 from buildarena_geometry import Machine, RefusalClass, replay
 
@@ -13,10 +12,7 @@ from buildarena_geometry import Machine, RefusalClass, replay
 @pytest.fixture
 def assembly(build):
     deck = build(("1", "A", "Small Wooden Block"), ("2", "E", "Powered Wheel"))
-    deck.act(
-        "connect_blocks",
-        {"block_a": "1", "face_a": "C", "block_b": "2", "face_b": "C", "connector": "Brace"},
-    )
+    connect(deck, "1", "C", "2", "C")
     deck.act("flip_spin", {"block_id": "3"})
     tower = build(("1", "C", "Small Wooden Block"))
     return Machine(available={"deck": deck, "tower": tower})
@@ -93,12 +89,8 @@ def test_motions_compose_exactly_about_the_starting_block(assembly):
 def test_what_is_attached_later_moves_along_and_connectors_follow(assembly):
     add(assembly, "deck")
     add(assembly, "tower", init_shift=[0, 6, 0])
-    torch = {"base_block": "A_1", "face": "B", "new_block": "Torch"}
-    assert assembly.act("attach_block_to", torch).changed == ("1",)
-    assembly.act(
-        "connect_blocks",
-        {"block_a": "A_1", "face_a": "E", "block_b": "B_1", "face_b": "F", "connector": "Winch"},
-    )
+    assert attach(assembly, "A_1", "B", "Torch").changed == ("1",)
+    connect(assembly, "A_1", "E", "B_1", "F", connector="Winch")
     assembly.act("twist_block", {"block_id": "A_3", "angle": 30})
     before = assembly.copy()
     assert assembly.act("shift_machine", {"machine_index": "A", "position": [0, -2, 1]}).ok
@@ -124,11 +116,8 @@ def test_a_motion_into_another_sub_structure_is_rolled_back_completely(assembly)
 def test_removing_a_sub_structure_takes_what_was_attached_to_it(assembly):
     add(assembly, "deck")
     add(assembly, "tower", init_shift=[0, 6, 0])
-    assembly.act("attach_block_to", {"base_block": "A_1", "face": "B", "new_block": "Torch"})
-    assembly.act(
-        "connect_blocks",
-        {"block_a": "A_1", "face_a": "E", "block_b": "B_1", "face_b": "F", "connector": "Brace"},
-    )
+    attach(assembly, "A_1", "B", "Torch")
+    connect(assembly, "A_1", "E", "B_1", "F")
     assert assembly.detached == ()
     outcome = assembly.act("remove_machine", {"machine_index": "A"})
     assert outcome.ok
@@ -163,8 +152,7 @@ def test_unknown_and_empty_machines_can_not_be_added():
 
 def test_an_assembly_begins_with_a_machine_and_not_with_a_starting_block(assembly):
     assert assembly.act("start").reason == RefusalClass.UNKNOWN_ACTION
-    torch = {"base_block": "A_1", "face": "B", "new_block": "Torch"}
-    refused = assembly.act("attach_block_to", torch)
+    refused = attach(assembly, "A_1", "B", "Torch")
     assert refused.reason == RefusalClass.INITIALIZATION_ABSENT
     assert "add_machine" in refused.text
 
@@ -172,7 +160,7 @@ def test_an_assembly_begins_with_a_machine_and_not_with_a_starting_block(assembl
 def test_later_changes_to_a_source_do_not_reach_the_assembly(build):
     source = build()
     assembly = Machine(available={"source": source})
-    source.act("attach_block_to", {"base_block": "1", "face": "A", "new_block": "Torch"})
+    attach(source, "1", "A", "Torch")
     add(assembly, "source")
     assert list(assembly.blocks) == ["A_1"]
 
@@ -180,7 +168,7 @@ def test_later_changes_to_a_source_do_not_reach_the_assembly(build):
 def test_an_assembly_survives_its_document_and_its_log(assembly):
     add(assembly, "deck", init_rotation=[15, 0, 0])
     add(assembly, "tower", init_shift=[0, 6, 0])
-    assembly.act("attach_block_to", {"base_block": "B_1", "face": "B", "new_block": "Torch"})
+    attach(assembly, "B_1", "B", "Torch")
     assembly.act("shift_machine", {"machine_index": "B", "position": [0, 1, 0]})
     assert replay(assembly.log) == assembly
     document = json.loads(json.dumps(assembly.to_document()))
@@ -211,5 +199,4 @@ def test_moved_blocks_collide_where_they_are_and_not_where_they_were(assembly):
 def test_removed_blocks_leave_their_place_to_others(build):
     machine = build(("1", "A", "Small Wooden Block"), ("2", "E", "Powered Wheel"))
     machine.act("remove_block", {"block_id": "3"})
-    torch = {"base_block": "2", "face": "E", "new_block": "Torch"}
-    assert machine.act("attach_block_to", torch).ok
+    assert attach(machine, "2", "E", "Torch").ok

@@ -1,32 +1,12 @@
 """Attaching, connecting and removing."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
+from support.machines.building import BLOCK, attach, connect
 
 from buildarena_geometry import Cause, Machine, RefusalClass, load_catalogue
 
 ATTACHABLE = load_catalogue().attachable
-
-
-def attach(machine, base, face, module, **more):
-    arguments = {"base_block": base, "face": face, "new_block": module, **more}
-    return machine.act("attach_block_to", arguments)
-
-
-def connect(machine, *ends, connector="Brace"):
-    block_a, face_a, block_b, face_b = ends
-    return machine.act(
-        "connect_blocks",
-        {
-            "block_a": block_a,
-            "face_a": face_a,
-            "block_b": block_b,
-            "face_b": face_b,
-            "connector": connector,
-        },
-    )
 
 
 def test_an_unrotated_starting_block_has_the_worlds_axes_and_faces():
@@ -85,8 +65,7 @@ def test_ids_count_from_one_and_a_refused_attach_uses_none_up(build):
 
 
 def test_an_overlap_names_every_pair_and_leaves_no_trace(build):
-    block = "Small Wooden Block"
-    machine = build(("1", "A", block), ("2", "E", block), ("1", "C", block), ("3", "C", block))
+    machine = build(("1", "A", BLOCK), ("2", "E", BLOCK), ("1", "C", BLOCK), ("3", "C", BLOCK))
     before = machine.copy()
     outcome = attach(machine, "2", "C", "Powered Wheel")
     assert outcome.reason == RefusalClass.OVERLAP
@@ -94,7 +73,7 @@ def test_an_overlap_names_every_pair_and_leaves_no_trace(build):
     assert "block 4" in outcome.text
     assert "block 5" in outcome.text
     assert machine == before
-    assert attach(machine, "2", "C", block).changed == ("6",)
+    assert attach(machine, "2", "C").changed == ("6",)
 
 
 def test_wheels_side_by_side_overlap(build):
@@ -178,11 +157,7 @@ def test_connector_ends_follow_the_blocks_they_sit_on(build):
 
 
 def test_removing_a_block_opens_its_faces_takes_its_connectors_and_names_what_hangs_loose(build):
-    machine = build(
-        ("1", "A", "Small Wooden Block"),
-        ("2", "E", "Small Wooden Block"),
-        ("3", "E", "Torch"),
-    )
+    machine = build(("1", "A", BLOCK), ("2", "E", BLOCK), ("3", "E", "Torch"))
     connect(machine, "1", "C", "2", "C")
     outcome = machine.act("remove_block", {"block_id": "2"})
     assert outcome.ok

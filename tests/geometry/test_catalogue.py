@@ -1,20 +1,17 @@
 """The module catalogue, and files that extend it."""
 
-from __future__ import annotations
-
 import copy
 import json
-from importlib import resources
 
 import jsonschema
 import pytest
 import yaml
+from support.machines.building import attach, built
+from support.machines.module_files import FILES, SCHEMA, module_file
 
 from buildarena_geometry import CatalogueError, Machine, RefusalClass, load_catalogue
 
-FILES = resources.files("buildarena_geometry.modules")
 BASIC = json.loads(FILES.joinpath("modules.yaml").read_text())
-SCHEMA = json.loads(FILES.joinpath("modules.schema.json").read_text())
 CRATE = {
     "name": "Crate",
     "kind": "block",
@@ -28,12 +25,6 @@ CRATE = {
     "description": "A large crate.",
     "besiege": {"id": 15, "data": []},
 }
-
-
-def write(tmp_path, *modules, name="more.json"):
-    file = tmp_path / name
-    file.write_text(json.dumps({"version": 1, "modules": list(modules)}))
-    return file
 
 
 @pytest.mark.parametrize(
@@ -68,10 +59,8 @@ def test_what_a_module_does_stands_in_its_entry():
     assert (wheel.motor.speed_rpm, wheel.motor.lag_per_s, wheel.motor.torque) == (100, 16, 20)
     assert wheel.motor.speed == pytest.approx(10.471975512)
     assert (cannon.thrust.cold, cannon.thrust.heated, cannon.thrust.along) == (1.6, 13.76, 0)
-    assert [(ball.along, ball.radius) for ball in cannon.thrust.spheres] == [
-        (-0.25, 0.5),
-        (0.5, 0.5),
-    ]
+    spheres = [(ball.along, ball.radius) for ball in cannon.thrust.spheres]
+    assert spheres == [(-0.25, 0.5), (0.5, 0.5)]
     assert [(flame.along, flame.radius) for flame in torch.flames] == [(1, 0.3)]
     seats = {name: module.physics.joint_type for name, module in basic.items() if module.physics}
     assert seats == {
@@ -108,7 +97,7 @@ def test_a_file_without_them_gives_a_module_what_its_kind_does(tmp_path, name):
     entry["name"] = "Spare"
     for mark in entry["landmarks"]:
         mark.pop("heats", None)
-    catalogue = load_catalogue(write(tmp_path, entry))
+    catalogue = load_catalogue(module_file(tmp_path, entry))
     spare, basic = catalogue["Spare"], catalogue[name]
     assert (spare.motor, spare.thrust) == (basic.motor, basic.thrust)
     assert (spare.physics, spare.flames) == (basic.physics, basic.flames)
@@ -119,7 +108,7 @@ def test_a_connector_that_does_not_say_so_is_rigid(tmp_path):
     strut = {**BASIC["modules"][5], "name": "Strut"}
     del strut["link"]
     rope = {**strut, "name": "Rope", "link": "rope"}
-    catalogue = load_catalogue(write(tmp_path, strut, rope))
+    catalogue = load_catalogue(module_file(tmp_path, strut, rope))
     assert [catalogue[name].link for name in ("Strut", "Rope")] == ["rigid", "rope"]
 
 
@@ -127,32 +116,24 @@ def test_a_users_module_says_what_it_does_itself(tmp_path):
     wheel = copy.deepcopy(BASIC["modules"][2])
     wheel |= {"name": "Slow Wheel", "motor": {**wheel["motor"], "speed_rpm": 30}}
     wheel["motor"]["forward_sense"] = "counterclockwise"
-    catalogue = load_catalogue(write(tmp_path, wheel))
+    catalogue = load_catalogue(module_file(tmp_path, wheel))
     assert catalogue["Slow Wheel"].motor.speed_rpm == 30
-    machine = Machine(catalogue=catalogue)
-    machine.act("start")
-    attach = {"base_block": "1", "face": "A", "new_block": "Slow Wheel"}
-    assert "forward rolls it <South>" in machine.act("attach_block_to", attach).text
+    machine = built(catalogue=catalogue)
+    assert "forward rolls it <South>" in attach(machine, "1", "A", "Slow Wheel").text
     assert "forward rolls it <North>" in machine.act("flip_spin", {"block_id": "2"}).text
 
 
 def test_a_users_file_adds_modules_that_can_be_built_with(tmp_path):
-    catalogue = load_catalogue(write(tmp_path, CRATE))
+    catalogue = load_catalogue(module_file(tmp_path, CRATE))
     assert catalogue.attachable[-1] == "Crate"
-    machine = Machine(catalogue=catalogue)
-    machine.act("start")
-    crate = {"base_block": "1", "face": "C", "new_block": "Crate"}
-    assert machine.act("attach_block_to", crate).ok
+    machine = built(("1", "C", "Crate"), catalogue=catalogue)
     assert tuple(machine.blocks["2"].center) == pytest.approx((0, 0, 2.5))
     assert Machine.from_document(machine.to_document(), catalogue=catalogue) == machine
 
 
 def test_a_block_inside_another_overlaps_it(tmp_path):
-    catalogue = load_catalogue(write(tmp_path, CRATE))
-    outer, inner = Machine(catalogue=catalogue), Machine(catalogue=catalogue)
-    outer.act("start")
-    outer.act("attach_block_to", {"base_block": "1", "face": "C", "new_block": "Crate"})
-    inner.act("start")
+    catalogue = load_catalogue(module_file(tmp_path, CRATE))
+    outer, inner = built(("1", "C", "Crate"), catalogue=catalogue), built(catalogue=catalogue)
     assembly = Machine(catalogue=catalogue, available={"outer": outer, "inner": inner})
     assembly.act("add_machine", {"machine_id": "outer"})
     inside = {"machine_id": "inner", "init_shift": [0, 0, 2.5]}
@@ -170,14 +151,14 @@ def test_a_users_file_may_use_the_old_names_of_fields(tmp_path):
     del physics["joint_type"]
     servo = {"kind": "speed", "rate": 9, "force": 2, "forward": "turn", "idle": "free"}
     old = edit(physics=physics, joint={"drive": servo}, actions=["turn"], tether={"length": 2})
-    module = load_catalogue(write(tmp_path, old))["Crate"]
+    module = load_catalogue(module_file(tmp_path, old))["Crate"]
     assert module.physics.joint_type == "hinge"
     assert module.joint.drive.default_mode == "free"
     assert module.rope_mount.length == 2
 
 
 def test_a_whole_number_may_be_written_with_a_point(tmp_path):
-    assert load_catalogue(write(tmp_path, edit(cost=3.0)))["Crate"].cost == 3
+    assert load_catalogue(module_file(tmp_path, edit(cost=3.0)))["Crate"].cost == 3
 
 
 def edit(**fields):
@@ -209,18 +190,9 @@ BROKEN = [
     ({key: value for key, value in CRATE.items() if key != "mass"}, "mass is missing"),
     (edit(grabs="yes"), "grabs: expected true or false"),
     (edit(physics={"joint_type": "axle"}), "physics: mass_at is missing"),
-    (
-        edit(physics={**WOOD["physics"], "joint_type": "glue"}),
-        "joint_type: expected one of attachment, axle",
-    ),
-    (
-        edit(physics={**WOOD["physics"], "friction": -1}),
-        "friction: expected a number of at least 0",
-    ),
-    (
-        edit(landmarks=[{"name": "fire", "along": 1, "heats": True}]),
-        "radius: expected the radius of a flame",
-    ),
+    (edit(physics={**WOOD["physics"], "joint_type": "glue"}), "expected one of attachment, axle"),
+    (edit(physics={**WOOD["physics"], "friction": -1}), "friction: expected a number of at least"),
+    (edit(landmarks=[{"name": "fire", "along": 1, "heats": True}]), "radius: expected the radius"),
     (other(BRACE, link="glue"), "link: expected one of rigid, rope, spring"),
     (other(WHEEL, motor={**WHEEL["motor"], "torque": 0}), "torque: expected a number above 0"),
     (other(CANNON, thrust={**CANNON["thrust"], "spheres": [{"along": 1}]}), "radius is missing"),
@@ -238,10 +210,7 @@ SENSELESS = [
     (other(WHEEL, actions=["spin"]), "forward: expected one of spin, found 'spinning_forward'"),
     (other(CANNON, actions=[]), "action: expected one of "),
     (other(CANNON, pointing=None, landmarks=[]), "thrust: expected no thrust: it acts along"),
-    (
-        other(BRACE, physics=WOOD["physics"]),
-        "physics: expected no physics: a connector is not",
-    ),
+    (other(BRACE, physics=WOOD["physics"]), "physics: expected no physics: a connector is not"),
     (other(CARGO, thrust=CANNON["thrust"]), "action: expected one of "),
     (edit(link="rope"), "link: expected no link: a block is not a connector"),
     (edit(physics=WHEEL["physics"]), "the joint type axle needs either a motor or a joint"),
@@ -251,7 +220,7 @@ SENSELESS = [
 @pytest.mark.parametrize(("module", "message"), [*BROKEN, *SENSELESS])
 def test_a_bad_module_is_refused_with_its_place_and_what_belongs_there(tmp_path, module, message):
     with pytest.raises(CatalogueError, match=message):
-        load_catalogue(write(tmp_path, module))
+        load_catalogue(module_file(tmp_path, module))
 
 
 @pytest.mark.parametrize("module", [module for module, _ in BROKEN])

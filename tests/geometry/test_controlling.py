@@ -1,7 +1,5 @@
 """Keys and control sequences."""
 
-from __future__ import annotations
-
 import pytest
 
 from buildarena_geometry import KEYS, Cause, KeyPress, RefusalClass

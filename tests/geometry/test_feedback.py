@@ -5,8 +5,6 @@ a change needs a new FEEDBACK_VERSION, and then `BUILDARENA_WRITE_GOLDENS=1 pyte
 writes the golden file anew.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import re
@@ -43,17 +41,9 @@ def attach(base, face, module, note=""):
     return ("attach_block_to", arguments)
 
 
-def connect(block_a, face_a, block_b, face_b):
-    return (
-        "connect_blocks",
-        {
-            "block_a": block_a,
-            "face_a": face_a,
-            "block_b": block_b,
-            "face_b": face_b,
-            "connector": "Brace",
-        },
-    )
+def connect(block_a, face_a, block_b, face_b, connector="Brace"):
+    ends = {"block_a": block_a, "face_a": face_a, "block_b": block_b, "face_b": face_b}
+    return ("connect_blocks", {**ends, "connector": connector})
 
 
 def twist(block, angle):
@@ -62,6 +52,10 @@ def twist(block, angle):
 
 def shift(block, *offset):
     return ("shift_block", {"block_id": block, "shift_real": list(offset)})
+
+
+def flip(block):
+    return ("flip_spin", {"block_id": block})
 
 
 def details(block):
@@ -89,7 +83,7 @@ CAR = (
     attach("1", "F", BLOCK),
     attach("4", "E", "Water Cannon"),
     attach("1", "C", "Torch"),
-    ("flip_spin", {"block_id": "3"}),
+    flip("3"),
     connect("1", "D", "4", "D"),
     bind("2", "spinning_forward", "UpArrow"),
     bind("3", "spinning_forward", "UpArrow"),
@@ -107,10 +101,9 @@ ENGINE = (
     twist("4", -90),
 )
 ADD_A = ("add_machine", {"machine_id": "cart"})
-ADD_B = (
-    "add_machine",
-    {"machine_id": "cart", "init_shift": [0, 8, 0], "init_rotation": [90, 0, 0]},
-)
+ELSEWHERE = {"init_shift": [0, 8, 0], "init_rotation": [90, 0, 0]}
+ADD_B = ("add_machine", {"machine_id": "cart", **ELSEWHERE})
+JOINED = (ADD_A, ADD_B, connect("A_1", "F", "B_1", "F"))
 
 SEQUENCES = {
     **{
@@ -146,12 +139,8 @@ SEQUENCES = {
     "twist a torch away from a cannon": (*ENGINE, twist("4", 90)),
     "shift a cannon from a flame": (*ENGINE, shift("5", 0, 0, 0.5)),
     "summary of an engine": (*ENGINE, SUMMARY),
-    "flip a wheel": (START, attach("1", "A", "Powered Wheel"), ("flip_spin", {"block_id": "2"})),
-    "flip a flat wheel": (
-        START,
-        attach("1", "D", "Powered Wheel"),
-        ("flip_spin", {"block_id": "2"}),
-    ),
+    "flip a wheel": (START, attach("1", "A", "Powered Wheel"), flip("2")),
+    "flip a flat wheel": (START, attach("1", "D", "Powered Wheel"), flip("2")),
     "bind a key": CAR[:9],
     "add a key": (
         *CAR,
@@ -173,27 +162,16 @@ SEQUENCES = {
     "add a turned machine": (ADD_A, ADD_B),
     "shift a machine": (ADD_A, ADD_B, sub("shift_machine", "B", position=[0, 1, 0])),
     "rotate a machine": (ADD_A, ADD_B, sub("rotate_machine", "B", rotation=[0, 0, 90])),
-    "remove a machine": (
-        ADD_A,
-        ADD_B,
-        connect("A_1", "F", "B_1", "F"),
-        sub("remove_machine", "B"),
-    ),
-    "summary of an assembly": (ADD_A, ADD_B, connect("A_1", "F", "B_1", "F"), SUMMARY),
+    "remove a machine": (*JOINED, sub("remove_machine", "B")),
+    "summary of an assembly": (*JOINED, SUMMARY),
 }
 REFUSALS = {
     Cause.NOT_STARTED: (attach("1", "A", "Torch"),),
     Cause.ALREADY_STARTED: (START, START),
     Cause.UNKNOWN_MODULE: (START, attach("1", "A", "Steel Beam")),
-    Cause.UNKNOWN_CONNECTOR: (
-        *BEAM,
-        ("connect_blocks", {**connect("1", "C", "2", "C")[1], "connector": "Rope"}),
-    ),
+    Cause.UNKNOWN_CONNECTOR: (*BEAM, connect("1", "C", "2", "C", "Rope")),
     Cause.CONNECTOR_MISUSE: (START, attach("1", "A", "Winch")),
-    Cause.BASIC_AS_CONNECTOR: (
-        *BEAM,
-        ("connect_blocks", {**connect("1", "C", "2", "C")[1], "connector": "Torch"}),
-    ),
+    Cause.BASIC_AS_CONNECTOR: (*BEAM, connect("1", "C", "2", "C", "Torch")),
     Cause.NO_SUCH_BLOCK: (*CAR, details("99")),
     Cause.START_BLOCK: (START, twist("1", 90)),
     Cause.NO_SUCH_FACE: (*BEAM, attach("2", "G", "Torch")),
@@ -201,7 +179,7 @@ REFUSALS = {
     Cause.FACE_OCCUPIED: (*BEAM, attach("2", "E", "Torch")),
     Cause.EXCESS_CONNECTION: (*BEAM, connect("1", "A", "2", "F")),
     Cause.TOO_CLOSE: (*BEAM, connect("1", "C", "1", "C")),
-    Cause.NOT_SPINNING: (*CAR, ("flip_spin", {"block_id": "6"})),
+    Cause.NOT_SPINNING: (*CAR, flip("6")),
     Cause.OVERLAP: (*CAR, attach("4", "C", "Powered Wheel"), attach("4", "D", "Powered Wheel")),
     Cause.BAD_KEY: (*CAR, bind("2", "spinning_forward", "W")),
     Cause.NO_LOCOMOTION: (*CAR, bind("6", "hold_to_fire", "UpArrow")),

@@ -1,21 +1,17 @@
 """What module files say of fans, wings, balloons, springs and what lets go."""
 
 import copy
-import json
-from importlib import resources
 
 import jsonschema
 import pytest
+from support.machines.building import BLOCK, built, connect
+from support.machines.module_files import SCHEMA, entries, module_file
 
 from buildarena_geometry import CatalogueError, Machine, load_catalogue
 from buildarena_geometry.modules.forces import FORCE_FIELDS
 from buildarena_geometry.modules.sets import module_set
 
-FILES = resources.files("buildarena_geometry.modules")
-FURTHER = {
-    one["name"]: one for one in json.loads(FILES.joinpath("extended.yaml").read_text())["modules"]
-}
-SCHEMA = json.loads(FILES.joinpath("modules.schema.json").read_text())
+FURTHER = entries("extended.yaml")
 
 
 def other(name, field, **changes):
@@ -26,9 +22,7 @@ def other(name, field, **changes):
 
 
 def read(tmp_path, entry):
-    file = tmp_path / "more.json"
-    file.write_text(json.dumps({"version": 1, "modules": [entry]}))
-    return load_catalogue(file)["Other"]
+    return load_catalogue(module_file(tmp_path, entry))["Other"]
 
 
 def test_a_wings_flow_is_its_normal_turned_by_the_pitch(tmp_path):
@@ -44,12 +38,7 @@ def test_a_wings_flow_is_its_normal_turned_by_the_pitch(tmp_path):
     ("name", "field", "changes", "said"),
     [
         ("Flying Block", "push", {"action": "rise"}, r"push\.action: expected one of fly"),
-        (
-            "Flying Block",
-            "push",
-            {"direction": [0, 0, 2]},
-            r"push\.direction: expected a direction",
-        ),
+        ("Flying Block", "push", {"direction": [0, 0, 2]}, r"push\.direction: expected a direct"),
         ("Flying Block", "push", {"force": -1}, r"push\.force: expected a number of at least 0"),
         ("Propeller", "wing", {"power": 3}, r"wing\.power: expected one of 0, 1, 2"),
         ("Propeller", "wing", {"coefficient": 0.04}, r"wing\.coefficient: .* at most 0\.0333"),
@@ -58,12 +47,7 @@ def test_a_wings_flow_is_its_normal_turned_by_the_pitch(tmp_path):
         ("Sqr Balloon", "altitude", {"sink": "fly"}, r"altitude\.sink: expected one of rise, sink"),
         ("Balloon", "rope_mount", {"length": 0}, r"rope_mount\.length: expected a number above 0"),
         ("Spring", "spring", {"stiffness": 1e6}, r"spring\.stiffness: .* at most 1000"),
-        (
-            "Spring",
-            "spring",
-            {"shortest": 1.5},
-            r"spring\.shortest: expected a number of at most 1",
-        ),
+        ("Spring", "spring", {"shortest": 1.5}, r"spring\.shortest: .* at most 1"),
         ("Spring", "spring", {"contract": "pull"}, r"spring\.contract: expected one of contract"),
         ("Decoupler", "decouple", {"impulse": -5}, r"decouple\.impulse: expected .* at least 0"),
         ("Grabber", "grip", {"reach": 0}, r"grip\.reach: expected a number above 0"),
@@ -98,13 +82,9 @@ def test_the_forces_of_the_further_types_fit_the_schema_and_say_where_they_are_f
 
 
 def test_a_springs_key_is_bound_like_a_blocks():
-    machine = Machine(catalogue=module_set("workshop"))
-    assert machine.act("start").ok
-    for face in "EF":
-        arguments = {"base_block": "1", "face": face, "new_block": "Small Wooden Block"}
-        assert machine.act("attach_block_to", arguments).ok
-    link = {"block_a": "2", "face_a": "A", "block_b": "3", "face_b": "A", "connector": "Spring"}
-    assert machine.act("connect_blocks", link).ok
+    sides = [("1", face, BLOCK) for face in "EF"]
+    machine = built(*sides, catalogue=module_set("workshop"))
+    assert connect(machine, "2", "A", "3", "A", connector="Spring").ok
     bound = {"block_id": "4", "action": "contract", "new_key": "UpArrow"}
     assert machine.act("change_control_key", bound).ok
     assert machine.act("add_control_key", {**bound, "new_key": "Alpha1"}).ok
@@ -119,11 +99,6 @@ def test_a_springs_key_is_bound_like_a_blocks():
 
 
 def test_documents_of_braces_and_winches_tell_no_keys():
-    machine = Machine()
-    assert machine.act("start").ok
-    for face in "EF":
-        arguments = {"base_block": "1", "face": face, "new_block": "Small Wooden Block"}
-        assert machine.act("attach_block_to", arguments).ok
-    link = {"block_a": "2", "face_a": "A", "block_b": "3", "face_b": "A", "connector": "Brace"}
-    assert machine.act("connect_blocks", link).ok
+    machine = built(*(("1", face, BLOCK) for face in "EF"))
+    assert connect(machine, "2", "A", "3", "A").ok
     assert "bindings" not in machine.to_document()["connectors"][0]

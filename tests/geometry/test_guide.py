@@ -1,7 +1,5 @@
 """The guide says what is so, its pictures are the library's, and the examples run."""
 
-from __future__ import annotations
-
 import doctest
 import json
 import runpy

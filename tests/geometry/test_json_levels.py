@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import pytest
 
 from buildarena_geometry.json_values import levels
@@ -18,7 +16,7 @@ DEEP = {"a": 1, "b": {"c": (2, 3)}}
         (DEEP, [[DEEP], [1, {"c": (2, 3)}], [(2, 3)], [2, 3]]),
     ],
 )
-def test_each_level_has_what_the_one_above_holds(value: object, found: list[object]) -> None:
+def test_each_level_has_what_the_one_above_holds(value, found) -> None:
     assert list(levels(value)) == found
 
 

@@ -1,7 +1,5 @@
 """What holds for every machine, whatever was done to it."""
 
-from __future__ import annotations
-
 import itertools
 import json
 
@@ -27,6 +25,11 @@ def action(name, **arguments):
     return st.tuples(st.just(name), st.fixed_dictionaries(arguments))
 
 
+def connects(blocks):
+    ends = {"block_a": blocks, "face_a": labels, "block_b": blocks, "face_b": labels}
+    return action("connect_blocks", **ends, connector=st.sampled_from(["Brace", "Winch"]))
+
+
 attach = action("attach_block_to", base_block=ids, face=labels, new_block=modules)
 actions = st.one_of(
     *[attach] * 6,
@@ -34,14 +37,7 @@ actions = st.one_of(
     action("shift_block", block_id=ids, shift_real=vectors),
     action("flip_spin", block_id=ids),
     action("remove_block", block_id=ids),
-    action(
-        "connect_blocks",
-        block_a=ids,
-        face_a=labels,
-        block_b=ids,
-        face_b=labels,
-        connector=st.sampled_from(["Brace", "Winch"]),
-    ),
+    connects(ids),
     action(
         "change_control_key",
         block_id=ids,
@@ -66,14 +62,7 @@ assembly_actions = st.one_of(
     action("twist_block", block_id=assembly_ids, angle=angles),
     action("shift_block", block_id=assembly_ids, shift_real=vectors),
     action("remove_block", block_id=assembly_ids),
-    action(
-        "connect_blocks",
-        block_a=assembly_ids,
-        face_a=labels,
-        block_b=assembly_ids,
-        face_b=labels,
-        connector=st.sampled_from(["Brace", "Winch"]),
-    ),
+    connects(assembly_ids),
 )
 
 
@@ -89,17 +78,13 @@ def solids(block):
     """The block's colliders as FCL objects, made here independently of the library's own."""
     for solid in block.module.colliders:
         if isinstance(solid, Box):
-            shape, center, turn = fcl.Box(*solid.size), solid.center, np.eye(3)
-        else:
-            shape, center = (
-                fcl.Cylinder(solid.radius, solid.length),
-                np.add(solid.base, solid.top) / 2,
-            )
-            turn = np.eye(3)  # the basic cylinders stand along z
+            shape, center = fcl.Box(*solid.size), solid.center
+        else:  # the basic cylinders stand along z
+            shape = fcl.Cylinder(solid.radius, solid.length)
+            center = np.add(solid.base, solid.top) / 2
         pose = block.world_from_block
-        yield fcl.CollisionObject(
-            shape, fcl.Transform(pose.rotation @ turn, pose.apply(np.array(center)))
-        )
+        place = fcl.Transform(pose.rotation, pose.apply(np.array(center)))
+        yield fcl.CollisionObject(shape, place)
 
 
 def overlap_depth(left, right) -> float:

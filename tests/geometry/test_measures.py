@@ -1,19 +1,15 @@
 """Mass, centre of mass, bounds."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
+from support.machines.building import connect
 
 from buildarena_geometry import Machine
 
 
 def test_the_center_of_mass_weighs_blocks_and_connectors(build):
     machine = build(("1", "A", "Small Wooden Block"), ("1", "C", "Torch"))
-    machine.act(
-        "connect_blocks",
-        {"block_a": "1", "face_a": "E", "block_b": "2", "face_b": "B", "connector": "Brace"},
-    )
+    connect(machine, "1", "E", "2", "B")
     link = machine.connectors["4"]
     middle = (link.start_point + link.end_point) / 2
     weighed = 0.3 * np.array((1, 0, 0)) + 1.0 * np.array((0, 0, 1)) + 0.5 * middle

@@ -1,16 +1,15 @@
 """The sets of modules, and the rules that further types bring."""
 
-from __future__ import annotations
-
 import itertools
 import json
 import math
 import re
-from importlib import resources
 
 import fcl
 import numpy as np
 import pytest
+from support.machines.building import BLOCK, attach, built
+from support.machines.module_files import BASIC, like, module_file
 
 from buildarena_geometry import (
     MODULE_SETS,
@@ -25,31 +24,12 @@ from buildarena_geometry import (
 )
 from buildarena_geometry.modules.catalogue import read_modules
 
-FILE = resources.files("buildarena_geometry.modules").joinpath("modules.yaml")
-BLOCK = next(
-    module
-    for module in json.loads(FILE.read_text())["modules"]
-    if module["name"] == "Small Wooden Block"
-)
 EXTENDED = [name for name in module_set("all") if name not in load_catalogue()]
 
 
 def own(tmp_path, **fields):
     """The basic modules and one of our own, "Own", like the small block but for some fields."""
-    file = tmp_path / "modules.json"
-    file.write_text(json.dumps({"version": 1, "modules": [{**BLOCK, "name": "Own", **fields}]}))
-    return load_catalogue(file)
-
-
-def built(catalogue, *parts):
-    machine = Machine(catalogue=catalogue)
-    assert machine.act("start").ok
-    for base, face, module in parts:
-        outcome = machine.act(
-            "attach_block_to", {"base_block": base, "face": face, "new_block": module}
-        )
-        assert outcome.ok, outcome.text
-    return machine
+    return load_catalogue(module_file(tmp_path, like(BLOCK, "Own", **fields)))
 
 
 def test_sets_hold_each_other():
@@ -126,7 +106,7 @@ def extent(solids):
 
 @pytest.mark.parametrize("name", module_set("all").attachable)
 def test_every_type_can_be_attached_and_comes_back_from_its_document(name):
-    machine = built(module_set("all"), ("1", "C", name))
+    machine = built(("1", "C", name), catalogue=module_set("all"))
     document = json.loads(json.dumps(machine.to_document()))
     again = Machine.from_document(document)
     assert again == machine
@@ -135,35 +115,34 @@ def test_every_type_can_be_attached_and_comes_back_from_its_document(name):
 
 @pytest.mark.parametrize("category", ["basic", "locomotion", "mechanical", "flight"])
 def test_lists_of_a_category_are_short(category):
-    lines = built(module_set("workshop")).act("list_modules", {"category": category}).text
+    lines = built(catalogue=module_set("workshop")).act("list_modules", {"category": category}).text
     assert all(len(line) < 130 for line in lines.splitlines())
     assert all(line.endswith(".") and not line.endswith("..") for line in lines.splitlines())
 
 
 def test_documents_know_all_types_and_a_machine_only_its_own():
-    machine = built(module_set("workshop"), ("1", "A", "Hinge"), ("2", "E", "Wing Panel"))
+    machine = built(("1", "A", "Hinge"), ("2", "E", "Wing Panel"), catalogue=module_set("workshop"))
     assert Machine.from_document(machine.to_document()) == machine
-    outcome = built(None).act(
-        "attach_block_to", {"base_block": "1", "face": "A", "new_block": "Hinge"}
-    )
+    outcome = attach(built(), "1", "A", "Hinge")
     assert outcome.reason.value == "module_restriction"
     assert "Hinge" not in outcome.text.partition("Modules:")[2]
 
 
 def test_a_machine_goes_on_with_what_it_was_made_of():
-    machine = built(module_set("workshop"), ("1", "A", "Hinge"))
+    machine = built(("1", "A", "Hinge"), catalogue=module_set("workshop"))
     assert machine.act("remove_block", {"block_id": "2"}).ok
     again = Machine.from_document(machine.to_document())
     assert again.catalogue is module_set("workshop")
     assert replay(again.log) == machine
-    plain = built(None, ("1", "A", "Torch"))
-    plain.act("attach_block_to", {"base_block": "1", "face": "B", "new_block": "Hinge"})
+    plain = built(("1", "A", "Torch"))
+    attach(plain, "1", "B", "Hinge")
     assert Machine.from_document(plain.to_document()).catalogue is module_set("basic")
-    gate = Machine(catalogue=module_set("all"), available={"arm": built(module_set("all"))})
+    everything = module_set("all")
+    gate = Machine(catalogue=everything, available={"arm": built(catalogue=everything)})
     assert gate.act("add_machine", {"machine_id": "arm"}).ok
-    boosted = built(module_set("all"), ("1", "A", "Booster"))
-    gate = Machine(catalogue=module_set("all"), available={"arm": boosted})
-    assert Machine.from_document(gate.to_document()).catalogue is module_set("all")
+    boosted = built(("1", "A", "Booster"), catalogue=everything)
+    gate = Machine(catalogue=everything, available={"arm": boosted})
+    assert Machine.from_document(gate.to_document()).catalogue is everything
 
 
 @pytest.mark.parametrize(
@@ -179,9 +158,7 @@ def test_a_machine_goes_on_with_what_it_was_made_of():
     ],
 )
 def test_a_wrong_name_is_answered_with_the_nearest_ones(written, meant):
-    outcome = built(module_set("all")).act(
-        "attach_block_to", {"base_block": "1", "face": "A", "new_block": written}
-    )
+    outcome = attach(built(catalogue=module_set("all")), "1", "A", written)
     assert outcome.reason.value == "module_restriction"
     assert f'"{written}"' in outcome.text or repr(written) in outcome.text
     named = re.split(r", | and ", outcome.text.partition("Modules: ")[2])
@@ -192,9 +169,7 @@ def test_a_wrong_name_is_answered_with_the_nearest_ones(written, meant):
 
 @pytest.mark.parametrize("written", ["", " ", "x" * 500, "\n"])
 def test_names_like_no_other_are_refused_in_short(written):
-    outcome = built(module_set("all")).act(
-        "attach_block_to", {"base_block": "1", "face": "A", "new_block": written}
-    )
+    outcome = attach(built(catalogue=module_set("all")), "1", "A", written)
     assert not outcome.ok
     assert len(outcome.text) < 400
 
@@ -203,7 +178,7 @@ def test_a_root_offset_lifts_a_block_off_its_face(tmp_path):
     down = {"label": "F", "center": [0, 0, -0.25], "normal": [0, 0, -1], "x_axis": [1, 0, 0]}
     up = {"label": "E", "center": [0, 0, 1], "normal": [0, 0, 1], "x_axis": [1, 0, 0]}
     catalogue = own(tmp_path, root_offset=0.25, faces=[up, down])
-    machine = built(catalogue, ("1", "C", "Own"), ("2", "E", "Own"))
+    machine = built(("1", "C", "Own"), ("2", "E", "Own"), catalogue=catalogue)
     np.testing.assert_allclose(machine.blocks["2"].world_from_block.xyz, (0, 0, 0.75))
     np.testing.assert_allclose(machine.blocks["3"].world_from_block.xyz, (0, 0, 2.0))
     assert [joint.offset for joint in machine.joints] == pytest.approx([0, 0], abs=1e-12)
@@ -241,36 +216,31 @@ def across(normal):
 
 def test_a_shape_that_reaches_into_its_base_is_compared_with_the_others_alone():
     catalogue = module_set("workshop")
-    machine = built(catalogue, ("1", "A", "Piston"))
+    machine = built(("1", "A", "Piston"), catalogue=catalogue)
     # Another piston's rod would not meet the first one's base from elsewhere.
     refused = machine.act("twist_block", {"block_id": "2", "angle": 30})
     assert refused.ok
-    machine = built(
-        catalogue,
-        ("1", "A", "Small Wooden Block"),
-        ("1", "C", "Small Wooden Block"),
-        ("2", "E", "Small Wooden Block"),
-    )
-    beside = {"base_block": "3", "face": "A", "new_block": "Piston"}
-    outcome = machine.act("attach_block_to", beside)
+    block = "Small Wooden Block"
+    sides = (("1", "A", block), ("1", "C", block), ("2", "E", block))
+    machine = built(*sides, catalogue=catalogue)
+    outcome = attach(machine, "3", "A", "Piston")
     assert outcome.ok or ("5", "3") not in outcome.overlaps
 
 
 def test_what_reaches_into_its_base_still_meets_it_after_that_base_was_exchanged(tmp_path):
     rod = {"shape": "cylinder", "radius": 0.2, "from": [0, 0, -0.4], "to": [0, 0, 0]}
-    catalogue = own(tmp_path, overlaps_base=True, colliders=[*BLOCK["colliders"], rod])
-    machine = built(catalogue, ("1", "A", "Small Wooden Block"), ("2", "E", "Own"))
+    catalogue = own(tmp_path, overlaps_base=True, colliders=[*BASIC[BLOCK]["colliders"], rod])
+    machine = built(("1", "A", "Small Wooden Block"), ("2", "E", "Own"), catalogue=catalogue)
     assert machine.act("remove_block", {"block_id": "2"}).ok
-    again = {"base_block": "1", "face": "A", "new_block": "Small Wooden Block"}
-    outcome = machine.act("attach_block_to", again)
+    outcome = attach(machine, "1", "A")
     assert not outcome.ok, "a rod that sits nowhere is a shape like any other"
     assert outcome.overlaps == (("4", "3"),)
 
 
 def test_what_reaches_into_its_base_may_be_met_from_either_side(tmp_path):
     rod = {"shape": "cylinder", "radius": 0.2, "from": [0, 0, -0.4], "to": [0, 0, 0]}
-    catalogue = own(tmp_path, overlaps_base=True, colliders=[*BLOCK["colliders"], rod])
-    machine = built(catalogue, ("1", "A", "Small Wooden Block"), ("2", "E", "Own"))
+    catalogue = own(tmp_path, overlaps_base=True, colliders=[*BASIC[BLOCK]["colliders"], rod])
+    machine = built(("1", "A", "Small Wooden Block"), ("2", "E", "Own"), catalogue=catalogue)
     # The base is what moves here: the two are compared the other way round.
     assert machine.act("twist_block", {"block_id": "2", "angle": 20}).ok
     assert Machine.from_document(machine.to_document(), catalogue=catalogue) == machine
@@ -279,9 +249,8 @@ def test_what_reaches_into_its_base_may_be_met_from_either_side(tmp_path):
 def test_balls_meet_as_balls(tmp_path):
     ball = [{"shape": "sphere", "radius": 0.8, "center": [0, 0, 1]}]
     catalogue = own(tmp_path, body=ball, colliders=ball, faces=[], size=[1.6, 1.6, 1.6])
-    machine = built(catalogue, ("1", "C", "Own"), ("1", "A", "Small Wooden Block"))
-    rising = {"base_block": "3", "face": "D", "new_block": "Own"}
-    assert machine.act("attach_block_to", rising).ok
+    machine = built(("1", "C", "Own"), ("1", "A", "Small Wooden Block"), catalogue=catalogue)
+    assert attach(machine, "3", "D", "Own").ok
     middles = [np.array(b.world_from_block.point((0, 0, 1))) for b in machine.blocks.values()]
     assert np.linalg.norm(middles[1] - middles[3]) > 1.6
     near = {"block_id": "2", "shift_real": [0.5, 0, 0]}
@@ -317,6 +286,6 @@ def test_balls_meet_as_balls(tmp_path):
     ],
 )
 def test_bad_fields_are_named(fields, complaint):
-    content = {"version": 1, "modules": [{**BLOCK, "name": "Own", **fields}]}
+    content = {"version": 1, "modules": [like(BLOCK, "Own", **fields)]}
     with pytest.raises(CatalogueError, match=complaint):
         read_modules(content, where="file")

@@ -1,20 +1,16 @@
 """What builders read of the free axes, wings and fans of further types."""
 
-from __future__ import annotations
-
 import pytest
+from support.machines.building import built
 
-from buildarena_geometry import Machine, module_set
+from buildarena_geometry import module_set
 
 CATALOGUE = module_set("workshop")
 
 
 def line(module, face="A", twist=0.0, *, flip=False):
     """What is said of a module on a face of a starting block: A looks east, C up, E north."""
-    machine = Machine(catalogue=CATALOGUE)
-    machine.act("start")
-    attach = {"base_block": "1", "face": face, "new_block": module}
-    assert machine.act("attach_block_to", attach).ok
+    machine = built(("1", face, module), catalogue=CATALOGUE)
     if twist:
         assert machine.act("twist_block", {"block_id": "2", "angle": twist}).ok
     if flip:

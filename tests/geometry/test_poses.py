@@ -1,7 +1,5 @@
 """Poses obey the laws of rigid motions."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

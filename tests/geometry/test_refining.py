@@ -1,9 +1,8 @@
 """Twisting, shifting, flipping, and what it does to joints."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
+from support.machines.building import connect
 
 from buildarena_geometry import Cause, RefusalClass
 
@@ -30,10 +29,8 @@ def test_twists_add_up_to_full_turns(build):
     before = machine.copy()
     for _ in range(8):
         assert twist(machine, "2", 45).ok
-    assert np.allclose(
-        machine.blocks["2"].world_from_block.rotation,
-        before.blocks["2"].world_from_block.rotation,
-    )
+    rotation, whole = (m.blocks["2"].world_from_block.rotation for m in (machine, before))
+    assert np.allclose(rotation, whole)
     assert twist(machine, "2", -720).ok
 
 
@@ -92,8 +89,7 @@ def test_the_starting_block_shifts_and_does_not_twist(build):
 
 def test_a_connector_turns_in_its_own_frame_and_keeps_its_ends(build):
     machine = build(("1", "A", "Small Wooden Block"))
-    ends = {"block_a": "1", "face_a": "C", "block_b": "2", "face_b": "C", "connector": "Brace"}
-    machine.act("connect_blocks", ends)
+    connect(machine, "1", "C", "2", "C")
     before = machine.connectors["3"]
     assert twist(machine, "3", 90).ok
     assert shift(machine, "3", 0, 0, 0.2).ok

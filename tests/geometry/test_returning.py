@@ -1,7 +1,5 @@
 """Going back to an earlier value of a machine: equal to having gone there by copying."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st

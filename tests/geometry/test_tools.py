@@ -1,7 +1,5 @@
 """The actions as tools for models."""
 
-from __future__ import annotations
-
 import inspect
 
 import jsonschema

@@ -1,7 +1,5 @@
 """Logs of Inspect in the service: their calls are made again, and the service judges."""
 
-from __future__ import annotations
-
 import os
 import re
 import shlex

@@ -1,7 +1,5 @@
 """Machines in notebooks are those of the geometry library, with an action for each method."""
 
-from __future__ import annotations
-
 import inspect
 import json
 import subprocess

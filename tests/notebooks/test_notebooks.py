@@ -1,7 +1,5 @@
 """The example notebooks run from their first cell to their last, as they are committed."""
 
-from __future__ import annotations
-
 import os
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Pages of machines and trials: whole in themselves, and nothing in them is a stranger's markup."""
 
-from __future__ import annotations
-
 import base64
 import gzip
 import json

@@ -1,7 +1,5 @@
 """What the distribution's README says happens, word for word."""
 
-from __future__ import annotations
-
 import doctest
 import re
 from pathlib import Path

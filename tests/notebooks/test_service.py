@@ -1,7 +1,5 @@
 """What notebooks read of a service is what it keeps; the notebook about it runs."""
 
-from __future__ import annotations
-
 import httpx
 import pytest
 from support.servers.live_api import live_api

@@ -1,7 +1,5 @@
 """Trials in notebooks are those of the libraries: the same scores, in the order asked for."""
 
-from __future__ import annotations
-
 from functools import partial
 from pathlib import Path
 

@@ -1,12 +1,10 @@
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import pytest
 from support.clients.tenants import WITH_KEYS
-from support.servers.live_api import live_api
+from support.servers.live_api import changed, live_api
 
-from buildarena_pipeline.runtime.context import Context, open_context
+from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.settings import Settings
 
 
@@ -24,7 +22,5 @@ def settings(settings: Settings, lease_s: float) -> Settings:
 @pytest.fixture
 def url(context: Context) -> Iterator[str]:
     """An API that asks for keys."""
-    own = open_context(context.settings.model_copy(update=WITH_KEYS))
-    with live_api(own) as found:
+    with changed(context, **WITH_KEYS) as own, live_api(own) as found:
         yield found
-    own.close()

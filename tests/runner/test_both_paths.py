@@ -1,7 +1,5 @@
 """What a trial comes to does not depend on how its worker reaches the service."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """Connections that break and an API that is away cost time only."""
 
-from __future__ import annotations
-
 import os
 import threading
 import time

@@ -1,7 +1,5 @@
 """Nothing that a runner sends is believed: forged, stale and repeated outcomes change nothing."""
 
-from __future__ import annotations
-
 import io
 import json
 from collections.abc import Callable
@@ -11,8 +9,8 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from sqlalchemy import text
 from support.clients.tenants import everything
+from support.jobs import expire_leases
 from support.servers.runner_rig import (
     CARRY,
     VERSIONS,
@@ -45,10 +43,18 @@ def moved(array: np.ndarray, by: float = 0.0) -> np.ndarray:
     return array + np.float32(by)
 
 
+def opened(data: bytes) -> tuple[pa.Table, dict[str, object]]:
+    table = pq.read_table(io.BytesIO(data))
+    return table, json.loads(table.schema.metadata[b"buildarena.trajectory"])
+
+
+def rows(data: bytes) -> int:
+    return pq.read_metadata(io.BytesIO(data)).num_rows
+
+
 def with_facts(data: bytes, **facts: object) -> bytes:
     """The file with other facts in its metadata, as no writer of ours would write it."""
-    table = pq.read_table(io.BytesIO(data))
-    kept = json.loads(table.schema.metadata[b"buildarena.trajectory"])
+    table, kept = opened(data)
     return packed(table, {**kept, **facts})
 
 
@@ -61,8 +67,7 @@ def packed(table: pa.Table, facts: object, **options: object) -> bytes:
 
 
 def with_column(data: bytes, name: str, column: pa.Array | None) -> bytes:
-    table = pq.read_table(io.BytesIO(data))
-    facts = json.loads(table.schema.metadata[b"buildarena.trajectory"])
+    table, facts = opened(data)
     table = table.drop_columns([name])
     return packed(table if column is None else table.append_column(name, column), facts)
 
@@ -151,8 +156,8 @@ FILES: dict[str, Callable[[bytes], bytes]] = {
     "half a file": lambda data: data[: len(data) // 2],
     "a file without its start": lambda data: data[100:],
     "bytes changed in the middle": lambda data: data[:200] + bytes(200) + data[400:],
-    "no facts": lambda data: packed(pq.read_table(io.BytesIO(data)), {}),
-    "facts of another kind": lambda data: packed(pq.read_table(io.BytesIO(data)), [1]),
+    "no facts": lambda data: packed(opened(data)[0], {}),
+    "facts of another kind": lambda data: packed(opened(data)[0], [1]),
     "an older schema": lambda data: with_facts(data, schema_version=2),
     "a schema to come": lambda data: with_facts(data, schema_version=99),
     "a schema that is no number": lambda data: with_facts(data, schema_version="3x"),
@@ -162,31 +167,16 @@ FILES: dict[str, Callable[[bytes], bytes]] = {
     "settings that are none": lambda data: with_facts(data, settings=[1]),
     "a column less": lambda data: with_column(data, "positions", None),
     "a column of texts": lambda data: with_column(
-        data, "positions", pa.array([["a"] * 6] * pq.read_metadata(io.BytesIO(data)).num_rows)
+        data, "positions", pa.array([["a"] * 6] * rows(data))
     ),
     "rows of different lengths": lambda data: with_column(
-        data,
-        "quaternions",
-        pa.array([[1.0] * k for k in range(pq.read_metadata(io.BytesIO(data)).num_rows)]),
+        data, "quaternions", pa.array([[1.0] * k for k in range(rows(data))])
     ),
-    "fewer instants": lambda data: packed(
-        pq.read_table(io.BytesIO(data)).slice(0, 5),
-        json.loads(pq.read_schema(io.BytesIO(data)).metadata[b"buildarena.trajectory"]),
-    ),
-    "several row groups": lambda data: packed(
-        pq.read_table(io.BytesIO(data)),
-        json.loads(pq.read_schema(io.BytesIO(data)).metadata[b"buildarena.trajectory"]),
-        row_group_size=4,
-    ),
-    "a dictionary": lambda data: packed(
-        pq.read_table(io.BytesIO(data)),
-        json.loads(pq.read_schema(io.BytesIO(data)).metadata[b"buildarena.trajectory"]),
-        use_dictionary=True,
-    ),
+    "fewer instants": lambda data: packed(opened(data)[0].slice(0, 5), opened(data)[1]),
+    "several row groups": lambda data: packed(*opened(data), row_group_size=4),
+    "a dictionary": lambda data: packed(*opened(data), use_dictionary=True),
     "far too much": lambda data: with_column(
-        data,
-        "heated",
-        pa.array([np.zeros(40_000)] * pq.read_metadata(io.BytesIO(data)).num_rows),
+        data, "heated", pa.array([np.zeros(40_000)] * rows(data))
     ),
 }
 
@@ -213,15 +203,10 @@ def test_what_is_said_beside_a_trajectory_is_checked(refused) -> None:
     refused(same, success=True, indicator=1e9)
     for wall_s in (-1, 1e9, "NaN"):
         refused(same, wall_s=wall_s)
-    engine = {
-        "success": True,
-        "indicator": 1.0,
-        "flags": [],
-        "simulation": "3",
-        "engine_version": "1",
-    }
-    refused(same, annotations={"mujoco": engine})
-    refused(same, annotations={"unity": engine})
+    said = {"success": True, "indicator": 1.0, "flags": []}
+    for engine in ("mujoco", "unity"):
+        told = {**said, "simulation": "3", "engine_version": "1"}
+        refused(same, annotations={engine: told})
     assert "does not refuse this machine" in refused(lambda _: None)
 
 
@@ -244,7 +229,7 @@ def test_names_that_are_not_this_trials_are_refused(context, caller) -> None:
         files = [{"name": name, **sent}]
         answer = caller.ask("POST", caller.at(lease, "/outcome"), json={**body, "files": files})
         assert answer.status_code == 422, name
-        fault = {"reason": "a", "detail": "b", "files": files}
+        fault = {"reason": "simulator_fault", "detail": "b", "files": files}
         answer = caller.ask("POST", caller.at(lease, "/fault"), json=fault)
         assert answer.status_code == 422, name
     assert everything(context.store.database) == before
@@ -321,8 +306,7 @@ def test_stale_tokens_are_refused(context, url, caller) -> None:
     old = caller.lease()
     data = write_trajectory(true_trajectory(context, job))
     sent = caller.upload(old, data)
-    with context.store.database.transaction() as connection:
-        connection.execute(text("UPDATE jobs SET lease_expires_at = now() - interval '1 hour'"))
+    expire_leases(context)
     context.store.leases.recover()
     pause_ends(context)
     new = Caller(url, caller.secret, name="another").lease()

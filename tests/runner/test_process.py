@@ -1,7 +1,5 @@
 """A runner as it is started: a program that knows an address and a key."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

@@ -1,7 +1,5 @@
 """A runner key may lease trials and nothing else, and nobody else may do that."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Files come in pieces, each once, and are what their hash says."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 

@@ -3,8 +3,10 @@
 from typing import Any
 
 import pytest
+from support.machines.building import BLOCK, built
 
 from buildarena_benchmark import Task, builtin_tasks
+from buildarena_geometry import Machine
 from buildarena_simulation import ENGINES
 from buildarena_simulation.structure import clusters
 
@@ -25,6 +27,12 @@ def root(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str
 
     monkeypatch.setattr(clusters, "_root", heaviest if request.param == "base" else lightest)
     return str(request.param)
+
+
+@pytest.fixture
+def beam() -> Machine:
+    """Two blocks."""
+    return built(("1", "E", BLOCK))
 
 
 @pytest.fixture(scope="session")

@@ -10,7 +10,7 @@ import pytest
 from support.machines.drafts import KeyedDraft
 from support.machines.families import beam, rocket
 
-from buildarena_benchmark import Task, failed_score, score
+from buildarena_benchmark import failed_score, score
 from buildarena_geometry import DocumentError, Machine
 from buildarena_simulation import (
     MachineNotSimulable,
@@ -27,16 +27,14 @@ from buildarena_simulation.structure.motion import Motion
 from buildarena_worker.builtin.designs.drafting import EAST
 
 
-def test_an_empty_machine_is_no_machine(engine: str, tasks: dict[str, Task]) -> None:
+def test_an_empty_machine_is_no_machine(engine, tasks) -> None:
     with pytest.raises(MachineNotSimulable, match="no blocks"):
         simulate(Machine(), tasks["lift-1"].scenario, engine)
     result = failed_score(tasks["lift-1"], Machine())
     assert (result.success, result.indicator) == (False, 0.0)
 
 
-def test_a_machine_of_ten_thousand_blocks_is_refused_at_once(
-    engine: str, tasks: dict[str, Task]
-) -> None:
+def test_a_machine_of_ten_thousand_blocks_is_refused_at_once(engine, tasks) -> None:
     draft = KeyedDraft()
     draft.start()
 
@@ -46,12 +44,12 @@ def test_a_machine_of_ten_thousand_blocks_is_refused_at_once(
         simulate(crowd, tasks["lift-1"].scenario, engine)
 
 
-def test_an_unknown_engine_is_named_with_the_known_ones(tasks: dict[str, Task]) -> None:
+def test_an_unknown_engine_is_named_with_the_known_ones(tasks) -> None:
     with pytest.raises(UnknownEngineError, match="pybullet, mujoco"):
         simulate(beam(3), tasks["lift-1"].scenario, "havok")
 
 
-def test_a_machine_in_two_halves_is_simulated_as_two(engine: str, tasks: dict[str, Task]) -> None:
+def test_a_machine_in_two_halves_is_simulated_as_two(engine, tasks) -> None:
     draft = KeyedDraft()
     far = draft.row(draft.start(), EAST, 3)
     draft.do("remove_block", block_id=far[0])
@@ -73,13 +71,13 @@ def test_a_document_with_an_unknown_module_never_reaches_the_simulator() -> None
         Machine.from_document(json.loads(_document_with("Small Stone Block")))
 
 
-def test_a_scenario_that_tracks_a_missing_block_says_so(tasks: dict[str, Task]) -> None:
+def test_a_scenario_that_tracks_a_missing_block_says_so(tasks) -> None:
     scenario = tasks["lift-1"].scenario.model_copy(update={"tracked_blocks": ("1", "77")})
     with pytest.raises(MachineNotSimulable, match="77"):
         simulate(beam(3), scenario, "mujoco")
 
 
-def test_the_process_goes_on_after_a_failed_trial(engine: str, tasks: dict[str, Task]) -> None:
+def test_the_process_goes_on_after_a_failed_trial(engine, tasks) -> None:
     scenario = tasks["lift-1"].scenario.model_copy(update={"duration_s": 0.2})
     with pytest.raises(MachineNotSimulable):
         simulate(Machine(), scenario, engine)
@@ -87,7 +85,7 @@ def test_the_process_goes_on_after_a_failed_trial(engine: str, tasks: dict[str, 
 
 
 def test_a_rollout_that_blows_up_is_reported_and_never_a_success(
-    engine: str, tasks: dict[str, Task], monkeypatch: pytest.MonkeyPatch
+    engine, tasks, monkeypatch
 ) -> None:
     def fragile(name: str, world: World) -> Engine:
         made = create_engine(name, world)

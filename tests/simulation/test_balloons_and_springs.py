@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support.machines.drafts import KeyedDraft
+from support.machines.trials import press
 
 from buildarena_benchmark.scorers.measures.components import joined_to_start
 from buildarena_geometry import KeyPress, Machine
@@ -21,10 +22,6 @@ WORKSHOP = module_set("workshop")
 DRIVEN = Control(mode="agent")
 
 
-def _press(key: str, time: float, hold_for: float) -> KeyPress:
-    return KeyPress(time_s=time, key=key, hold_for_s=hold_for)
-
-
 def _stood(machine: Machine, engine: str, seconds: float, *keys: KeyPress) -> Trajectory:
     return simulate(machine, Scenario(duration_s=seconds, control=DRIVEN), engine, controls=keys)
 
@@ -36,11 +33,7 @@ def _foot(draft: KeyedDraft) -> str:
     return start
 
 
-def _rope_load(trajectory: Trajectory) -> float:
-    return next(peak.force for peak in trajectory.joint_peaks if peak.kind == "rope")
-
-
-def test_a_balloon_stands_over_its_rope_and_pulls_what_it_can(engine: str) -> None:
+def test_a_balloon_stands_over_its_rope_and_pulls_what_it_can(engine) -> None:
     draft = KeyedDraft(modules="workshop")
     balloon = draft.attach(_foot(draft), UP, "Balloon")
     module = WORKSHOP["Balloon"]
@@ -56,7 +49,7 @@ def test_a_balloon_stands_over_its_rope_and_pulls_what_it_can(engine: str) -> No
     assert trajectory.joint_loads[-25:, -1].mean() * 1000 == pytest.approx(net, abs=1.96)
 
 
-def test_a_balloon_that_is_pulled_along_leans_as_drag_and_lift_say(engine: str) -> None:
+def test_a_balloon_that_is_pulled_along_leans_as_drag_and_lift_say(engine) -> None:
     draft = KeyedDraft(modules="workshop")
     start = draft.start()
     balloon = draft.attach(start, UP, "Balloon")
@@ -64,7 +57,7 @@ def test_a_balloon_that_is_pulled_along_leans_as_drag_and_lift_say(engine: str) 
         for side in (EAST, WEST):
             draft.bind(draft.wheel(base, side), "spinning_forward", "UpArrow")
     module = WORKSHOP["Balloon"]
-    trajectory = _stood(draft.machine, engine, 12.0, _press("UpArrow", 0.5, 20.0))
+    trajectory = _stood(draft.machine, engine, 12.0, press("UpArrow", 0.5, 20.0))
     rows = slice(-25, None)
     root = trajectory.positions[rows, 0].astype(float) + np.array([0.0, 0.0, 0.5])
     at = trajectory.positions[rows, trajectory.block_ids.index(balloon)].astype(float)
@@ -89,10 +82,10 @@ def _aloft(load: int) -> tuple[Machine, str]:
 
 
 @pytest.mark.parametrize("load", [0, 6, 14])
-def test_a_balloon_holds_the_height_that_its_keys_ask_for(engine: str, load: int) -> None:
+def test_a_balloon_holds_the_height_that_its_keys_ask_for(engine, load) -> None:
     machine, balloon = _aloft(load)
     altitude = WORKSHOP["Sqr Balloon"].altitude
-    keys = (_press("UpArrow", 1.0, 4.0), _press("DownArrow", 9.0, 1.0))
+    keys = (press("UpArrow", 1.0, 4.0), press("DownArrow", 9.0, 1.0))
     trajectory = _stood(machine, engine, 20.0, *keys)
     height = trajectory.positions[:, trajectory.block_ids.index(balloon), 2].astype(float)
     sag = structure_of(machine).masses.sum() / altitude.stiffness
@@ -102,10 +95,10 @@ def test_a_balloon_holds_the_height_that_its_keys_ask_for(engine: str, load: int
     assert np.ptp(height[-50:]) < 0.05, "it comes to rest"
 
 
-def test_a_balloon_does_not_lift_more_than_it_can(engine: str) -> None:
+def test_a_balloon_does_not_lift_more_than_it_can(engine) -> None:
     machine, _ = _aloft(18)
     assert structure_of(machine).masses.sum() > WORKSHOP["Sqr Balloon"].altitude.most
-    trajectory = _stood(machine, engine, 6.0, _press("UpArrow", 0.5, 5.0))
+    trajectory = _stood(machine, engine, 6.0, press("UpArrow", 0.5, 5.0))
     assert np.ptp(trajectory.positions[:, 0, 2]) < 0.2
 
 
@@ -137,7 +130,7 @@ def _mass_of(machine: Machine, load: str) -> float:
     return float(structure_of(machine).masses[ids.index(load) :].sum())
 
 
-def test_a_load_swings_on_a_spring_as_mass_and_stiffness_say(engine: str) -> None:
+def test_a_load_swings_on_a_spring_as_mass_and_stiffness_say(engine) -> None:
     machine, load = _hung(1)
     spring, mass = WORKSHOP["Spring"].spring, _mass_of(machine, load)
     stretch = _springs_stretch(_stood(machine, engine, 4.0), load)
@@ -153,7 +146,7 @@ def test_a_load_swings_on_a_spring_as_mass_and_stiffness_say(engine: str) -> Non
     assert peaks[3] / peaks[0] == pytest.approx(math.exp(-rate * 3 * period), rel=0.1)
 
 
-def test_a_spring_bears_its_load_at_rest(engine: str) -> None:
+def test_a_spring_bears_its_load_at_rest(engine) -> None:
     machine, load = _hung(1)
     spring, mass = WORKSHOP["Spring"].spring, _mass_of(machine, load)
     trajectory = _stood(machine, engine, 14.0)
@@ -164,7 +157,7 @@ def test_a_spring_bears_its_load_at_rest(engine: str) -> None:
     assert trajectory.bearing.ground[-25:].mean() == pytest.approx(weight, rel=0.01)
 
 
-def test_springs_between_the_same_faces_are_worth_one(engine: str) -> None:
+def test_springs_between_the_same_faces_are_worth_one(engine) -> None:
     single, load = _hung(1)
     double, other = _hung(2)
     found = [
@@ -175,11 +168,11 @@ def test_springs_between_the_same_faces_are_worth_one(engine: str) -> None:
     assert found[1] == pytest.approx(found[0], rel=0.03)
 
 
-def test_a_spring_draws_together_while_its_key_is_held(engine: str) -> None:
+def test_a_spring_draws_together_while_its_key_is_held(engine) -> None:
     machine, load = _hung(1, bind=True)
     spring, mass = WORKSHOP["Spring"].spring, _mass_of(machine, load)
     built = structure_of(machine).ropes.length[0]
-    trajectory = _stood(machine, engine, 15.0, _press("UpArrow", 1.0, 7.0))
+    trajectory = _stood(machine, engine, 15.0, press("UpArrow", 1.0, 7.0))
     stretch = _springs_stretch(trajectory, load)
     sag = mass / spring.stiffness
     drawn = built * (1.0 - spring.shortest)
@@ -210,7 +203,7 @@ def test_a_springs_keys_are_kept_in_documents() -> None:
     assert again.to_document() == machine.to_document()
 
 
-def test_a_balloon_belongs_to_its_machine_until_its_rope_gives_way(engine: str) -> None:
+def test_a_balloon_belongs_to_its_machine_until_its_rope_gives_way(engine) -> None:
     draft = KeyedDraft(modules="workshop")
     balloon = draft.attach(_foot(draft), UP, "Balloon")
     trajectory = _stood(draft.machine, engine, 1.0)

@@ -36,7 +36,7 @@ def _peak(trajectory: Trajectory, joint: str) -> tuple[float, float]:
     return found.force, found.moment
 
 
-def test_a_block_falls_as_gravity_and_drag_say(engine: str) -> None:
+def test_a_block_falls_as_gravity_and_drag_say(engine) -> None:
     scenario = Scenario(duration_s=1.0, placement=SpanPlacement(gap=1.0, lowest_center=30.0))
     trajectory = simulate(_lone_block(), scenario, engine)
     t = trajectory.time_s
@@ -57,7 +57,7 @@ def _slab() -> Machine:
 
 @pytest.mark.parametrize("slope_deg", [20.0, 45.0])
 def test_a_slab_stays_on_a_slope_below_the_friction_angle_and_slides_above(
-    engine: str, slope_deg: float
+    engine, slope_deg
 ) -> None:
     slope = math.radians(slope_deg)
     uphill = np.array([0.0, math.cos(slope), math.sin(slope)])
@@ -82,7 +82,7 @@ def test_a_slab_stays_on_a_slope_below_the_friction_angle_and_slides_above(
     assert (late - early) / duration == pytest.approx(expected, abs=0.02 * GRAVITY)
 
 
-def test_a_cantilever_bears_its_weight_at_the_root(engine: str) -> None:
+def test_a_cantilever_bears_its_weight_at_the_root(engine) -> None:
     length = 4
     draft = KeyedDraft()
     middle = draft.start()
@@ -118,7 +118,7 @@ def _bending_of_beam(engine: str, cargo_mass: float) -> dict[str, float]:
     return {peak.joint: peak.moment for peak in trajectory.joint_peaks}
 
 
-def test_a_beam_on_two_supports_bears_the_moments_of_statics(engine: str) -> None:
+def test_a_beam_on_two_supports_bears_the_moments_of_statics(engine) -> None:
     load = 120.0
     light, half, full = (_bending_of_beam(engine, mass) for mass in (5.0, load / 2, load))
     # A beam that sags stands on the gap's edges, and the cargo presses evenly over its 2.5.
@@ -139,7 +139,7 @@ def test_a_beam_on_two_supports_bears_the_moments_of_statics(engine: str) -> Non
         assert gained == pytest.approx(share * (full[joint] - light[joint]), rel=0.05)
 
 
-def test_a_rocket_climbs_as_thrust_weight_and_drag_say(engine: str) -> None:
+def test_a_rocket_climbs_as_thrust_weight_and_drag_say(engine) -> None:
     machine = rocket()
     scenario = Scenario(duration_s=7.0, control=Control(mode="held", from_s=2.0))
     trajectory = simulate(machine, scenario, engine)
@@ -154,7 +154,7 @@ def test_a_rocket_climbs_as_thrust_weight_and_drag_say(engine: str) -> None:
         assert rise[sample] == pytest.approx(climbed[sample], rel=0.03)
 
 
-def test_each_axle_of_a_standing_car_bears_its_share(engine: str) -> None:
+def test_each_axle_of_a_standing_car_bears_its_share(engine) -> None:
     machine = car(drive=())
     trajectory = simulate(machine, Scenario(duration_s=2.0), engine)
     axles = {peak.joint: peak for peak in trajectory.joint_peaks if peak.kind == "axle"}
@@ -171,7 +171,7 @@ def test_each_axle_of_a_standing_car_bears_its_share(engine: str) -> None:
         assert axle.moment == pytest.approx(0.25 * axle.force, rel=0.35)
 
 
-def test_a_wheel_rolls_without_slip(engine: str) -> None:
+def test_a_wheel_rolls_without_slip(engine) -> None:
     machine = car(drive=[("UpArrow", 0.5, 10.0)])
     scenario = Scenario(duration_s=4.0, control=Control(mode="agent"))
     trajectory = simulate(machine, scenario, engine)
@@ -181,7 +181,7 @@ def test_a_wheel_rolls_without_slip(engine: str) -> None:
 
 
 @pytest.mark.parametrize("mass", [5.0, 50.0, 500.0, 1500.0])
-def test_no_cargo_mass_makes_an_intact_structure_jitter_or_sink(engine: str, mass: float) -> None:
+def test_no_cargo_mass_makes_an_intact_structure_jitter_or_sink(engine, mass) -> None:
     scenario = Scenario(
         duration_s=4.0,
         cargo=Cargo(
@@ -201,7 +201,7 @@ def test_no_cargo_mass_makes_an_intact_structure_jitter_or_sink(engine: str, mas
     assert height.mean() == pytest.approx(resting - 2 * COLLISION_MARGIN, abs=0.06)
 
 
-def test_a_cargo_falls_as_fast_however_it_grows(engine: str) -> None:
+def test_a_cargo_falls_as_fast_however_it_grows(engine) -> None:
     machine = Machine()
     machine.act("start")
     for final in (5.0, 1000.0):

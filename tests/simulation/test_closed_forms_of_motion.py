@@ -35,14 +35,14 @@ def _gain(speeds: np.ndarray, start_s: float, end_s: float) -> tuple[float, floa
     return float(np.polyfit(time_s, speeds[rows], 1)[0]), float(speeds[rows].mean())
 
 
-def test_a_car_whose_wheels_spin_starts_as_friction_says(engine: str) -> None:
+def test_a_car_whose_wheels_spin_starts_as_friction_says(engine) -> None:
     machine = car(drive=[("UpArrow", 0.5, 10.0)])
     speeds = _speeds(simulate(machine, Scenario(duration_s=1.2, control=DRIVEN), engine))
     gained, mean = _gain(speeds, 0.64, 0.92)
     assert gained == pytest.approx(GRIP - DRAG * mean, rel=0.03)
 
 
-def test_a_car_that_brakes_skids_to_rest_as_friction_says(engine: str) -> None:
+def test_a_car_that_brakes_skids_to_rest_as_friction_says(engine) -> None:
     machine = car(drive=[("UpArrow", 0.5, 2.0)])
     trajectory = simulate(machine, Scenario(duration_s=4.0, control=DRIVEN), engine)
     speeds = _speeds(trajectory)
@@ -52,7 +52,7 @@ def test_a_car_that_brakes_skids_to_rest_as_friction_says(engine: str) -> None:
 
 
 @pytest.mark.parametrize("slope_deg", [25.0, 29.0])
-def test_a_car_climbs_as_friction_and_slope_say(engine: str, slope_deg: float) -> None:
+def test_a_car_climbs_as_friction_and_slope_say(engine, slope_deg) -> None:
     slope = math.radians(slope_deg)
     machine = car(drive=[("UpArrow", 0.0, 10.0)])
     # A car of seven blocks is set down above a slope whose middle is 40 high.
@@ -85,7 +85,7 @@ def _leaning(arm: int, height: int) -> Machine:
     return draft.machine
 
 
-def test_a_machine_tips_when_its_weight_leaves_its_foot(engine: str) -> None:
+def test_a_machine_tips_when_its_weight_leaves_its_foot(engine) -> None:
     edge = 1.5 - COLLISION_MARGIN
     shares = {
         (arm, height): float(_leaning(arm, height).center_of_mass[0]) / edge
@@ -102,7 +102,7 @@ def test_a_machine_tips_when_its_weight_leaves_its_foot(engine: str) -> None:
         assert (drop > 1.0) == falls
 
 
-def test_a_rope_bears_what_hangs_on_it(engine: str) -> None:
+def test_a_rope_bears_what_hangs_on_it(engine) -> None:
     draft = KeyedDraft()
     middle = draft.start()
     for side in (EAST, WEST, NORTH, SOUTH):
@@ -120,7 +120,7 @@ def test_a_rope_bears_what_hangs_on_it(engine: str) -> None:
     assert rope.force == pytest.approx(weight, rel=0.03)
 
 
-def test_a_cannon_off_the_centre_turns_a_machine_as_its_inertia_says(engine: str) -> None:
+def test_a_cannon_off_the_centre_turns_a_machine_as_its_inertia_says(engine) -> None:
     draft = KeyedDraft()
     middle = draft.start()
     draft.row(middle, WEST, 3)

@@ -29,7 +29,7 @@ def _speeds(trajectory: Trajectory, *blocks: str) -> list[np.ndarray]:
 @pytest.mark.usefixtures("root")
 @pytest.mark.parametrize(("other", "apart", "ratio"), [(MEDIUM, 2, 1.0), (LARGE, 3, 0.5)])
 def test_a_cog_turns_another_the_other_way_by_the_ratio_of_their_radii(
-    engine: str, other: str, apart: int, ratio: float
+    engine, other, apart, ratio
 ) -> None:
     rig, motor, cog = _pair(other, apart)
     trajectory = rig.tried(engine, 2.0)
@@ -41,14 +41,14 @@ def test_a_cog_turns_another_the_other_way_by_the_ratio_of_their_radii(
 
 
 @pytest.mark.parametrize("apart", [3, 4])
-def test_cogs_that_do_not_touch_leave_each_other_alone(engine: str, apart: int) -> None:
+def test_cogs_that_do_not_touch_leave_each_other_alone(engine, apart) -> None:
     rig, motor, cog = _pair(MEDIUM, apart)
     driving, driven = _speeds(rig.tried(engine, 1.2), motor, cog)
     assert driving[-1] == pytest.approx(-RPM_100, rel=0.03)
     assert abs(driven).max() < 0.01
 
 
-def test_cogs_on_different_levels_leave_each_other_alone(engine: str) -> None:
+def test_cogs_on_different_levels_leave_each_other_alone(engine) -> None:
     rig = Rig()
     motor = rig.bound(rig.attach(rig.top, UP, "Cog Medium Powered"), spinning_forward="UpArrow")
     base = rig.row(rig.top, EAST, 2)[-1]
@@ -59,7 +59,7 @@ def test_cogs_on_different_levels_leave_each_other_alone(engine: str) -> None:
     assert abs(driven).max() < 0.01
 
 
-def test_a_row_of_cogs_turns_by_turns(engine: str) -> None:
+def test_a_row_of_cogs_turns_by_turns(engine) -> None:
     rig = Rig()
     motor = rig.bound(rig.attach(rig.top, UP, "Cog Medium Powered"), spinning_forward="UpArrow")
     row = rig.row(rig.top, EAST, 4)
@@ -70,7 +70,7 @@ def test_a_row_of_cogs_turns_by_turns(engine: str) -> None:
 
 
 @pytest.mark.usefixtures("root")
-def test_a_cog_that_is_held_stalls_the_other(engine: str) -> None:
+def test_a_cog_that_is_held_stalls_the_other(engine) -> None:
     rig, motor, cog = _pair(MEDIUM, 2)
     arm = rig.attach(cog, UP)
     rig.connect(arm, rig.attach(rig.top, (0, 1, 0)), EAST, EAST)

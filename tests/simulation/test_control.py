@@ -7,8 +7,8 @@ import pytest
 from support.machines.drafts import KeyedDraft
 from support.machines.families import car, rocket
 from support.machines.references import REFERENCES, load_machine
+from support.machines.trials import press
 
-from buildarena_benchmark import Task
 from buildarena_geometry import KeyPress, Machine, load_catalogue
 from buildarena_geometry.flames import heating
 from buildarena_simulation import Scenario, simulate
@@ -19,10 +19,6 @@ from buildarena_worker.builtin.designs.drafting import DOWN, EAST, NORTH, UP, WE
 
 MOTOR = load_catalogue()["Powered Wheel"].motor
 WHEEL_SPEED, WHEEL_LAG_RATE = MOTOR.speed, MOTOR.lag_per_s
-
-
-def _press(key: str, time: float, hold_for: float) -> KeyPress:
-    return KeyPress(time_s=time, key=key, hold_for_s=hold_for)
 
 
 def _speeds(machine: Machine, *keys: KeyPress) -> np.ndarray:
@@ -37,7 +33,7 @@ def _speeds(machine: Machine, *keys: KeyPress) -> np.ndarray:
 
 
 def test_a_wheel_follows_its_key_with_a_lag() -> None:
-    speeds = np.abs(_speeds(car(), _press("UpArrow", 0.5, 1.0))[:, 0])
+    speeds = np.abs(_speeds(car(), press("UpArrow", 0.5, 1.0))[:, 0])
     assert (speeds[:50] == 0.0).all()
     reached = WHEEL_SPEED * (1 - math.exp(-WHEEL_LAG_RATE * 0.1))
     assert speeds[59] == pytest.approx(reached)
@@ -46,23 +42,23 @@ def test_a_wheel_follows_its_key_with_a_lag() -> None:
 
 
 def test_keys_for_both_directions_brake() -> None:
-    both = _press("UpArrow", 0.0, 3.0), _press("DownArrow", 0.0, 3.0)
+    both = press("UpArrow", 0.0, 3.0), press("DownArrow", 0.0, 3.0)
     assert (_speeds(car(), *both) == 0.0).all()
 
 
 def test_wheels_on_both_sides_roll_the_same_way_once_flipped() -> None:
     machine = car()
     structure = structure_of(machine)
-    speeds = _speeds(machine, _press("UpArrow", 0.0, 3.0))[-1]
+    speeds = _speeds(machine, press("UpArrow", 0.0, 3.0))[-1]
     spin = speeds[:, None] * structure.directions[structure.wheels]
     rolling = np.cross(spin, [0.0, 0.0, 1.0])  # velocity of the axle over the ground
     assert (rolling[:, 1] > 10.0).all()
 
 
-def test_given_controls_replace_the_machines_own(tasks: dict[str, Task]) -> None:
+def test_given_controls_replace_the_machines_own(tasks) -> None:
     scenario = tasks["transport-1"].scenario.model_copy(update={"duration_s": 2.0})
     machine = car(drive=())
-    keys = (_press("UpArrow", 0.0, 2.0), _press("Alpha9", 0.0, 1.0))
+    keys = (press("UpArrow", 0.0, 2.0), press("Alpha9", 0.0, 1.0))
     trajectory = simulate(machine, scenario, "mujoco", controls=keys)
     assert trajectory.positions[-1, 0, 1] > 10.0
     assert trajectory.settings["effective_key_presses"] == 1
@@ -80,7 +76,7 @@ def _heated(flame: tuple[float, float, float]) -> bool:
 
 
 @pytest.mark.parametrize("name", REFERENCES)
-def test_a_cannon_is_heated_in_the_simulation_if_its_builder_was_told_so(name: str) -> None:
+def test_a_cannon_is_heated_in_the_simulation_if_its_builder_was_told_so(name) -> None:
     machine = load_machine(name)
     structure = structure_of(machine)
     directions = np.zeros((len(structure), 3))
@@ -122,7 +118,7 @@ def _hanging_block() -> Machine:
     return draft.machine
 
 
-def test_a_rope_holds_what_hangs_on_it(engine: str) -> None:
+def test_a_rope_holds_what_hangs_on_it(engine) -> None:
     machine = _hanging_block()
     trajectory = simulate(machine, Scenario(duration_s=4.0), engine)
     rope = next(peak for peak in trajectory.joint_peaks if peak.kind == "rope")
@@ -134,7 +130,7 @@ def test_a_rope_holds_what_hangs_on_it(engine: str) -> None:
     assert 0.3 + 0.2 <= rope.force < 5.0
 
 
-def test_a_rope_does_not_push(engine: str) -> None:
+def test_a_rope_does_not_push(engine) -> None:
     draft = KeyedDraft()
     low = draft.start()
     middle, high = draft.row(low, UP, 2)

@@ -31,7 +31,7 @@ def _hash_in_new_process(engine: str, name: str, task: str, hash_seed: str) -> s
     return done.stdout
 
 
-def test_two_processes_give_the_same_bytes(engine: str) -> None:
+def test_two_processes_give_the_same_bytes(engine) -> None:
     for name, task in (("carrier", "transport-2"), ("beam", "support-1")):
         first, second = (_hash_in_new_process(engine, name, task, seed) for seed in ("1", "2"))
         assert first == second

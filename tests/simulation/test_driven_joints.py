@@ -13,7 +13,7 @@ pytestmark = pytest.mark.usefixtures("root")
 RPM_100 = 100 * 2 * math.pi / 60
 
 
-def test_a_slider_falls_freely_to_its_stop(engine: str) -> None:
+def test_a_slider_falls_freely_to_its_stop(engine) -> None:
     rig = Rig()
     slider = rig.attach(rig.attach(rig.top, EAST), DOWN, "Slider")
     rig.row(slider, DOWN, 2)
@@ -30,7 +30,7 @@ def test_a_slider_falls_freely_to_its_stop(engine: str) -> None:
     assert abs(way[:, :2] - way[0, :2]).max() < 0.02
 
 
-def test_a_slider_on_its_side_stays_level_under_a_load_beside_it(engine: str) -> None:
+def test_a_slider_on_its_side_stays_level_under_a_load_beside_it(engine) -> None:
     rig = Rig()
     slider = rig.attach(rig.top, EAST, "Slider")
     end = rig.row(slider, EAST, 3)[-1]
@@ -40,9 +40,7 @@ def test_a_slider_on_its_side_stays_level_under_a_load_beside_it(engine: str) ->
 
 
 @pytest.mark.parametrize("weights", [1, 2])
-def test_a_suspension_sags_and_swings_as_its_spring_and_damper_say(
-    engine: str, weights: int
-) -> None:
+def test_a_suspension_sags_and_swings_as_its_spring_and_damper_say(engine, weights) -> None:
     rig = Rig()
     leg = rig.attach(rig.top, UP, "Suspension")
     top = leg
@@ -66,7 +64,7 @@ def test_a_suspension_sags_and_swings_as_its_spring_and_damper_say(
         assert height[0] - height == pytest.approx(expected, abs=0.05 * sag)
 
 
-def test_a_piston_drives_out_and_back(engine: str) -> None:
+def test_a_piston_drives_out_and_back(engine) -> None:
     rig = Rig()
     piston = rig.bound(rig.attach(rig.top, UP, "Piston"), extend="Alpha1")
     rig.attach(piston, UP, "Weight")
@@ -95,7 +93,7 @@ def test_a_piston_lifts_no_more_than_its_force(engine: str, weights: int, *, lif
 
 
 @pytest.mark.parametrize(("key", "way"), [("LeftArrow", 1), ("RightArrow", -1)])
-def test_a_steering_hinge_turns_to_its_limit_at_its_rate(engine: str, key: str, way: int) -> None:
+def test_a_steering_hinge_turns_to_its_limit_at_its_rate(engine, key, way) -> None:
     rig = Rig()
     # Its pin lies along the x axis of its face, which is west on the top face.
     hinge = rig.attach(rig.top, UP, "Steering Hinge")
@@ -112,7 +110,7 @@ def test_a_steering_hinge_turns_to_its_limit_at_its_rate(engine: str, key: str, 
     assert angle[-1] == pytest.approx(way * 40.0, abs=1.0)
 
 
-def test_a_steering_block_turns_on_without_a_limit(engine: str) -> None:
+def test_a_steering_block_turns_on_without_a_limit(engine) -> None:
     rig = Rig()
     block = rig.bound(rig.attach(rig.top, UP, "Steering Block"), turn_left="LeftArrow")
     rig.row(block, EAST, 2)
@@ -154,7 +152,7 @@ def test_a_spinning_block_turns_what_its_torque_lifts(
         assert angle.max() < 2.0
 
 
-def test_a_fly_wheel_turns_on_when_its_key_is_let_go(engine: str) -> None:
+def test_a_fly_wheel_turns_on_when_its_key_is_let_go(engine) -> None:
     rig = Rig()
     wheel = rig.bound(rig.attach(rig.top, UP, "Fly Wheel"), spinning_forward="UpArrow")
     rig.press("UpArrow", 0.2, 1.0)
@@ -167,7 +165,7 @@ def test_a_fly_wheel_turns_on_when_its_key_is_let_go(engine: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["Large Wheel", "Cog Medium Powered"])
-def test_a_motor_turns_at_its_speed_and_brakes(engine: str, name: str) -> None:
+def test_a_motor_turns_at_its_speed_and_brakes(engine, name) -> None:
     rig = Rig()
     wheel = rig.bound(rig.attach(rig.top, UP, name), spinning_backward="UpArrow")
     rig.press("UpArrow", 0.2, 1.0)
@@ -177,7 +175,7 @@ def test_a_motor_turns_at_its_speed_and_brakes(engine: str, name: str) -> None:
     assert speed[-1] == pytest.approx(0.0, abs=0.05)
 
 
-def test_nothing_moves_where_nothing_drives(engine: str) -> None:
+def test_nothing_moves_where_nothing_drives(engine) -> None:
     rig = Rig()
     names = ["Steering Hinge", "Steering Block", "Piston", "Slider", "Swivel", "Hinge"]
     for k, way in enumerate((EAST, WEST, NORTH, SOUTH)):

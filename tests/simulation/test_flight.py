@@ -54,7 +54,7 @@ def _way(trajectory: Trajectory) -> np.ndarray:
 
 
 @pytest.mark.parametrize("load", [1, 9, 14])
-def test_a_fan_lifts_and_drops_its_load_as_thrust_and_weight_say(engine: str, load: int) -> None:
+def test_a_fan_lifts_and_drops_its_load_as_thrust_and_weight_say(engine, load) -> None:
     draft = KeyedDraft(modules="workshop")
     start = draft.start()
     draft.row(start, DOWN, load)
@@ -85,9 +85,7 @@ def _plate(v: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("attack_deg", [-8.0, 2.0, 5.0, 12.0, 30.0, 90.0])
 @pytest.mark.parametrize("speed", [12.0, 24.0, 45.0])
-def test_a_wing_lifts_and_drags_as_its_law_says(
-    engine: str, attack_deg: float, speed: float
-) -> None:
+def test_a_wing_lifts_and_drags_as_its_law_says(engine, attack_deg, speed) -> None:
     machine = _pair("Wing Panel", UP)
     angle = math.radians(attack_deg)
     velocity = (0.0, speed * math.cos(angle), -speed * math.sin(angle))
@@ -107,7 +105,7 @@ def test_a_glider_of_a_few_panels_flies_at_a_sensible_speed() -> None:
 
 
 @pytest.mark.parametrize("name", ["Propeller", "Small Propeller"])
-def test_the_published_law_holds_for_any_flow(name: str) -> None:
+def test_the_published_law_holds_for_any_flow(name) -> None:
     wing = WORKSHOP[name].wing
     rng = np.random.default_rng(7)
     velocity = 20.0 * rng.normal(size=(200, 3))
@@ -144,9 +142,7 @@ def _lifted(engine: str, module: str, y_axis: Direction, flip: bool) -> float:
 
 @pytest.mark.parametrize("name", ["Propeller", "Small Propeller"])
 @pytest.mark.parametrize("y_axis", [UP, DOWN])
-def test_blades_on_a_wheel_pull_as_the_published_law_says(
-    engine: str, name: str, y_axis: Direction
-) -> None:
+def test_blades_on_a_wheel_pull_as_the_published_law_says(engine, name, y_axis) -> None:
     module = WORKSHOP[name]
     radius = 0.5 + structure_of(_pair(name, UP)).positions[1, 0] - 0.5
     speed = WORKSHOP["Powered Wheel"].motor.speed * radius
@@ -157,7 +153,7 @@ def test_blades_on_a_wheel_pull_as_the_published_law_says(
 
 
 @pytest.mark.parametrize("y_axis", [UP, DOWN])
-def test_bowls_fall_as_fast_as_their_drag_says(engine: str, y_axis: Direction) -> None:
+def test_bowls_fall_as_fast_as_their_drag_says(engine, y_axis) -> None:
     machine = _pair("Drag Block", y_axis)
     wing = WORKSHOP["Drag Block"].wing
     # The bowl opens against its y axis: what falls with it down is braked.

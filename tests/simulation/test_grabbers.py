@@ -2,7 +2,9 @@
 
 import numpy as np
 import pytest
+from support.machines.building import attach
 from support.machines.drafts import KeyedDraft
+from support.machines.trials import press
 
 from buildarena_geometry import KeyPress, Machine
 from buildarena_geometry.modules.sets import module_set
@@ -15,12 +17,6 @@ from buildarena_worker.builtin.designs.drafting import DOWN, EAST, NORTH, SOUTH,
 WORKSHOP = module_set("workshop")
 GRIP = WORKSHOP["Grabber"].grip
 DRIVEN = Control(mode="agent")
-
-
-def _press(key: str, time: float, hold_for: float = 0.1) -> KeyPress:
-    return KeyPress(time_s=time, key=key, hold_for_s=hold_for)
-
-
 END = 3.0 - COLLISION_MARGIN
 """Height of the grabber's end, units."""
 
@@ -61,7 +57,7 @@ def _told(trajectory: Trajectory) -> list[tuple[str, str]]:
 
 
 @pytest.mark.parametrize("mass", [2.0, 50.0, 150.0])
-def test_a_grabber_holds_a_load_against_its_weight(engine: str, mass: float) -> None:
+def test_a_grabber_holds_a_load_against_its_weight(engine, mass) -> None:
     machine, grabber = _stool(bound=False)
     trajectory = _tried(machine, engine, _cargo(mass))
     assert _told(trajectory) == [("grabbed", "cargo")]
@@ -74,7 +70,7 @@ def test_a_grabber_holds_a_load_against_its_weight(engine: str, mass: float) -> 
     assert trajectory.bearing.ground[-25:].mean() == pytest.approx(weight, rel=0.03)
 
 
-def test_a_load_that_grows_too_heavy_slips(engine: str) -> None:
+def test_a_load_that_grows_too_heavy_slips(engine) -> None:
     machine, _ = _stool()
     trajectory = _tried(machine, engine, _cargo(5.0, final=405.0), seconds=6.0)
     assert _told(trajectory) == [("grabbed", "cargo"), ("slipped", "cargo")]
@@ -83,21 +79,21 @@ def test_a_load_that_grows_too_heavy_slips(engine: str) -> None:
     assert trajectory.cargo_position[-1, 2] == pytest.approx(0.5, abs=0.1)
 
 
-def test_what_is_out_of_reach_is_not_held(engine: str) -> None:
+def test_what_is_out_of_reach_is_not_held(engine) -> None:
     machine, _ = _stool()
     trajectory = _tried(machine, engine, _cargo(2.0, gap=GRIP.reach + 0.1))
     assert trajectory.events == ()
     assert trajectory.cargo_position[-1, 2] == pytest.approx(0.5, abs=0.05)
 
 
-def test_a_released_grabber_stays_open_until_it_is_told_to_grab(engine: str) -> None:
+def test_a_released_grabber_stays_open_until_it_is_told_to_grab(engine) -> None:
     machine, _ = _stool()
     top = END - 1.0 - 0.15
     table = TerrainBox(center=(0.0, 0.0, top / 2), size=(1.0, 1.0, top))
     scenario = Scenario(
         duration_s=4.0, terrain=(table,), cargo=_cargo(2.0, gap=0.1), control=DRIVEN
     )
-    keys = (_press("DownArrow", 1.0), _press("UpArrow", 3.0))
+    keys = (press("DownArrow", 1.0), press("UpArrow", 3.0))
     trajectory = simulate(machine, scenario, engine, controls=keys)
     assert _told(trajectory) == [("grabbed", "cargo"), ("released", "cargo"), ("grabbed", "cargo")]
     times = [event.time_s for event in trajectory.events]
@@ -116,10 +112,10 @@ def _anchored() -> Machine:
     return draft.machine
 
 
-def test_a_grabber_holds_the_ground(engine: str) -> None:
+def test_a_grabber_holds_the_ground(engine) -> None:
     machine = _anchored()
     scenario = Scenario(duration_s=2.0, control=DRIVEN)
-    keys = (_press("UpArrow", 0.2, 2.0), _press("DownArrow", 1.2))
+    keys = (press("UpArrow", 0.2, 2.0), press("DownArrow", 1.2))
     trajectory = simulate(machine, scenario, engine, controls=keys)
     assert _told(trajectory) == [("grabbed", "ground"), ("released", "ground")]
     height = trajectory.positions[:, 0, 2].astype(float)
@@ -130,23 +126,22 @@ def test_a_grabber_holds_the_ground(engine: str) -> None:
     assert height[45] - height[30] == pytest.approx(rise, rel=0.15)
 
 
-def test_a_grabber_holds_a_block_of_another_piece(engine: str) -> None:
+def test_a_grabber_holds_a_block_of_another_piece(engine) -> None:
     machine, grabber = _stool()
-    below = {"base_block": grabber, "face": "A", "new_block": "Small Wooden Block"}
-    assert machine.act("attach_block_to", below).ok
+    assert attach(machine, grabber, "A").ok
     loose = list(machine.blocks)[-1]
     for _ in range(2):
         away = {"block_id": loose, "shift_real": [0.3, 0.0, 0.0]}
         assert machine.act("shift_block", away).ok
     scenario = Scenario(duration_s=2.0, control=DRIVEN)
-    trajectory = simulate(machine, scenario, engine, controls=(_press("DownArrow", 1.0),))
+    trajectory = simulate(machine, scenario, engine, controls=(press("DownArrow", 1.0),))
     assert _told(trajectory) == [("grabbed", loose), ("released", loose)]
     height = trajectory.positions[:, trajectory.block_ids.index(loose), 2].astype(float)
     assert np.ptp(height[2:25]) < 0.06
     assert height[-1] == pytest.approx(0.5, abs=0.1)
 
 
-def test_an_arm_carries_what_it_holds(engine: str) -> None:
+def test_an_arm_carries_what_it_holds(engine) -> None:
     draft = KeyedDraft(modules="workshop")
     start = draft.start()
     for side in (EAST, WEST, NORTH, SOUTH):
@@ -160,7 +155,7 @@ def test_an_arm_carries_what_it_holds(engine: str) -> None:
         size=(1.0, 1.0, 1.0), initial_mass=3.0, final_mass=3.0, ramp_s=1.0, at=(x, y, z - 1.05)
     )
     scenario = Scenario(duration_s=4.0, cargo=cargo, control=DRIVEN)
-    keys = (_press("LeftArrow", 0.5, 1.0), _press("DownArrow", 3.0))
+    keys = (press("LeftArrow", 0.5, 1.0), press("DownArrow", 3.0))
     trajectory = simulate(draft.machine, scenario, engine, controls=keys)
     assert _told(trajectory) == [("grabbed", "cargo"), ("released", "cargo")]
     assert not trajectory.breaks

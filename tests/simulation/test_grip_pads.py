@@ -32,13 +32,13 @@ def _slid(engine: str, slope_deg: float, *, pads: bool) -> np.ndarray:
     return positions @ np.array([0.0, -math.cos(slope), -math.sin(slope)])
 
 
-def test_pads_hold_on_a_slope_that_wood_slides_down(engine: str) -> None:
+def test_pads_hold_on_a_slope_that_wood_slides_down(engine) -> None:
     wood, pads = (_slid(engine, 45.0, pads=with_pads) for with_pads in (False, True))
     assert wood[-1] - wood[25] > 5.0
     assert abs(pads[-1] - pads[25]) < 0.3
 
 
-def test_pads_slide_as_their_friction_says(engine: str) -> None:
+def test_pads_slide_as_their_friction_says(engine) -> None:
     slope = math.radians(58.0)
     way = _slid(engine, 58.0, pads=True)
     speeds = np.diff(way) * 25.0

@@ -9,7 +9,7 @@ HEAVY = ("pybullet", "mujoco", "pyarrow", "scipy", "matplotlib", "PIL")
 
 
 @pytest.mark.parametrize("library", ["buildarena_simulation", "buildarena_benchmark"])
-def test_importing_a_library_loads_nothing_heavy(library: str) -> None:
+def test_importing_a_library_loads_nothing_heavy(library) -> None:
     program = f"import sys, {library}; print(*sorted(set({HEAVY!r}) & set(sys.modules)))"
     done = subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, check=True

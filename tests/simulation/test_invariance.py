@@ -8,10 +8,10 @@ from support.long_tests import long, slow_on_pybullet
 from support.machines.drafts import KeyedDraft
 from support.machines.families import beam, deck
 from support.machines.random_machines import TASKS, random_machine
+from support.machines.trials import trial
 
-from buildarena_benchmark import Score, Task, score
+from buildarena_benchmark import Task
 from buildarena_geometry import Machine
-from buildarena_simulation import simulate
 from buildarena_simulation.scenario import TerrainBox
 from buildarena_worker.builtin.designs.drafting import EAST, NORTH, SOUTH, WEST
 
@@ -24,24 +24,18 @@ def _turned(machine: Machine, yaw_deg: float) -> Machine:
     return whole
 
 
-def _tried(task: Task, machine: Machine, engine: str, **changes: Any) -> Score:
-    scenario = task.scenario.model_copy(update=changes)
-    return score(task, machine, simulate(machine, scenario, engine))
-
-
 @slow_on_pybullet
 @pytest.mark.parametrize("yaw_deg", [90, long(180), long(270)])
-def test_a_turned_bridge_carries_the_same(
-    engine: str, tasks: dict[str, Task], yaw_deg: int
-) -> None:
+def test_a_turned_bridge_carries_the_same(engine, tasks, yaw_deg) -> None:
     task = tasks["support-1"]
     for machine in (deck(5, 7), beam(9, "t")):
         # A deck is as long across as along, so the gap turns with it.
         terrain = task.scenario.terrain
         if yaw_deg != 180:
             terrain = tuple(_turned_box(box) for box in terrain)
-        straight = _tried(task, machine, engine).metrics["load_at_first_break"]
-        turned = _tried(task, _turned(machine, yaw_deg), engine, terrain=terrain, **_unturned(task))
+        straight = trial(task, machine, engine)[0].metrics["load_at_first_break"]
+        changes = {"terrain": terrain, **_unturned(task)}
+        turned, _ = trial(task, _turned(machine, yaw_deg), engine, **changes)
         found = turned.metrics["load_at_first_break"]
         assert found == pytest.approx(straight, rel=TOLERANCE[engine])
 
@@ -72,9 +66,9 @@ def _turning_car(*, mirrored: bool) -> Machine:
     return draft.machine
 
 
-def test_a_mirrored_car_drives_as_far(engine: str, tasks: dict[str, Task]) -> None:
+def test_a_mirrored_car_drives_as_far(engine, tasks) -> None:
     task = tasks["transport-1"]
-    found = [_tried(task, _turning_car(mirrored=m), engine) for m in (False, True)]
+    found = [trial(task, _turning_car(mirrored=m), engine)[0] for m in (False, True)]
     assert found[0].success == found[1].success
     assert found[0].indicator == pytest.approx(found[1].indicator, rel=TOLERANCE[engine])
 
@@ -82,7 +76,7 @@ def test_a_mirrored_car_drives_as_far(engine: str, tasks: dict[str, Task]) -> No
 @pytest.mark.parametrize(
     "task", [long(task) if task in {"transport-2", "transport-3"} else task for task in TASKS]
 )
-def test_engines_agree_on_machines_that_nobody_chose(task: str) -> None:
+def test_engines_agree_on_machines_that_nobody_chose(task) -> None:
     result = compared("basic", task, seed=5)
     assert result.same
     assert result.close

@@ -37,7 +37,7 @@ def _tried(rig: Rig, engine: str, duration_s: float = 2.0) -> Trajectory:
 
 
 @pytest.mark.parametrize("joint", KINDS)
-def test_a_joint_bears_what_hangs_on_it(engine: str, joint: str) -> None:
+def test_a_joint_bears_what_hangs_on_it(engine, joint) -> None:
     rig, seat = _hung(joint, 3)
     trajectory = _tried(rig, engine, 3.0)
     assert not trajectory.breaks
@@ -70,7 +70,7 @@ def test_a_joint_breaks_above_its_strength_and_lets_go(
     assert (height[0] - height[-1] > 2.0) != holds
 
 
-def test_a_swinging_hinge_bears_the_pull_of_its_swing(engine: str) -> None:
+def test_a_swinging_hinge_bears_the_pull_of_its_swing(engine) -> None:
     # A bob that falls from level pulls three times its weight at the bottom.
     rig = Rig()
     swivel = rig.attach(rig.row(rig.top, NORTH, 3)[-1], NORTH, "Swivel")
@@ -87,7 +87,7 @@ def test_a_swinging_hinge_bears_the_pull_of_its_swing(engine: str) -> None:
     assert loads.max() < 1.0
 
 
-def test_what_a_motor_exerts_goes_into_its_base(engine: str) -> None:
+def test_what_a_motor_exerts_goes_into_its_base(engine) -> None:
     # A block that spins an arm against gravity's moment hands that moment on to its mount.
     rig = Rig()
     block = rig.attach(rig.row(rig.top, NORTH, 3)[-1], NORTH, "Steering Block")
@@ -99,7 +99,7 @@ def test_what_a_motor_exerts_goes_into_its_base(engine: str) -> None:
     assert level > moment * 0.9
 
 
-def test_pieces_fly_apart_with_the_motion_they_had(engine: str) -> None:
+def test_pieces_fly_apart_with_the_motion_they_had(engine) -> None:
     # A spinning arm whose hub breaks away keeps turning at the speed it had.
     rig = Rig()
     block = rig.attach(rig.top, UP, "Spinning Block")

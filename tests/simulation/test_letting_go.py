@@ -35,9 +35,7 @@ def _fallen(machine: Machine, engine: str, *, pressed: bool = True) -> Trajector
 
 @pytest.mark.parametrize(("below", "above"), [(1, 1), (6, 2), (2, 9)])
 @pytest.mark.parametrize("across", [False, True])
-def test_both_sides_leave_with_the_same_momentum(
-    engine: str, below: int, above: int, across: bool
-) -> None:
+def test_both_sides_leave_with_the_same_momentum(engine, below, above, across) -> None:
     machine, leaving = _staged(below, above, across=across)
     trajectory = _fallen(machine, engine)
     structure = structure_of(machine)
@@ -54,7 +52,7 @@ def test_both_sides_leave_with_the_same_momentum(
     assert masses @ gained == pytest.approx(0.0, abs=0.02 * IMPULSE)
 
 
-def test_what_lets_go_is_told_and_is_no_break(engine: str) -> None:
+def test_what_lets_go_is_told_and_is_no_break(engine) -> None:
     machine, leaving = _staged(1, 1)
     trajectory = _fallen(machine, engine)
     assert trajectory.breaks == ()
@@ -71,14 +69,14 @@ def test_what_lets_go_is_told_and_is_no_break(engine: str) -> None:
     assert write_trajectory(_fallen(machine, engine)) == write_trajectory(trajectory)
 
 
-def test_without_its_key_it_holds(engine: str) -> None:
+def test_without_its_key_it_holds(engine) -> None:
     machine, _ = _staged(1, 1)
     trajectory = _fallen(machine, engine, pressed=False)
     assert trajectory.events == ()
     assert (trajectory.pieces == 0).all()
 
 
-def test_one_that_is_braced_across_lets_go_and_stays(engine: str) -> None:
+def test_one_that_is_braced_across_lets_go_and_stays(engine) -> None:
     draft = KeyedDraft(modules="workshop")
     start = draft.start()
     decoupler = draft.attach(start, UP, "Decoupler")

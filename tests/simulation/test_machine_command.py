@@ -50,7 +50,7 @@ def test_json_tells_the_score_and_nothing_else(run) -> None:
     assert report["metrics"]["parts"] == 7
 
 
-def test_a_document_a_log_and_a_bare_list_are_the_same_machine(run, tmp_path: Path) -> None:
+def test_a_document_a_log_and_a_bare_list_are_the_same_machine(run, tmp_path) -> None:
     machine = beam(7)
     forms = {
         "document.json": machine.to_document(),
@@ -67,7 +67,7 @@ def test_a_document_a_log_and_a_bare_list_are_the_same_machine(run, tmp_path: Pa
 
 
 @pytest.mark.parametrize("kind", ["png", "gif", "mp4"])
-def test_a_film_shows_the_trial(run, tmp_path: Path, kind: str) -> None:
+def test_a_film_shows_the_trial(run, tmp_path, kind) -> None:
     video, data = tmp_path / f"film.{kind}", tmp_path / "beam.parquet"
     file = str(DATA / "beam.json")
     done = run("simulate", file, "--engine", "mujoco", "--trajectory", str(data))
@@ -89,7 +89,7 @@ def test_a_film_shows_the_trial(run, tmp_path: Path, kind: str) -> None:
     assert len(colors) > 8
 
 
-def test_a_seed_varies_the_start(run, tmp_path: Path) -> None:
+def test_a_seed_varies_the_start(run, tmp_path) -> None:
     starts = []
     for more in ([], ["--seed", "1"], ["--seed", "2"]):
         data = tmp_path / "shifted.parquet"
@@ -128,7 +128,7 @@ def test_seeds_and_a_single_trials_options_exclude_each_other(run) -> None:
     assert "--seed" in done.output
 
 
-def test_an_empty_machine_is_a_failed_trial_not_a_crash(run, tmp_path: Path) -> None:
+def test_an_empty_machine_is_a_failed_trial_not_a_crash(run, tmp_path) -> None:
     file = tmp_path / "empty.json"
     file.write_text("[]", encoding="utf-8")
     done = run("simulate", str(file), "--json")
@@ -145,9 +145,7 @@ def test_an_empty_machine_is_a_failed_trial_not_a_crash(run, tmp_path: Path) -> 
         ("[]", ["--engine", "havok"], "pybullet, mujoco"),
     ],
 )
-def test_bad_input_is_reported_in_one_line(
-    run, tmp_path: Path, content: str, arguments: list[str], rendered: str
-) -> None:
+def test_bad_input_is_reported_in_one_line(run, tmp_path, content, arguments, rendered) -> None:
     file = tmp_path / "machine.json"
     file.write_text(content, encoding="utf-8")
     if "--engine" in arguments:
@@ -165,9 +163,7 @@ def test_an_unknown_task_is_reported_with_the_known_ones(run) -> None:
 
 
 @pytest.mark.parametrize("form", ["log", "document"])
-def test_a_machine_that_breaks_a_constraint_is_not_simulated(
-    run, tmp_path: Path, form: str
-) -> None:
+def test_a_machine_that_breaks_a_constraint_is_not_simulated(run, tmp_path, form) -> None:
     name = "rule-breakers/loose-cannon"
     machine = load_machine(name)
     content = actions_of(name) if form == "log" else machine.to_document()

@@ -1,13 +1,12 @@
 """What a user's module file says is what is simulated."""
 
-import copy
-import json
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from support.machines.building import BLOCK, built, connect
+from support.machines.module_files import BASIC, like, module_file
 
 from buildarena_geometry import Catalogue, Machine, load_catalogue
 from buildarena_simulation import Scenario, simulate
@@ -15,35 +14,19 @@ from buildarena_simulation.control import heated_cannons, recoil
 from buildarena_simulation.machine import structure_of
 from buildarena_simulation.scenario import Control
 
-FILE = resources.files("buildarena_geometry.modules").joinpath("modules.yaml")
-BASIC = {module["name"]: module for module in json.loads(FILE.read_text())["modules"]}
-
 
 def _other(name: str, **fields: Any) -> dict[str, Any]:
-    return {**copy.deepcopy(BASIC[name]), "name": "Other", **fields}
+    return like(name, "Other", **fields)
 
 
 def _catalogue(folder: Path, module: dict[str, Any]) -> Catalogue:
-    file = folder / "modules.json"
-    file.write_text(json.dumps({"version": 1, "modules": [module]}))
-    return load_catalogue(file)
-
-
-def _built(catalogue: Catalogue | None, *parts: tuple[str, str, str]) -> Machine:
-    machine = Machine(catalogue=catalogue)
-    assert machine.act("start").ok
-    for base, face, module in parts:
-        arguments = {"base_block": base, "face": face, "new_block": module}
-        assert machine.act("attach_block_to", arguments).ok
-    return machine
+    return load_catalogue(module_file(folder, module))
 
 
 def _driven_car(catalogue: Catalogue | None, wheel: str) -> Machine:
     """A car of three blocks and four wheels that drives north from 0.2 s on."""
     sides = tuple((base, face, wheel) for base in ("2", "3") for face in "AB")
-    machine = _built(
-        catalogue, ("1", "E", "Small Wooden Block"), ("1", "F", "Small Wooden Block"), *sides
-    )
+    machine = built(("1", "E", BLOCK), ("1", "F", BLOCK), *sides, catalogue=catalogue)
     for block in ("4", "5", "6", "7"):
         if "<South>" in machine.act("get_block_details", {"block_id": block}).text.split("\n")[0]:
             assert machine.act("flip_spin", {"block_id": block}).ok
@@ -54,7 +37,7 @@ def _driven_car(catalogue: Catalogue | None, wheel: str) -> Machine:
     return machine
 
 
-def test_a_wheel_turns_at_its_own_speed(tmp_path: Path, engine: str) -> None:
+def test_a_wheel_turns_at_its_own_speed(tmp_path, engine) -> None:
     motor = {**BASIC["Powered Wheel"]["motor"], "speed_rpm": 50}
     slow = _catalogue(tmp_path, _other("Powered Wheel", motor=motor))
     scenario = Scenario(duration_s=3.0, control=Control(mode="agent"))
@@ -67,21 +50,21 @@ def test_a_wheel_turns_at_its_own_speed(tmp_path: Path, engine: str) -> None:
 
 @pytest.mark.parametrize("name", ["Powered Wheel", "Water Cannon", "Torch", "Small Wooden Block"])
 def test_a_file_that_says_nothing_of_physics_is_simulated_like_its_kind(
-    tmp_path: Path, engine: str, name: str
+    tmp_path, engine, name
 ) -> None:
     new = ("motor", "thrust", "physics")
     entry = {key: value for key, value in _other(name).items() if key not in new}
     catalogue = _catalogue(tmp_path, entry)
     scenario = Scenario(duration_s=0.4, control=Control(mode="held"))
     first, second = (
-        simulate(_built(catalogue, ("1", "A", part), ("1", "B", part)), scenario, engine)
+        simulate(built(("1", "A", part), ("1", "B", part), catalogue=catalogue), scenario, engine)
         for part in (name, "Other")
     )
     assert (first.positions == second.positions).all()
     assert (first.quaternions == second.quaternions).all()
 
 
-def test_a_cannon_pushes_and_is_heated_as_its_entry_says(tmp_path: Path) -> None:
+def test_a_cannon_pushes_and_is_heated_as_its_entry_says(tmp_path) -> None:
     thrust = {
         **BASIC["Water Cannon"]["thrust"],
         "along": -0.5,
@@ -90,7 +73,7 @@ def test_a_cannon_pushes_and_is_heated_as_its_entry_says(tmp_path: Path) -> None
         "spheres": [{"along": 3.0, "radius": 0.5}],
     }
     catalogue = _catalogue(tmp_path, _other("Water Cannon", thrust=thrust))
-    structure = structure_of(_built(catalogue, ("1", "A", "Other"), ("1", "B", "Torch")))
+    structure = structure_of(built(("1", "A", "Other"), ("1", "B", "Torch"), catalogue=catalogue))
     (cannon,), (torch,) = structure.cannons, structure.torches
     expected = structure.shown[cannon] - 0.5 * structure.directions[cannon]
     assert structure.thrust_points[0] == pytest.approx(expected)
@@ -105,11 +88,10 @@ def test_a_cannon_pushes_and_is_heated_as_its_entry_says(tmp_path: Path) -> None
     assert hot / cold == pytest.approx(10)
 
 
-def test_a_ropes_module_is_known_by_what_it_is_and_not_by_its_name(tmp_path: Path) -> None:
+def test_a_ropes_module_is_known_by_what_it_is_and_not_by_its_name(tmp_path) -> None:
     catalogue = _catalogue(tmp_path, _other("Brace", link="rope", mass=0.2))
-    machine = _built(catalogue, ("1", "A", "Small Wooden Block"))
-    ends = {"block_a": "1", "face_a": "C", "block_b": "2", "face_b": "E", "connector": "Other"}
-    assert machine.act("connect_blocks", ends).ok
+    machine = built(("1", "A", BLOCK), catalogue=catalogue)
+    assert connect(machine, "1", "C", "2", "E", connector="Other").ok
     structure = structure_of(machine)
     assert structure.ropes.names == ("Other 3",)
     assert structure.masses.sum() == pytest.approx(0.25 + 0.3 + 0.2)

@@ -1,13 +1,13 @@
 """Trials whose machine is let go in the air, whose cargo has a place, whose keys end."""
 
 import json
-from collections.abc import Callable
 
 import numpy as np
 import pytest
 from pydantic import ValidationError
+from support.machines.building import built
 
-from buildarena_geometry import KeyPress, Machine
+from buildarena_geometry import KeyPress
 from buildarena_simulation import MachineNotSimulable, Scenario, simulate
 from buildarena_simulation.constants import GRAVITY
 from buildarena_simulation.control import ended_presses
@@ -18,16 +18,6 @@ BOX = {"size": [1, 1, 1], "initial_mass": 2, "final_mass": 2, "ramp_s": 1}
 
 def scenario(**fields: object) -> Scenario:
     return Scenario.model_validate({"duration_s": 0.4, **fields})
-
-
-@pytest.fixture
-def beam() -> Machine:
-    machine = Machine()
-    machine.act("start", {})
-    machine.act(
-        "attach_block_to", {"base_block": "1", "face": "E", "new_block": "Small Wooden Block"}
-    )
-    return machine
 
 
 def test_unused_additions_leave_a_scenario_as_it_was() -> None:
@@ -46,7 +36,7 @@ def test_unused_additions_leave_a_scenario_as_it_was() -> None:
 
 
 @pytest.mark.parametrize("seed", [None, 3])
-def test_a_released_machine_flies_a_parabola(engine: str, beam: Machine, seed: int | None) -> None:
+def test_a_released_machine_flies_a_parabola(engine, beam, seed) -> None:
     given = scenario(placement={"kind": "released", "height": 40, "velocity": [3, 15, 2]})
     trial = simulate(beam, given, engine, seed=seed)
     start, t = trial.positions[0, 0].astype(float), 0.4
@@ -57,7 +47,7 @@ def test_a_released_machine_flies_a_parabola(engine: str, beam: Machine, seed: i
     assert moved[2] == pytest.approx(2 * t - GRAVITY * t**2 / 2, rel=0.06)
 
 
-def test_a_cargo_stands_at_its_place(engine: str, beam: Machine) -> None:
+def test_a_cargo_stands_at_its_place(engine, beam) -> None:
     trial = simulate(beam, scenario(cargo=BOX | {"at": [3, 4, 0]}), engine)
     assert trial.cargo_position is not None
     assert np.abs(trial.cargo_position - [3, 4, 0.5]).max() < 0.02
@@ -69,19 +59,14 @@ WALL = {"center": [0, 2.2, 1], "size": [4, 1, 2]}
 @pytest.mark.parametrize(
     ("given", "named"),
     [
-        (
-            {"cargo": BOX | {"at": [0, 1.6, 0]}},
-            r"block 2 \(Small Wooden Block\) overlaps the cargo",
-        ),
+        ({"cargo": BOX | {"at": [0, 1.6, 0]}}, r"2 \(Small Wooden Block\) overlaps the cargo"),
         ({"cargo": BOX | {"at": [0.2, 0, 0]}}, r"block 1 \(Starting Block\) overlaps the cargo"),
         ({"terrain": [WALL | {"center": [0, 1.9, 1]}]}, r"block 2 .* overlaps terrain 1"),
         ({"terrain": [WALL | {"center": [0, 2.5, 0.2], "slope_deg": 45}]}, "terrain 1"),
         ({"terrain": [WALL | {"center": [5, 9, 9]}, WALL | {"center": [0, 0, 0]}]}, "terrain 2"),
     ],
 )
-def test_a_place_that_is_taken_is_refused(
-    beam: Machine, given: dict[str, object], named: str
-) -> None:
+def test_a_place_that_is_taken_is_refused(beam, given, named) -> None:
     with pytest.raises(MachineNotSimulable, match=named):
         simulate(beam, scenario(clear_start=True, **given))
     simulate(beam, scenario(**given))  # only where the scenario asks for it
@@ -96,14 +81,12 @@ def test_a_place_that_is_taken_is_refused(
         {"terrain": [WALL | {"center": [0, 3.1, 0], "slope_deg": 45}]},
     ],
 )
-def test_what_is_only_near_is_not(beam: Machine, given: dict[str, object]) -> None:
+def test_what_is_only_near_is_not(beam, given) -> None:
     simulate(beam, scenario(clear_start=True, **given))
 
 
 def test_a_wheel_is_round_to_a_ridge() -> None:
-    machine = Machine()
-    machine.act("start", {})
-    machine.act("attach_block_to", {"base_block": "1", "face": "A", "new_block": "Powered Wheel"})
+    machine = built(("1", "A", "Powered Wheel"))
     # A ridge half a unit high: its box's corner lies inside the square around the wheel only.
     ridge = {"size": [9, 0.8, 0.8], "slope_deg": 45}
     peak = 0.5 - 0.4 * np.sqrt(2)
@@ -113,18 +96,12 @@ def test_a_wheel_is_round_to_a_ridge() -> None:
         simulate(machine, scenario(clear_start=True, terrain=[ridge | {"center": [0, 0.8, peak]}]))
 
 
-def test_keys_end_when_the_control_says_so(make_presses: Callable[..., list[KeyPress]]) -> None:
-    presses = make_presses((1.0, 2.0), (4.0, 9.0), (5.5, 1.0), (5.0, 0.0))
+def test_keys_end_when_the_control_says_so() -> None:
+    times = ((1.0, 2.0), (4.0, 9.0), (5.5, 1.0), (5.0, 0.0))
+    presses = [KeyPress(time_s=begin, key="UpArrow", hold_for_s=hold) for begin, hold in times]
     ended = ended_presses(presses, Control(mode="agent", until_s=5.0))
     assert [(press.time_s, press.hold_for_s) for press in ended] == [(1.0, 2.0), (4.0, 1.0)]
     assert ended_presses(presses, Control(mode="agent")) is presses
-
-
-@pytest.fixture
-def make_presses() -> Callable[..., list[KeyPress]]:
-    return lambda *times: [
-        KeyPress(time_s=begin, key="UpArrow", hold_for_s=hold) for begin, hold in times
-    ]
 
 
 @pytest.mark.parametrize(
@@ -138,7 +115,7 @@ def make_presses() -> Callable[..., list[KeyPress]]:
         ({"marks": [{"name": "a\x00", "center": [0, 0, 0], "radius": 1}]}, "pattern"),
     ],
 )
-def test_what_makes_no_sense_is_refused(fields: dict[str, object], said: str) -> None:
+def test_what_makes_no_sense_is_refused(fields, said) -> None:
     with pytest.raises(ValidationError, match=said):
         scenario(**fields)
 

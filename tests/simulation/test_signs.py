@@ -1,7 +1,5 @@
 """Gates and marks stand in films where scorers look for them, and nothing touches them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

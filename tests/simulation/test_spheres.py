@@ -1,43 +1,31 @@
 """Modules whose body is a sphere, on both engines."""
 
-import copy
-import json
-from importlib import resources
 from pathlib import Path
 
 import numpy as np
 import pytest
+from support.machines.building import BLOCK, built
+from support.machines.module_files import like, module_file
 
 from buildarena_geometry import Machine, load_catalogue
 from buildarena_simulation import Scenario, simulate
 from buildarena_simulation.engines.base import rotation_of
 from buildarena_simulation.machine import structure_of
 
-FILE = resources.files("buildarena_geometry.modules").joinpath("modules.yaml")
-BLOCK = next(
-    module
-    for module in json.loads(FILE.read_text())["modules"]
-    if module["name"] == "Small Wooden Block"
-)
 RADIUS = 0.8
 
 
 @pytest.fixture
 def on_a_ball(tmp_path: Path) -> Machine:
     """A starting block on top of a ball that hangs from its lower face."""
-    ball = {**copy.deepcopy(BLOCK), "name": "Ball", "faces": [], "mass": 2.0, "grabs": False}
+    ball = like(BLOCK, "Ball", faces=[], mass=2.0, grabs=False)
     ball["body"] = [{"shape": "sphere", "radius": RADIUS, "center": [0, 0, 0.9]}]
     ball["physics"]["mass_at"] = "body"
-    file = tmp_path / "modules.json"
-    file.write_text(json.dumps({"version": 1, "modules": [ball]}))
-    machine = Machine(catalogue=load_catalogue(file))
-    assert machine.act("start", {"init_rotation": [0, 0, 40]}).ok
-    arguments = {"base_block": "1", "face": "D", "new_block": "Ball"}
-    assert machine.act("attach_block_to", arguments).ok
-    return machine
+    catalogue = load_catalogue(module_file(tmp_path, ball))
+    return built(("1", "D", "Ball"), catalogue=catalogue, init_rotation=[0, 0, 40])
 
 
-def test_a_ball_has_a_balls_volume_and_inertia(on_a_ball: Machine) -> None:
+def test_a_ball_has_a_balls_volume_and_inertia(on_a_ball) -> None:
     structure = structure_of(on_a_ball)
     shape = structure.parts[1].shapes[0]
     assert shape.volume == pytest.approx(4 / 3 * np.pi * RADIUS**3)
@@ -47,7 +35,7 @@ def test_a_ball_has_a_balls_volume_and_inertia(on_a_ball: Machine) -> None:
     )
 
 
-def test_a_ball_touches_the_ground_at_its_radius(on_a_ball: Machine, engine: str) -> None:
+def test_a_ball_touches_the_ground_at_its_radius(on_a_ball, engine) -> None:
     # Tilted by 40°, a box of the same extent would stand a third higher, or be pushed up there.
     trajectory = simulate(on_a_ball, Scenario(duration_s=0.2), engine=engine, seed=0)
     away = rotation_of(trajectory.quaternions[-1, 1].astype(float))[:, 2]

@@ -5,7 +5,6 @@ import json
 import numpy as np
 import pytest
 
-from buildarena_geometry import Machine
 from buildarena_simulation import Scenario, simulate
 from buildarena_simulation.engines.base import CargoBox
 from buildarena_simulation.machine import structure_of
@@ -17,19 +16,7 @@ SHORT = Scenario(duration_s=0.4)
 LOADED = Scenario(duration_s=0.4, cargo=Cargo(size=(1, 1, 1), final_mass=6, ramp_s=1))
 
 
-@pytest.fixture
-def beam() -> Machine:
-    machine = Machine()
-    machine.act("start", {})
-    machine.act(
-        "attach_block_to", {"base_block": "1", "face": "E", "new_block": "Small Wooden Block"}
-    )
-    return machine
-
-
-def test_the_scenarios_own_place_given_as_a_start_changes_nothing(
-    beam: Machine, engine: str
-) -> None:
+def test_the_scenarios_own_place_given_as_a_start_changes_nothing(beam, engine) -> None:
     there = start_of(structure_of(beam), LOADED)
     given = simulate(beam, LOADED, engine, start=there)
     usual = simulate(beam, LOADED, engine)
@@ -40,7 +27,7 @@ def test_the_scenarios_own_place_given_as_a_start_changes_nothing(
     assert np.array_equal(given.cargo_position, usual.cargo_position)
 
 
-def test_machine_and_cargo_start_where_they_are_put(beam: Machine, engine: str) -> None:
+def test_machine_and_cargo_start_where_they_are_put(beam, engine) -> None:
     box = CargoBox(size=np.ones(3), position=np.array([40.0, 2.0, 9.0]), mass=5.0)
     start = Start(position=np.array([7.0, -3.0, 6.0]), rotation=QUARTER, cargo=box)
     trajectory = simulate(beam, LOADED, engine, start=start)
@@ -51,7 +38,7 @@ def test_machine_and_cargo_start_where_they_are_put(beam: Machine, engine: str) 
     assert (fall > 1).all()  # nothing holds it up there
 
 
-def test_the_settings_tell_one_start_from_another(beam: Machine) -> None:
+def test_the_settings_tell_one_start_from_another(beam) -> None:
     high = [
         Start(position=np.array([0.0, 0.0, z]), rotation=np.eye(3), cargo=None) for z in (2, 2, 3)
     ]
@@ -76,9 +63,7 @@ def test_the_settings_tell_one_start_from_another(beam: Machine) -> None:
         ),
     ],
 )
-def test_a_start_that_contradicts_the_rest_is_refused(
-    beam: Machine, scenario: Scenario, cargo: CargoBox | None, seed: int | None, message: str
-) -> None:
+def test_a_start_that_contradicts_the_rest_is_refused(beam, scenario, cargo, seed, message) -> None:
     start = Start(position=np.zeros(3), rotation=np.eye(3), cargo=cargo)
     with pytest.raises(ValueError, match=message):
         simulate(beam, scenario, "mujoco", start=start, seed=seed)

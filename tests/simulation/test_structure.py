@@ -116,9 +116,7 @@ vectors = st.tuples(*[st.floats(-5, 5)] * 3).map(np.array)
 
 @given(vectors, vectors, st.integers(0, 20))
 @settings(max_examples=40, deadline=None)
-def test_a_break_keeps_linear_and_angular_momentum(
-    velocity: np.ndarray, spin: np.ndarray, broken: int
-) -> None:
+def test_a_break_keeps_linear_and_angular_momentum(velocity, spin, broken) -> None:
     structure = structure_of(deck(3, 7))
     before = _clusters(structure)
     holds = np.ones(len(structure.members), dtype=bool)
@@ -149,9 +147,7 @@ def test_a_break_keeps_linear_and_angular_momentum(
 
 @given(st.lists(st.tuples(vectors, vectors), min_size=2, max_size=12))
 @settings(max_examples=60, deadline=None)
-def test_sharing_a_patch_evenly_keeps_its_resultant(
-    contacts: list[tuple[np.ndarray, np.ndarray]],
-) -> None:
+def test_sharing_a_patch_evenly_keeps_its_resultant(contacts) -> None:
     point = np.array([p for p, _ in contacts])
     force = np.array([f for _, f in contacts])
     force[:, 2] = np.abs(force[:, 2]) + 20.0

@@ -8,47 +8,40 @@ from support.long_tests import long, slow_on_pybullet
 from support.machines.drafts import KeyedDraft
 from support.machines.families import beam, deck
 from support.machines.references import load_machine
+from support.machines.trials import trial
 
-from buildarena_benchmark import Score, Task, score
 from buildarena_geometry import Machine
-from buildarena_simulation import Trajectory, simulate
+from buildarena_simulation import simulate
 from buildarena_simulation.scenario import SpanPlacement, gap_terrain
 from buildarena_worker.builtin.designs.drafting import BRACE, EAST, NORTH, SOUTH, UP
 
 
-def _trial(task: Task, machine: Machine, engine: str) -> tuple[Score, Trajectory]:
-    trajectory = simulate(machine, task.scenario, engine)
-    return score(task, machine, trajectory), trajectory
-
-
 @slow_on_pybullet
-def test_more_bracing_carries_more(engine: str, tasks: dict[str, Task]) -> None:
+def test_more_bracing_carries_more(engine, tasks) -> None:
     beams = [beam(7, braces) for braces in ("", "t", "tb", "12")]
-    loads = [_trial(tasks["support-1"], actions, engine)[0].indicator for actions in beams]
+    loads = [trial(tasks["support-1"], actions, engine)[0].indicator for actions in beams]
     assert loads == sorted(loads)
     assert all(b > 1.2 * a for a, b in itertools.pairwise(loads))
 
 
-def test_a_braced_deck_carries_more_than_a_bare_one(engine: str, tasks: dict[str, Task]) -> None:
-    bare, _ = _trial(tasks["support-1"], deck(5, 7), engine)
-    braced, trajectory = _trial(tasks["support-1"], deck(5, 7, cross=True), engine)
+def test_a_braced_deck_carries_more_than_a_bare_one(engine, tasks) -> None:
+    bare, _ = trial(tasks["support-1"], deck(5, 7), engine)
+    braced, trajectory = trial(tasks["support-1"], deck(5, 7, cross=True), engine)
     assert braced.indicator > bare.indicator
     heavier = braced.metrics["load_at_first_break"], bare.metrics["load_at_first_break"]
     assert heavier[0] > 1.05 * heavier[1]
     assert min(event.time_s for event in trajectory.breaks) > 5.0  # not while the cargo is light
 
 
-def test_the_one_shot_bridge_stands_in_the_gap(engine: str, tasks: dict[str, Task]) -> None:
-    result, _ = _trial(tasks["support-1"], load_machine("one-shot-bridge"), engine)
+def test_the_one_shot_bridge_stands_in_the_gap(engine, tasks) -> None:
+    result, _ = trial(tasks["support-1"], load_machine("one-shot-bridge"), engine)
     assert result.metrics["load_when_decided"] >= 900.0
     assert (result.success, result.indicator) == (False, 0.0)
     assert result.flags == ("does_not_span",)
     assert result.metrics["floor_share"] > 0.5  # its pillars reach the gap's floor
 
 
-def test_the_one_shot_bridge_breaks_where_the_paper_reports_its_load(
-    engine: str, tasks: dict[str, Task]
-) -> None:
+def test_the_one_shot_bridge_breaks_where_the_paper_reports_its_load(engine, tasks) -> None:
     # Over a gap so deep that its pillars hang free; over the task's they stand on the floor.
     deep = tasks["support-1"].scenario.model_copy(
         update={
@@ -61,9 +54,9 @@ def test_the_one_shot_bridge_breaks_where_the_paper_reports_its_load(
 
 
 @slow_on_pybullet
-def test_overlap_on_the_terrain_never_hurts(engine: str, tasks: dict[str, Task]) -> None:
+def test_overlap_on_the_terrain_never_hurts(engine, tasks) -> None:
     loads = [
-        _trial(tasks["support-1"], beam(length), engine)[0].metrics["load_at_first_break"]
+        trial(tasks["support-1"], beam(length), engine)[0].metrics["load_at_first_break"]
         for length in (7, 11, 25)
     ]
     assert loads == sorted(loads)
@@ -92,40 +85,32 @@ def _beam_with(
         long(tuple((k, k + 1) for k in range(6))),
     ],
 )
-def test_connectors_stacked_on_the_same_faces_are_worth_one(
-    engine: str, tasks: dict[str, Task], spans: tuple[tuple[int, int], ...]
-) -> None:
+def test_connectors_stacked_on_the_same_faces_are_worth_one(engine, tasks, spans) -> None:
     task = tasks["support-1"]
-    once, often = (_trial(task, _beam_with(spans * n), engine)[0].metrics for n in (1, 5))
+    once, often = (trial(task, _beam_with(spans * n), engine)[0].metrics for n in (1, 5))
     assert often["load_at_first_break"] <= 1.02 * once["load_at_first_break"]
-    assert _trial(task, _beam_with(spans * 5), engine)[0].indicator < 1000.0
+    assert trial(task, _beam_with(spans * 5), engine)[0].indicator < 1000.0
 
 
 @slow_on_pybullet
-def test_winches_stacked_between_the_same_faces_are_one_rope(
-    engine: str, tasks: dict[str, Task]
-) -> None:
+def test_winches_stacked_between_the_same_faces_are_one_rope(engine, tasks) -> None:
     spans = ((0, 3), (3, 6), (0, 6))
     loads = [
-        _trial(tasks["support-1"], _beam_with(spans * n, connector="Winch"), engine)[0].indicator
+        trial(tasks["support-1"], _beam_with(spans * n, connector="Winch"), engine)[0].indicator
         for n in (1, 4)
     ]
     assert loads[1] <= 1.05 * loads[0]
 
 
-def test_a_beam_that_is_too_short_for_the_gap_scores_nothing(
-    engine: str, tasks: dict[str, Task]
-) -> None:
-    result, _ = _trial(tasks["support-1"], beam(5), engine)
+def test_a_beam_that_is_too_short_for_the_gap_scores_nothing(engine, tasks) -> None:
+    result, _ = trial(tasks["support-1"], beam(5), engine)
     assert not result.success
     assert result.indicator == 0.0
 
 
 @slow_on_pybullet
-def test_a_bridge_built_along_the_gap_is_turned_across_it(
-    engine: str, tasks: dict[str, Task]
-) -> None:
-    along = _trial(tasks["support-1"], beam(7, direction=EAST), engine)[0]
-    across = _trial(tasks["support-1"], beam(7), engine)[0]
+def test_a_bridge_built_along_the_gap_is_turned_across_it(engine, tasks) -> None:
+    along = trial(tasks["support-1"], beam(7, direction=EAST), engine)[0]
+    across = trial(tasks["support-1"], beam(7), engine)[0]
     assert along.success
     assert along.indicator == pytest.approx(across.indicator, rel=0.1)

@@ -8,7 +8,6 @@ from support.machines.drafts import KeyedDraft
 from support.machines.families import beam, car, deck, rocket
 from support.machines.references import load_machine
 
-from buildarena_benchmark import Task
 from buildarena_simulation import (
     SIMULATION_VERSION,
     Bearing,
@@ -33,7 +32,7 @@ def _equal(first: object, second: object) -> bool:
     return first == second
 
 
-def test_a_file_gives_back_the_trajectory(tasks: dict[str, Task]) -> None:
+def test_a_file_gives_back_the_trajectory(tasks) -> None:
     bridge = simulate(load_machine("one-shot-bridge"), tasks["support-1"].scenario, "mujoco")
     scenario = tasks["lift-1"].scenario.model_copy(update={"duration_s": 1.0})
     engine = simulate(rocket(), scenario, "mujoco")
@@ -44,9 +43,7 @@ def test_a_file_gives_back_the_trajectory(tasks: dict[str, Task]) -> None:
     assert len(write_trajectory(bridge)) < 250_000  # 51 blocks, 17 s, most of it falling debris
 
 
-def test_a_trajectory_tells_what_bears_the_machine_and_what_it_bears(
-    engine: str, tasks: dict[str, Task]
-) -> None:
+def test_a_trajectory_tells_what_bears_the_machine_and_what_it_bears(engine, tasks) -> None:
     machine = deck(5, 7)
     cargo = tasks["support-1"].scenario.cargo.model_copy(update={"final_mass": 100.0})
     scenario = tasks["support-1"].scenario.model_copy(update={"cargo": cargo})
@@ -63,9 +60,7 @@ def test_a_trajectory_tells_what_bears_the_machine_and_what_it_bears(
     assert len(wheels.wheel_ids) == 4
 
 
-def test_a_trajectory_tells_what_each_joint_bears_over_time(
-    engine: str, tasks: dict[str, Task]
-) -> None:
+def test_a_trajectory_tells_what_each_joint_bears_over_time(engine, tasks) -> None:
     trajectory = simulate(beam(7), tasks["support-1"].scenario, engine)
     loads = trajectory.joint_loads
     assert loads is not None
@@ -90,7 +85,7 @@ def test_a_trajectory_tells_what_each_joint_bears_over_time(
     assert 0 < first[broken // 2] < first[broken - 2]
 
 
-def test_ropes_bear_their_share_too(engine: str, tasks: dict[str, Task]) -> None:
+def test_ropes_bear_their_share_too(engine, tasks) -> None:
     draft = KeyedDraft()
     middle = draft.start()
     row = [*draft.row(middle, NORTH, 3), *draft.row(middle, SOUTH, 3)]
@@ -104,7 +99,7 @@ def test_ropes_bear_their_share_too(engine: str, tasks: dict[str, Task]) -> None
     assert loads[:, -1].max() == pytest.approx(peaks[-1].ratio, abs=0.003)
 
 
-def test_older_files_are_read_and_can_be_written(tasks: dict[str, Task]) -> None:
+def test_older_files_are_read_and_can_be_written(tasks) -> None:
     scenario = tasks["support-1"].scenario.model_copy(update={"duration_s": 1.0})
     trajectory = simulate(beam(7), scenario, "mujoco")
     old = write_trajectory(trajectory, schema=2)
@@ -119,7 +114,7 @@ def test_older_files_are_read_and_can_be_written(tasks: dict[str, Task]) -> None
         dataclasses.replace(trajectory, joint_loads=np.zeros((3, 2), dtype=np.float32))
 
 
-def test_a_break_makes_pieces(tasks: dict[str, Task]) -> None:
+def test_a_break_makes_pieces(tasks) -> None:
     trajectory = simulate(beam(7), tasks["support-1"].scenario, "mujoco")
     assert trajectory.pieces is not None
     assert len(set(trajectory.pieces[0])) == 1
@@ -129,7 +124,7 @@ def test_a_break_makes_pieces(tasks: dict[str, Task]) -> None:
     assert len(set(trajectory.pieces[broken - 1])) == 1
 
 
-def test_a_trajectory_tells_where_it_is_from(engine: str, tasks: dict[str, Task]) -> None:
+def test_a_trajectory_tells_where_it_is_from(engine, tasks) -> None:
     scenario = tasks["lift-1"].scenario.model_copy(update={"duration_s": 0.4})
     trajectory = simulate(rocket(), scenario, engine)
     assert (trajectory.engine, trajectory.engine_version) == (engine, engine_version(engine))
@@ -137,7 +132,7 @@ def test_a_trajectory_tells_where_it_is_from(engine: str, tasks: dict[str, Task]
     assert {"time_step_s", "gravity", "scenario"} <= set(trajectory.settings)
 
 
-def test_samples_are_taken_at_25_hz_from_the_start_on(tasks: dict[str, Task]) -> None:
+def test_samples_are_taken_at_25_hz_from_the_start_on(tasks) -> None:
     scenario = tasks["support-1"].scenario.model_copy(update={"duration_s": 2.0})
     trajectory = simulate(load_machine("one-shot-bridge"), scenario, "mujoco")
     assert np.allclose(trajectory.time_s, np.arange(51) / 25)
@@ -146,7 +141,7 @@ def test_samples_are_taken_at_25_hz_from_the_start_on(tasks: dict[str, Task]) ->
     assert trajectory.cargo_mass[-1] == pytest.approx(5 + 1495 * 0.1)
 
 
-def test_positions_are_the_points_shown_to_models(engine: str, tasks: dict[str, Task]) -> None:
+def test_positions_are_the_points_shown_to_models(engine, tasks) -> None:
     machine = car()
     scenario = tasks["transport-1"].scenario.model_copy(update={"duration_s": 0.04})
     trajectory = simulate(machine, scenario, engine)
@@ -157,7 +152,7 @@ def test_positions_are_the_points_shown_to_models(engine: str, tasks: dict[str, 
         assert np.allclose(turn, block.world_from_block.rotation, atol=1e-4)
 
 
-def test_only_tracked_blocks_are_recorded(tasks: dict[str, Task]) -> None:
+def test_only_tracked_blocks_are_recorded(tasks) -> None:
     scenario = tasks["transport-1"].scenario.model_copy(
         update={"duration_s": 0.2, "tracked_blocks": ("1", "3")}
     )
@@ -166,7 +161,7 @@ def test_only_tracked_blocks_are_recorded(tasks: dict[str, Task]) -> None:
     assert trajectory.positions.shape == (6, 2, 3)
 
 
-def test_arrays_are_read_only(tasks: dict[str, Task]) -> None:
+def test_arrays_are_read_only(tasks) -> None:
     scenario = tasks["lift-1"].scenario.model_copy(update={"duration_s": 0.2})
     trajectory = simulate(rocket(), scenario, "mujoco")
     with pytest.raises(ValueError, match="read-only"):
@@ -174,6 +169,6 @@ def test_arrays_are_read_only(tasks: dict[str, Task]) -> None:
 
 
 @pytest.mark.parametrize("data", [b"", b"PAR1", b"not a parquet file at all" * 10])
-def test_other_bytes_are_refused(data: bytes) -> None:
+def test_other_bytes_are_refused(data) -> None:
     with pytest.raises(TrajectoryFormatError):
         read_trajectory(data)

@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from support.machines.building import built
 
-from buildarena_geometry import Machine, module_set
+from buildarena_geometry import module_set
 from buildarena_simulation import Scenario, simulate
 from buildarena_simulation.engines.base import rotation_of
 from buildarena_simulation.scenario import Control
@@ -13,11 +14,9 @@ WAYS = {"<East>": (1, 0, 0), "<North>": (0, 1, 0), "<Up>": (0, 0, 1), "<Down>": 
 
 @pytest.mark.parametrize("flip", [False, True], ids=["as it is", "flipped"])
 @pytest.mark.parametrize("twist", [0, 90])
-def test_a_steering_hinge_swings_where_it_is_said_to(engine: str, twist: int, flip: bool) -> None:
-    machine = Machine(catalogue=module_set("workshop"))
-    attach = {"base_block": "1", "face": "A", "new_block": "Steering Hinge"}
-    assert machine.act("start", {"init_shift": [0, 0, 20]}).ok
-    assert machine.act("attach_block_to", attach).ok
+def test_a_steering_hinge_swings_where_it_is_said_to(engine, twist, flip) -> None:
+    hinge = ("1", "A", "Steering Hinge")
+    machine = built(hinge, catalogue=module_set("workshop"), init_shift=[0, 0, 20])
     assert machine.act("twist_block", {"block_id": "2", "angle": twist}).ok
     if flip:
         assert machine.act("flip_spin", {"block_id": "2"}).ok

@@ -1,7 +1,5 @@
 """What the JSON columns of an archive's rows may hold."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
@@ -32,7 +30,7 @@ def lists(levels: int, inner: Any) -> Any:
         {"a": lists(DEEPEST - 1, "x")},
     ],
 )
-def test_plain_values_come_in_as_they_are(value: Any) -> None:
+def test_plain_values_come_in_as_they_are(value) -> None:
     assert READ(value) == value
 
 
@@ -51,6 +49,6 @@ def test_plain_values_come_in_as_they_are(value: Any) -> None:
         ({"a": lists(DEEPEST, "x")}, "nested deeper than 64"),
     ],
 )
-def test_others_are_refused_wherever_they_stand(wrap: Any, value: Any, message: str) -> None:
+def test_others_are_refused_wherever_they_stand(wrap, value, message) -> None:
     with pytest.raises(ValidationError, match=message):
         READ(wrap(value))

@@ -1,7 +1,5 @@
 """A sweep out of one service and into another."""
 
-from __future__ import annotations
-
 import json
 import tracemalloc
 import zipfile
@@ -10,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from sqlalchemy import text
+from support.jobs import attach, execute
 from support.servers.databases import empty
 from support.stages import work
 
@@ -115,9 +113,8 @@ def test_pictures_and_evidence_arrive_too(context, played, elsewhere, tmp_path) 
         f"log-0-{n}.{end}": (end.encode(), kind) for n, (end, kind) in enumerate(EVIDENCE.items())
     }
     made["thumbnail"] = (b"drawn", EVIDENCE["png"])
-    with context.store.database.transaction() as connection:
-        infos = {name: context.artifacts.put(data, kind) for name, (data, kind) in made.items()}
-        context.store.results.attach(job, infos, connection=connection)
+    for name, (data, kind) in made.items():
+        attach(context, job, {name: data}, kind)
     again = tmp_path / "again.zip"
     write_archive(context.store.database, context.artifacts, sweep_id, again)
     other = elsewhere()
@@ -409,8 +406,7 @@ def test_a_forged_score_never_counts(archive, elsewhere) -> None:
 
 def test_a_sweep_that_is_here_keeps_its_jobs(played, context) -> None:
     sweep_id, file = played
-    with context.store.database.transaction() as connection:
-        connection.execute(text("DELETE FROM sweep_jobs WHERE job_id = (SELECT min(id) FROM jobs)"))
+    execute(context, "DELETE FROM sweep_jobs WHERE job_id = (SELECT min(id) FROM jobs)")
     with pytest.raises(ArchiveError, match=f"{sweep_id} is here, with other jobs"):
         read_archive(context, file)
 

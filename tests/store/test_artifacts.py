@@ -1,13 +1,9 @@
-from __future__ import annotations
-
-from pathlib import Path
-
 import pytest
 
 from buildarena_store import ArtifactDamagedError, ArtifactMissingError, ArtifactStore
 
 
-def test_bytes_come_back_by_their_hash(tmp_path: Path) -> None:
+def test_bytes_come_back_by_their_hash(tmp_path) -> None:
     store = ArtifactStore(tmp_path / "a")
     info = store.put(b"machine", "application/json")
     assert store.put(b"machine", "application/json") == info
@@ -15,7 +11,7 @@ def test_bytes_come_back_by_their_hash(tmp_path: Path) -> None:
     assert info.size == 7
 
 
-def test_damage_is_noticed(tmp_path: Path) -> None:
+def test_damage_is_noticed(tmp_path) -> None:
     store = ArtifactStore(tmp_path / "a")
     info = store.put(b"machine", "application/json")
     (tmp_path / "a" / info.hash[:2] / info.hash).write_bytes(b"machinf")
@@ -24,6 +20,6 @@ def test_damage_is_noticed(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["0" * 64, "../../etc/passwd", "", "A" * 64, "a" * 63])
-def test_what_is_not_there_is_an_error(tmp_path: Path, name: str) -> None:
+def test_what_is_not_there_is_an_error(tmp_path, name) -> None:
     with pytest.raises(ArtifactMissingError):
         ArtifactStore(tmp_path / "a").get(name)

@@ -1,37 +1,20 @@
-from __future__ import annotations
-
-import threading
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from decimal import Decimal
 
 import pytest
+from support.jobs import cancel, claim, journal_entry, set_budget
 
 from buildarena_pipeline.runtime.context import Context
-from buildarena_store import (
-    BudgetLimits,
-    JournalEntry,
-    Lease,
-    Need,
-    NewSweep,
-    StaleLeaseError,
-    Usage,
-)
+from buildarena_store import JournalEntry, Lease, Need, NewSweep, StaleLeaseError, Usage
 
 NEED = Need(cost_usd=Decimal("0.30"), tokens=300)
 
 
 def reply(sequence: int = 0, cost: str = "0.25") -> JournalEntry:
     usage = Usage(requests=1, input_tokens=200, output_tokens=50, cost_usd=Decimal(cost))
-    return JournalEntry(
-        sequence=sequence,
-        stage="build",
-        role="builder",
-        request_hash="h",
-        reply={},
-        usage=usage,
-        latency_s=0.1,
-    )
+    return journal_entry(sequence, usage=usage)
 
 
 @pytest.fixture
@@ -40,9 +23,9 @@ def sweep(context: Context, new_job) -> Callable[..., str]:
 
     def make(*seeds: int, name: str = "sweep_a", owner: str | None = None, **limits: object) -> str:
         new = [replace(new_job(seed), owner=owner, payer=name) for seed in seeds]
+        if limits:
+            set_budget(context, name, **limits)
         with context.store.database.transaction() as connection:
-            if limits:
-                context.store.budgets.set(name, BudgetLimits(**limits), connection=connection)
             context.store.jobs.add(new, connection=connection)
             context.store.sweeps.add(
                 NewSweep(id=name, name=name, spec={}, owner=owner),
@@ -54,13 +37,7 @@ def sweep(context: Context, new_job) -> Callable[..., str]:
     return make
 
 
-def claim(context: Context) -> Lease:
-    lease = context.store.leases.claim("construct", owner="w")
-    assert lease is not None
-    return lease
-
-
-def test_what_is_reserved_can_not_be_reserved_again(context: Context, sweep) -> None:
+def test_what_is_reserved_can_not_be_reserved_again(context, sweep) -> None:
     sweep(0, 1, 2, max_cost_usd=Decimal("0.70"))
     first, second, third = (claim(context) for _ in range(3))
     assert context.store.budgets.reserve(first, NEED) is None
@@ -75,7 +52,7 @@ def test_what_is_reserved_can_not_be_reserved_again(context: Context, sweep) -> 
 @pytest.mark.parametrize(
     "limits", [{"max_cost_usd": Decimal("0.5")}, {"max_tokens": 500}, {"max_requests": 1}]
 )
-def test_a_used_up_budget_says_what_is_lacking(context: Context, sweep, limits) -> None:
+def test_a_used_up_budget_says_what_is_lacking(context, sweep, limits) -> None:
     name = sweep(0, **limits)
     lease = claim(context)
     assert context.store.budgets.reserve(lease, NEED) is None
@@ -91,11 +68,9 @@ def test_a_used_up_budget_says_what_is_lacking(context: Context, sweep, limits) 
     assert budget.spent_requests == 1
 
 
-def test_a_key_pays_beside_its_sweep(context: Context, sweep) -> None:
+def test_a_key_pays_beside_its_sweep(context, sweep) -> None:
     sweep(0, owner="key_k", max_cost_usd=Decimal(10))
-    with context.store.database.transaction() as connection:
-        limits = BudgetLimits(max_requests=1)
-        context.store.budgets.set("key_k", limits, connection=connection)
+    set_budget(context, "key_k", max_requests=1)
     lease = claim(context)
     assert context.store.budgets.reserve(lease, NEED) is None
     context.store.journal.append(lease, reply())
@@ -108,33 +83,30 @@ def test_a_key_pays_beside_its_sweep(context: Context, sweep) -> None:
         assert budget.spent_requests == 1
 
 
-def test_a_budget_that_comes_later_counts_what_was_spent(context: Context, sweep) -> None:
+def test_a_budget_that_comes_later_counts_what_was_spent(context, sweep) -> None:
     name = sweep(0)
     context.store.journal.append(claim(context), reply())
-    with context.store.database.transaction() as connection:
-        context.store.budgets.set(name, BudgetLimits(max_requests=5), connection=connection)
+    set_budget(context, name, max_requests=5)
     budget = context.store.budgets.get(name)
     assert budget is not None
     assert (budget.spent_requests, budget.spent_tokens) == (1, 250)
 
 
-def test_the_end_of_a_hold_gives_its_reservation_back(context: Context, sweep) -> None:
+def test_the_end_of_a_hold_gives_its_reservation_back(context, sweep) -> None:
     sweep(0, 1, max_requests=1)
     first, second = claim(context), claim(context)
     assert context.store.budgets.reserve(first, NEED) is None
     assert context.store.budgets.reserve(second, NEED) is not None
     context.store.leases.hand_back(first)
     assert context.store.budgets.reserve(second, NEED) is None
-    with context.store.database.transaction() as connection:
-        context.store.jobs.cancel([second.job.id], connection=connection)
+    cancel(context, second.job.id)
     assert context.store.budgets.reserve(claim(context), NEED) is None
 
 
-def test_a_reply_that_came_too_late_was_paid_for(context: Context, sweep) -> None:
+def test_a_reply_that_came_too_late_was_paid_for(context, sweep) -> None:
     name = sweep(0, max_requests=5)
     lease = claim(context)
-    with context.store.database.transaction() as connection:
-        context.store.jobs.cancel([lease.job.id], connection=connection)
+    cancel(context, lease.job.id)
     with pytest.raises(StaleLeaseError):
         context.store.journal.append(lease, reply())
     context.store.budgets.charge_lost(lease, reply().usage)
@@ -143,9 +115,7 @@ def test_a_reply_that_came_too_late_was_paid_for(context: Context, sweep) -> Non
     assert budget.spent_requests == 1
 
 
-def test_a_stopped_sweep_passes_on_what_another_wants_and_holds_the_rest(
-    context: Context, sweep
-) -> None:
+def test_a_stopped_sweep_passes_on_what_another_wants_and_holds_the_rest(context, sweep) -> None:
     sweep(0, 1, max_requests=1)
     sweep(1, 2, name="sweep_b", owner="key_b")
     with context.store.lifecycle.command() as connection:
@@ -163,7 +133,7 @@ def test_a_stopped_sweep_passes_on_what_another_wants_and_holds_the_rest(
     assert context.store.jobs.get(jobs[0].id).state == "queued"
 
 
-def test_a_held_job_that_is_wanted_again_is_paid_by_who_wants_it(context: Context, sweep) -> None:
+def test_a_held_job_that_is_wanted_again_is_paid_by_who_wants_it(context, sweep) -> None:
     sweep(0, max_requests=1)
     with context.store.lifecycle.command() as connection:
         context.store.lifecycle.exhaust("sweep_a", "used up", connection=connection)
@@ -172,30 +142,20 @@ def test_a_held_job_that_is_wanted_again_is_paid_by_who_wants_it(context: Contex
     assert (job.state, job.payer) == ("queued", "sweep_b")
 
 
-def test_many_workers_together_never_reserve_more_than_there_is(context: Context, sweep) -> None:
+def test_many_workers_together_never_reserve_more_than_there_is(context, sweep) -> None:
     name = sweep(*range(8), owner="key_k", max_requests=20)
-    with context.store.database.transaction() as connection:
-        context.store.budgets.set("key_k", BudgetLimits(max_requests=25), connection=connection)
+    set_budget(context, "key_k", max_requests=25)
     leases = [claim(context) for _ in range(8)]
-    errors: list[BaseException] = []
 
     def work(lease: Lease) -> None:
-        try:
-            for sequence in range(5):
-                while (shortage := context.store.budgets.reserve(lease, NEED)) is not None:
-                    if not shortage.temporary:
-                        return
-                context.store.journal.append(lease, reply(sequence))
-        except BaseException as error:
-            errors.append(error)
-            raise
+        for sequence in range(5):
+            while (shortage := context.store.budgets.reserve(lease, NEED)) is not None:
+                if not shortage.temporary:
+                    return
+            context.store.journal.append(lease, reply(sequence))
 
-    threads = [threading.Thread(target=work, args=(lease,)) for lease in leases]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert not errors
+    with ThreadPoolExecutor(len(leases)) as threads:
+        list(threads.map(work, leases))
     budget = context.store.budgets.get(name)
     assert budget is not None
     assert budget.spent_requests == 20

@@ -1,7 +1,5 @@
 """Connections to the database over links that die, and pools whose connections all hang."""
 
-from __future__ import annotations
-
 import socket
 
 import pytest

@@ -1,7 +1,5 @@
 """Garbage collection removes what nothing refers to, late, and never anything else."""
 
-from __future__ import annotations
-
 import os
 import time
 from datetime import timedelta
@@ -9,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from sqlalchemy import text
+from support.jobs import attach, execute
 
 from buildarena_store import ArtifactMissingError
 from buildarena_store.artifacts import GarbageCollector
@@ -36,18 +35,11 @@ def age(folder: Path, days: float) -> None:
             os.utime(file, (then, then))
 
 
-def attach(context, job: str, name: str, data: bytes) -> str:
-    kept = context.artifacts.put(data, "text/plain")
-    with context.store.database.transaction() as connection:
-        context.store.results.attach(job, {name: kept}, connection=connection)
-    return kept.hash
-
-
 def test_only_old_bytes_that_nothing_refers_to_go_and_only_after_the_trash(
     context, add, collector, folder
 ) -> None:
     (job,) = add(1)
-    kept = attach(context, job, "machine", b"a bridge")
+    kept = attach(context, job, {"machine": b"a bridge"})["machine"]
     orphan = context.artifacts.put(b"an upload that was broken off", "text/plain").hash
     age(folder, 8)
     young = context.artifacts.put(b"its row is not committed yet", "text/plain").hash
@@ -71,18 +63,22 @@ def test_what_a_rollout_names_is_no_garbage(context, add, collector, folder, col
     (job,) = add(1)
     digest = context.artifacts.put(column.encode(), "text/plain").hash
     values = {"machine_hash": "0" * 64, "trajectory_hash": None, column: digest}
-    with context.store.database.transaction() as connection:
-        connection.execute(
-            text(
-                "INSERT INTO rollouts"
-                " (job_id, number, final, engine, machine_hash, trajectory_hash)"
-                " VALUES (:job, 0, true, 'mujoco', :machine_hash, :trajectory_hash)"
-            ),
-            {"job": job, **values},
-        )
+    execute(
+        context,
+        "INSERT INTO rollouts (job_id, number, final, engine, machine_hash, trajectory_hash)"
+        " VALUES (:job, 0, true, 'mujoco', :machine_hash, :trajectory_hash)",
+        {"job": job, **values},
+    )
     age(folder, 30)
     assert collector.collect().trashed == 0
     assert context.artifacts.get(digest) == column.encode()
+
+
+def attach_again(context, job: str, digest: str) -> None:
+    """A job refers to bytes that are in the trash."""
+    values = {"job": job, "hash": digest}
+    execute(context, "INSERT INTO artifacts VALUES (:hash, 'text/plain', 5)", values)
+    execute(context, "INSERT INTO job_artifacts VALUES (:job, 'machine', :hash)", values)
 
 
 def test_what_is_referred_to_again_comes_back_from_the_trash(
@@ -92,12 +88,7 @@ def test_what_is_referred_to_again_comes_back_from_the_trash(
     digest = context.artifacts.put(b"the same bridge", "text/plain").hash
     age(folder, 8)
     assert collector.collect().trashed == 1
-    with context.store.database.transaction() as connection:
-        known = {"hash": digest}
-        connection.execute(text("INSERT INTO artifacts VALUES (:hash, 'text/plain', 15)"), known)
-        connection.execute(
-            text("INSERT INTO job_artifacts VALUES (:job, 'machine', :hash)"), {"job": job, **known}
-        )
+    attach_again(context, job, digest)
     age(folder, 30)
     assert collector.collect().taken_back == 1
     assert context.artifacts.get(digest) == b"the same bridge"
@@ -113,14 +104,7 @@ def test_a_reference_that_appears_during_the_move_undoes_it(
 
     def and_somebody_refers(_: object, found: str) -> None:
         move(found)
-        with context.store.database.transaction() as connection:
-            connection.execute(
-                text("INSERT INTO artifacts VALUES (:hash, 'text/plain', 5)"), {"hash": found}
-            )
-            connection.execute(
-                text("INSERT INTO job_artifacts VALUES (:job, 'm', :hash)"),
-                {"job": job, "hash": found},
-            )
+        attach_again(context, job, found)
 
     monkeypatch.setattr(type(context.artifacts), "trash", and_somebody_refers)
     assert collector.collect().trashed == 0

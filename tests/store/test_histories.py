@@ -1,12 +1,11 @@
 """Histories leave the tables and come back as they were, to the byte."""
 
-from __future__ import annotations
-
 from datetime import timedelta
 from pathlib import Path
 
 import pytest
 from sqlalchemy import text
+from support.jobs import execute
 from support.stages import work
 
 from buildarena_pipeline.catalog.specs import SweepSpec
@@ -84,10 +83,7 @@ def test_young_and_errored_jobs_and_those_under_verification_keep_their_rows(
     before = rows(context)
     assert list(histories.pack_all(timedelta(days=1))) == []
     first, second = ids(context)
-    with context.store.database.transaction() as connection:
-        connection.execute(
-            text("UPDATE jobs SET outcome = 'errored' WHERE id = :id"), {"id": first}
-        )
+    execute(context, "UPDATE jobs SET outcome = 'errored' WHERE id = :id", {"id": first})
     context.store.verifications.request([second], owner=None)
     assert histories.waiting(NOW) == 0
     assert list(histories.pack_all(NOW)) == []

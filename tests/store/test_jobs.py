@@ -1,13 +1,11 @@
-from __future__ import annotations
-
 import pytest
+from support.jobs import claim
 
-from buildarena_pipeline.runtime.context import Context
 from buildarena_store import UnknownIdError
 from buildarena_store.tables import jobs
 
 
-def test_a_job_with_the_same_key_is_the_same_job(context: Context, new_job, add) -> None:
+def test_a_job_with_the_same_key_is_the_same_job(context, new_job, add) -> None:
     (first,) = add(1)
     with context.store.database.transaction() as connection:
         added = context.store.jobs.add([new_job(1), new_job(2)], connection=connection)
@@ -16,12 +14,12 @@ def test_a_job_with_the_same_key_is_the_same_job(context: Context, new_job, add)
     assert len(context.store.jobs.page(limit=10)) == 2
 
 
-def test_an_unknown_id_is_named(context: Context) -> None:
+def test_an_unknown_id_is_named(context) -> None:
     with pytest.raises(UnknownIdError, match="there is no job 'job_x'"):
         context.store.jobs.get("job_x")
 
 
-def test_pages_hold_every_job_once(context: Context, add) -> None:
+def test_pages_hold_every_job_once(context, add) -> None:
     ids = set(add(*range(7)))
     seen: list[str] = []
     after = None
@@ -43,12 +41,11 @@ def test_a_cancelled_job_is_opened_again_when_it_is_wanted_again(context, new_jo
     assert context.store.jobs.get(job_id).outcome is None
 
 
-def test_only_errored_jobs_are_retried(context: Context, add) -> None:
+def test_only_errored_jobs_are_retried(context, add) -> None:
     (job_id,) = add(1)
     with context.store.database.transaction() as connection:
         assert not context.store.jobs.retry(jobs.c.id == job_id, connection=connection)
-    lease = context.store.leases.claim("construct", owner="w")
-    assert lease is not None
+    lease = claim(context)
     context.store.leases.give_up(lease, "no key", reason="missing_key")
     assert context.store.jobs.get(job_id).outcome == "errored"
     with context.store.database.transaction() as connection:
@@ -56,10 +53,9 @@ def test_only_errored_jobs_are_retried(context: Context, add) -> None:
     assert context.store.jobs.get(job_id).state == "queued"
 
 
-def test_what_happened_to_a_job_is_reported_in_order(context: Context, add) -> None:
+def test_what_happened_to_a_job_is_reported_in_order(context, add) -> None:
     (job_id,) = add(1)
-    lease = context.store.leases.claim("construct", owner="w")
-    assert lease is not None
+    lease = claim(context)
     context.store.leases.hand_back(lease)
     kinds = [event.kind for event in context.store.events.after(0, job_id=job_id)]
     assert kinds == ["queued", "running", "queued"]

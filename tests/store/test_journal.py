@@ -1,14 +1,11 @@
-from __future__ import annotations
-
 from dataclasses import replace
 from decimal import Decimal
 
 import pytest
-from sqlalchemy import text
 from sqlalchemy.exc import IntegrityError
+from support.jobs import claim, execute, journal_entry, set_budget
 
-from buildarena_pipeline.runtime.context import Context
-from buildarena_store import BudgetLimits, JournalEntry, Usage
+from buildarena_store import JournalEntry, Usage
 from buildarena_store.jobs.journal import MAX_USD
 
 USAGE = Usage(
@@ -17,22 +14,12 @@ USAGE = Usage(
 
 
 def entry(sequence: int) -> JournalEntry:
-    return JournalEntry(
-        sequence=sequence,
-        stage="build",
-        role="builder",
-        request_hash="h",
-        reply={"text": "ü"},
-        usage=USAGE,
-        latency_s=0.5,
-        tries=2,
-    )
+    return journal_entry(sequence, reply={"text": "ü"}, usage=USAGE, tries=2)
 
 
-def test_a_reply_and_its_cost_are_written_together(context: Context, add) -> None:
+def test_a_reply_and_its_cost_are_written_together(context, add) -> None:
     (job_id,) = add(1)
-    lease = context.store.leases.claim("construct", owner="w")
-    assert lease is not None
+    lease = claim(context)
     context.store.journal.append(lease, entry(0))
     context.store.journal.append(lease, entry(1))
     with pytest.raises(IntegrityError):
@@ -45,20 +32,11 @@ def test_a_reply_and_its_cost_are_written_together(context: Context, add) -> Non
     assert read[0].usage == USAGE
 
 
-def met_faults(context: Context, job_id: str, faults: int) -> None:
-    with context.store.database.transaction() as connection:
-        connection.execute(
-            text("UPDATE jobs SET faults = :faults WHERE id = :id"),
-            {"faults": faults, "id": job_id},
-        )
-
-
 @pytest.mark.parametrize("finish", ["garbage", "out_of_time"])
-def test_what_is_no_answer_is_paid_for_and_no_progress(context: Context, add, finish) -> None:
+def test_what_is_no_answer_is_paid_for_and_no_progress(context, add, finish) -> None:
     (job_id,) = add(1)
-    lease = context.store.leases.claim("construct", owner="w")
-    assert lease is not None
-    met_faults(context, job_id, 3)
+    lease = claim(context)
+    execute(context, "UPDATE jobs SET faults = 3")
     context.store.journal.append(lease, replace(entry(0), reply={"text": "", "finish": finish}))
     job = context.store.jobs.get(job_id)
     assert (job.faults, job.requests, job.cost_usd) == (3, 1, Decimal("0.25"))
@@ -66,13 +44,11 @@ def test_what_is_no_answer_is_paid_for_and_no_progress(context: Context, add, fi
     assert context.store.jobs.get(job_id).faults == 0
 
 
-def test_sums_that_a_provider_claims_never_overflow(context: Context, add) -> None:
+def test_sums_that_a_provider_claims_never_overflow(context, add) -> None:
     (job_id,) = add(1)
-    with context.store.database.transaction() as connection:
-        connection.execute(text("UPDATE jobs SET payer = 'sweep_x'"))
-        context.store.budgets.set("sweep_x", BudgetLimits(max_requests=99), connection=connection)
-    lease = context.store.leases.claim("construct", owner="w")
-    assert lease is not None
+    execute(context, "UPDATE jobs SET payer = 'sweep_x'")
+    set_budget(context, "sweep_x", max_requests=99)
+    lease = claim(context)
     most = Usage(requests=1, input_tokens=10**7, cost_usd=Decimal(60_000_000))
     for sequence in range(3):
         context.store.journal.append(lease, replace(entry(sequence), usage=most))

@@ -1,7 +1,5 @@
 """Counts that triggers keep are those that counting finds, and the benchmark's database is real."""
 
-from __future__ import annotations
-
 import random
 
 import pytest

@@ -1,31 +1,16 @@
-from __future__ import annotations
-
 import threading
 import time
 from datetime import timedelta
 
 import pytest
 from sqlalchemy import text
+from support.jobs import cancel, claim, execute, expire_leases, finish, journal_entry
 
 from buildarena_pipeline.runtime.context import Context
-from buildarena_store import JobScore, JournalEntry, Leases, StaleLeaseError, Usage
-from buildarena_store.jobs.leases import Lease
-
-SCORE = JobScore(outcome="success", success=True, indicator=7.5)
+from buildarena_store import Leases, StaleLeaseError
 
 
-def claim(context: Context, owner: str = "w", hint: str | None = None) -> Lease:
-    lease = context.store.leases.claim("construct", owner=owner, hint=hint)
-    assert lease is not None
-    return lease
-
-
-def expire(context: Context) -> None:
-    with context.store.database.transaction() as connection:
-        connection.exec_driver_sql("UPDATE jobs SET lease_expires_at = now() - interval '1 s'")
-
-
-def test_a_job_is_leased_to_one_worker_at_a_time(context: Context, add) -> None:
+def test_a_job_is_leased_to_one_worker_at_a_time(context, add) -> None:
     add(*range(20))
     taken: list[str] = []
 
@@ -46,62 +31,51 @@ def test_the_hinted_job_is_taken_first_and_a_recovered_one_before_it(context, ad
     first, second, third = add(1, 2, 3)
     assert claim(context, hint=third).job.id == third
     lost = claim(context, hint=second)
-    expire(context)
+    expire_leases(context)
     assert set(context.store.leases.recover()) == {second, third}
     assert claim(context, hint=first).job.id in {lost.job.id, third}
 
 
-def test_a_hint_that_is_gone_still_brings_another_job(context: Context, add) -> None:
+def test_a_hint_that_is_gone_still_brings_another_job(context, add) -> None:
     (only,) = add(1)
     assert claim(context, hint="job_gone").job.id == only
     assert context.store.leases.claim("construct", owner="w") is None
     assert context.store.leases.claim("simulate.mujoco", owner="w") is None
 
 
-def test_a_stale_lease_can_write_nothing(context: Context, add) -> None:
+def test_a_stale_lease_can_write_nothing(context, add) -> None:
     (job_id,) = add(1)
     stale = claim(context, "slow")
-    expire(context)
+    expire_leases(context)
     context.store.leases.recover()
     fresh = claim(context, "quick")
     assert fresh.token > stale.token
-    entry = JournalEntry(
-        sequence=0,
-        stage="plan",
-        role="planner",
-        request_hash="h",
-        reply={},
-        usage=Usage(),
-        latency_s=0,
-    )
-    with pytest.raises(StaleLeaseError):
-        context.store.journal.append(stale, entry)
-    with pytest.raises(StaleLeaseError), context.store.database.transaction() as connection:
-        context.store.results.finish(stale, SCORE, connection=connection)
-    with pytest.raises(StaleLeaseError):
-        context.store.leases.hand_back(stale)
+    for write in (
+        lambda: context.store.journal.append(stale, journal_entry()),
+        lambda: finish(context, stale),
+        lambda: context.store.leases.hand_back(stale),
+    ):
+        with pytest.raises(StaleLeaseError):
+            write()
     assert context.store.journal.read(job_id) == []
-    with context.store.database.transaction() as connection:
-        context.store.results.finish(fresh, SCORE, connection=connection)
+    finish(context, fresh, indicator=7.5)
     job = context.store.jobs.get(job_id)
     assert (job.outcome, job.indicator) == ("success", 7.5)
 
 
-def test_a_scored_job_cannot_be_scored_again(context: Context, add) -> None:
+def test_a_scored_job_cannot_be_scored_again(context, add) -> None:
     add(1)
     lease = claim(context)
-    with context.store.database.transaction() as connection:
-        context.store.results.finish(lease, SCORE, connection=connection)
-    with pytest.raises(StaleLeaseError), context.store.database.transaction() as connection:
-        context.store.results.finish(lease, SCORE, connection=connection)
+    finish(context, lease)
+    with pytest.raises(StaleLeaseError):
+        finish(context, lease)
     assert context.store.leases.claim("construct", owner="w") is None
 
 
-def test_heartbeats_keep_a_lease_and_say_of_lost_ones(context: Context, add) -> None:
+def test_heartbeats_keep_a_lease_and_say_of_lost_ones(context, add) -> None:
     add(1, 2)
     kept, lost = claim(context), claim(context)
-    with context.store.database.transaction() as connection:
-        context.store.jobs.cancel([lost.job.id], connection=connection)
+    cancel(context, lost.job.id)
     assert context.store.leases.heartbeat([kept, lost]) == {kept.job.id: False}
     context.store.leases.duration = timedelta(seconds=0.05)
     context.store.leases.heartbeat([kept])
@@ -109,19 +83,19 @@ def test_heartbeats_keep_a_lease_and_say_of_lost_ones(context: Context, add) -> 
     assert context.store.leases.recover() == [kept.job.id]
 
 
-def test_a_job_that_keeps_losing_its_workers_is_given_up(context: Context, add) -> None:
+def test_a_job_that_keeps_losing_its_workers_is_given_up(context, add) -> None:
     (job_id,) = add(1)
     leases = Leases(context.store.database, duration_s=1, max_faults=2)
     for _ in range(2):
         assert leases.claim("construct", owner="w") is not None
-        expire(context)
+        expire_leases(context)
         leases.recover()
     job = context.store.jobs.get(job_id)
     assert (job.outcome, job.reason, job.success) == ("errored", "lost_worker", None)
     assert [attempt.result for attempt in context.store.jobs.attempts(job_id)] == ["lost", "lost"]
 
 
-def test_a_fault_waits_before_the_next_attempt(context: Context, add) -> None:
+def test_a_fault_waits_before_the_next_attempt(context, add) -> None:
     add(1)
     lease = claim(context)
     assert context.store.leases.fault(lease, "outage", delay_s=30, reason="provider_outage")
@@ -129,62 +103,48 @@ def test_a_fault_waits_before_the_next_attempt(context: Context, add) -> None:
     assert context.store.leases.to_notify("construct", 10) == []
 
 
-def test_handing_back_is_no_fault(context: Context, add) -> None:
+def test_handing_back_is_no_fault(context, add) -> None:
     (job_id,) = add(1)
     context.store.leases.hand_back(claim(context))
     job = context.store.jobs.get(job_id)
     assert (job.state, job.faults) == ("queued", 0)
 
 
-def test_workers_are_notified_of_waiting_jobs_once(context: Context, add) -> None:
+def test_workers_are_notified_of_waiting_jobs_once(context, add) -> None:
     ids = add(1, 2, 3)
     assert set(context.store.leases.to_notify("construct", 10)) == set(ids)
     assert context.store.leases.to_notify("construct", 10) == []
 
 
-def test_a_cancelled_job_frees_its_worker(context: Context, add) -> None:
+def test_a_cancelled_job_frees_its_worker(context, add) -> None:
     (job_id,) = add(1)
     lease = claim(context)
-    with context.store.database.transaction() as connection:
-        context.store.jobs.cancel([job_id], connection=connection)
-    with pytest.raises(StaleLeaseError), context.store.database.transaction() as connection:
-        context.store.results.finish(lease, SCORE, connection=connection)
+    cancel(context, job_id)
+    with pytest.raises(StaleLeaseError):
+        finish(context, lease)
     assert context.store.jobs.get(job_id).outcome == "cancelled"
 
 
-def test_a_job_that_gets_on_is_not_given_up(context: Context, add) -> None:
+def test_a_job_that_gets_on_is_not_given_up(context, add) -> None:
     (job_id,) = add(1)
     leases = Leases(context.store.database, duration_s=1, max_faults=2)
     for sequence in range(4):
         lease = leases.claim("construct", owner="w")
         assert lease is not None
-        entry = JournalEntry(
-            sequence=sequence,
-            stage="build",
-            role="builder",
-            request_hash="h",
-            reply={},
-            usage=Usage(),
-            latency_s=0,
-        )
-        context.store.journal.append(lease, entry)
-        expire(context)
+        context.store.journal.append(lease, journal_entry(sequence))
+        expire_leases(context)
         leases.recover()
     assert context.store.jobs.get(job_id).state == "queued"
 
 
 def owned(context: Context, add, owners: list[str | None]) -> list[str]:
     ids: list[str] = add(*range(len(owners)))
-    with context.store.database.transaction() as connection:
-        for job_id, owner in zip(ids, owners, strict=True):
-            connection.execute(
-                text("UPDATE jobs SET owner = :owner WHERE id = :id"),
-                {"owner": owner, "id": job_id},
-            )
+    values = [{"owner": owner, "id": id_} for id_, owner in zip(ids, owners, strict=True)]
+    execute(context, "UPDATE jobs SET owner = :owner WHERE id = :id", values)
     return ids
 
 
-def test_owners_take_turns(context: Context, add) -> None:
+def test_owners_take_turns(context, add) -> None:
     owned(context, add, ["a"] * 4 + ["b"] * 2 + [None, "c"])
     taken, last = [], None
     for _ in range(8):
@@ -196,7 +156,7 @@ def test_owners_take_turns(context: Context, add) -> None:
     assert context.store.leases.claim("construct", owner="w", last="a") is None
 
 
-def test_a_hint_does_not_jump_the_turn_of_another_owner(context: Context, add) -> None:
+def test_a_hint_does_not_jump_the_turn_of_another_owner(context, add) -> None:
     mine = owned(context, add, ["a", "a", "a", "b"])
     claim = context.store.leases.claim
     assert claim("construct", owner="w", hint=mine[2], last="b").job.id == mine[2]
@@ -205,10 +165,9 @@ def test_a_hint_does_not_jump_the_turn_of_another_owner(context: Context, add) -
 
 
 @pytest.mark.parametrize("faults", [0, 1])
-def test_jobs_of_full_owners_wait_whatever_names_them(context: Context, add, faults) -> None:
+def test_jobs_of_full_owners_wait_whatever_names_them(context, add, faults) -> None:
     a, b, operators = owned(context, add, ["a", "b", None])
-    with context.store.database.transaction() as connection:
-        connection.execute(text("UPDATE jobs SET faults = :faults"), {"faults": faults})
+    execute(context, "UPDATE jobs SET faults = :faults", {"faults": faults})
     claim = context.store.leases.claim
     assert claim("construct", owner="w", hint=a, full=["a", ""]).job.id == b
     assert claim("construct", owner="w", hint=operators, full=["a", ""]) is None
@@ -218,8 +177,7 @@ def test_jobs_of_full_owners_wait_whatever_names_them(context: Context, add, fau
 def test_looking_at_leases_says_what_a_heartbeat_says_and_renews_nothing(context, add) -> None:
     add(1, 2)
     first, second = claim(context), claim(context)
-    with context.store.database.transaction() as connection:
-        context.store.jobs.cancel([second.job.id], connection=connection)
+    cancel(context, second.job.id)
     expires = text("SELECT lease_expires_at FROM jobs WHERE id = :id")
     with context.store.database.transaction() as connection:
         before = connection.execute(expires, {"id": first.job.id}).scalar_one()

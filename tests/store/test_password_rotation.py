@@ -1,7 +1,5 @@
 """Another login of the database's owner: how its password is changed while processes run."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 
@@ -49,7 +47,7 @@ def login(database_url: str, role: str, password: str, database: str) -> Databas
 
 
 def test_a_second_login_takes_over_while_the_first_is_still_used(
-    database_url: str, worker_id: str, roles: tuple[Database, str, str]
+    database_url, worker_id, roles
 ) -> None:
     operator, owner, new = roles
     first = login(database_url, owner, "secret", f"rotated_{worker_id}")

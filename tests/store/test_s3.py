@@ -1,7 +1,5 @@
 """Artifacts in an S3-compatible store, spoken to over real HTTP."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Iterator
 

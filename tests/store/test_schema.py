@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import io
 import re
 from collections.abc import Iterator
@@ -10,13 +8,12 @@ from alembic import command
 from alembic.script import ScriptDirectory
 from sqlalchemy.exc import OperationalError
 
-from buildarena_pipeline.runtime.context import Context
 from buildarena_store import Database, SchemaVersionError
 from buildarena_store import database as database_module
 from buildarena_store.database import alembic_config, expected_schema
 
 
-def test_the_migrations_make_the_tables_that_the_code_knows(context: Context) -> None:
+def test_the_migrations_make_the_tables_that_the_code_knows(context) -> None:
     command.check(alembic_config(context.store.database.url))
 
 
@@ -45,7 +42,7 @@ def database(database_url: str) -> Iterator[Database]:
     opened.close()
 
 
-def test_an_older_schema_is_refused_with_advice(database: Database) -> None:
+def test_an_older_schema_is_refused_with_advice(database) -> None:
     database.require_schema()
     with (
         of_schema(database, "2026_11_22_annotations"),
@@ -54,12 +51,12 @@ def test_an_older_schema_is_refused_with_advice(database: Database) -> None:
         database.require_schema()
 
 
-def test_a_later_schema_that_only_adds_serves_the_programs_before(database: Database) -> None:
+def test_a_later_schema_that_only_adds_serves_the_programs_before(database) -> None:
     with of_schema(database, "2099_01_01_flight"):
         database.require_schema()
 
 
-def test_a_later_schema_that_broke_with_this_program_is_refused(database: Database) -> None:
+def test_a_later_schema_that_broke_with_this_program_is_refused(database) -> None:
     with (
         of_schema(database, "2099_01_01_flight", since="2098_12_31_wings"),
         pytest.raises(SchemaVersionError, match=r"of a later version.*upgrade"),
@@ -106,9 +103,7 @@ def test_what_takes_away_is_recognised(sql, breaks) -> None:
 
 
 @pytest.mark.parametrize("idle_s", [0.0, 1000.0])
-def test_a_connection_that_the_server_dropped_is_noticed(
-    context: Context, monkeypatch: pytest.MonkeyPatch, idle_s: float
-) -> None:
+def test_a_connection_that_the_server_dropped_is_noticed(context, monkeypatch, idle_s) -> None:
     monkeypatch.setattr(database_module, "IDLE_S", idle_s)
     other = Database(context.store.database.url)
 

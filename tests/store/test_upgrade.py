@@ -1,7 +1,5 @@
 """A database of the version before: it is migrated, and its jobs stay as they were and verify."""
 
-from __future__ import annotations
-
 import json
 import os
 from collections.abc import Iterator
@@ -73,7 +71,7 @@ def sweep_id(name: str) -> str:
     return next(row["id"] for row in ROWS["sweeps"] if row["name"] == name)
 
 
-def test_jobs_keep_their_ids_outcomes_and_figures(upgraded: Context) -> None:
+def test_jobs_keep_their_ids_outcomes_and_figures(upgraded) -> None:
     jobs = {job.id: job for job in upgraded.store.jobs.page(limit=100)}
     assert jobs.keys() == {row["id"] for row in ROWS["jobs"]}
     same = (
@@ -94,7 +92,7 @@ def test_jobs_keep_their_ids_outcomes_and_figures(upgraded: Context) -> None:
         assert jobs[row["id"]].state == state
 
 
-def test_states_and_events_have_their_new_names(upgraded: Context) -> None:
+def test_states_and_events_have_their_new_names(upgraded) -> None:
     states = {s.name: s.state for s in upgraded.store.sweeps.page(limit=10)}
     assert states == {
         "finished": SweepState.ACTIVE,
@@ -106,7 +104,7 @@ def test_states_and_events_have_their_new_names(upgraded: Context) -> None:
     assert {"on_hold", "budget_exhausted"} <= kinds
 
 
-def test_ended_jobs_of_older_task_versions_say_what_they_would_need(upgraded: Context) -> None:
+def test_ended_jobs_of_older_task_versions_say_what_they_would_need(upgraded) -> None:
     ended = [job for job in upgraded.store.jobs.page(limit=100) if job.success is not None]
     assert ended
     for job in ended:
@@ -115,7 +113,7 @@ def test_ended_jobs_of_older_task_versions_say_what_they_would_need(upgraded: Co
         assert f"{job.task} is no longer at version {job.task_version}" in failed["found"]
 
 
-def test_stopped_sweeps_go_on(upgraded: Context) -> None:
+def test_stopped_sweeps_go_on(upgraded) -> None:
     submissions = Submissions(upgraded, load_registry())
     submissions.resume(sweep_id("paused"), None)
     submissions.resume(sweep_id("limited"), Budget(max_requests=1000))
@@ -125,9 +123,7 @@ def test_stopped_sweeps_go_on(upgraded: Context) -> None:
         assert progress.done == progress.total, name
 
 
-def test_jobs_with_limits_move_to_the_ids_that_follow_from_them(
-    old_database: str, settings
-) -> None:
+def test_jobs_with_limits_move_to_the_ids_that_follow_from_them(old_database, settings) -> None:
     limits = {"max_requests": 500}
     database = Database(old_database)
     with database.transaction() as connection:

@@ -6,8 +6,6 @@ kernels pinned here. Importing this module pins them for this process and its ch
 comes before numpy.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 from pathlib import Path

@@ -3,8 +3,6 @@
 A variant is long when another of the same test stays in `make test`: no rule is without one.
 """
 
-from __future__ import annotations
-
 import os
 from typing import Any, Final
 

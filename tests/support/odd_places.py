@@ -1,7 +1,5 @@
 """Runs a program from a clone at an odd place, in a mount namespace that leaves nothing behind."""
 
-from __future__ import annotations
-
 import os
 import pwd
 import shlex

@@ -1,7 +1,5 @@
 """Does what waits, with the real stage handlers, in the test's process."""
 
-from __future__ import annotations
-
 from concurrent.futures import ThreadPoolExecutor
 
 from buildarena_pipeline.catalog.models import load_registry

@@ -1,7 +1,5 @@
 """What processes apart do in tests."""
 
-from __future__ import annotations
-
 import os
 import signal
 import time

@@ -1,7 +1,5 @@
 """Machines built by random tool calls, here and over the tools API, and where all parts must be."""
 
-from __future__ import annotations
-
 import random
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Photographs the dashboard: a service of its own, a demo in it, and a browser."""
 
-from __future__ import annotations
-
 import argparse
 import os
 import shutil

@@ -1,9 +1,6 @@
 """The job's page against what really happens: random machines, live sessions, processes killed."""
 
-from __future__ import annotations
-
 import json
-from pathlib import Path
 
 import httpx
 import psutil
@@ -39,7 +36,7 @@ def processes(*names: str) -> str:
 
 
 @pytest.mark.sized
-def test_the_room_of_a_job_shows_what_is(tmp_path: Path) -> None:
+def test_the_room_of_a_job_shows_what_is(tmp_path) -> None:
     with running_stack(tmp_path) as stack:
         with httpx.Client(base_url=stack.url, timeout=30) as client:
             sweep = client.post("/v1/sweeps", json=SWEEP).raise_for_status().json()["id"]
@@ -52,7 +49,7 @@ def test_the_room_of_a_job_shows_what_is(tmp_path: Path) -> None:
         in_browser(stack.url, ["e2e/room"], BUILDARENA_WEB_MACHINES=str(file))
 
 
-def test_a_session_is_watched_while_processes_die(tmp_path: Path) -> None:
+def test_a_session_is_watched_while_processes_die(tmp_path) -> None:
     with ProviderStandIn("expert", latency_s=LATENCY_S) as standin:
         models = tmp_path / "models.yaml"
         models.write_text(

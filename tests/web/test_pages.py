@@ -1,9 +1,6 @@
 """The dashboard in a real browser, against the whole service."""
 
-from __future__ import annotations
-
 import subprocess
-from pathlib import Path
 
 import httpx
 import pytest
@@ -26,7 +23,7 @@ pytestmark = needs_pages
 
 @pytest.mark.sized
 @pytest.mark.parametrize("files", ["e2e/pages", "e2e/boards"])
-def test_pages_work_in_a_browser(tmp_path: Path, files: str) -> None:
+def test_pages_work_in_a_browser(tmp_path, files) -> None:
     report = tmp_path / "report.md"
     with running_stack(tmp_path) as stack:
         with httpx.Client(base_url=stack.url) as client:
@@ -37,18 +34,18 @@ def test_pages_work_in_a_browser(tmp_path: Path, files: str) -> None:
         in_browser(stack.url, [files], BUILDARENA_WEB_REPORT=str(report))
 
 
-def test_people_build_and_bring_machines(tmp_path: Path) -> None:
+def test_people_build_and_bring_machines(tmp_path) -> None:
     with running_stack(tmp_path, simulators=("pybullet", "mujoco")) as stack:
         in_browser(stack.url, ["e2e/build"])
 
 
-def test_pages_ask_for_a_key_and_offer_what_it_may(tmp_path: Path) -> None:
+def test_pages_ask_for_a_key_and_offer_what_it_may(tmp_path) -> None:
     with running_stack(tmp_path, require_keys=True, admin_key=SecretStr(ADMIN)) as stack:
         given = {"BUILDARENA_WEB_GUARDED_URL": stack.url, "BUILDARENA_WEB_ADMIN_KEY": ADMIN}
         in_browser(stack.url, ["e2e/keys"], **given)
 
 
-def test_pages_work_below_a_path(tmp_path: Path) -> None:
+def test_pages_work_below_a_path(tmp_path) -> None:
     with (
         running_stack(tmp_path, base_path="/tools/arena") as stack,
         httpx.Client(base_url=stack.url) as client,

@@ -1,7 +1,5 @@
 """A published site in a real browser, from a plain file server, under a sub-path."""
 
-from __future__ import annotations
-
 import subprocess
 import threading
 from collections.abc import Iterator
@@ -52,7 +50,7 @@ def file_server(folder: Path) -> Iterator[str]:
 
 
 @pytest.mark.sized
-def test_a_site_works_from_a_file_server(tmp_path: Path) -> None:
+def test_a_site_works_from_a_file_server(tmp_path) -> None:
     host = tmp_path / "host"
     with running_stack(tmp_path) as stack, file_server(host) as address:
         with httpx.Client(base_url=stack.url) as client:

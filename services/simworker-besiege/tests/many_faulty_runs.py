@@ -1,7 +1,5 @@
 """Faulty runs on several screens at once; prints how they ended, by kind of fault."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

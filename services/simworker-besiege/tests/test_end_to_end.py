@@ -1,7 +1,5 @@
 """From a submission over the queue and the window of the game to a score that can be verified."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
@@ -10,20 +8,19 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import pytest
-from game_rig import Rig
+from game_rig import Rig, our_score
 from support.long_tests import LONG
 from support.stages import work
 
 from buildarena_api.leaderboard.agreement import agreement_rows
-from buildarena_benchmark import builtin_tasks, paper_tasks, score
-from buildarena_besiege import game_start, read_machine_file
+from buildarena_benchmark import builtin_tasks, paper_tasks
+from buildarena_besiege import read_machine_file
 from buildarena_geometry import KeyPress, Machine
 from buildarena_pipeline.catalog.models import load_registry
 from buildarena_pipeline.catalog.specs import JobSpec
 from buildarena_pipeline.runtime.context import Context, open_context
 from buildarena_pipeline.runtime.scoring import best_rollout
 from buildarena_pipeline.submission.submission import Submissions
-from buildarena_simulation import simulate
 from buildarena_store import Job
 from buildarena_worker.wiring import verifier
 
@@ -65,7 +62,7 @@ def playing(context: Context, rig: Rig, screen: dict[str, str]) -> Iterator[Cont
 
 
 @pytest.mark.sized
-def test_each_category_is_played_scored_verified_and_compared(playing: Context, rig: Rig) -> None:
+def test_each_category_is_played_scored_verified_and_compared(playing, rig) -> None:
     submissions = Submissions(playing, load_registry())
     for task in TASKS:
         submissions.submit_job(JobSpec(task=task, model="builtin/expert", simulator="besiege"))
@@ -99,14 +96,7 @@ def _check(context: Context, job: Job) -> None:
     machine = _machine(context, record.machine_hash)
     task = builtin_tasks()[job.task]
     presses = None if record.controls is None else [KeyPress(**one) for one in record.controls]
-    trajectory = simulate(
-        machine,
-        task.scenario,
-        "mujoco",
-        controls=presses,
-        start=game_start(machine, task.scenario),
-    )
-    ours = score(task, machine, trajectory)
+    ours = our_score(task, machine, controls=presses)
     assert job.success == ours.success
     assert job.indicator == pytest.approx(ours.indicator, rel=NEAR)
     assert job.manifest is not None
@@ -147,9 +137,7 @@ def _spoil_log(context: Context, job: Job, name: str, digest: str) -> None:
     assert failed, "a changed log passed"
 
 
-def test_a_job_of_another_version_of_the_game_ends_with_what_to_do(
-    playing: Context, rig: Rig
-) -> None:
+def test_a_job_of_another_version_of_the_game_ends_with_what_to_do(playing, rig) -> None:
     other = open_context(playing.settings.model_copy(update={"besiege_mod": "1.5"}))
     Submissions(other, load_registry()).submit_job(
         JobSpec(task="lift-1", model="builtin/expert", simulator="besiege")

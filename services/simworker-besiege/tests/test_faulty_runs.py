@@ -1,7 +1,5 @@
 """A few runs in a game that misbehaves; `make besiege-faults` plays 200."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

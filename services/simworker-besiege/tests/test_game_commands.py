@@ -1,7 +1,5 @@
 """The commands about this machine's game and about what the game said."""
 
-from __future__ import annotations
-
 import json
 import sys
 from datetime import UTC, datetime

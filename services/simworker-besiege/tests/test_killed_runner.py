@@ -1,7 +1,5 @@
 """A runner killed at any step: the next one cleans up and plays the run again."""
 
-from __future__ import annotations
-
 import json
 import os
 import random
@@ -12,11 +10,7 @@ from collections.abc import Iterator
 
 import psutil
 import pytest
-from game_rig import Rig, short_trial
-
-from buildarena_benchmark import score
-from buildarena_besiege import game_start
-from buildarena_simulation import simulate
+from game_rig import Rig, our_score, short_trial
 
 pytestmark = pytest.mark.timeout(900)
 KILLS = int(os.environ.get("BESIEGE_KILLS", "3"))
@@ -39,10 +33,9 @@ def runner(rig: Rig, screen: dict[str, str]) -> subprocess.Popen[str]:
     return subprocess.Popen(words, env=environment, stdout=subprocess.PIPE, text=True)
 
 
-def test_the_next_runner_cleans_up_and_plays_the_run_again(clean: Rig, screen) -> None:
+def test_the_next_runner_cleans_up_and_plays_the_run_again(clean, screen) -> None:
     task, machine = short_trial("transport-1")
-    start = game_start(machine, task.scenario)
-    right = score(task, machine, simulate(machine, task.scenario, "mujoco", start=start))
+    right = our_score(task, machine)
     draw = random.Random(KILLS)
     for number in range(KILLS):
         with runner(clean, screen) as killed:
@@ -62,10 +55,9 @@ def test_the_next_runner_cleans_up_and_plays_the_run_again(clean: Rig, screen) -
     assert report["modifiers"] == []
 
 
-def test_a_log_in_a_file_takes_the_place_of_the_log_window(clean: Rig, screen) -> None:
+def test_a_log_in_a_file_takes_the_place_of_the_log_window(clean, screen) -> None:
     task, machine = short_trial("transport-1")
-    start = game_start(machine, task.scenario)
-    right = score(task, machine, simulate(machine, task.scenario, "mujoco", start=start))
+    right = our_score(task, machine)
     log = clean.folder / "mod.log"
     command = clean.environment()["BUILDARENA_BESIEGE_COMMAND"] + f" --log-file {log}"
     given = {"BUILDARENA_BESIEGE_COMMAND": command, "BUILDARENA_BESIEGE_LOG_FILE": str(log)}

@@ -1,7 +1,5 @@
 """The golden logs are those of today's tasks, machines and scripts."""
 
-from __future__ import annotations
-
 import gzip
 
 import pytest

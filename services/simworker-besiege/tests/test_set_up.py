@@ -1,7 +1,5 @@
 """Calibration, examination and refusals of a machine that is not set up."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess
@@ -42,14 +40,14 @@ def answer(words: list[str], rig: Rig, screen: dict[str, str] | None, **given: o
     )
 
 
-def test_the_published_positions_are_tried_with_a_small_machine(rig: Rig, screen) -> None:
+def test_the_published_positions_are_tried_with_a_small_machine(rig, screen) -> None:
     done = answer(["calibrate", "--defaults"], rig, screen)
     assert done.returncode == 0, (done.stdout, done.stderr)
     assert "Loaded, started, read" in done.stdout
     assert not list(rig.machines.iterdir())
 
 
-def test_wrong_positions_are_found_out_and_named(rig: Rig, screen) -> None:
+def test_wrong_positions_are_found_out_and_named(rig, screen) -> None:
     places = {**Calibration().positions, "open_machine": (0.9, 0.9)}
     Calibration(positions=places).save(rig.folder / "state" / "calibration.json")
     done = answer(["calibrate", "--try"], replace(rig, patience=0.05), screen)
@@ -57,7 +55,7 @@ def test_wrong_positions_are_found_out_and_named(rig: Rig, screen) -> None:
     assert "It does not work yet: load the machine" in done.stdout
 
 
-def test_a_person_points_at_each_place(rig: Rig, screen) -> None:
+def test_a_person_points_at_each_place(rig, screen) -> None:
     with GamePlayed(rig, screen) as person:
         done = person.calibrate()
     assert done == 0, person.told
@@ -123,21 +121,21 @@ class GamePlayed:
         )
 
 
-def test_a_machine_that_can_play_is_found_able(rig: Rig, screen) -> None:
+def test_a_machine_that_can_play_is_found_able(rig, screen) -> None:
     done = answer(["doctor", "--json"], rig, screen)
     found = {one["name"]: one for one in json.loads(done.stdout)}
     assert all(one["ok"] for one in found.values()), found
     assert {"versions", "folder of machine files", "display", "calibration", "window"} <= set(found)
 
 
-def test_without_a_screen_the_doctor_says_so_and_goes_on(rig: Rig) -> None:
+def test_without_a_screen_the_doctor_says_so_and_goes_on(rig) -> None:
     done = answer(["doctor"], rig, None)
     assert done.returncode == 1
     assert "!!  display: there is no screen" in done.stdout
     assert "ok  versions" in done.stdout
 
 
-def test_a_worker_without_a_screen_does_not_start_and_says_why(rig: Rig) -> None:
+def test_a_worker_without_a_screen_does_not_start_and_says_why(rig) -> None:
     environment = {**os.environ, **rig.environment()}
     environment.pop("DISPLAY", None)
     done = subprocess.run(
@@ -152,7 +150,7 @@ def test_a_worker_without_a_screen_does_not_start_and_says_why(rig: Rig) -> None
     assert "there is no screen to play on" in done.stderr
 
 
-def test_without_the_extra_the_doctor_says_what_to_install(rig: Rig, tmp_path) -> None:
+def test_without_the_extra_the_doctor_says_what_to_install(rig, tmp_path) -> None:
     (tmp_path / "pyautogui.py").write_text("raise ImportError('No module named pyautogui')")
     path = f"{tmp_path}{os.pathsep}{rig.environment()['PYTHONPATH']}"
     done = answer(["doctor"], rig, {"PYTHONPATH": path})
@@ -167,14 +165,14 @@ def test_without_the_extra_the_doctor_says_what_to_install(rig: Rig, tmp_path) -
         ({"DESKTOP": "headless", "COMMAND": ""}, "restart"),
     ],
 )
-def test_what_is_missing_is_named_with_advice(rig: Rig, changes, named) -> None:
+def test_what_is_missing_is_named_with_advice(rig, changes, named) -> None:
     found = findings(rig, {f"BUILDARENA_BESIEGE_{name}": to for name, to in changes.items()})
     assert not found[named]["ok"]
     assert "BUILDARENA_BESIEGE_" in found[named]["advice"]
 
 
 @pytest.mark.parametrize("kind", ["folder", "manifest", "none"])
-def test_the_mod_is_looked_for_by_name_and_by_manifest(rig: Rig, tmp_path, kind) -> None:
+def test_the_mod_is_looked_for_by_name_and_by_manifest(rig, tmp_path, kind) -> None:
     mods = tmp_path / "game" / "Besiege_Data" / "Mods"
     (mods / "Other").mkdir(parents=True)
     if kind == "folder":

@@ -1,6 +1,3 @@
-from __future__ import annotations
-
-import random
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 
@@ -113,8 +110,7 @@ def test_the_published_reading_leaves_out_what_it_calls_hacked(flag, success) ->
 
 @pytest.mark.parametrize("flag", [name for name, flag in KNOWN.items() if not flag.published])
 def test_the_published_reading_knows_no_flags_but_its_own(flag) -> None:
-    found = [replace(t, flags=(flag,)) for t in trials("lift-1", "a", 3, 4)]
-    cell = summarise(found, policy=ScoringPolicy.PUBLISHED)
+    cell = summarise(trials("lift-1", "a", 3, 4, flags=(flag,)), policy=ScoringPolicy.PUBLISHED)
     assert (cell.flagged, cell.successes, cell.trials) == (0, 3, 4)
 
 
@@ -135,18 +131,13 @@ def test_a_bridge_that_carries_everything_is_the_best_result() -> None:
 
 def test_who_cheats_does_not_gain_by_it() -> None:
     """Not in our policy: neither by far-off figures nor by having few trials that count."""
-    cheat = [
-        replace(t, flags=("not_driven",), indicator=1e6) for t in trials("lift-1", "a", 60, 64)
-    ]
+    cheat = trials("lift-1", "a", 60, 64, flags=("not_driven",), indicator=1e6)
     board = board_of(cheat, trials("lift-1", "b", 5, 64), trials("lift-1", "c", 30, 64))
     assert [row.cell.model for row in board.board(ALL).tasks[0].rows] == ["c", "b", "a"]
 
 
 def test_errored_jobs_alone_give_no_numbers() -> None:
-    board = board_of(
-        [replace(t, outcome="errored", success=False) for t in trials("lift-1", "a", 0, 3)]
-    )
-    answer = board.board(ALL)
+    answer = board_of(trials("lift-1", "a", 0, 3, outcome="errored", success=False)).board(ALL)
     (row,) = answer.tasks[0].rows
     assert (row.rank, row.cell.success_rate, row.cell.indicator_mean) == (None, None, None)
     assert (row.cell.trials, row.cell.errored, row.cell.success_rate_of_ended) == (0, 3, 0.0)
@@ -173,9 +164,7 @@ def test_one_model_is_first_and_scores_one() -> None:
 
 
 def test_models_alike_share_a_rank_and_better_ones_do_not() -> None:
-    board = board_of(
-        trials("lift-1", "a", 60, 64), trials("lift-1", "b", 30, 64), trials("lift-1", "c", 29, 64)
-    )
+    board = board_of(*(trials("lift-1", m, n, 64) for m, n in (("a", 60), ("b", 30), ("c", 29))))
     rows = board.board(ALL).tasks[0].rows
     assert [(row.cell.model, row.rank) for row in rows] == [("a", 1), ("b", 2), ("c", 2)]
     assert [(row.rank_low, row.rank_high) for row in rows] == [(1, 1), (2, 3), (2, 3)]
@@ -256,7 +245,7 @@ changes = st.lists(
 
 @settings(suppress_health_check=[HealthCheck.too_slow], deadline=None, max_examples=30)
 @given(changes, st.randoms(use_true_random=False))
-def test_a_board_kept_up_to_date_equals_one_made_anew(steps, rng: random.Random) -> None:
+def test_a_board_kept_up_to_date_equals_one_made_anew(steps, rng) -> None:
     pool = [
         *trials("lift-1", "a", 4, 10),
         *trials("lift-1", "b", 6, 10),
@@ -287,12 +276,8 @@ def test_a_duel_pairs_shared_seeds_and_adjusts_for_the_tasks() -> None:
     assert (lift.successes, lift.trials, lift.success.pairs) == ((60, 20), (64, 64), 64)
     # Two figures on two tasks: all four tests are one family.
     tests = [lift.success, lift.indicator, support.success, support.indicator]
-    assert [
-        lift.success_p,
-        lift.indicator_p,
-        support.success_p,
-        support.indicator_p,
-    ] == pytest.approx(holm([test.p_value for test in tests]))
+    found = [lift.success_p, lift.indicator_p, support.success_p, support.indicator_p]
+    assert found == pytest.approx(holm([test.p_value for test in tests]))
     assert lift.success_p < 0.001
     assert lift.low > 0
     assert support.low < 0 < support.high

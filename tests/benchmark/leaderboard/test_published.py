@@ -1,7 +1,5 @@
 """The paper's own figures, put through our mathematics."""
 
-from __future__ import annotations
-
 import csv
 import math
 import re

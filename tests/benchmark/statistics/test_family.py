@@ -1,7 +1,5 @@
 """What a board claims of models that are alike, and of models that are not."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from support.boards.made_up_trials import LOADS, board, rankings

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import os
 import signal
 import subprocess
@@ -7,25 +5,18 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
-from pathlib import Path
 
 import psutil
 import pytest
 from redis import Redis
+from support.servers.stacks import wait_until
 
 from buildarena_cli.local import EmbeddedValkey, ManagedProcess, Supervisor
 from buildarena_cli.local.supervisor import LOOK_EVERY_S
 from buildarena_pipeline.errors import StartupError
 
 
-def wait_until(condition, within_s: float = 10.0) -> None:
-    deadline = time.monotonic() + within_s
-    while not condition():
-        assert time.monotonic() < deadline, "it did not happen in time"
-        time.sleep(0.02)
-
-
-def test_a_killed_broker_is_started_again_with_its_data(tmp_path: Path) -> None:
+def test_a_killed_broker_is_started_again_with_its_data(tmp_path) -> None:
     valkey = EmbeddedValkey(tmp_path / "valkey", tmp_path / "log")
     managed = ManagedProcess(name="valkey", start=valkey.start, stop=valkey.stop)
     with Supervisor() as supervisor, Redis.from_url(valkey.url, retry=None) as client:
@@ -35,7 +26,7 @@ def test_a_killed_broker_is_started_again_with_its_data(tmp_path: Path) -> None:
         time.sleep(1.2)  # appendfsync everysec
         first = managed.process
         first.kill()
-        wait_until(lambda: managed.process is not first)
+        wait_until(lambda: managed.process is not first, 10, "it is started again")
         assert client.get("k") == b"v"
         pid = managed.process.pid
     assert not psutil.pid_exists(pid)
@@ -48,7 +39,7 @@ def test_a_process_that_keeps_dying_is_given_up() -> None:
     with Supervisor() as supervisor:
         supervisor.launch(ManagedProcess(name="mayfly", start=start))
         supervisor.watch()
-        wait_until(lambda: supervisor.failed is not None)
+        wait_until(lambda: supervisor.failed is not None, 10, "it is given up")
     assert "mayfly died 6 times" in supervisor.failed
     assert "exit code 3" in supervisor.failed
 
@@ -105,7 +96,7 @@ def test_what_dies_while_all_is_stopped_is_not_started_again(started) -> None:
     assert [process.returncode for process in started] == [-signal.SIGKILL] * 2
 
 
-def test_a_server_that_ends_at_once_is_reported(tmp_path: Path) -> None:
+def test_a_server_that_ends_at_once_is_reported(tmp_path) -> None:
     valkey = EmbeddedValkey(tmp_path / "valkey", tmp_path / "log")
     process = valkey.start()
     try:
@@ -115,7 +106,7 @@ def test_a_server_that_ends_at_once_is_reported(tmp_path: Path) -> None:
         valkey.stop(process)
 
 
-def test_children_do_not_outlive_a_killed_parent(tmp_path: Path) -> None:
+def test_children_do_not_outlive_a_killed_parent(tmp_path) -> None:
     program = (
         "import sys, time, pathlib\n"
         "from buildarena_cli.local import EmbeddedValkey\n"
@@ -131,4 +122,4 @@ def test_children_do_not_outlive_a_killed_parent(tmp_path: Path) -> None:
     os.kill(parent.pid, signal.SIGKILL)
     parent.wait()
     parent.stdout.close()
-    wait_until(lambda: not psutil.pid_exists(child))
+    wait_until(lambda: not psutil.pid_exists(child), 10, "the child ends")

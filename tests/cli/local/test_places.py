@@ -1,7 +1,5 @@
 """The servers start wherever a clone lies, whoever uses it, and leave nothing behind."""
 
-from __future__ import annotations
-
 import dataclasses
 import signal
 
@@ -76,7 +74,7 @@ FEW = ("private folder", "long path", "noexec", "read-only checkout")
         for name, case in CASES.items()
     ],
 )
-def test_the_servers_start_anywhere(case: Case, user: str) -> None:
+def test_the_servers_start_anywhere(case, user) -> None:
     case = dataclasses.replace(case, ordinary=user != "root")
     printed = run_elsewhere(case, ["-c", BOTH, "{data}"])
     assert printed.splitlines() == ["42", "True", "", "cluster password"]

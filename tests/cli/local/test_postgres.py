@@ -1,7 +1,5 @@
 """What goes wrong around the embedded Postgres, and what it leaves behind."""
 
-from __future__ import annotations
-
 import fcntl
 import os
 import subprocess
@@ -32,7 +30,7 @@ def left_in(place: Path, name: str, *, age_s: float = 3600.0) -> Path:
     return folder
 
 
-def test_a_copy_runs_and_is_gone_when_it_is_not_needed_any_more(place: Path) -> None:
+def test_a_copy_runs_and_is_gone_when_it_is_not_needed_any_more(place) -> None:
     copy = ProgramCopy(installed_postgres(), None, places=())
     initdb = copy.install / "bin" / "initdb"
     done = subprocess.run([initdb, "--version"], capture_output=True, text=True, check=True)
@@ -42,7 +40,7 @@ def test_a_copy_runs_and_is_gone_when_it_is_not_needed_any_more(place: Path) -> 
     assert list(place.iterdir()) == []
 
 
-def test_what_a_killed_process_left_is_removed_by_the_next(place: Path) -> None:
+def test_what_a_killed_process_left_is_removed_by_the_next(place) -> None:
     left, used, young = left_in(place, "left"), left_in(place, "used"), left_in(place, "y", age_s=1)
     with (place / PREFIX).open("w") as other:  # a file of another's
         lock = os.open(used, os.O_RDONLY)
@@ -53,7 +51,7 @@ def test_what_a_killed_process_left_is_removed_by_the_next(place: Path) -> None:
     assert not left.exists()
 
 
-def test_a_program_that_can_be_run_from_nowhere_names_the_places(place: Path) -> None:
+def test_a_program_that_can_be_run_from_nowhere_names_the_places(place) -> None:
     broken = place / "package" / "pginstall"
     (broken / "bin").mkdir(parents=True)
     (broken / "bin" / "postgres").write_text("#!/bin/sh\necho libpq is missing >&2; exit 127")
@@ -62,7 +60,7 @@ def test_a_program_that_can_be_run_from_nowhere_names_the_places(place: Path) ->
         ProgramCopy(broken, None, places=())
 
 
-def test_the_servers_own_reason_is_in_the_message(tmp_path: Path) -> None:
+def test_the_servers_own_reason_is_in_the_message(tmp_path) -> None:
     postgres = EmbeddedPostgres(tmp_path / "pg", tmp_path / "log", durable=False)
     postgres.stop(postgres.start())
     (tmp_path / "pg/cluster/PG_VERSION").write_text("9\n")
@@ -74,7 +72,7 @@ def test_the_servers_own_reason_is_in_the_message(tmp_path: Path) -> None:
     assert "choose another folder with --data" in message
 
 
-def test_a_cluster_whose_making_was_interrupted_is_made_anew(tmp_path: Path) -> None:
+def test_a_cluster_whose_making_was_interrupted_is_made_anew(tmp_path) -> None:
     half = tmp_path / "pg/cluster.partial"
     half.mkdir(parents=True)
     (half / "PG_VERSION").write_text("18\n")

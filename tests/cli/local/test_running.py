@@ -1,7 +1,5 @@
 """A service in the background: started, looked at, killed, started again and stopped."""
 
-from __future__ import annotations
-
 import fcntl
 import json
 import os

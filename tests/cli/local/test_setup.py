@@ -1,7 +1,5 @@
 """Set-up with a uv that only notes what it is asked and fails as wished."""
 
-from __future__ import annotations
-
 import os
 import shlex
 import shutil
@@ -58,7 +56,7 @@ def calls(folder: Path) -> list[str]:
     return (folder / "calls").read_text().splitlines()
 
 
-def test_set_up_says_nothing_where_everything_has_a_wheel(folder: Path) -> None:
+def test_set_up_says_nothing_where_everything_has_a_wheel(folder) -> None:
     done = set_up(folder)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
     (sync,) = [call for call in calls(folder) if "sync" in call]
@@ -70,14 +68,14 @@ NO_WHEEL = '*"--only-binary"*) echo no wheel >&2; exit 1;;'
 NO_COMPILING = '*"sync"*"requirements.lock") echo cc1plus is missing >&2; exit 1;;'
 
 
-def test_without_wheel_and_compiler_all_but_pybullet_is_installed(folder: Path) -> None:
+def test_without_wheel_and_compiler_all_but_pybullet_is_installed(folder) -> None:
     done = set_up(folder, NO_WHEEL, NO_COMPILING)
     assert (done.returncode, done.stderr) == (0, "")
     assert "there is no C++ compiler: without it, name MuJoCo" in done.stdout
     assert (folder / ".venv/without-pybullet.lock").read_text() == REST
 
 
-def test_pybullet_that_cannot_be_compiled_is_left_out_in_words(folder: Path) -> None:
+def test_pybullet_that_cannot_be_compiled_is_left_out_in_words(folder) -> None:
     program(folder / "bin" / "c++", "exit 1")
     done = set_up(folder, NO_WHEEL, NO_COMPILING)
     assert (done.returncode, done.stderr) == (0, "")
@@ -87,14 +85,14 @@ def test_pybullet_that_cannot_be_compiled_is_left_out_in_words(folder: Path) -> 
     assert "cc1plus is missing" in (folder / ".venv/pybullet.log").read_text()
 
 
-def test_a_failure_of_other_packages_is_shown_as_it_is(folder: Path) -> None:
+def test_a_failure_of_other_packages_is_shown_as_it_is(folder) -> None:
     done = set_up(folder, '*"sync"*) echo no index >&2; exit 1;;')
     assert done.returncode != 0
     assert done.stderr == "no index\n"
     assert done.stdout == ""
 
 
-def test_a_python_with_wheels_is_preferred_and_else_fetched(folder: Path) -> None:
+def test_a_python_with_wheels_is_preferred_and_else_fetched(folder) -> None:
     python = shlex.quote(sys.executable)
     set_up(folder, f'"python find"*3.12) echo {python};;')
     assert f"venv --quiet --clear --no-project --python {sys.executable} .venv" in calls(folder)
@@ -105,7 +103,7 @@ def test_a_python_with_wheels_is_preferred_and_else_fetched(folder: Path) -> Non
     assert "python install --quiet 3.11" in calls(folder)
 
 
-def test_a_given_python_is_used_unless_it_is_too_old(folder: Path) -> None:
+def test_a_given_python_is_used_unless_it_is_too_old(folder) -> None:
     assert set_up(folder, PYTHON=sys.executable).returncode == 0
     assert not [call for call in calls(folder) if "python find" in call]
     program(folder / "old", "exit 1")
@@ -114,7 +112,7 @@ def test_a_given_python_is_used_unless_it_is_too_old(folder: Path) -> None:
     assert "needs Python 3.11 or newer, and ./old is older or missing" in done.stderr
 
 
-def test_what_pip_says_before_another_way_works_is_not_shown(folder: Path) -> None:
+def test_what_pip_says_before_another_way_works_is_not_shown(folder) -> None:
     program(
         folder / "managed",
         'case "$*" in\n'
@@ -128,7 +126,7 @@ def test_what_pip_says_before_another_way_works_is_not_shown(folder: Path) -> No
     assert (done.returncode, done.stdout, done.stderr) == (0, "own uv: pip list\n", "")
 
 
-def test_without_any_uv_the_reason_is_shown(folder: Path) -> None:
+def test_without_any_uv_the_reason_is_shown(folder) -> None:
     program(folder / "bare", "echo No module named pip >&2; exit 1")
     done = run(folder, "uv.sh", "pip", "list", PYTHON="./bare")
     assert done.returncode == 1

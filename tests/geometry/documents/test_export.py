@@ -1,13 +1,12 @@
 """Machines as GLB files and SVG drawings."""
 
-from __future__ import annotations
-
 import json
 import struct
 import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
+from support.machines.building import connect
 
 from buildarena_geometry import Machine
 from buildarena_geometry.export import View, machine_glb, machine_svg
@@ -25,10 +24,7 @@ def machine(build):
         ("1", "D", "Water Cannon"),
     )
     built.act("twist_block", {"block_id": "5", "angle": 30})
-    built.act(
-        "connect_blocks",
-        {"block_a": "1", "face_a": "E", "block_b": "4", "face_b": "A", "connector": "Brace"},
-    )
+    connect(built, "1", "E", "4", "A")
     return built
 
 

@@ -1,7 +1,5 @@
 """The guide of all modules is what the module files say."""
 
-from __future__ import annotations
-
 import importlib.util
 import xml.etree.ElementTree as ET
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Records of the further types replay in the words of the interface they were made with."""
 
-from __future__ import annotations
-
 import gzip
 import json
 import math
@@ -9,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.machines.building import attach
 
 from buildarena_geometry import Machine, module_set
 from buildarena_geometry.__main__ import main
@@ -109,15 +108,14 @@ def test_blocks_sit_on_every_face_by_the_smallest_turn(name):
     for angle in (0, 33):
         base = Machine(catalogue=CATALOGUE)
         base.act("start", {"init_rotation": [20, -50, 70]})
-        base.act("attach_block_to", {"base_block": "1", "face": "f4", "new_block": name})
+        attach(base, "1", "f4", name)
         base.act("twist_block", {"block_id": "2", "angle": angle})
         sitting = base.blocks["2"]
         for face in sitting.module.faces:
             if face.label == sitting.module.root_face:
                 continue
             machine = base.copy()
-            attach = {"base_block": "2", "face": face.label, "new_block": "Spike"}
-            if not machine.act("attach_block_to", attach).ok:
+            if not attach(machine, "2", face.label, "Spike").ok:
                 continue  # beside the starting block: the face is not open
             new = machine.blocks["3"]
             x, y, z = face.normal
@@ -169,31 +167,17 @@ def test_connectors_are_called_by_the_dialects_names(op, params, kind):
 def test_only_types_with_a_spin_of_their_own_are_flipped():
     flipped = {name for name, module in CATALOGUE.items() if module.spins}
     told = {
-        "Wheel",
-        "Steering Block",
-        "Spinning Block",
-        "Steering Hinge",
-        "Cog Medium Powered",
-        "Large Wheel",
-        "Drill",
-        "Nautical Screw",
-        "Space Wheel",
+        *("Wheel", "Steering Block", "Spinning Block", "Steering Hinge", "Cog Medium Powered"),
+        *("Large Wheel", "Drill", "Nautical Screw", "Space Wheel"),
     }
     assert flipped - {"Small Wheel"} == told
 
 
 def test_our_names_are_unknown_in_the_dialect_and_theirs_in_ours(capsys, tmp_path):
-    steps = [
-        {"op": "start", "params": {}},
-        {
-            "op": "attach_block_to",
-            "params": {"base_block": "1", "face": "f0", "new_block": "Wheel"},
-        },
-        {
-            "op": "attach_block_to",
-            "params": {"base_block": "1", "face": "A", "new_block": "Powered Wheel"},
-        },
-    ]
+    theirs = {"base_block": "1", "face": "f0", "new_block": "Wheel"}
+    ours = {"base_block": "1", "face": "A", "new_block": "Powered Wheel"}
+    attached = [{"op": "attach_block_to", "params": params} for params in (theirs, ours)]
+    steps = [{"op": "start", "params": {}}, *attached]
     file = tmp_path / "steps.json"
     file.write_text(json.dumps(steps))
     kinds = {}

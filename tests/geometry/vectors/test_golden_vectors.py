@@ -1,7 +1,5 @@
 """The library does what the published library and Besiege do, action by action."""
 
-from __future__ import annotations
-
 import gzip
 import json
 import math

@@ -1,7 +1,5 @@
 """`python -m buildarena_geometry replay`: sequences in, JSON lines out."""
 
-from __future__ import annotations
-
 import gzip
 import io
 import json

@@ -1,7 +1,5 @@
 """Made-up trials of models whose true figures are known: what intervals and claims are tried on."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
@@ -92,17 +90,7 @@ def coverage(
     failures: float = 0.0,
     interval: Callable[[Floats, NDArray[np.bool_]], tuple[float, float] | None] = mean_interval,
 ) -> Coverage:
-    """Tries intervals of mean indicators.
-
-    Args:
-        loads: Indicators of successes.
-        trials: Trials of a sample.
-        rate: Chance of a success.
-        samples: How many samples.
-        seed: Seed of the samples.
-        failures: Failures have indicators up to so much.
-        interval: What is tried.
-    """
+    """Tries intervals of mean indicators."""
     rng = np.random.default_rng(seed)
     truth = rate * loads.mean + (1 - rate) * failures / 2
     shown = covered = 0
@@ -119,14 +107,7 @@ def coverage(
 def board(
     rng: np.random.Generator, rates: Floats, sizes: Sequence[int], loads: Sequence[Loads]
 ) -> Board:
-    """A board of made-up trials.
-
-    Args:
-        rng: Where chance comes from.
-        rates: (T, M) float64, chances of success.
-        sizes: Trials of each model on each task.
-        loads: Indicators of each model's successes.
-    """
+    """A board of made-up trials."""
     return [
         [
             np.column_stack([won, won * load.draw(rng, size)])

@@ -1,7 +1,5 @@
 """Boards made in the plain way, from all ended jobs one by one: what the kept ones must equal."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -40,15 +38,7 @@ def plain_board(
     *,
     inside: Callable[[EndedJob], bool] = lambda _: True,
 ) -> Board:
-    """The board of a track's trials.
-
-    Args:
-        trials: All of the track.
-        query: What is asked for.
-        versions: Current version of each known task.
-        weights: Difficulty weights by task.
-        inside: Whether a trial is among the jobs that were asked for.
-    """
+    """The board of a track's trials."""
     cells: dict[CellKey, list[EndedJob]] = {}
     for trial in trials:
         key = (trial.task, trial.task_version, trial.configuration)

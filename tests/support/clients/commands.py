@@ -1,7 +1,5 @@
 """Commands of the command line, run in the test's process: one of their own takes seconds."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from typer.testing import CliRunner

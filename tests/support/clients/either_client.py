@@ -1,7 +1,5 @@
 """Both clients behind one face, so that one test speaks of both."""
 
-from __future__ import annotations
-
 import asyncio
 import inspect
 from collections.abc import AsyncIterator, Iterator
@@ -11,11 +9,7 @@ from buildarena_client import AsyncClient, Client
 
 
 class EitherClient:
-    """A client whose methods answer at once, whichever it is.
-
-    Attributes:
-        made: The client itself.
-    """
+    """A client whose methods answer at once, whichever it is."""
 
     def __init__(self, kind: str, url: str | None = None, key: str | None = None, **more: Any):
         self.made: Any = (AsyncClient if kind == "async" else Client)(url, key, **more)

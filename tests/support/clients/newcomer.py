@@ -23,11 +23,7 @@ class RefusedError(AssertionError):
 
 
 class Newcomer:
-    """Plays one session.
-
-    Attributes:
-        calls: Tool calls so far.
-    """
+    """Plays one session."""
 
     def __init__(self, session: ClientSession, tools: Mapping[str, Any]) -> None:
         self._session = session

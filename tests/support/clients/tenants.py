@@ -1,7 +1,5 @@
 """Tenants of a service that asks for keys: each a key with its own requests."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,13 +22,7 @@ WITH_KEYS = {
 
 @dataclass(frozen=True)
 class Tenant:
-    """A key's holder.
-
-    Attributes:
-        client: The API.
-        secret: The key.
-        id: Its id.
-    """
+    """A key's holder."""
 
     client: Client
     secret: str

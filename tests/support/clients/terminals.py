@@ -1,7 +1,5 @@
 """Commands on a terminal of a given width, and through a pipe."""
 
-from __future__ import annotations
-
 import fcntl
 import os
 import pty

@@ -1,7 +1,5 @@
 """Runs what a document shows, word for word, and compares what it says it prints."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import re
@@ -33,19 +31,7 @@ def shown_in(document: Path) -> Iterator[Shown]:
 
 
 def run_document(document: Path, *, environment: Mapping[str, str], folder: Path) -> int:
-    """Runs all blocks of Python, in one namespace, and of bash, in a folder, in their order.
-
-    Args:
-        document: Markdown.
-        environment: Environment variables for commands.
-        folder: Where commands run.
-
-    Returns:
-        How many blocks were run.
-
-    Raises:
-        AssertionError: A block prints something else than the document shows, or a command fails.
-    """
+    """Runs all blocks of Python, in one namespace, and of bash, in a folder, in their order."""
     names: dict[str, Any] = {"__name__": "__main__"}
     count = 0
     for language, code, output in shown_in(document):

@@ -1,7 +1,5 @@
 """Kubernetes' manifests as `kubectl kustomize` renders them."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 from functools import cache

@@ -1,7 +1,5 @@
 """The dashboard's pages in a real browser: what they need, and how their tests are run."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """Prometheus' own checks, from Debian's package."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 

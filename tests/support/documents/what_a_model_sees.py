@@ -4,8 +4,6 @@ Run by `make what-a-model-sees` after an intended change of prompts, statements 
 compares the file with what sessions say now.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path

@@ -4,8 +4,6 @@ tests/data/expert_calls.json keeps them for those who can't import the worker; `
 expert_calls` in this folder writes it, and the environment's references, again.
 """
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -9,6 +9,7 @@ from types import MappingProxyType
 from typing import Final
 
 import numpy as np
+from support.machines.building import attach, connect
 from support.machines.families import beam, car, deck, rocket, rocket_assembly
 
 from buildarena_geometry import Machine
@@ -20,12 +21,7 @@ _KEYS: Final = ("UpArrow", "DownArrow", "LeftArrow", "RightArrow")
 
 
 def random_machine(task: str, seed: int) -> Machine:
-    """A machine for a task.
-
-    Args:
-        task: Name of a built-in task.
-        seed: Of the draw; equal seeds give equal machines.
-    """
+    """A machine for a task."""
     names = sorted(_DESIGNS)
     draw = np.random.default_rng([seed, names.index(task)])
     while True:
@@ -103,25 +99,9 @@ def _with_extras(machine: Machine, draw: Draw, most: int = 6) -> Machine:
         first, second = (blocks[int(k)] for k in draw.integers(0, len(blocks), size=2))
         faces = [str(draw.choice([face.label for face in b.module.faces])) for b in (first, second)]
         if draw.random() < 0.7:
-            machine.act(
-                "attach_block_to",
-                {
-                    "base_block": first.id,
-                    "face": faces[0],
-                    "new_block": "Small Wooden Block",
-                },
-            )
+            attach(machine, first.id, faces[0])
         elif first.id != second.id:
-            machine.act(
-                "connect_blocks",
-                {
-                    "block_a": first.id,
-                    "face_a": faces[0],
-                    "block_b": second.id,
-                    "face_b": faces[1],
-                    "connector": BRACE,
-                },
-            )
+            connect(machine, first.id, faces[0], second.id, faces[1], connector=BRACE)
     return machine
 
 

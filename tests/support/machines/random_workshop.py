@@ -4,13 +4,12 @@ Each is a design that answers its task, with other parts here and there, parts m
 a little off, and keys that are pressed sooner, later, longer or shorter.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
+from support.machines.building import attach
 
 from buildarena_benchmark import builtin_tasks
 from buildarena_geometry import Machine
@@ -56,12 +55,7 @@ _SWAPPED, _TWIST_DEG = 0.04, 4.0
 
 
 def random_workshop_machine(task: str, seed: int) -> Machine:
-    """A machine for a task of the workshop, its keys bound and its presses written.
-
-    Args:
-        task: Its name.
-        seed: Of the draw; equal seeds give equal machines.
-    """
+    """A machine for a task of the workshop, its keys bound and its presses written."""
     draw = np.random.default_rng([seed, TASKS.index(task)])
     while True:
         machine = _drawn(task, draw)
@@ -108,8 +102,7 @@ def _add_parts(machine: Machine, draw: Draw) -> None:
         base = blocks[int(draw.integers(0, len(blocks)))]
         face = str(draw.choice([face.label for face in base.module.faces]))
         module = str(draw.choice(offered))
-        place = {"base_block": base.id, "face": face, "new_block": module}
-        machine.act("attach_block_to", place)
+        attach(machine, base.id, face, module)
 
 
 def _bind(machine: Machine, control: Mapping[str, Any], draw: Draw) -> None:

@@ -22,12 +22,7 @@ GOLDENS: Final = DATA / "goldens.json"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reference:
-    """A reference machine.
-
-    Attributes:
-        task: The task it is for.
-        quality: "good", "mediocre" or "bad".
-    """
+    """A reference machine."""
 
     task: str
     quality: str

@@ -1,15 +1,13 @@
 """Rigs for joints: a heavy mast that stands still, and what moves on it."""
 
-import copy
-import json
 import math
 from dataclasses import replace
 from functools import cache
-from importlib import resources
-from typing import Any
 
 import numpy as np
+from support.machines.building import BLOCK
 from support.machines.drafts import KeyedDraft
+from support.machines.module_files import like
 
 from buildarena_geometry import Catalogue, Machine, module_set
 from buildarena_geometry.modules.catalogue import read_modules
@@ -25,19 +23,10 @@ from buildarena_worker.builtin.designs.drafting import DOWN
 SIDES = ("base", "arm")
 """Which side of a joint is a tree's root, from which the engines see the joint."""
 
-_BASIC = resources.files("buildarena_geometry.modules").joinpath("modules.yaml")
-
-
-def entry(name: str, like: str, **fields: Any) -> dict[str, Any]:
-    """A module file's entry, like that of a basic module but for some fields."""
-    modules = {module["name"]: module for module in json.loads(_BASIC.read_text())["modules"]}
-    return {**copy.deepcopy(modules[like]), "name": name, **fields}
-
 
 @cache
 def catalogue() -> Catalogue:
     """The workshop's modules, a mast, a weight of 10, a heavy one of 100, and a wedge of 30°."""
-    wood = "Small Wooden Block"
     slope, up = math.sin(math.radians(30)), math.cos(math.radians(30))
     slanted = {
         "label": "A",
@@ -62,21 +51,17 @@ def catalogue() -> Catalogue:
         "body": [{"shape": "box", "from": [-2, -2, 0], "to": [2, 2, 10]}],
     }
     entries = [
-        entry("Mast", wood, grabs=False, **mast),
-        entry("Weight", wood, mass=10, grabs=False),
-        entry("Heavy Weight", wood, mass=100, grabs=False),
-        entry("Wedge", wood, faces=[slanted], grabs=False),
+        like(BLOCK, "Mast", grabs=False, **mast),
+        like(BLOCK, "Weight", mass=10, grabs=False),
+        like(BLOCK, "Heavy Weight", mass=100, grabs=False),
+        like(BLOCK, "Wedge", faces=[slanted], grabs=False),
     ]
     extra = read_modules({"version": 1, "modules": entries}, where="rigs")
     return Catalogue((*module_set("workshop").values(), *extra))
 
 
 class Rig(KeyedDraft):
-    """A starting block on a mast, 10.5 above the ground.
-
-    Args:
-        modules: What it may be made of.
-    """
+    """A starting block on a mast, 10.5 above the ground."""
 
     def __init__(self, modules: Catalogue | None = None) -> None:
         super().__init__()

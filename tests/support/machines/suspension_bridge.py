@@ -1,7 +1,5 @@
 """A suspension bridge of our own design: a deck that hangs by ropes from two towers."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from buildarena_worker.builtin.designs.drafting import (
@@ -26,11 +24,7 @@ HANGERS = (1, 3)
 
 
 def suspension_bridge(*, roped: bool = True) -> Mapping[str, list[Action]]:
-    """The actions that build it, by machine: ``deck``, ``tower`` and ``assembly``.
-
-    Args:
-        roped: Whether the deck hangs by ropes.
-    """
+    """The actions that build it, by machine: ``deck``, ``tower`` and ``assembly``."""
     deck, rows = _deck()
     tower, legs, beam = _tower()
     whole = Draft({"deck": deck.machine, "tower": tower.machine})

@@ -1,7 +1,5 @@
 """Models for session tests: some reply as scripted, some remember what they were asked."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from buildarena_store import Usage

@@ -4,8 +4,6 @@ Behind the wire plays a built-in model, from nothing but what the wire carries. 
 answered, so that accounts can be compared, and fails on demand.
 """
 
-from __future__ import annotations
-
 import contextlib
 import gzip
 import json

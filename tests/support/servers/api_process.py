@@ -1,7 +1,5 @@
 """An API process with its database and broker, and no workers, for benchmarks."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """A construct worker's threads in the test's process, against stand-ins for providers."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """An empty database: every row is gone but what migrations wrote."""
 
-from __future__ import annotations
-
 from typing import Final
 
 from sqlalchemy import text

@@ -1,7 +1,5 @@
 """A proxy between a runner and the API that breaks connections off in the middle."""
 
-from __future__ import annotations
-
 import socket
 import threading
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """A reverse proxy in front of a service: passes bytes on as they come, and says who sent them."""
 
-from __future__ import annotations
-
 import asyncio
 import threading
 from collections.abc import Iterator

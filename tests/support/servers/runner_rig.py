@@ -1,7 +1,5 @@
 """Runners of tests: real ones, and those that say what they like."""
 
-from __future__ import annotations
-
 import hashlib
 import threading
 from collections.abc import Iterator
@@ -12,6 +10,7 @@ from typing import Any
 import httpx
 from sqlalchemy import text
 from support.clients.tenants import ADMIN
+from support.machines.building import built
 
 from buildarena_benchmark.tasks.loading import parse_custom_task
 from buildarena_geometry import Machine
@@ -74,10 +73,7 @@ MISSING = SHORT.replace("name: short", "name: missing").replace(
 
 def two_blocks() -> Machine:
     """A starting block with one more on it."""
-    machine = Machine()
-    machine.act("start", {})
-    machine.act("attach_block_to", {"base_block": "1", "face": "C", "new_block": "Torch"})
-    return machine
+    return built(("1", "C", "Torch"))
 
 
 def waiting(context: Context, text: str = SHORT, *, seed: int = 0, owner: str | None = None) -> Job:
@@ -136,13 +132,7 @@ def slot(
 
 @dataclass
 class Caller:
-    """Somebody who speaks the protocol by hand.
-
-    Attributes:
-        url: The API.
-        secret: The key; None for none.
-        name: What it calls itself.
-    """
+    """Somebody who speaks the protocol by hand."""
 
     url: str
     secret: str | None = None

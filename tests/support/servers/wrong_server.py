@@ -1,7 +1,5 @@
 """A server that answers as it is told, rightly or wrongly, and keeps what it was sent."""
 
-from __future__ import annotations
-
 import socket
 import threading
 from collections.abc import Iterator, Sequence
@@ -13,12 +11,7 @@ WITHIN_S = 5.0
 
 @dataclass
 class WrongServer:
-    """A server.
-
-    Attributes:
-        url: Where it is.
-        received: Every request, with its body.
-    """
+    """A server."""
 
     url: str
     received: list[bytes] = field(default_factory=list)

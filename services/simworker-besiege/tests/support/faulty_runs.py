@@ -3,8 +3,6 @@
 A program of its own, because PyAutoGUI takes the screen that its process was started with.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os
@@ -16,13 +14,11 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from game_rig import TRIALS, Rig, short_trial, trial_of
+from game_rig import TRIALS, Rig, our_score, short_trial, trial_of
 from stand_in_game.faults import KINDS, ONLY_AT, POINTS
 
 from buildarena_benchmark import Score, Task, score
-from buildarena_besiege import game_start
 from buildarena_geometry import Machine
-from buildarena_simulation import simulate
 
 NEAR = 0.02
 """A score is right when its indicator is so near to the engine's, as a share."""
@@ -30,13 +26,7 @@ NEAR = 0.02
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Run:
-    """How one run ended.
-
-    Attributes:
-        seed: Draws task and faults.
-        ended: "right", "fault", or what is wrong with it.
-        detail: The score, or the runner's sentence.
-    """
+    """How one run ended."""
 
     seed: int
     task: str
@@ -135,12 +125,7 @@ def main() -> None:
     trials = {}
     for name in TRIALS:
         task, machine = short_trial(name)
-        right = score(
-            task,
-            machine,
-            simulate(machine, task.scenario, "mujoco", start=game_start(machine, task.scenario)),
-        )
-        trials[name] = (task, machine, right)
+        trials[name] = (task, machine, our_score(task, machine))
     ends: Counter[str] = Counter()
     for seed in range(given.first, given.first + given.runs):
         run = run_one(rig, seed, trials)

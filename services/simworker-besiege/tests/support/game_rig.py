@@ -1,7 +1,5 @@
 """A runner of the game and the stand-in that it plays, in a folder and on a screen of their own."""
 
-from __future__ import annotations
-
 import json
 import os
 import sys
@@ -9,12 +7,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from support.machines.building import BLOCK, built
 from support.player import Player
 
-from buildarena_benchmark import Task, builtin_tasks
+from buildarena_benchmark import Score, Task, builtin_tasks, score
+from buildarena_besiege import game_start
 from buildarena_geometry import Machine
 from buildarena_pipeline.runtime.simulators.simulator import TrialRequest
-from buildarena_simulation import Scenario
+from buildarena_simulation import Scenario, simulate
 from buildarena_simworker_besiege.calibrate import TRIAL_S
 
 HERE = Path(__file__).parent
@@ -105,10 +105,7 @@ def experts_machine(task: str) -> Machine:
 
 def tried_machine() -> tuple[Machine, Scenario]:
     """What `calibrate` plays to see whether the positions are right."""
-    machine = Machine()
-    machine.act("start", {})
-    block = {"base_block": "1", "face": "A", "new_block": "Small Wooden Block", "note": ""}
-    machine.act("attach_block_to", block)
+    machine = built(("1", "A", BLOCK))
     scenario = {"duration_s": TRIAL_S, "control": {"mode": "agent"}}
     return machine, Scenario.model_validate(scenario)
 
@@ -120,6 +117,13 @@ def short_trial(name: str) -> tuple[Task, Machine]:
     cargo = task.scenario.cargo and task.scenario.cargo.model_copy(update=changes)
     scenario = task.scenario.model_copy(update={"duration_s": duration_s, "cargo": cargo})
     return replace(task, scenario=scenario), experts_machine(name)
+
+
+def our_score(task: Task, machine: Machine, **more: Any) -> Score:
+    """What our engine gives the machine where it starts as in the game."""
+    start = game_start(machine, task.scenario)
+    trajectory = simulate(machine, task.scenario, "mujoco", start=start, **more)
+    return score(task, machine, trajectory)
 
 
 def trial_of(task: Task, machine: Machine, *, job_id: str = "job_0001") -> TrialRequest:

@@ -1,7 +1,5 @@
 """Plays one short trial in the game, prints its score; a program, so that it can be killed."""
 
-from __future__ import annotations
-
 import json
 import os
 import sys

@@ -5,8 +5,6 @@ The run's own script is run in a real Lua, its blocks moved by the engine's traj
 game says these lines again under the id of the run that it plays.
 """
 
-from __future__ import annotations
-
 import gzip
 from collections.abc import Iterator
 from dataclasses import dataclass

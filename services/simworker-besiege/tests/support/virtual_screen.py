@@ -1,7 +1,5 @@
 """A screen without a monitor: Xvfb on a display of its own."""
 
-from __future__ import annotations
-
 import os
 import select
 import shutil
@@ -30,11 +28,7 @@ def missing_packages() -> str:
 
 @contextmanager
 def virtual_screen(size: tuple[int, int] = (1400, 900)) -> Iterator[dict[str, str]]:
-    """A screen of a size in pixels; gives the environment of the programs that are shown there.
-
-    Raises:
-        NoScreenError: a program is missing, or the server does not start.
-    """
+    """A screen of a size in pixels; gives the environment of the programs that are shown there."""
     lacking = missing_packages()
     if lacking:
         raise NoScreenError(lacking)

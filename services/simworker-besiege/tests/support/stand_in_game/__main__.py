@@ -1,7 +1,5 @@
 """Starts the stand-in game: `python -m stand_in_game --machines DIR --games DIR`."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

@@ -15,11 +15,7 @@ _SOON_MS: Final = 30
 
 
 class Breakage:
-    """Carries out faults.
-
-    Args:
-        root: the game's window.
-    """
+    """Carries out faults."""
 
     def __init__(self, root: tk.Tk) -> None:
         self._root = root

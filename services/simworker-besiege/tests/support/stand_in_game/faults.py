@@ -1,7 +1,5 @@
 """Faults on demand: what goes wrong, when, and how often."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -93,11 +91,7 @@ class Fault:
 
 
 class Faults:
-    """The faults still to come.
-
-    Args:
-        faults: them, in the order in which they strike at one point.
-    """
+    """The faults still to come."""
 
     def __init__(self, faults: Iterable[Fault] = ()) -> None:
         self._faults = list(faults)
@@ -124,11 +118,7 @@ class Faults:
 
 
 def read_faults(path: Path) -> list[Fault]:
-    """The faults of a file: a JSON list of objects with "fault" and what else is told.
-
-    Raises:
-        FaultError: an entry is not one.
-    """
+    """The faults of a file: a JSON list of objects with "fault" and what else is told."""
     entries = json.loads(path.read_text())
     if not isinstance(entries, list):
         raise FaultError("a file of faults is a list of objects")

@@ -1,7 +1,5 @@
 """The game behind the window: what is loaded, what runs, what the log says."""
 
-from __future__ import annotations
-
 import random
 from dataclasses import dataclass
 from pathlib import Path
@@ -33,12 +31,7 @@ class Settings:
 
 
 class Game:
-    """The state of the game; the window and the headless server move it.
-
-    Args:
-        settings: how it runs.
-        faults: what goes wrong.
-    """
+    """The state of the game; the window and the headless server move it."""
 
     def __init__(self, settings: Settings, faults: Faults) -> None:
         self.settings, self.faults = settings, faults
@@ -92,11 +85,7 @@ class Game:
         self.simulating = False
 
     def frame(self, passed_s: float) -> None:
-        """One frame of the game.
-
-        Args:
-            passed_s: wall-clock time since the last one.
-        """
+        """One frame of the game."""
         if not self.simulating or self.run is None:
             return
         self._clock_s += min(passed_s, _LONGEST_FRAME_S) * self.settings.speed * self._pace()

@@ -4,8 +4,6 @@ A golden log has each line once, without the run's mark in front and the check s
 a game without a window stand below them.
 """
 
-from __future__ import annotations
-
 import gzip
 import re
 from dataclasses import dataclass
@@ -58,11 +56,7 @@ class Run:
 
 
 def read_run(path: Path, games: Path) -> Run:
-    """The run of a machine file.
-
-    Raises:
-        GameFileError: It is no machine file, has no script, or none that was recorded.
-    """
+    """The run of a machine file."""
     try:
         root = ET.fromstring(path.read_bytes())
     except (OSError, ET.ParseError) as error:

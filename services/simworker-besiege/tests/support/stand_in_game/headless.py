@@ -5,8 +5,6 @@ are lines on standard output, "[Info   :BesiegeAgent] SendMessage: <message>". A
 command is told on standard output too and otherwise passed over, as are commands at a wrong time.
 """
 
-from __future__ import annotations
-
 import os
 import selectors
 import socket
@@ -34,14 +32,7 @@ _SCENES: Final = {
 
 
 class Headless:
-    """The server and the game's loop, in one thread.
-
-    Args:
-        game: what is played.
-        report: what tells others about it.
-        ip: where it listens.
-        port: see ip; 0 for a free one.
-    """
+    """The server and the game's loop, in one thread."""
 
     def __init__(self, game: Game, report: Report, *, ip: str, port: int) -> None:
         self._game, self._report = game, report

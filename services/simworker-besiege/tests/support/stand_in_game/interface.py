@@ -1,7 +1,5 @@
 """What the window's panels and the keyboard do, apart from any toolkit."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -61,19 +59,7 @@ class NameBox:
 
 @dataclass(slots=True)
 class Interface:
-    """Panels, focus and what clicks and keys do.
-
-    Attributes:
-        game: what is played.
-        machines: the folder with the machine files.
-        screen: the window around it.
-        load_panel: whether the load panel is open.
-        loading: whether a machine is being loaded.
-        confirm: whether the question is open if the machine is to be deleted.
-        lua_panel: whether the mod's panel is shown.
-        dialog: the text of a dialog in the way, "" if there is none.
-        focus: what takes the keys.
-    """
+    """Panels, focus and what clicks and keys do."""
 
     game: Game
     machines: Path

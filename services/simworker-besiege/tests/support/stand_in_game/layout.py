@@ -1,7 +1,5 @@
 """Where everything is in the window, in fractions of its width and height."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Final
 
@@ -47,5 +45,3 @@ CONFIRM_ITEMS: Final = {
 }
 DIALOG_PANEL: Final = Box(0.300, 0.300, 0.700, 0.600)
 DIALOG_ITEMS: Final = {"dialog_ok": around(0.500, 0.540, 0.080, 0.050)}
-EMPTY_SPACE: Final = (0.034, 0.726)
-"""Where the published runner takes the focus away: nothing may ever be here."""

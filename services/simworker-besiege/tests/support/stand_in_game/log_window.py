@@ -1,7 +1,5 @@
 """The mod's log window: newest line first, a limited number of lines."""
 
-from __future__ import annotations
-
 import random
 from collections import deque
 from collections.abc import Sequence
@@ -15,11 +13,7 @@ KEPT: Final = 400
 
 
 class LogWindow:
-    """What the log window shows.
-
-    Args:
-        file: where every line is written as well, as by a mod that keeps a log.
-    """
+    """What the log window shows."""
 
     def __init__(self, file: Path | None = None) -> None:
         self._file = file

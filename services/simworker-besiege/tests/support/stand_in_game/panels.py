@@ -35,12 +35,7 @@ _WORDS: Final = {
 
 
 class Panels:
-    """Draws what lies over the world.
-
-    Args:
-        canvas: what it is drawn on.
-        size: the window's width and height, pixels.
-    """
+    """Draws what lies over the world."""
 
     def __init__(self, canvas: tk.Canvas, size: tuple[int, int]) -> None:
         self._canvas, (self._width, self._height) = canvas, size

@@ -1,18 +1,12 @@
 """The report: a file that says what the game is doing, for whoever watches it."""
 
-from __future__ import annotations
-
 import json
 import os
 from pathlib import Path
 
 
 class Report:
-    """Rewritten as a whole whenever it changes, so that a reader never sees half of it.
-
-    Args:
-        path: the file; None for no report.
-    """
+    """Rewritten as a whole whenever it changes, so that a reader never sees half of it."""
 
     def __init__(self, path: Path | None) -> None:
         self._path, self._written = path, ""

@@ -1,7 +1,5 @@
 """The faults that stop the whole process, with a window or without."""
 
-from __future__ import annotations
-
 import os
 import time
 from typing import Final

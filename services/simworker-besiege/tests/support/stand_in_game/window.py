@@ -26,13 +26,7 @@ _MODIFIERS: Final = ("Control", "Shift", "Alt", "Super", "Meta")
 
 
 class Window:
-    """The window with everything in it.
-
-    Args:
-        game: what is played.
-        machines: the folder with the machine files.
-        report: what tells others about it.
-    """
+    """The window with everything in it."""
 
     def __init__(self, game: Game, machines: Path, report: Report) -> None:
         self._game, self._report = game, report

@@ -1,0 +1,18 @@
+"""Trials of machines by the benchmark's tasks, and what is pressed in them."""
+
+from typing import Any
+
+from buildarena_benchmark import Score, Task, score
+from buildarena_geometry import KeyPress, Machine
+from buildarena_simulation import Trajectory, simulate
+
+
+def press(key: str, time: float, hold_for: float = 0.1) -> KeyPress:
+    return KeyPress(time_s=time, key=key, hold_for_s=hold_for)
+
+
+def trial(task: Task, machine: Machine, engine: str, **changes: Any) -> tuple[Score, Trajectory]:
+    """A trial of the task, whose scenario has these changes."""
+    scenario = task.scenario.model_copy(update=changes)
+    trajectory = simulate(machine, scenario, engine)
+    return score(task, machine, trajectory), trajectory
