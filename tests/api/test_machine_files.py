@@ -11,7 +11,7 @@ from support.machines.building import BLOCK, built
 
 from buildarena_api.machine_uploads import MAX_BYTES
 from buildarena_geometry import Machine
-from buildarena_pipeline.agents import machine_trials
+from buildarena_store.jobs import files
 
 BSG = Path(__file__).parents[1] / "data" / "besiege" / "bsg"
 TRIAL = {"task": "support-1", "simulator": "mujoco"}
@@ -150,7 +150,7 @@ def test_what_does_not_exist_is_named(api, field, value) -> None:
 
 
 def test_trials_under_way_are_bounded_for_each_key(guarded, monkeypatch) -> None:
-    monkeypatch.setattr(machine_trials, "MAX_OPEN", 2)
+    monkeypatch.setattr(files, "MAX_OPEN", 2)
     mine, other = new_tenant(guarded, "mine"), new_tenant(guarded, "other")
 
     def code(tenant, seed: int) -> int:
@@ -161,3 +161,53 @@ def test_trials_under_way_are_bounded_for_each_key(guarded, monkeypatch) -> None
     # An equal one takes no place.
     assert [code(mine, seed) for seed in (0, 1, 0, 2)] == [202, 202, 200, 429]
     assert code(other, 7) == 202
+
+
+@pytest.fixture
+def tenants(guarded):
+    return new_tenant(guarded, "mine"), new_tenant(guarded, "other")
+
+
+def brought(tenant, seed: int = 0):
+    params = {**TRIAL, "seed": seed}
+    return tenant.ask("POST", "/v1/machines/trials", content=document(), params=params)
+
+
+def test_who_cancels_leaves_what_another_wants(tenants) -> None:
+    mine, other = tenants
+    job = brought(mine).json()["id"]
+    assert brought(other).json()["id"] == job
+    assert mine.ask("POST", f"/v1/jobs/{job}/cancel").status_code == 200
+    assert other.ask("GET", f"/v1/jobs/{job}").json()["state"] == "queued"
+    # The one who left has no say any more; the one who stays has.
+    assert mine.ask("POST", f"/v1/jobs/{job}/cancel").status_code == 403
+    assert other.ask("POST", f"/v1/jobs/{job}/cancel").json()["outcome"] == "cancelled"
+
+
+def test_who_only_wants_it_too_ends_nothing(tenants) -> None:
+    mine, other = tenants
+    job = brought(mine).json()["id"]
+    brought(other)
+    assert other.ask("POST", f"/v1/jobs/{job}/cancel").json()["state"] == "queued"
+    assert mine.ask("POST", f"/v1/jobs/{job}/cancel").json()["outcome"] == "cancelled"
+
+
+def test_a_trial_that_is_opened_again_takes_a_place(tenants, monkeypatch) -> None:
+    monkeypatch.setattr(files, "MAX_OPEN", 2)
+    mine, _ = tenants
+    first = brought(mine, 0).json()["id"]
+    assert mine.ask("POST", f"/v1/jobs/{first}/cancel").status_code == 200
+    assert [brought(mine, seed).status_code for seed in (1, 2)] == [202, 202]
+    assert brought(mine, 0).status_code == 429
+    assert mine.ask("GET", f"/v1/jobs/{first}").json()["outcome"] == "cancelled"
+
+
+def test_an_errored_trial_that_is_tried_again_takes_a_place(tenants, context, monkeypatch) -> None:
+    monkeypatch.setattr(files, "MAX_OPEN", 2)
+    mine, _ = tenants
+    first = brought(mine, 0).json()["id"]
+    lease = context.store.leases.claim(f"simulate.{TRIAL['simulator']}", owner="simulate@here:1")
+    context.store.leases.give_up(lease, "no reason", reason="simulator_fault")
+    assert [brought(mine, seed).status_code for seed in (1, 2)] == [202, 202]
+    assert mine.ask("POST", f"/v1/jobs/{first}/retry").status_code == 429
+    assert mine.ask("GET", f"/v1/jobs/{first}").json()["outcome"] == "errored"

@@ -61,6 +61,16 @@ class NameTakenError(StoreError):
         super().__init__(f"the {kind} name {name!r} {whose}: choose another name")
 
 
+class TooManyFilesError(StoreError):
+    """An owner has as many trials of files under way as one may have."""
+
+    def __init__(self, most: int) -> None:
+        super().__init__(
+            f"{most} trials of files are under way, as many as one key may have: wait for some to "
+            "end"
+        )
+
+
 class TooManyLeasesError(StoreError):
     """A key's runners have as many leases as they may.
 

@@ -9,21 +9,15 @@ from buildarena_geometry import Machine
 from buildarena_geometry.machine_files import machine_bytes
 from buildarena_pipeline.agents.submission import chosen_task, submit_machine
 from buildarena_pipeline.catalog.tracks import file_track
-from buildarena_pipeline.errors import PipelineError
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.simulators.known import simulation_version
 from buildarena_store import Job, JobKey, NewJob
-from buildarena_store.jobs.files import files_under_way
+from buildarena_store.jobs.files import require_room
 from buildarena_store.jobs.job import configuration_hash
 from buildarena_store.states import FILE_PROVIDER
+from buildarena_store.sweeps.claims import add_claim
 
-MAX_OPEN: Final = 20
-"""Trials of files that one owner may have waiting or running."""
 NAME_LENGTH: Final = 12
-
-
-class TooManyTrialsError(PipelineError):
-    """The owner has as many trials of files under way as one may have."""
 
 
 def request_trial(
@@ -37,7 +31,8 @@ def request_trial(
 ) -> tuple[Job, bool]:
     """Opens a job that puts a machine through a task's trial.
 
-    An equal machine on the same task, simulator and seed gives the same job, whoever asks.
+    An equal machine on the same task, simulator and seed gives the same job, whoever asks; each who
+    does has a claim on it, and it goes on until nobody has.
 
     Args:
         context: The process' connections.
@@ -52,7 +47,7 @@ def request_trial(
 
     Raises:
         SubmissionError: The task or the simulator is unknown.
-        TooManyTrialsError: Too many are under way.
+        TooManyFilesError: The owner has as many under way as one may have.
     """
     chosen = chosen_task(context, task, simulator)
     digest = sha256(machine_bytes(machine)).hexdigest()
@@ -70,15 +65,13 @@ def request_trial(
         key=key, model=name, model_config=config, track_config=track.as_config(), owner=owner
     )
     queue = None
-    with context.store.database.transaction() as connection:
-        context.store.jobs.add([new], connection=connection)
+    with context.store.lifecycle.submission() as connection:
+        added = context.store.jobs.add([new], connection=connection)
+        add_claim(key.job_id, owner, connection=connection)
+        if added:
+            require_room(owner, connection=connection)
         fresh = context.store.external_calls.open(key.job_id, connection=connection)
         if fresh:
-            if files_under_way(owner, connection=connection) > MAX_OPEN:
-                raise TooManyTrialsError(
-                    f"{MAX_OPEN} trials of files are under way, as many as one key may have: wait "
-                    "for some to end"
-                )
             lease = context.store.external_calls.lease(key.job_id, connection=connection)
             if lease is None:
                 raise RuntimeError(f"job {key.job_id} was opened and is not open")

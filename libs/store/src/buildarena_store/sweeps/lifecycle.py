@@ -18,9 +18,10 @@ from buildarena_store import events
 from buildarena_store.accounts.budgets import BudgetLimits, Budgets
 from buildarena_store.database import Database
 from buildarena_store.errors import NotOwnedError, TransitionError, UnknownIdError
+from buildarena_store.jobs.files import require_room
 from buildarena_store.jobs.jobs import Jobs
 from buildarena_store.jobs.transitions import transition
-from buildarena_store.states import JobState, Stage, SweepState, sweep_states_before
+from buildarena_store.states import FILE_PROVIDER, JobState, Stage, SweepState, sweep_states_before
 from buildarena_store.sweeps import claims
 from buildarena_store.tables import jobs, sweep_jobs, sweeps
 
@@ -174,6 +175,7 @@ class SweepLifecycle:
         Raises:
             UnknownIdError: There is no such job.
             NotOwnedError: It is another key's.
+            TooManyFilesError: Its machine is a file, and its key has as many under way as may be.
         """
         with self.command() as connection:
             job = self._job(job_id, connection)
@@ -193,6 +195,8 @@ class SweepLifecycle:
             retried = self._jobs.retry(jobs.c.id == job_id, connection=connection, payer=payer)
             if retried and payer is None:
                 claims.add_claim(job_id, job.owner, connection=connection)
+            if retried and job.provider == FILE_PROVIDER:
+                require_room(job.owner, connection=connection)
         return bool(retried)
 
     def exhaust(self, budget_id: str, detail: str, *, connection: Connection) -> list[str]:
@@ -301,8 +305,10 @@ class SweepLifecycle:
             raise UnknownIdError("sweep", sweep_id)
         return row
 
-    def _job(self, job_id: str, connection: Connection) -> Row[Any, Any, Any]:
-        query = select(jobs.c.owner, jobs.c.payer, jobs.c.state).where(jobs.c.id == job_id)
+    def _job(self, job_id: str, connection: Connection) -> Row[Any, Any, Any, Any]:
+        provider = jobs.c.model_config["provider"].as_string().label("provider")
+        query = select(jobs.c.owner, jobs.c.payer, jobs.c.state, provider)
+        query = query.where(jobs.c.id == job_id)
         row = connection.execute(query).first()
         if row is None:
             raise UnknownIdError("job", job_id)

@@ -29,6 +29,7 @@ from buildarena_store import (
     NameTakenError,
     NotOwnedError,
     StoreError,
+    TooManyFilesError,
     TransitionError,
     UnknownIdError,
 )
@@ -36,6 +37,7 @@ from buildarena_store import (
 PROBLEM_JSON = "application/problem+json"
 QUOTED = re.compile(r"'([^']*)'")
 """How pydantic spells the values that it expects."""
+RETRY_FILES_S = 5
 MAX_SHOWN = 100
 """Characters of a wrong value that are repeated."""
 
@@ -167,6 +169,10 @@ def _add_store_handlers(app: FastAPI) -> None:
     @app.exception_handler(NameTakenError)
     async def on_others(_: Request, error: StoreError) -> JSONResponse:
         return _answer(403, str(error))
+
+    @app.exception_handler(TooManyFilesError)
+    async def on_too_many(_: Request, error: TooManyFilesError) -> JSONResponse:
+        return _answer(429, str(error), headers={"Retry-After": str(RETRY_FILES_S)})
 
     @app.exception_handler(UnknownIdError)
     async def on_unknown(_: Request, error: UnknownIdError) -> JSONResponse:

@@ -16,7 +16,7 @@ from buildarena_api.scenes import MachineScene, Vector, machine_scene
 from buildarena_api.schemas import JobView
 from buildarena_benchmark import ValidationIssue, broken_constraint
 from buildarena_geometry import Machine
-from buildarena_pipeline.agents.machine_trials import TooManyTrialsError, request_trial
+from buildarena_pipeline.agents.machine_trials import request_trial
 from buildarena_pipeline.catalog.specs import MAX_SEED, Name
 from buildarena_pipeline.runtime.context import Context
 from buildarena_simulation import DEFAULT_ENGINE
@@ -25,7 +25,6 @@ router = APIRouter(prefix="/v1/machines", tags=["machines"])
 
 CHECK_PATH: Final = "/v1/machines/check"
 TRIAL_PATH: Final = "/v1/machines/trials"
-RETRY_S: Final = 5
 """When a caller may come back whose trials found no room."""
 FILE: Final[dict[str, Any]] = {
     "requestBody": {
@@ -123,17 +122,14 @@ def try_file(
     fault = not_storable(machine)
     if fault is not None:
         raise refused(fault)
-    try:
-        job, fresh = request_trial(
-            context,
-            machine,
-            task=wanted.task,
-            simulator=wanted.simulator,
-            seed=wanted.seed,
-            owner=caller.key_id,
-        )
-    except TooManyTrialsError as error:
-        raise ProblemError(429, str(error), headers={"Retry-After": str(RETRY_S)}) from error
+    job, fresh = request_trial(
+        context,
+        machine,
+        task=wanted.task,
+        simulator=wanted.simulator,
+        seed=wanted.seed,
+        owner=caller.key_id,
+    )
     response.status_code = 202 if fresh else 200
     response.headers["Location"] = f"/v1/jobs/{job.id}"
     return JobView.of(job)
