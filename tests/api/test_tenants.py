@@ -333,8 +333,9 @@ def test_a_refused_request_changes_nothing(a, b, context) -> None:
 def test_names_belong_to_the_key_that_first_used_them(a, b, guarded) -> None:
     a.post("/v1/sessions", SESSION)
     b.post("/v1/sessions", {**SESSION, "seed": 1, "task": "lift-1"}, status=403)
-    b.post("/v1/sessions", {**SESSION, "agent": "Mason"})
-    a.post("/v1/sessions", {**SESSION, "agent": "Mason", "seed": 1}, status=403)
+    b.post("/v1/sessions", {**SESSION, "agent": "Mason"}, status=403)  # it looks like a's
+    b.post("/v1/sessions", {**SESSION, "agent": "carpenter"})
+    a.post("/v1/sessions", {**SESSION, "agent": "carpenter", "seed": 1}, status=403)
     operator(guarded).post("/v1/sessions", {**SESSION, "seed": 2})
     a.post("/v1/sessions", {**SESSION, "seed": 3})  # an admin's use does not take it
 

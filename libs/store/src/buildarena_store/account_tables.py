@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
-from sqlalchemy import BigInteger, Column, ForeignKey, Index, Numeric, Table, Text, text
+from sqlalchemy import BigInteger, Column, Computed, ForeignKey, Index, Numeric, Table, Text, text
 from sqlalchemy.dialects.postgresql import JSONB
 
 from buildarena_store.tables import count_column, metadata, time_column
 
-# Names that belong to the key that first used them; the operator's key is null.
+FOLD = (
+    "replace(replace(translate(lower(regexp_replace({}, '[._-]', '', 'g')), '01i5', 'olls'),"
+    " 'rn', 'm'), 'vv', 'w')"
+)
+"""SQL of a name's folded form: names that people may take for each other have the same one."""
+# Names that belong to the key that first used them, with all that look like them; the operator's
+# key is null.
 names = Table(
     "names",
     metadata,
     Column("kind", Text, primary_key=True),
     Column("name", Text, primary_key=True),
     Column("owner", Text),
+    Column("folded", Text, Computed(FOLD.format("name"), persisted=True)),
+    Index("ix_names_folded", "folded"),
 )
 
 api_keys = Table(

@@ -54,10 +54,22 @@ class NotOwnedError(StoreError):
 class NameTakenError(StoreError):
     """A name belongs to the key, and is of the kind, that first used it; nothing was changed."""
 
-    def __init__(self, kind: str, name: str, *, holder: str | None = None) -> None:
+    def __init__(
+        self, kind: str, name: str, *, holder: str | None = None, like: str | None = None
+    ) -> None:
+        """Says why a name is not to be had.
+
+        Args:
+            kind: What was to be named.
+            name: The name.
+            holder: The kind that has it, if that is another one.
+            like: The name that is taken: this one, or one that looks like it.
+        """
         whose = "belongs to the key that first used it"
         if holder is not None:
             whose = f"is the name of an {holder}" if holder == "agent" else f"is a {holder}'s name"
+        if like is not None and like != name:
+            whose = f"looks like {like!r}, which {whose}"
         super().__init__(f"the {kind} name {name!r} {whose}: choose another name")
 
 

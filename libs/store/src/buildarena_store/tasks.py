@@ -10,6 +10,7 @@ from typing import Any
 from sqlalchemy import Select, select, tuple_
 from sqlalchemy.dialects.postgresql import distinct_on, insert
 
+from buildarena_benchmark import builtin_tasks
 from buildarena_store.accounts.names import claim_name
 from buildarena_store.database import Database
 from buildarena_store.rows import columns_of, value_of
@@ -73,7 +74,14 @@ class Tasks:
             .returning(tasks.c.version)
         )
         with self._database.transaction() as connection:
-            claim_name("task", name, owner=owner, connection=connection, force=force)
+            claim_name(
+                "task",
+                name,
+                owner=owner,
+                connection=connection,
+                force=force,
+                reserved=builtin_tasks(),
+            )
             return connection.execute(statement).first() is not None
 
     def newest(self, names: Collection[str] | None = None) -> list[StoredTask]:

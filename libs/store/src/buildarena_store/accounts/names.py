@@ -1,19 +1,26 @@
-"""Names: each belongs to the key that first used it, decided by a unique row."""
+"""Names: each belongs to the key that first used it, with all that look like it."""
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Final, Literal
 
-from sqlalchemy import Connection, func, select
+from sqlalchemy import Connection, func, select, text
 from sqlalchemy.dialects.postgresql import insert
 
-from buildarena_store.account_tables import names
+from buildarena_store.account_tables import FOLD, names
 from buildarena_store.errors import NameTakenError
 
 NameKind = Literal["agent", "human", "task"]
 PLAYERS: Final[frozenset[NameKind]] = frozenset({"agent", "human"})
 """Kinds that stand on leaderboards beside each other: a name is of one of them only."""
-PLAYERS_LOCK: Final = 0x706C79  # "ply"
+NAMES_LOCK: Final = 0x706C79  # "ply"
+
+_FOLDED: Final = text(f"SELECT {FOLD.format(':name')}")
+_LIKE_RESERVED: Final = text(
+    f"SELECT reserved FROM unnest(CAST(:names AS text[])) AS reserved "  # noqa: S608 - our own SQL
+    f"WHERE {FOLD.format('reserved')} = :folded AND reserved <> :name LIMIT 1"
+)
 
 
 def claim_name(
@@ -23,11 +30,13 @@ def claim_name(
     owner: str | None,
     connection: Connection,
     force: bool = False,
+    reserved: Collection[str] = (),
 ) -> None:
-    """Makes a name the key's own, unless another key has it.
+    """Makes a name the key's own, unless another key has it or one that looks like it.
 
-    Of two keys that use a new name at once, one gets it: the other waits for the first one's
-    transaction, and then finds the name taken or free.
+    Names that differ only in case, dots, dashes, underscores or letters and digits of the same
+    shape look alike. Of two keys that use a new name at once, one gets it: the other waits for the
+    first one's transaction, and then finds the name taken or free.
 
     Args:
         kind: What is named.
@@ -35,23 +44,24 @@ def claim_name(
         owner: The key; None for the operator.
         connection: The transaction that also uses the name.
         force: Use another key's name, as an admin may; it stays the other key's.
+        reserved: Names that are nobody's, so that nothing may look like them.
 
     Raises:
         NameTakenError: Another key has it, or it is another kind's; the transaction must be undone.
     """
-    if kind in PLAYERS:
-        # Rows of two kinds do not collide: without the lock, both could be first.
-        lock = func.pg_advisory_xact_lock(PLAYERS_LOCK, func.hashtext(name))
-        connection.execute(select(lock))
-        others = names.c.kind.in_(sorted(PLAYERS - {kind}))
-        taken = select(names.c.kind).where(others, names.c.name == name)
-        other = connection.execute(taken).scalar()
-        if other is not None:
-            raise NameTakenError(kind, name, holder=other)
-    row = insert(names).values(kind=kind, name=name, owner=owner)
-    connection.execute(row.on_conflict_do_nothing())
-    holder = connection.execute(
-        select(names.c.owner).where(names.c.kind == kind, names.c.name == name)
-    ).scalar()
-    if holder != owner and not force:
-        raise NameTakenError(kind, name)
+    folded = connection.execute(_FOLDED, {"name": name}).scalar_one()
+    connection.execute(select(func.pg_advisory_xact_lock(NAMES_LOCK, func.hashtext(folded))))
+    given = {"names": list(reserved), "folded": folded, "name": name}
+    like = connection.execute(_LIKE_RESERVED, given).scalar()
+    if like is not None:
+        raise NameTakenError(kind, name, like=like)
+    kinds = PLAYERS if kind in PLAYERS else {kind}
+    query = select(names).where(names.c.folded == folded, names.c.kind.in_(sorted(kinds)))
+    for row in connection.execute(query.order_by((names.c.name == name).desc())):
+        if row.kind != kind:
+            raise NameTakenError(kind, name, holder=row.kind, like=row.name)
+        if row.owner != owner and not force:
+            raise NameTakenError(kind, name, like=row.name)
+        if row.name == name:
+            return
+    connection.execute(insert(names).values(kind=kind, name=name, owner=owner))
