@@ -1,9 +1,8 @@
-import { AxeBuilder } from "@axe-core/playwright";
 import { readFileSync } from "node:fs";
 import type { Browser, BrowserContext, Page } from "playwright-core";
 import { afterAll, beforeAll, describe, expect, it } from "vitest";
 import type { components } from "../src/api/contract";
-import { launched, URL_OF_SERVICE, visit, type Visit } from "./browser";
+import { expectNoSeriousFault, launched, URL_OF_SERVICE, type Visit, visit } from "./browser";
 import { count, dollars, number, percent, places } from "../src/format";
 
 type Schemas = components["schemas"];
@@ -217,17 +216,7 @@ describe("sweeps", () => {
     const { page, context } = await opened(path, URL_OF_SERVICE, width);
     if (path === "/sweeps/new") await page.getByText("YAML", { exact: true }).click();
     if (path === "/sweeps/new") await page.locator(".cm-content").waitFor();
-    const { violations } = await new AxeBuilder({ page }).analyze();
-    const serious = violations.filter((one) => one.impact === "serious" || one.impact === "critical");
-    expect(
-      serious.map(
-        (one) =>
-          `${one.id}: ${one.nodes
-            .map((node) => node.html.slice(0, 160))
-            .slice(0, 3)
-            .join(" | ")}`,
-      ),
-    ).toEqual([]);
+    await expectNoSeriousFault(page);
     expect(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth)).toBe(true);
     await context.close();
   });

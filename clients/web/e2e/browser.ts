@@ -1,4 +1,6 @@
+import { AxeBuilder } from "@axe-core/playwright";
 import { chromium, type Browser, type BrowserContext, type Page } from "playwright-core";
+import { expect } from "vitest";
 
 export const URL_OF_SERVICE = process.env.BUILDARENA_WEB_URL ?? "";
 /** Whether the long tests run: every page in every look. */
@@ -22,6 +24,13 @@ export const ATTACH = (base: number, face: number): Record<string, string> => ({
 
 export function launched(): Promise<Browser> {
   return chromium.launch({ executablePath: CHROMIUM, args: ARGUMENTS });
+}
+
+/** Expects that a page has no serious fault of accessibility. */
+export async function expectNoSeriousFault(page: Page): Promise<void> {
+  const { violations } = await new AxeBuilder({ page }).analyze();
+  const serious = violations.filter((violation) => violation.impact === "serious" || violation.impact === "critical");
+  expect(serious.map(({ id, nodes }) => [id, ...nodes.slice(0, 3).map((node) => node.html.slice(0, 160))])).toEqual([]);
 }
 
 /** Waits until a page has read what it shows. */

@@ -1,7 +1,6 @@
-import { AxeBuilder } from "@axe-core/playwright";
 import type { Browser, Page } from "playwright-core";
 import { afterAll, beforeAll, describe, expect, it } from "vitest";
-import { launched, opened, URL_OF_SERVICE } from "./browser";
+import { expectNoSeriousFault, launched, opened, URL_OF_SERVICE } from "./browser";
 
 const LONG_MS = 90_000;
 const TASK = "transport-1";
@@ -182,12 +181,7 @@ describe("building by hand", () => {
       await accepted(page, () => page.getByRole("button", { name: "Bind", exact: true }).click());
       await accepted(page, () => page.getByRole("button", { name: "Add", exact: true }).click());
       expect((await bench(page)).control_sequence).toHaveLength(1);
-      const { violations } = await new AxeBuilder({ page }).analyze();
-      expect(
-        violations
-          .filter((one) => one.impact === "serious" || one.impact === "critical")
-          .map((one) => `${one.id} ${one.nodes[0]?.html}`),
-      ).toEqual([]);
+      await expectNoSeriousFault(page);
       await page.getByRole("button", { name: "Start the trial" }).click();
       await page.getByRole("button", { name: "Start it" }).click();
       await page.locator("[data-outcome]").waitFor({ timeout: LONG_MS });
@@ -292,10 +286,7 @@ describe("building by hand", () => {
     await page.getByRole("button", { name: "Begin" }).click();
     await page.getByText("letters, digits, dots, dashes and underscores").first().waitFor();
     expect(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth)).toBe(true);
-    const { violations } = await new AxeBuilder({ page }).analyze();
-    expect(
-      violations.filter((one) => one.impact === "serious" || one.impact === "critical").map((one) => one.id),
-    ).toEqual([]);
+    await expectNoSeriousFault(page);
     await page.close();
   });
 });
@@ -320,12 +311,7 @@ describe("in the dark, at 390", () => {
     for (const tab of path === "room" ? ["Attach", "Part", "Keys", "All tools"] : [""]) {
       if (tab !== "") await page.getByRole("tab", { name: tab }).click();
       if (tab === "Part") await page.getByText("1 Starting Block").click();
-      const { violations } = await new AxeBuilder({ page }).analyze();
-      expect(
-        violations
-          .filter((one) => one.impact === "serious" || one.impact === "critical")
-          .map((one) => `${tab} ${one.id} ${one.nodes[0]?.html}`),
-      ).toEqual([]);
+      await expectNoSeriousFault(page);
       expect(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth)).toBe(true);
     }
     await page.close();
@@ -368,10 +354,7 @@ describe("a machine from a file", () => {
       await page.locator(".stage-3d canvas").waitFor();
       await page.getByRole("button", { name: "Start the trial" }).click();
       await page.locator("[data-outcome]").waitFor({ timeout: LONG_MS });
-      const { violations } = await new AxeBuilder({ page }).analyze();
-      expect(
-        violations.filter((one) => one.impact === "serious" || one.impact === "critical").map((one) => one.id),
-      ).toEqual([]);
+      await expectNoSeriousFault(page);
       for (const [name, content, says] of [
         ["noise.bsg", "\u0000\u0001nothing", "neither a machine document"],
         ["page.bsg", "<html><script>document.title='run'</script></html>", "page.bsg"],

@@ -1,7 +1,6 @@
-import { AxeBuilder } from "@axe-core/playwright";
 import type { Browser } from "playwright-core";
 import { afterAll, beforeAll, describe, expect, it } from "vitest";
-import { launched, LONG, URL_OF_SERVICE, visit, type Visit } from "./browser";
+import { expectNoSeriousFault, launched, LONG, URL_OF_SERVICE, type Visit, visit } from "./browser";
 
 let browser: Browser;
 let sweep = "";
@@ -45,17 +44,7 @@ describe.each(PAGES.map((page, index) => [...page, index] as const))("the page o
     "at %d px, %s, has no serious fault",
     async (width, scheme) => {
       const { page, faults, context } = await open(path(), width, scheme);
-      const { violations } = await new AxeBuilder({ page }).analyze();
-      const serious = violations.filter((one) => one.impact === "serious" || one.impact === "critical");
-      expect(
-        serious.map(
-          (one) =>
-            `${one.id}: ${one.nodes
-              .map((node) => node.html.slice(0, 160))
-              .slice(0, 3)
-              .join(" | ")}`,
-        ),
-      ).toEqual([]);
+      await expectNoSeriousFault(page);
       expect(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth)).toBe(true);
       expect(faults).toEqual([]);
       await context.close();

@@ -1,8 +1,7 @@
 import { readFileSync } from "node:fs";
-import { AxeBuilder } from "@axe-core/playwright";
 import type { Browser, Page } from "playwright-core";
 import { afterAll, beforeAll, describe, expect, it } from "vitest";
-import { act, ATTACH, launched, opened, openSession, URL_OF_SERVICE } from "./browser";
+import { act, ATTACH, expectNoSeriousFault, launched, opened, openSession, URL_OF_SERVICE } from "./browser";
 
 /** Poses of blocks by id, as (x, y, z, w, x, y, z), and those of refused blocks. */
 interface Expected {
@@ -145,10 +144,7 @@ describe.skipIf(sessions.length === 0)("two jobs", () => {
     const page = await opened(browser, `/compare?a=${a}&b=${b}`);
     await page.getByRole("tab", { name: "Trials, by one clock" }).click();
     await page.locator("[data-trial=b] canvas").waitFor();
-    const { violations } = await new AxeBuilder({ page }).analyze();
-    expect(
-      violations.filter((one) => one.impact === "serious" || one.impact === "critical").map((one) => one.id),
-    ).toEqual([]);
+    await expectNoSeriousFault(page);
     const eyes = (): Promise<number[][]> =>
       page.evaluate(() =>
         [...document.querySelectorAll("[data-trial] .stage-3d canvas")].map((canvas) => {

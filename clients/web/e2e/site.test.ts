@@ -1,11 +1,10 @@
-import { AxeBuilder } from "@axe-core/playwright";
 import type { Browser, Page } from "playwright-core";
 import { afterAll, beforeAll, describe, expect, it } from "vitest";
 import type { components } from "../src/api/contract";
 import { listed, type Rows } from "../src/api/kept-jobs";
 import type { Site } from "../src/api/site";
 import { count, number, percent, places } from "../src/format";
-import { launched, LONG, URL_OF_SERVICE } from "./browser";
+import { expectNoSeriousFault, launched, LONG, URL_OF_SERVICE } from "./browser";
 
 type Board = components["schemas"]["Board"];
 type JobPage = components["schemas"]["JobPage"];
@@ -88,17 +87,7 @@ describe.skipIf(WHOLE === "")("a published site", () => {
     "shows %s at %d px without a fault, from its own files",
     async (_, width, path) => {
       const { page, faults } = await opened(WHOLE, path(), width);
-      const { violations } = await new AxeBuilder({ page }).analyze();
-      const serious = violations.filter((one) => one.impact === "serious" || one.impact === "critical");
-      expect(
-        serious.map(
-          (one) =>
-            `${one.id}: ${one.nodes
-              .map((node) => node.html.slice(0, 160))
-              .slice(0, 3)
-              .join(" | ")}`,
-        ),
-      ).toEqual([]);
+      await expectNoSeriousFault(page);
       expect(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth)).toBe(true);
       expect(await page.getByRole("alert").filter({ hasText: "Try again" }).count()).toBe(0);
       expect(faults).toEqual([]);
