@@ -35,12 +35,14 @@ def machine_document(machine: LoggedState) -> dict[str, Any]:
             for press in state.control_sequence
         ],
         "structures": [
-            {"letter": found.letter, "source": found.source, "root": found.root}
-            for found in state.structures.values()
+            {"letter": structure.letter, "source": structure.source, "root": structure.root}
+            for structure in state.structures.values()
         ],
         "structures_made": state.structures_made,
         "next_id": state.next_id,
-        "available": {name: machine_document(one) for name, one in machine.available.items()},
+        "available": {
+            name: machine_document(available) for name, available in machine.available.items()
+        },
         "log": [
             {"name": record.name, "arguments": record.arguments, "reason": record.reason}
             for record in machine.records
