@@ -174,9 +174,9 @@ def _targets(
         lags[w] = motor.lag_per_s
     targets = lagged(targets, lags, time_step_s)
     for d, block in enumerate(structure.joints.driven):
-        found = _driven(structure.parts[block], partial(held, int(block)), step_count, time_step_s)
-        if found is not None:
-            targets[:, d] = found
+        driven = _driven(structure.parts[block], partial(held, int(block)), step_count, time_step_s)
+        if driven is not None:
+            targets[:, d] = driven
     return targets
 
 

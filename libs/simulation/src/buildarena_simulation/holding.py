@@ -151,15 +151,15 @@ class Holding:
         grips, block = self._grips, self._grips.blocks[k]
         c = int(clusters.cluster_of[block])
         points = motion.position[c] + grips.places[k] @ motion.rotation[c].T
-        reach, found = float(grips.reach[k]), []
+        reach, candidates = float(grips.reach[k]), []
         if self._world.ground:
-            found.append((max(0.0, float(points[:, 2].min())), WORLD, "ground"))
+            candidates.append((max(0.0, float(points[:, 2].min())), WORLD, "ground"))
         for name, other, shape in self._things(cargo):
             near = np.linalg.norm(points[4] - shape.center)
             if near < reach + np.linalg.norm(shape.half_extents) + np.ptp(points, axis=0).max():
-                found.append((float(distances(points, [shape])[0]), other, name))
-        found += self._pieces(points, c, clusters, motion, reach)
-        nearest = min(found, default=None)
+                candidates.append((float(distances(points, [shape])[0]), other, name))
+        candidates += self._pieces(points, c, clusters, motion, reach)
+        nearest = min(candidates, default=None)
         if nearest is not None and nearest[0] <= reach:
             hold = Hold(grip=k, block=block, other=nearest[1], point=grips.tips[k])
             self._held[k] = (hold, nearest[2])
@@ -184,7 +184,7 @@ class Holding:
         self, points: FloatArray, c: int, clusters: Clusters, motion: Motion, reach: float
     ) -> list[tuple[float, int, str]]:
         """Blocks of other pieces within reach: distance, block, id."""
-        found = []
+        candidates = []
         structure = self._world.structure
         far = clusters.root[clusters.cluster_of] != clusters.root[c]
         for block in np.flatnonzero(far).tolist():
@@ -193,8 +193,8 @@ class Holding:
             shapes: Sequence[Shape] = structure.parts[block].shapes
             near = float(distances(local, shapes).min())
             if near <= reach:
-                found.append((near, block, structure.parts[block].id))
-        return found
+                candidates.append((near, block, structure.parts[block].id))
+        return candidates
 
 
 def _as_forces(point: FloatArray, wrench: FloatArray) -> Iterator[tuple[FloatArray, FloatArray]]:

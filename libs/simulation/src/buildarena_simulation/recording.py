@@ -140,22 +140,22 @@ class Recorder:
     ) -> Trajectory:
         """The trajectory of all samples kept."""
         has_cargo = self._cargo_size is not None
-        kept = slice(self._row)
-        turns = self._cargo_quaternion[kept]
+        recorded = slice(self._row)
+        turns = self._cargo_quaternion[recorded]
         quaternion = np.where(turns[:, :1] < 0, -turns, turns)
         structure = self._structure
         positions, quaternions = self._poses()
         return Trajectory(
-            time_s=self._time_s[kept],
+            time_s=self._time_s[recorded],
             block_ids=self._ids,
             positions=rounded_positions(positions),
             quaternions=rounded_quaternions(quaternions),
-            cargo_position=rounded_positions(self._cargo_position[kept]) if has_cargo else None,
+            cargo_position=rounded_positions(self._cargo_position[recorded]) if has_cargo else None,
             cargo_quaternion=rounded_quaternions(quaternion) if has_cargo else None,
-            cargo_mass=self._cargo_mass[kept] if has_cargo else None,
+            cargo_mass=self._cargo_mass[recorded] if has_cargo else None,
             cargo_size=self._cargo_size,
             cannon_ids=tuple(structure.block_ids[i] for i in structure.cannons),
-            heated=self._heated[kept],
+            heated=self._heated[recorded],
             pieces=self._pieces(),
             bearing=breaking.bearing.series(
                 np.array(self._bearing), tuple(structure.block_ids[i] for i in structure.wheels)

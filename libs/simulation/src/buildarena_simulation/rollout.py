@@ -147,7 +147,7 @@ def simulate_structure(
         until: See `simulate`.
         on_progress: Called now and then with the share of the trial that is done.
     """
-    given, placed = scenario, start is not None
+    unvaried, placed = scenario, start is not None
     if start is None:
         start = start_of(structure, scenario, seed)
     else:
@@ -182,7 +182,7 @@ def simulate_structure(
                 "effective_key_presses": effective_presses(bindings, controls),
                 **({} if seed is None else {"seed": seed}),
                 **({"start": start_digest(start)} if placed else {}),
-                "scenario": hashlib.sha256(given.model_dump_json().encode()).hexdigest()[:16],
+                "scenario": hashlib.sha256(unvaried.model_dump_json().encode()).hexdigest()[:16],
             },
         )
     except BuildarenaSimulationError:

@@ -111,20 +111,20 @@ class EdgeSupports:
             Contacts and forces, one row each; the first rows are those given.
         """
         first_face = len(contacts.block) - len(corners)
-        found: list[tuple[IntArray, _Candidates]] = []
+        patches: list[tuple[IntArray, _Candidates]] = []
         of = self._cluster_of[contacts.block]
         resting = contacts.other[first_face:] == WORLD
         for c in sorted(set(of[first_face:][resting].tolist())):
             rows = self._patch(contacts, of, first_face, c)
             candidates = _candidates(contacts, spread, corners, rows, first_face)
             if (candidates.block != candidates.block[0]).any() and self._matters(candidates):
-                found.append((rows, candidates))
-        if not found:
+                patches.append((rows, candidates))
+        if not patches:
             return contacts, spread
         displaced = structure.displacements(together([spread, *others]), motion)
         force = spread.force.copy()
         added: list[tuple[_Candidates, FloatArray]] = []
-        for rows, candidates in found:
+        for rows, candidates in patches:
             normal = contacts.normal[rows[-1]]
             pushes = self._pushes(candidates, normal, structure, motion, displaced)
             if pushes is not None:
@@ -256,14 +256,14 @@ class _LeastEnergy:
         self._bearing: BoolArray = np.ones(len(h), dtype=bool)
         self._factors: tuple[bytes, object] = (b"", None)
 
-    def solve(self, target: FloatArray, given: FloatArray) -> FloatArray | None:
+    def solve(self, target: FloatArray, forces: FloatArray) -> FloatArray | None:
         """The forces; None if none have the resultant.
 
         Args:
             target: (P,).
-            given: (P,) forces with the resultant that is wanted.
+            forces: (P,) forces with the resultant that is wanted.
         """
-        bearing, wanted = self._bearing, self._balance @ given
+        bearing, wanted = self._bearing, self._balance @ forces
         scale = float(np.abs(wanted).max()) + 1e-12
         for turn in range(_ROUNDS):
             if not bearing.any():

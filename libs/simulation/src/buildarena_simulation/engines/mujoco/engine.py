@@ -331,8 +331,8 @@ class MujocoEngine:
                     self._shapes[c] = shape_table(self._structure, self._clusters.blocks[c])
                 among = (cluster == c).nonzero()[0]
                 local = (points[among] - motion.position[c]) @ motion.rotation[c]
-                row, found, weight = self._shapes[c].share(local)
+                row, sharing, weight = self._shapes[c].share(local)
                 rows.append(among[row])
-                blocks.append(found)
+                blocks.append(sharing)
                 weights.append(weight)
         return np.concatenate(rows), np.concatenate(blocks), np.concatenate(weights)

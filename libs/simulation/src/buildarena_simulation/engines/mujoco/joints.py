@@ -108,16 +108,16 @@ def enter_joint(
         data.qvel[joint.dofadr[0]] = joint_rate(structure, clusters, motion, c)
         return
     seat = seat_of(structure, clusters, c)
-    found = entered_place(structure, clusters, motion, c, targets)
+    entered = entered_place(structure, clusters, motion, c, targets)
     place, dof = int(joint.qposadr[0]), int(joint.dofadr[0])
     if seat == "ball":
-        turn = axes[c].T @ rotation_of(found.place) @ axes[c]
+        turn = axes[c].T @ rotation_of(entered.place) @ axes[c]
         data.qpos[place : place + 4] = quaternion_of(turn)
-        data.qvel[dof : dof + 3] = axes[c].T @ found.rate
+        data.qvel[dof : dof + 3] = axes[c].T @ entered.rate
         return
-    count = len(found.place)
-    data.qpos[place : place + count] = found.place
-    data.qvel[dof : dof + count] = found.rate
+    count = len(entered.place)
+    data.qpos[place : place + count] = entered.place
+    data.qvel[dof : dof + count] = entered.rate
 
 
 def drag_apart(

@@ -27,15 +27,15 @@ def thrust_forces(
         axes: (C, 3, 3) machine_from_principal.
         thrusts: (C,) recoil of each cannon, mass·unit/s².
     """
-    found = []
+    forces = []
     for cannon in np.flatnonzero(thrusts):
         block = structure.cannons[cannon]
         c = int(clusters.cluster_of[block])
         to_body = axes[c].T
         arm = to_body @ (structure.thrust_points[cannon] - clusters.center_of_mass[c])
         force = -thrusts[cannon] * (to_body @ structure.directions[block])
-        found.append((c, (force.tolist(), arm.tolist())))
-    return found
+        forces.append((c, (force.tolist(), arm.tolist())))
+    return forces
 
 
 def drag_forces(
@@ -53,18 +53,18 @@ def drag_forces(
         axes: (C, 3, 3) machine_from_principal.
         moments: (C, 3) principal moments of inertia.
     """
-    found = []
+    forces = []
     for piece in clusters.pieces:
         if not is_simple_piece(structure, clusters, piece):
-            found += [(c, _own_drag(clusters, motion, axes, moments, c=c)) for c in piece]
+            forces += [(c, _own_drag(clusters, motion, axes, moments, c=c)) for c in piece]
             continue
         root, inside = piece[0], list(piece)
         to_body = (motion.rotation[root] @ axes[root]).T
         drag = float(clusters.linear_drag[inside] @ clusters.mass[inside])
         force = -drag * (to_body @ motion.velocity[root])
         torque = -clusters.angular_drag[root] * moments[root] * (to_body @ motion.spin[root])
-        found.append((root, (force.tolist(), torque.tolist())))
-    return found
+        forces.append((root, (force.tolist(), torque.tolist())))
+    return forces
 
 
 def body_wrenches(wrenches: FloatArray, axes: FloatArray) -> list[tuple[int, Force]]:

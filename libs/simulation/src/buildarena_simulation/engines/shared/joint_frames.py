@@ -128,26 +128,26 @@ def entered_place(
         c: A cluster that hangs on another.
         targets: (D,) what the driven joints aimed at last; None at the start.
     """
-    found = joint_place(structure, clusters, motion, c)
+    current = joint_place(structure, clusters, motion, c)
     block = clusters.seated[c]
     joint = structure.parts[block].module.joint
     if targets is None or joint is None or joint.drive is None or joint.limits is not None:
-        return found
+        return current
     if joint.drive.kind == "position" and seat_of(structure, clusters, c) != "slider":
         target = targets[structure.joints.driven == block][0] * sign_of(clusters, c)
-        turns = np.round((target - found.place) / (2.0 * np.pi))
-        return JointPlace(place=found.place + 2.0 * np.pi * turns, rate=found.rate)
-    return found
+        turns = np.round((target - current.place) / (2.0 * np.pi))
+        return JointPlace(place=current.place + 2.0 * np.pi * turns, rate=current.rate)
+    return current
 
 
 def driven_clusters(structure: Structure, clusters: Clusters) -> list[int]:
     """Clusters that hang on their parents by a joint that follows a target."""
-    found = []
+    driven = []
     for c in np.flatnonzero(clusters.parent >= 0).tolist():
         module = structure.parts[clusters.seated[c]].module
         if module.motor is not None or (module.joint is not None and module.joint.drive):
-            found.append(c)
-    return found
+            driven.append(c)
+    return driven
 
 
 def engaged(structure: Structure, clusters: Clusters) -> list[tuple[int, int, float]]:
@@ -158,13 +158,13 @@ def engaged(structure: Structure, clusters: Clusters) -> list[tuple[int, int, fl
     """
     place = {int(block): c for c, block in enumerate(clusters.seated) if block >= 0}
     base = clusters.cluster_of[structure.members.first]
-    found = []
+    meshing = []
     for mesh in structure.joints.meshes:
         c, d = place.get(mesh.first), place.get(mesh.second)
         if c is None or d is None or base[clusters.joint[c]] != base[clusters.joint[d]]:
             continue
-        found.append((c, d, mesh.ratio * sign_of(clusters, c) * sign_of(clusters, d)))
-    return found
+        meshing.append((c, d, mesh.ratio * sign_of(clusters, c) * sign_of(clusters, d)))
+    return meshing
 
 
 def _slide(clusters: Clusters, motion: Motion, c: int, axis: FloatArray) -> JointPlace:
