@@ -238,7 +238,9 @@ def _reported(
     machine: Machine, scenario: Scenario, tracked: tuple[str, ...], references: Mapping[str, str]
 ) -> tuple[Reported, ...]:
     hot = set(cannons(machine))
-    blocks = [Reported(reference=references[one], burns=one in hot) for one in tracked]
+    blocks = [
+        Reported(reference=references[block_id], burns=block_id in hot) for block_id in tracked
+    ]
     if scenario.cargo is not None:
         blocks.append(Reported(reference=references[CARGO_ID], cargo=True))
     return tuple(blocks)

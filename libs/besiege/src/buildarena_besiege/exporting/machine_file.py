@@ -127,7 +127,9 @@ def block_records(
         for part in parts_in_file_order(machine)
     ]
     if cargo is not None:
-        module = next(one for one in machine.catalogue.values() if one.besiege_id == CARGO)
+        module = next(
+            candidate for candidate in machine.catalogue.values() if candidate.besiege_id == CARGO
+        )
         records.append(_cargo_record(module, guids.draw(), cargo))
     _require_finite(records)
     return records

@@ -91,7 +91,7 @@ def script_text(
     if cargo is not None:
         parts.append(_cargo(cargo, cargo_reference))
     if telling is not None:
-        parts += [_told(telling), _REPORT]
+        parts += [_telling_tables(telling), _REPORT]
     calls = ["  updates = updates + 1", "  move_keys()"]
     if cargo is not None:
         calls.insert(1, "  weigh()")
@@ -131,7 +131,7 @@ def _cargo(cargo: Cargo, reference: str) -> str:
     )
 
 
-def _told(telling: Telling) -> str:
+def _telling_tables(telling: Telling) -> str:
     rows = [
         f"  {{{_reference(block)}, {str(block.burns).lower()}, {str(block.cargo).lower()}}},"
         for block in telling.blocks

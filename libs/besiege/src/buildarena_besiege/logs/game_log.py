@@ -25,7 +25,7 @@ _LONGEST_COMPLAINT: Final = 500
 
 def run_ids(text: str) -> tuple[str, ...]:
     """The ids of the runs whose begin lines stand whole in a text, in their order."""
-    marks = dict.fromkeys(found[1] for found in _BEGINNINGS.finditer(text))
+    marks = dict.fromkeys(match[1] for match in _BEGINNINGS.finditer(text))
     return tuple(
         run
         for run in map(unquote, marks)

@@ -91,16 +91,16 @@ def line_of(text: str, prefix: str) -> Line | None:
 
 
 def _read(text: str, rest: str) -> Line | None:
-    if found := _SAMPLE.fullmatch(rest):
-        update, part, parts = (int(found[i]) for i in (1, 2, 3))
+    if match := _SAMPLE.fullmatch(rest):
+        update, part, parts = (int(match[i]) for i in (1, 2, 3))
         sound = 1 <= part <= parts and update > 0
-        entries = _entries(found[4])
+        entries = _entries(match[4])
         line = Line(kind="s", text=text, update=update, part=part, parts=parts, entries=entries)
         return line if sound else None
-    if found := _END.fullmatch(rest):
-        return Line(kind="e", text=text, update=int(found[1]))
-    found = _BEGIN.fullmatch(rest)
-    return found and Line(kind="b", text=text, fields=tuple(int(found[i]) for i in (1, 2, 3)))
+    if match := _END.fullmatch(rest):
+        return Line(kind="e", text=text, update=int(match[1]))
+    match = _BEGIN.fullmatch(rest)
+    return match and Line(kind="b", text=text, fields=tuple(int(match[i]) for i in (1, 2, 3)))
 
 
 def _entries(text: str) -> tuple[tuple[int, Entry], ...]:

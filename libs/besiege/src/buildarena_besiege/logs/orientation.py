@@ -36,7 +36,9 @@ def placed_quaternions(machine: Machine, block_ids: tuple[str, ...], turn: Quate
         block_ids: (N,) the blocks.
         turn: (w, x, y, z) how the game turns the machine, our components.
     """
-    rows = [multiply(turn, machine.blocks[one].world_from_block.wxyz) for one in block_ids]
+    rows = [
+        multiply(turn, machine.blocks[block_id].world_from_block.wxyz) for block_id in block_ids
+    ]
     return np.array(rows, np.float64).reshape(len(block_ids), 4)
 
 
@@ -69,13 +71,13 @@ def machine_rotations(built: Floats, roots: Floats, joined: NDArray[np.bool_]) -
     left, _, right = np.linalg.svd(np.einsum("tni,tnj->tij", after[known], before[known]))
     mirrored = np.linalg.det(left @ right) < 0.0
     left[mirrored, :, 2] *= -1.0
-    found = np.tile(np.eye(3), (len(roots), 1, 1))
-    found[known] = left @ right
-    fit = after[0] - before[0] @ found[0].T
+    rotations = np.tile(np.eye(3), (len(roots), 1, 1))
+    rotations[known] = left @ right
+    fit = after[0] - before[0] @ rotations[0].T
     if np.sqrt((fit**2).sum() / counts[0]) > MAX_MISFIT:
         return None
     latest = np.maximum.accumulate(np.where(known, np.arange(len(known)), 0))
-    return np.asarray(found[latest])
+    return np.asarray(rotations[latest])
 
 
 def turned(rotations: Floats, placed: Floats) -> Floats:
@@ -102,16 +104,16 @@ def centers_of(
         roots: (T, N, 3) their roots, units.
         turns: (T, N, 4) world_from_block.
     """
-    own = np.array([machine.blocks[one].module.center for one in block_ids], np.float64)
+    own = np.array([machine.blocks[block_id].module.center for block_id in block_ids], np.float64)
     vectors = np.concatenate([np.zeros((len(own), 1)), own.reshape(-1, 3)], axis=1)[None]
     conjugate = turns * np.array([1.0, -1.0, -1.0, -1.0])
     return np.asarray(roots + _product(_product(turns, vectors), conjugate)[..., 1:])
 
 
-def _product(one: Floats, other: Floats) -> Floats:
+def _product(left: Floats, right: Floats) -> Floats:
     """Quaternions (w, x, y, z) multiplied, the right one turning first."""
-    a, b, c, d = np.moveaxis(one, -1, 0)
-    e, f, g, h = np.moveaxis(other, -1, 0)
+    a, b, c, d = np.moveaxis(left, -1, 0)
+    e, f, g, h = np.moveaxis(right, -1, 0)
     return np.stack(
         [
             a * e - b * f - c * g - d * h,

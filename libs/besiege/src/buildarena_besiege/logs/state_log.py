@@ -113,7 +113,7 @@ class StateLog:
         order += [CARGO_ID] if scenario.cargo is not None else []
         rows = self._rows[:expected]
         _require_blocks(rows, len(order))
-        values = np.array([[one[1] for one in row] for row in rows], np.float64)
+        values = np.array([[entry[1] for entry in row] for row in rows], np.float64)
         time_s = np.arange(len(rows), dtype=np.float64) * INTERVAL_S
         instants = sample_instants(float(time_s[-1]))
         ids = tracked_blocks(machine, scenario)
@@ -122,14 +122,17 @@ class StateLog:
         samples = Samples(
             block_ids=ids,
             positions=stacked(
-                [resampled(instants, time_s, of_block[one][:, :3]) for one in ids],
+                [resampled(instants, time_s, of_block[block_id][:, :3]) for block_id in ids],
                 (len(instants), 0, 3),
             ),
             burning=np.zeros((len(instants), len(ids)), dtype=bool),
             cargo=None if cargo is None else resampled(instants, time_s, of_block[CARGO_ID][:, :3]),
             mass=None if cargo is None else np.full(len(instants), cargo.initial_mass),
             quaternions=stacked(
-                [_turns(machine.blocks[one].module, of_block[one], instants) for one in ids],
+                [
+                    _turns(machine.blocks[block_id].module, of_block[block_id], instants)
+                    for block_id in ids
+                ],
                 (len(instants), 0, 4),
             ),
             settings={
@@ -157,8 +160,8 @@ class StateLog:
                 self.begun = True
                 self._lines.append(line)
             return
-        if found := _STAT.search(line):
-            row = _row(found[1])
+        if match := _STAT.search(line):
+            row = _row(match[1])
             if row is not None:
                 self._rows.append(row)
                 self._lines.append(line)
@@ -172,19 +175,19 @@ class StateLog:
 
 def _row(text: str) -> Row | None:
     """What a GameStat message tells; None if it is damaged. Goals are no blocks."""
-    found = []
+    blocks = []
     for part in text.strip().strip("|").split("|"):
         name, _, numbers = part.partition(":")
         if name.startswith("GOAL_"):
             continue
         try:
-            values = tuple(float(one) for one in numbers.split(","))
+            values = tuple(float(number) for number in numbers.split(","))
         except ValueError:
             return None
         if len(values) != _VALUES or not all(map(math.isfinite, values)):
             return None
-        found.append((name, values))
-    return tuple(found) or None
+        blocks.append((name, values))
+    return tuple(blocks) or None
 
 
 def _require_blocks(rows: list[Row], count: int) -> None:
