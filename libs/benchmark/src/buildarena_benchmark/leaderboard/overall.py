@@ -118,12 +118,12 @@ def dimension_scores(
         if models > 1:
             scores[number] = (models - _single_task_ranks(row)) / (models - 1)
     names = dict.fromkeys(name for task in weights for name in task)
-    found: list[dict[str, float]] = [{} for _ in range(models)]
+    by_model: list[dict[str, float]] = [{} for _ in range(models)]
     for name in names:
         weight = np.array([task.get(name, 0) for task in weights], float)
         for model in range(models):
-            found[model][name] = float(weight @ scores[:, model] / weight.sum())
-    return found
+            by_model[model][name] = float(weight @ scores[:, model] / weight.sum())
+    return by_model
 
 
 def _single_task_ranks(row: Sequence[Cell]) -> NDArray[np.float64]:

@@ -65,7 +65,7 @@ def published_rows() -> Mapping[str, Sequence[PublishedRow]]:
     for line in csv.DictReader(text.splitlines()):
         row = _row(line)
         rows.setdefault(row.task, []).append(row)
-    return MappingProxyType({task: tuple(found) for task, found in rows.items()})
+    return MappingProxyType({task: tuple(task_rows) for task, task_rows in rows.items()})
 
 
 @cache

@@ -94,7 +94,7 @@ def tallied(trials: Iterable[EndedJob]) -> list[Tally]:
     kinds: dict[Kind, list[EndedJob]] = {}
     for trial in trials:
         kinds.setdefault(_kind(trial), []).append(trial)
-    return [_tally(kind, found) for kind, found in kinds.items()]
+    return [_tally(kind, jobs) for kind, jobs in kinds.items()]
 
 
 def _kind(trial: EndedJob) -> Kind:

@@ -106,7 +106,7 @@ def adjusted(family: Sequence[PairTests]) -> list[Floats]:
     """P-values of all tests of a family, adjusted such that any false finding is unlikely."""
     sizes = [len(tests.p_value) for tests in family]
     p_values = holm([float(p) for tests in family for p in tests.p_value])
-    return [np.array(found) for found in _split(p_values, sizes)]
+    return [np.array(part) for part in _split(p_values, sizes)]
 
 
 def rank_models(

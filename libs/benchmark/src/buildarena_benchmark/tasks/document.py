@@ -98,12 +98,13 @@ class Constraints(Document):
     modules: (
         Annotated[
             Annotated[ModuleSet, Tag("set")] | Annotated[ModuleNames, Tag("names")],
-            Discriminator(lambda given: "set" if isinstance(given, str) else "names"),
+            Discriminator(lambda value: "set" if isinstance(value, str) else "names"),
         ]
         | None
     ) = None
     module_list: Annotated[
-        Literal["inline", "on_demand"], BeforeValidator(lambda said: _FORMER_LISTS.get(said, said))
+        Literal["inline", "on_demand"],
+        BeforeValidator(lambda value: _FORMER_LISTS.get(value, value)),
     ] = "inline"
     min_modules: dict[ModuleName, Annotated[int, Field(ge=1, le=1000)]] = Field(default={})
     min_wheels: Count = 0

@@ -51,8 +51,8 @@ class Source:
     def issues(self, error: ValidationError, model: type[BaseModel]) -> tuple[ValidationIssue, ...]:
         """What the schema says against the content, in words, with lines and valid choices."""
         schema = model.model_json_schema()
-        found = [self._issue(item, schema) for item in error.errors(include_url=False)]
-        return tuple(dict.fromkeys(found))
+        issues = [self._issue(item, schema) for item in error.errors(include_url=False)]
+        return tuple(dict.fromkeys(issues))
 
     def _issue(self, item: ErrorDetails, schema: _Schema) -> ValidationIssue:
         field, line = self._located(item["loc"])
@@ -231,8 +231,8 @@ def _resolved(part: _Schema, schema: _Schema) -> _Schema:
     reference = part.get("$ref")
     if reference is None:
         return part
-    found: _Schema = schema["$defs"][reference.rsplit("/", 1)[1]]
-    return found
+    resolved: _Schema = schema["$defs"][reference.rsplit("/", 1)[1]]
+    return resolved
 
 
 def _tag(option: _Schema) -> str | None:

@@ -81,8 +81,8 @@ def deciding_sample(
         fall_height: Units.
     """
     assert trajectory.cargo_position is not None  # noqa: S101 - the caller looked
-    found = np.flatnonzero(is_lost(scenario, trajectory.cargo_position, fall_height=fall_height))
-    return int(found[0]) if len(found) else None
+    lost = np.flatnonzero(is_lost(scenario, trajectory.cargo_position, fall_height=fall_height))
+    return int(lost[0]) if len(lost) else None
 
 
 def is_lost(
