@@ -36,7 +36,7 @@ class RunLog(Protocol):
 
 
 class Desktop(Protocol):
-    """Hands on one running game.
+    """Controls one running game.
 
     Each call returns when its effect was seen, and raises `DesktopError` when it was not.
     """

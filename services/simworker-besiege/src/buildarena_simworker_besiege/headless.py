@@ -59,7 +59,7 @@ class HeadlessDesktop:
         self._running = False
         self._log: StateLog | None = None
         self._first = ""
-        self._told_s, self._told_at = 0.0, 0.0
+        self._newest_s, self._newest_at = 0.0, 0.0
         self._edges: list[tuple[float, str, bool]] = []
 
     @property
@@ -101,7 +101,7 @@ class HeadlessDesktop:
         self._edges = sorted(run.key_changes, key=lambda edge: edge[0])
         self._send(TOGGLE, "")
         self._first = self._expect("SimulationStart", "start the simulation", self._limits.answer_s)
-        self._told_s, self._told_at = 0.0, time.monotonic()
+        self._newest_s, self._newest_at = 0.0, time.monotonic()
         self._running = True
 
     def new_log(self, run: GameRun) -> StateLog:
@@ -136,10 +136,10 @@ class HeadlessDesktop:
 
     def _game_time(self) -> float:
         """The newest line's time, and what has passed since, until the next line is due."""
-        told = 0.0 if self._log is None else self._log.time_s
-        if told != self._told_s:
-            self._told_s, self._told_at = told, time.monotonic()
-        return told + min(time.monotonic() - self._told_at, INTERVAL_S)
+        newest_s = 0.0 if self._log is None else self._log.time_s
+        if newest_s != self._newest_s:
+            self._newest_s, self._newest_at = newest_s, time.monotonic()
+        return newest_s + min(time.monotonic() - self._newest_at, INTERVAL_S)
 
     def stop(self) -> None:
         """Ends the simulation."""

@@ -87,8 +87,8 @@ class BesiegeSettings(BaseSettings):
             return None
         # Source: the published projects; the game's builds differ in where they look.
         places = ("SavedMachines", "Besiege_Data/SavedMachines", "Contents/SavedMachines")
-        found = [self.folder / place for place in places if (self.folder / place).is_dir()]
-        return found[0] if found else self.folder / places[0]
+        folders = [self.folder / place for place in places if (self.folder / place).is_dir()]
+        return folders[0] if folders else self.folder / places[0]
 
     @property
     def calibration_file(self) -> Path:
