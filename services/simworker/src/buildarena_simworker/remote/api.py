@@ -129,9 +129,9 @@ class RunnerApi:
 
     def facts(self, *, patience_s: float | None = None) -> dict[str, Any]:
         """What the API says of key, versions and limits; waits for it until it answers."""
-        found: dict[str, Any] = self._json("GET", "/v1/runner", patience_s=patience_s)
-        self._piece_bytes = int(found["piece_bytes"])
-        return found
+        facts: dict[str, Any] = self._json("GET", "/v1/runner", patience_s=patience_s)
+        self._piece_bytes = int(facts["piece_bytes"])
+        return facts
 
     def lease(self, about: Mapping[str, Any], wait_s: float) -> dict[str, Any] | None:
         """The next trial, or None when there is none for so long; waits for an API that is away."""
@@ -254,11 +254,11 @@ class RunnerApi:
             raise UnreachableError("this runner has stopped") from error
         if answer.status_code in BUSY:
             asked = answer.headers.get("retry-after", "")
-            raise _TryAgainError(_said(answer), float(asked) if asked.isdecimal() else 0.0)
+            raise _TryAgainError(_detail(answer), float(asked) if asked.isdecimal() else 0.0)
         if answer.status_code == GONE:
-            raise LeaseLostError(_said(answer))
+            raise LeaseLostError(_detail(answer))
         if not answer.is_success:
-            raise RefusedError(answer.status_code, _said(answer))
+            raise RefusedError(answer.status_code, _detail(answer))
         if not answer.content:
             return None
         try:
@@ -275,7 +275,7 @@ def _pause(state: RetryCallState) -> float:
     return min(asked, LONGEST_PAUSE_S) + chance
 
 
-def _said(answer: httpx2.Response) -> str:
+def _detail(answer: httpx2.Response) -> str:
     try:
         return str(answer.json()["detail"])
     except (ValueError, KeyError, TypeError):

@@ -81,9 +81,9 @@ class Heartbeats:
         self._thread.stop()
         with self._lock:
             active, self._active = list(self._active.values()), {}
-        for one in active:
-            one.lost.set()
-        return [one.lease for one in active]
+        for active_lease in active:
+            active_lease.lost.set()
+        return [active_lease.lease for active_lease in active]
 
     @contextmanager
     def keeping(self, lease: HeldLease) -> Iterator[_Active]:
@@ -133,17 +133,19 @@ class LeasedOverHttp:
 
     def take(self) -> TrialRequest:
         """What is to be run; see `TrialSource`."""
-        given = self._document
+        document = self._document
         try:
-            controls = given["controls"]
+            controls = document["controls"]
             return TrialRequest(
                 job_id=self._active.lease.job_id,
-                number=int(given["number"]),
+                number=int(document["number"]),
                 token=self._active.lease.token,
-                version=str(given["version"]),
-                task=task_of(TaskDocument.model_validate(given["task"])),
-                machine=Machine.from_document(given["machine"]),
-                controls=None if controls is None else tuple(KeyPress(**one) for one in controls),
+                version=str(document["version"]),
+                task=task_of(TaskDocument.model_validate(document["task"])),
+                machine=Machine.from_document(document["machine"]),
+                controls=None
+                if controls is None
+                else tuple(KeyPress(**press) for press in controls),
                 require_held=self._active.require,
             )
         except Exception as error:
