@@ -60,6 +60,6 @@ def require_hash(data: bytes, sha256: str, name: str) -> bytes:
     return data
 
 
-def _compare(found: str, expected: str | None, name: str) -> None:
-    if expected is not None and found != expected:
+def _compare(digest: str, expected: str | None, name: str) -> None:
+    if expected is not None and digest != expected:
         raise DamagedError(f"{name} arrived damaged: its hash differs")
