@@ -136,10 +136,12 @@ def simulate_all(
     require_engine(engine)
     trials = []
     with Evaluator(chosen, engine, seed=seed, processes=processes, trajectories=True) as evaluator:
-        for number, (machine, found) in enumerate(zip(copies, evaluator.map(copies), strict=True)):
-            if found.trial is None:
-                raise SimulationError(f"machine {number} could not be tried: {found.error}")
-            trials.append(_shown_trial(chosen, machine, found.trial))
+        for number, (machine, evaluated) in enumerate(
+            zip(copies, evaluator.map(copies), strict=True)
+        ):
+            if evaluated.trial is None:
+                raise SimulationError(f"machine {number} could not be tried: {evaluated.error}")
+            trials.append(_shown_trial(chosen, machine, evaluated.trial))
     return trials
 
 
