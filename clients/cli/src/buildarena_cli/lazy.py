@@ -107,11 +107,11 @@ def new_group(text: str) -> typer.Typer:
 
 
 def _load(name: str, entry: Entry) -> Any:
-    found = getattr(import_module(f"buildarena_cli.commands.{entry.module}"), entry.attribute)
-    if isinstance(found, typer.Typer):
-        group = get_group(found)
+    target = getattr(import_module(f"buildarena_cli.commands.{entry.module}"), entry.attribute)
+    if isinstance(target, typer.Typer):
+        group = get_group(target)
         group.name = name
         return group
     alone = typer.Typer(rich_markup_mode=None, add_completion=False, pretty_exceptions_enable=False)
-    alone.command(name, context_settings=CONTEXT)(found)
+    alone.command(name, context_settings=CONTEXT)(target)
     return get_command(alone)

@@ -51,10 +51,10 @@ def read_machine(file: Path, dialect: str | None = None) -> Machine:
         DocumentError: It is none of these, the document is wrong, or an action is refused.
         ValueError: There is no such dialect.
     """
-    found = read_imported(file, dialect)
-    for remark in found.not_understood:
+    imported = read_imported(file, dialect)
+    for remark in imported.not_understood:
         warn(f"{file}: {remark}")
-    return found.machine
+    return imported.machine
 
 
 def read_imported(file: Path, dialect: str | None = None) -> ImportedMachine:

@@ -45,9 +45,9 @@ class SpecFile:
     content: dict[str, Any]
     overridden: frozenset[str] = field(default_factory=frozenset)
 
-    def with_words(self, given: Mapping[str, Any]) -> SpecFile:
+    def with_words(self, values: Mapping[str, Any]) -> SpecFile:
         """The same file with values from the command line in the place of its fields."""
-        return replace(self, content={**self.content, **given}, overridden=frozenset(given))
+        return replace(self, content={**self.content, **values}, overridden=frozenset(values))
 
     def refusal(self, issues: Sequence[ValidationIssue]) -> CommandError:
         """Issues in words, each with its line of the file or the flag that it came from."""
@@ -74,8 +74,10 @@ class SpecFile:
         near = suggested_field(issue.path, issue.message, issue.choices)
         if top not in self.overridden:
             return issue.describe(self.source.origin) + near
-        given = ValidationIssue(path=issue.path, message=issue.message, choices=issue.choices)
-        return given.describe(FLAGS[str(top)]) + near
+        without_line = ValidationIssue(
+            path=issue.path, message=issue.message, choices=issue.choices
+        )
+        return without_line.describe(FLAGS[str(top)]) + near
 
 
 def read_fields(file: Path) -> SpecFile:
@@ -108,11 +110,11 @@ def read_sweep(file: Path, flags: Mapping[str, Any]) -> SpecFile:
     Raises:
         CommandError: The file, or what the flags make of it, is not a sweep.
     """
-    given = {name: value for name, value in flags.items() if value is not None}
-    sweep = read_fields(file).with_words(given)
-    for one, other in (("samples", "seeds"), ("seeds", "samples")):
-        if one in given:
-            sweep.content.pop(other, None)
+    values = {name: value for name, value in flags.items() if value is not None}
+    sweep = read_fields(file).with_words(values)
+    for given_field, replaced_field in (("samples", "seeds"), ("seeds", "samples")):
+        if given_field in values:
+            sweep.content.pop(replaced_field, None)
     try:
         SweepSpec.model_validate(sweep.content)
     except ValidationError as error:

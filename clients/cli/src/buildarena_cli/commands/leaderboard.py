@@ -173,10 +173,10 @@ def audit(
         print_json({"scored": accepted["scored"], "checked": checked, "differences": differences})
     else:
         say(f"{checked} of {accepted['scored']} results checked")
-        for found in differences:
-            for entry in found["checks"]:
+        for difference in differences:
+            for entry in difference["checks"]:
                 say(
-                    f"!!  {found['job_id']} {entry['name']}: kept {entry['kept']}, "
+                    f"!!  {difference['job_id']} {entry['name']}: kept {entry['kept']}, "
                     f"found {entry['found']}"
                 )
         if not differences:

@@ -140,8 +140,8 @@ def cost_plot(bins: Mapping[str, Sequence[TokenBin]]) -> Figure:
 
     figure = Figure(figsize=(9, 3.4), layout="constrained")
     panels = figure.subplots(1, len(bins), squeeze=False, sharey=True)[0]
-    for axes, (category, found) in zip(panels, bins.items(), strict=True):
-        filled = [b for b in found if b.trials]
+    for axes, (category, category_bins) in zip(panels, bins.items(), strict=True):
+        filled = [b for b in category_bins if b.trials]
         centres = [math.sqrt(b.low * b.high) for b in filled]
         axes.plot(centres, [b.mean for b in filled], "o-", color=COLOURS[0], label="mean")
         axes.plot(centres, [b.median for b in filled], "s--", color=COLOURS[1], label="median")

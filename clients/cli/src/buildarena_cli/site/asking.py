@@ -37,9 +37,9 @@ def question(path: str, params: Mapping[str, Any] | None = None) -> str:
     """Path and parameters as pages look them up: decoded, the parameters in order."""
     words = sorted(
         f"{name}={value}"
-        for name, given in (params or {}).items()
+        for name, param in (params or {}).items()
         for value in (
-            given if isinstance(given, Sequence) and not isinstance(given, str) else [given]
+            param if isinstance(param, Sequence) and not isinstance(param, str) else [param]
         )
         if value is not None
     )

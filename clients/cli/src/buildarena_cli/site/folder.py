@@ -48,8 +48,8 @@ class Folder:
             raise CommandError(f"{path} is a file; --out names a folder")
         marker = path / MARKER
         if marker.is_file():
-            found = marker.read_text(encoding="utf-8", errors="replace").strip()
-            if found not in {VERSION, ""}:
+            version = marker.read_text(encoding="utf-8", errors="replace").strip()
+            if version not in {VERSION, ""}:
                 raise CommandError(f"{path} holds a site of another version of this program")
         elif path.is_dir():
             others = sorted(entry.name for entry in path.iterdir())
@@ -115,13 +115,13 @@ class Folder:
             another then.
         """
         try:
-            kept = json.loads((self.path / job_file(job_id)).read_bytes())
-            answers: dict[str, str | None] = dict(kept["answers"])
+            stored = json.loads((self.path / job_file(job_id)).read_bytes())
+            answers: dict[str, str | None] = dict(stored["answers"])
         except (OSError, ValueError, KeyError, TypeError):
             return None
         names = [name for name in answers.values() if name is not None]
         whole = all(_CONTENT.fullmatch(name) and (self.path / name).is_file() for name in names)
-        return answers if whole and kept.get("digest") == digest else None
+        return answers if whole and stored.get("digest") == digest else None
 
     def keep_job(self, job_id: str, digest: str, answers: Mapping[str, str | None]) -> None:
         """Keeps the index of a job's answers; a later run finds it."""

@@ -35,8 +35,8 @@ def built_pages() -> Path:
     Raises:
         CommandError: They were not built.
     """
-    found = find_spec("buildarena_api")
-    for place in (found.submodule_search_locations or ()) if found else ():
+    package = find_spec("buildarena_api")
+    for place in (package.submodule_search_locations or ()) if package else ():
         folder = Path(place, "pages")
         if (folder / INDEX).is_file():
             return folder

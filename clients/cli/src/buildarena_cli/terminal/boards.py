@@ -294,13 +294,13 @@ def _marked(rows: Sequence[Mapping[str, Any]]) -> str:
 
 def _remarks(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     """What is shown of flags, where there are some."""
-    found = []
+    remarks = []
     if any(map(_is_censored, rows)):
-        found.append("≥ cargos that never fell may weigh more")
+        remarks.append("≥ cargos that never fell may weigh more")
     counts = _flags(rows)
     if counts:
-        found.append("flags: " + ", ".join(f"{n} {flag}" for flag, n in sorted(counts.items())))
-    return found
+        remarks.append("flags: " + ", ".join(f"{n} {flag}" for flag, n in sorted(counts.items())))
+    return remarks
 
 
 def _flags(rows: Sequence[Mapping[str, Any]]) -> Counter[str]:
@@ -313,12 +313,12 @@ def _flags(rows: Sequence[Mapping[str, Any]]) -> Counter[str]:
 def _policy(board: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> list[str]:
     """What the board's flags say, and what was done about them."""
     counts = _flags(rows)
-    found = [
+    remarks = [
         f"  {flag['name']}: {flag['meaning']}" for flag in board["flags"] if counts[flag["name"]]
     ]
     if board["policy"] != "ours":
-        found.append("what the published evaluation calls hacked is left out, as it does itself")
-    return found
+        remarks.append("what the published evaluation calls hacked is left out, as it does itself")
+    return remarks
 
 
 def _imports(rows: Sequence[Mapping[str, Any]]) -> list[str]:
