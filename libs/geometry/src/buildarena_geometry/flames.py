@@ -40,7 +40,7 @@ def flames_touch(
 
 
 def heating(state: MachineState) -> Mapping[str, tuple[str, ...]]:
-    """What heats each cannon where the machine stands as it is built.
+    """What heats each cannon while the machine is as it was built.
 
     Returns:
         For each block that a flame can heat, in the order of the blocks, the ids of the blocks

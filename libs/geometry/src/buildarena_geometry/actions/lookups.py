@@ -128,7 +128,7 @@ def nearest(written: str, choices: Sequence[str]) -> str:
         return listing(choices)
     folded = {choice.casefold(): choice for choice in choices}
     words = " ".join(written[:_LONGEST_NAME].split()).casefold()
-    # Whoever writes "wheel" means one of the wheels, however long their names are.
+    # "wheel" means one of the wheels, however long their names are.
     within = [choice for fold, choice in folded.items() if words and words in fold]
     alike = get_close_matches(words, folded, n=_NEAREST, cutoff=0.0)
     close = list(dict.fromkeys([*within, *(folded[fold] for fold in alike)]))[:_NEAREST]

@@ -1,8 +1,8 @@
 """Machines as JSON documents.
 
-The parts are the truth of a document and are checked like a machine's; the log tells how it came
-to be. Quaternions and positions are written in full, so a machine that is read back equals the one
-that was written, bit for bit.
+The parts decide what the machine is, and are checked like a machine's; the log is its history.
+Quaternions and positions are written in full, so a machine that is read back equals the one that
+was written, bit for bit.
 """
 
 from __future__ import annotations

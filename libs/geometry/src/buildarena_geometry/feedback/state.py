@@ -193,7 +193,7 @@ def seats(before: MachineState, after: MachineState, moved_id: str) -> list[str]
         if joint is None or earlier is None:
             continue
         parted = parted or not joint.holds
-        # The moved block's own gap stands in its line.
+        # The moved block's own gap is in its line already.
         if joint.offset > FLUSH_OFFSET and block is not moved:
             sentences.append(f"Block {joint.part} is {_gap(joint)}.")
         if joint.offset <= FLUSH_OFFSET < earlier.offset:
