@@ -22,7 +22,7 @@ _NONE: Final = PointForces(
 
 
 class Holding:
-    """What the grips hold: they take the first thing that comes near until they are told to let go.
+    """What the grips hold: the first thing that comes near, until they are made to release it.
 
     Args:
         world: The machine and what is around it.
@@ -59,8 +59,8 @@ class Holding:
             clusters: The clusters.
             motion: Where they are.
             cargo: Where the cargo is, if there is one.
-            grab: (G,) whether each grip is told to hold again.
-            release: (G,) whether each is told to let go; it wins over `grab`.
+            grab: (G,) whether each grip shall hold again.
+            release: (G,) whether each shall let go; it wins over `grab`.
             time_s: Time now, seconds.
 
         Returns:
@@ -126,7 +126,7 @@ class Holding:
         """Vertical forces of what is held, upwards: of the ground on grips, of grips on the cargo.
 
         Returns:
-            Both in mass·g, as `Bearing` tells them; terrain that is held counts as ground.
+            Both in mass·g, as in `Bearing`; terrain that is held counts as ground.
         """
         on = dict.fromkeys((WORLD, CARGO), 0.0)
         for hold, wrench in self._borne:

@@ -88,7 +88,7 @@ class Recorder:
 
     @property
     def cargo_now(self) -> NDArray[np.float32] | None:
-        """(3,) where the cargo was at the last sample, as the trajectory tells it."""
+        """(3,) where the cargo was at the last sample, rounded as in the trajectory."""
         if self._cargo_size is None:
             return None
         return rounded_positions(self._cargo_position[self._row - 1])
@@ -138,7 +138,7 @@ class Recorder:
         simulation_version: str,
         settings: Mapping[str, Setting],
     ) -> Trajectory:
-        """The trajectory of all samples kept."""
+        """The trajectory of all recorded samples."""
         has_cargo = self._cargo_size is not None
         recorded = slice(self._row)
         turns = self._cargo_quaternion[recorded]

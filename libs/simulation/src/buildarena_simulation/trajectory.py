@@ -200,5 +200,5 @@ def rounded_quaternions(quaternions: NDArray[np.float64]) -> NDArray[np.float32]
 
 
 def rounded_loads(loads: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Shares of strength as they are stored: upwards, so that one that breaks a joint tells so."""
+    """Shares of strength as they are stored: rounded up, so a breaking load still shows as one."""
     return (np.ceil(loads / LOAD_GRAIN) * LOAD_GRAIN).astype(np.float32)

@@ -1,4 +1,4 @@
-"""One picture of a machine as it stands at the start of its trial."""
+"""One picture of a machine at the start of its trial."""
 
 import io
 from typing import TYPE_CHECKING, Final

@@ -95,7 +95,7 @@ def mean_contacts(readings: Sequence[tuple[float, ContactForces]]) -> ContactFor
     """The mean of several readings.
 
     Args:
-        readings: Share of the time each stands for, and the reading.
+        readings: Each with the share of the time that it represents.
     """
     if len(readings) == 1:
         return readings[0][1]

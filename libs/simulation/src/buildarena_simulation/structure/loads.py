@@ -74,7 +74,7 @@ class LoadModel:
             forces: Mean forces on the blocks, without gravity.
             motion: The clusters' motion now.
             elapsed_s: Time since the last evaluation, seconds.
-            seen_s: The part of it that the forces stand for, seconds.
+            seen_s: The part of it that the forces are the mean of, seconds.
 
         Returns:
             The loads of all members.

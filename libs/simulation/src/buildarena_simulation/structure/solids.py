@@ -29,7 +29,7 @@ class Solid:
         center: (3,) machine frame, units.
         rotation: (3, 3) machine_from_solid; a cylinder's axis is the third column.
         half_extents: (3,) as in `Shape`, a box's less the collision margin, units.
-        blocks: The blocks it stands for.
+        blocks: The blocks it represents.
         friction: Coefficient of its surface.
         is_wheel: Whether it is a wheel's.
     """

@@ -1,10 +1,9 @@
 """How terrain bears a structure that bends: unilateral supports on an elastic structure.
 
-What ground and terrain push on one cluster is known as a resultant; which block gets how much of
-it is for the structure's own stiffness to say. A beam that sags over a gap leaves its far ends
-without load and stands on the gap's edges, however long it is. So the normal forces f >= 0 at the
-corners of all resting faces are those of least elastic energy among all that have the same
-resultant force and moment.
+Ground and terrain push on one cluster with a known resultant; the structure's own stiffness decides
+how much of it each block gets. A beam that sags over a gap rests on the gap's edges and leaves its
+far ends without load, however long it is. So the normal forces f >= 0 at the corners of all resting
+faces are those of least elastic energy among all that have the same resultant force and moment.
 """
 
 from collections.abc import Sequence

@@ -21,7 +21,7 @@ class Addresses:
     Attributes:
         bodies: (C,) body of each cluster.
         body_of_geom: Cluster of each geom, `CARGO` or `WORLD`.
-        block_of_geom: Block of each geom that stands for one only, else -1.
+        block_of_geom: Block of each geom that represents one only, else -1.
         surface_of_geom: Fixed body of each geom as in `ContactForces.surface`.
         joints: The driven joints.
         thrust_actuators: (K,) actuator of each cannon.
@@ -71,7 +71,7 @@ def addresses_in(
         geom = model.geom(name).id
         body_of_geom[geom], surface_of_geom[geom] = WORLD, surface
     pieces = [model.joint(f"free {piece[0]}").dofadr[0] for piece in clusters.pieces]
-    # Only the cargo can stand before the pieces; its free joint comes first.
+    # Only the cargo can come before the pieces; its free joint is the first.
     free = pieces if pieces[0] == 0 else [0, *pieces]
     return Addresses(
         bodies=_ids(model.body(f"cluster {c}").id for c in range(len(clusters))),

@@ -1,4 +1,4 @@
-"""Moving joints in a compiled MuJoCo model: where they start, and what their drives are told."""
+"""Moving joints in a compiled MuJoCo model: where they start, and the targets of their drives."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -92,7 +92,7 @@ def enter_joint(
     c: int,
     targets: FloatArray | None,
 ) -> None:
-    """Puts a cluster's joint where the cluster stands, moving as it moves.
+    """Gives a cluster's joint the position and the rate that the cluster's motion implies.
 
     Args:
         model: The model.

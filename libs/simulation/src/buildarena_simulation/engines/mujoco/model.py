@@ -34,7 +34,7 @@ _TERRAIN_PRIORITY, _CARGO_PRIORITY, _BLOCK_PRIORITY, _WHEEL_PRIORITY = 0, 1, 2, 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MjcfSettings:
-    """What the text says about the solver.
+    """The solver's settings in the text.
 
     Attributes:
         time_step_s: Length of a step, seconds.
@@ -57,7 +57,7 @@ class MjcfSettings:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MjcfState:
-    """What the text says about the bodies.
+    """The bodies in the text.
 
     Attributes:
         clusters: The clusters.

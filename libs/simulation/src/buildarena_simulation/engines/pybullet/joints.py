@@ -91,7 +91,7 @@ class Articulation:
         return self.world.structure
 
     def start(self, motion: Motion, targets: FloatArray | None) -> None:
-        """Puts all joints where the clusters stand, and sets up springs and friction.
+        """Puts all joints at their clusters' positions, and sets up springs and friction.
 
         Args:
             motion: The clusters' motion.

@@ -22,7 +22,7 @@ def urdf_of(
     axes: FloatArray,
     moments: FloatArray,
 ) -> str:
-    """The URDF of a piece whose joints all stand at 0 in the machine frame.
+    """The URDF of a piece whose joints are all at 0 in the machine frame.
 
     Args:
         structure: The machine.
@@ -33,7 +33,7 @@ def urdf_of(
     """
     inside = list(solids)
     root = inside[0]
-    # A link's frame stands where its hinge is; the root's, at its centre of mass.
+    # A link's frame is at its hinge; the root's, at its centre of mass.
     origins = {root: clusters.center_of_mass[root]}
     lines = ['<robot name="piece">']
     for link, c in enumerate(inside):

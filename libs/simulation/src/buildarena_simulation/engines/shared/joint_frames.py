@@ -1,7 +1,7 @@
-"""Where clusters stand on their joints, and how fast they move there.
+"""Positions and rates of joints.
 
-All of it is of a cluster against its parent, whichever of them the seated block belongs to. In the
-machine frame every joint stands at 0.
+All of them are of a cluster relative to its parent, whichever of them the seated block belongs to.
+In the machine frame every joint is at 0.
 """
 
 import math
@@ -118,8 +118,8 @@ def entered_place(
 ) -> JointPlace:
     """The place of a cluster on its joint as an engine starts from it.
 
-    Poses do not tell how often a joint has turned; where its drive holds a place without limits, it
-    is taken to be at the turn nearest to that.
+    Poses do not show how often a joint has turned; where its drive holds a position without limits,
+    the turn nearest to that position is assumed.
 
     Args:
         structure: The machine.
