@@ -1,8 +1,8 @@
-"""What a script's first lines tell of the machine that its file's blocks cannot.
+"""The description of a machine in a script's first lines.
 
-A machine file names no block, tells nothing of faces and keeps no control sequence. Our scripts
-begin with a comment that holds all this as JSON, tied to the blocks by their guids and by a digest
-of their places, so that it is believed only as long as nobody has moved a block.
+A machine file has no names of blocks, no faces and no control sequence. Our scripts begin with a
+comment that holds all this as JSON, tied to the blocks by their guids and by a digest of their
+positions, so that it counts only as long as nobody has moved a block.
 """
 
 from __future__ import annotations

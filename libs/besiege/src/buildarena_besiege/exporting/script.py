@@ -44,8 +44,8 @@ class Reported:
 
     Attributes:
         reference: its reference key; "0" for the machine's first block.
-        burns: whether the script also tells if it burns.
-        cargo: whether it is the cargo, whose mass is told.
+        burns: whether the script also reports if it burns.
+        cargo: whether it is the cargo, whose mass is reported.
     """
 
     reference: str

@@ -63,7 +63,7 @@ class Part:
         bindings: the keys of its actions.
         start: of a connector: where it begins, in its own frame, units.
         end: of a connector: where it ends, in its own frame, units.
-        end_rotation: of a connector: its end face's frame as the file has it; None if not told.
+        end_rotation: of a connector: its end face's frame as the file has it; None without one.
     """
 
     number: int

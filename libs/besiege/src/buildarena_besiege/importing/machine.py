@@ -1,4 +1,4 @@
-"""Reads machine files (.bsg): our own back as they were, anybody's as far as they can be."""
+"""Reads machine files (.bsg): our own exactly, others' as far as they are understood."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class ImportedMachine:
     Attributes:
         machine: The machine.
         name: What the file calls it.
-        not_understood: What the file says that the machine does not hold, a sentence each.
+        not_understood: What the file has and the machine cannot hold, a sentence each.
     """
 
     machine: Machine

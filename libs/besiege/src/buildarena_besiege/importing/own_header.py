@@ -1,6 +1,6 @@
-"""What our own scripts tell of the machine they play, read back and doubted.
+"""The description of a machine in our own scripts, read back and checked.
 
-Nothing in it is believed unless every word of it fits the blocks of the file.
+It is used only if all of it fits the blocks of the file.
 """
 
 from __future__ import annotations
@@ -157,7 +157,7 @@ def _entry(part: Part, described: dict[str, Any]) -> dict[str, Any]:
 
 
 def _sources(document: dict[str, Any]) -> dict[str, Any]:
-    """The machines an assembly was made of, as its sub-structures are now."""
+    """The machines an assembly was made of, each as its sub-structure is in the assembly."""
     return {
         structure["source"]: sub_document(document, structure["letter"])
         for structure in reversed(document["structures"])

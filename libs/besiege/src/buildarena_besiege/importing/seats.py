@@ -1,4 +1,4 @@
-"""Which face each block sits on, and which faces a connector joins, as far as places tell."""
+"""Which face each block sits on, and which faces a connector joins, derived from positions."""
 
 from __future__ import annotations
 

@@ -85,7 +85,7 @@ class FileBlock:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FileMachine:
-    """Everything a machine file says."""
+    """The content of a machine file."""
 
     name: str
     version: str
@@ -96,7 +96,7 @@ class FileMachine:
 
 
 def parse_file(data: bytes) -> FileMachine:
-    """What a machine file says.
+    """The content of a machine file.
 
     Raises:
         MachineFileError: It is no machine file, or breaks a bound.

@@ -24,7 +24,7 @@ _LONGEST_COMPLAINT: Final = 500
 
 
 def run_ids(text: str) -> tuple[str, ...]:
-    """The ids of the runs whose begin lines stand whole in a text, in their order."""
+    """The ids of the runs whose begin lines are complete in a text, in their order."""
     marks = dict.fromkeys(match[1] for match in _BEGINNINGS.finditer(text))
     return tuple(
         run
@@ -50,7 +50,7 @@ class GameLog:
     def __init__(self, run_id: str) -> None:
         self.run_id = run_id
         self._prefix = marked(run_id)
-        # Lines may be glued together: each begins where the run's mark stands.
+        # Lines may be glued together: each begins at the run's mark.
         self._begins = re.compile(f"(?={re.escape(self._prefix)},)")
         self._lines: dict[str, Line] = {}
         self._complaints: dict[str, None] = {}

@@ -1,7 +1,7 @@
 """How a machine is turned, from where its blocks are, and from their roots to their centres.
 
-The game tells where a block's root is, and not how it is turned. Blocks that hold together move as
-one, so three of them that are not in a line tell the machine's rotation.
+The game reports where a block's root is, and not how it is turned. Blocks that hold together move
+as one, so three of them that are not in a line determine the machine's rotation.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 MIN_WIDTH: Final = 0.5
-"""Blocks that lie nearer to one line tell no rotation about it, units (root of summed squares)."""
+"""Blocks nearer to one line than this give no rotation about it, units (root of summed squares)."""
 
 
 MAX_MISFIT: Final = 0.25
@@ -53,7 +53,7 @@ def machine_rotations(built: Floats, roots: Floats, joined: NDArray[np.bool_]) -
         joined: (T, N) which blocks still hold together.
 
     Returns:
-        None when the blocks tell no rotation at the start, or lie otherwise than they were put.
+        None when the blocks give no rotation at the start, or are not where they were put.
 
     Source: W. Kabsch, Acta Cryst. A32 (1976) 922.
     """

@@ -58,7 +58,7 @@ Row = tuple[str, ...]
 
 @dataclass(slots=True)
 class _BlockLog:
-    """What the rows tell of one block: by time label the distinct values, in tenths of a second."""
+    """The rows of one block: distinct values by time label, in tenths of a second."""
 
     places: dict[int, dict[tuple[float, ...], None]] = field(
         default_factory=lambda: defaultdict(dict)
@@ -67,7 +67,7 @@ class _BlockLog:
 
 
 def published_trajectory(csv_text: str, machine: Machine, scenario: Scenario) -> Trajectory:
-    """The trajectory that a log of the published runner tells.
+    """The trajectory in a log of the published runner.
 
     It may end a little before the scenario does. Blocks it does not report are not tracked.
 
@@ -77,7 +77,7 @@ def published_trajectory(csv_text: str, machine: Machine, scenario: Scenario) ->
         scenario: What it was put through.
 
     Raises:
-        LogIncompleteError: It has gaps, ends too early, or tells of something else.
+        LogIncompleteError: It has gaps, ends too early, or is of another machine.
     """
     reported, complaint = _read(csv_text)
     ids = tuple(block for block in machine.blocks if block in reported and reported[block].places)
@@ -93,7 +93,7 @@ def published_trajectory(csv_text: str, machine: Machine, scenario: Scenario) ->
     series = {name: _series(reported[name], name, instants, end_s) for name in names}
     burning = [_burning(reported[block], instants) for block in ids]
     samples = Samples(
-        of_roots=False,  # the published evaluation judges the heights as they are told
+        of_roots=False,  # the published evaluation judges the heights as they are logged
         block_ids=ids,
         positions=stacked([series[block][0] for block in ids], (len(instants), 0, 3)),
         burning=np.array(burning, dtype=bool).reshape(len(ids), len(instants)).T,
@@ -139,7 +139,7 @@ def looks_published(text: str) -> bool:
 
 
 def _read(text: str) -> tuple[dict[str, _BlockLog], str]:
-    """What is told of each block, and a sentence about a Lua error among the rows."""
+    """The rows of each block, and a sentence about a Lua error among them."""
     rows = list(_rows(text))
     reported: dict[str, _BlockLog] = defaultdict(_BlockLog)
     for label, *fields in _trusted([row for row in rows if _is_sound(row)]):
@@ -189,7 +189,7 @@ def _trusted(rows: Sequence[Row]) -> Iterator[Row]:
         if later > earlier:
             edges |= {i, i + 1}
     inside = {row for i, row in enumerate(rows) if i not in edges}
-    # A run's very first and last samples stand at edges alone: they are kept where they fit in.
+    # A run's very first and last samples appear only at edges: they are kept where they fit in.
     least, most = min(times), max(times)
     for i, row in enumerate(rows):
         if i not in edges or row in inside or times[i] in {least, most}:

@@ -1,7 +1,7 @@
 """The log of a headless game: BesiegeField's GameStat lines on its standard output.
 
-Each line tells of all blocks in the order of the machine file, every 0.2 s. It holds no time, no
-run and no check sum, so its lines are taken in the order they come, each once.
+Each line has all blocks in the order of the machine file, every 0.2 s. It has no time, no run and
+no check sum, so the lines are taken in the order they come, each once.
 """
 
 from __future__ import annotations
@@ -44,12 +44,12 @@ Row = tuple[tuple[str, tuple[float, ...]], ...]
 
 
 class StateLog:
-    """What the game's standard output said of one run, piece by piece.
+    """The game's standard output about one run, read bit by bit.
 
     Reading begins with the first start of a simulation and stops with its end.
 
     Args:
-        run_id: The run's id; the lines themselves do not tell it.
+        run_id: The run's id, which the lines themselves do not have.
     """
 
     def __init__(self, run_id: str) -> None:
@@ -94,13 +94,13 @@ class StateLog:
     def trajectory(
         self, machine: Machine, scenario: Scenario, *, game: str, mod: str
     ) -> Trajectory:
-        """The trajectory that the log tells; see `trajectory_of`.
+        """The trajectory in the log; see `trajectory_of`.
 
-        The mass of a cargo is not told: it does not change in a game without a script. Nothing
-        tells whether cannons burn.
+        The mass of a cargo is not reported: it does not change in a game without a script. Whether
+        cannons burn is not reported either.
 
         Raises:
-            LogIncompleteError: Lines are missing, or tell of another machine.
+            LogIncompleteError: Lines are missing, or are of another machine.
         """
         if not self.begun:
             raise LogIncompleteError("The log does not tell of a simulation's start.")
@@ -174,7 +174,7 @@ class StateLog:
 
 
 def _row(text: str) -> Row | None:
-    """What a GameStat message tells; None if it is damaged. Goals are no blocks."""
+    """The blocks of a GameStat message; None if it is damaged. Goals are not blocks."""
     blocks = []
     for part in text.strip().strip("|").split("|"):
         name, _, numbers = part.partition(":")

@@ -54,15 +54,15 @@ JOINED_DRIFT: Final = 1.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Samples:
-    """Everything a log told, on the trajectory's own instants.
+    """All values in a log, at the trajectory's own instants.
 
     Attributes:
         block_ids: (N,) the tracked blocks.
         positions: (T, N, 3) Besiege's components, units.
-        burning: (T, N) bool; False where not told.
+        burning: (T, N) bool; False where not reported.
         cargo: (T, 3) Besiege's components, units; None without cargo.
         mass: (T,) the cargo's; None without cargo.
-        quaternions: (T, N, 4) world_from_block, where the log tells them.
+        quaternions: (T, N, 4) world_from_block, if the log has them.
         of_roots: Whether positions are those of the blocks' roots; otherwise of their centres.
     """
 
@@ -79,7 +79,7 @@ class Samples:
 def trajectory_of(
     log: GameLog, machine: Machine, scenario: Scenario, *, game: str, mod: str
 ) -> Trajectory:
-    """The trajectory that a run's log tells.
+    """The trajectory in a run's log.
 
     Args:
         log: The run's log.
@@ -121,10 +121,10 @@ def made_trajectory(
 ) -> Trajectory:
     """The trajectory of samples that are complete.
 
-    The game tells where blocks' roots are; a cargo stands upright as far as is known.
+    The game reports where blocks' roots are; a cargo is taken to be upright.
 
     Args:
-        samples: What was told.
+        samples: What was reported.
         machine: The machine.
         scenario: What it was put through.
         version: Of game and mod.
@@ -175,7 +175,7 @@ def made_trajectory(
 def pieces_of(
     machine: Machine, block_ids: tuple[str, ...], positions: NDArray[np.float64]
 ) -> NDArray[np.int16] | None:
-    """(T, N) which piece each tracked block belongs to, as far as distances tell.
+    """(T, N) which piece each tracked block belongs to, as far as distances show.
 
     From the moment its distance from the first starting block differs by more than `JOINED_DRIFT`
     from that at the start, a block is a piece of its own.
@@ -230,7 +230,7 @@ def _require_whole(
 
 
 def _log_samples(log: GameLog, scenario: Scenario, count: int) -> NDArray[np.float64]:
-    """(T, count, 5) what the log tells: 1, position and state; NaN where it tells nothing."""
+    """(T, count, 5) the log's values: 1, position and state; NaN where it has none."""
     reported = np.full((scenario.sample_count, count, 5), np.nan)
     parts = max(-(-count // BLOCKS_PER_LINE), 1)
     for line in log.lines:
@@ -257,7 +257,7 @@ def _fits(line: Line, count: int) -> bool:
 def _filled(
     reported: NDArray[np.float64], known: NDArray[np.bool_], names: list[str]
 ) -> tuple[NDArray[np.float64], int]:
-    """What was told with its short gaps filled, and the longest gap in samples."""
+    """The reported values with short gaps filled, and the longest gap in samples."""
     filled, longest = reported.copy(), 0
     rows = np.arange(len(reported))
     most = round(LONGEST_GAP_S * SAMPLE_RATE_HZ)
@@ -265,7 +265,7 @@ def _filled(
         seen = np.flatnonzero(known[:, column])
         if not len(seen):
             raise LogIncompleteError(f"The log tells nothing of {name}.")
-        # Nothing is told of the start itself: the first sample is one interval later.
+        # Nothing is reported of the start itself: the first sample is one interval later.
         bounds = np.concatenate([[0], seen, [len(reported) - 1]])
         gaps = np.diff(bounds)
         worst = int(gaps.argmax())
@@ -325,7 +325,7 @@ def _rotations(
     roots: NDArray[np.float64],
     pieces: NDArray[np.int16],
 ) -> NDArray[np.float64] | None:
-    """(T, 3, 3) how the machine is turned; None if its tracked blocks do not tell."""
+    """(T, 3, 3) how the machine is turned; None if its tracked blocks do not show it."""
     pose = Pose(quaternion=turn)
     built = np.array(
         [pose.point(machine.blocks[block_id].world_from_block.xyz) for block_id in block_ids]
