@@ -1,7 +1,7 @@
 """What a task allows: checked on the machine, not only asked for.
 
-Every road by which a machine can come to a trial passes here: sessions of models, external agents'
-submissions, verification of what an archive brought, and the command `machine simulate`.
+Every machine is checked here before a trial: those of models' sessions, of external agents'
+submissions, of imported archives that are verified, and of the command `machine simulate`.
 """
 
 from __future__ import annotations

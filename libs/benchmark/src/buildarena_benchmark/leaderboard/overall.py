@@ -60,7 +60,7 @@ def overall_rows(
 
     Args:
         cells: Cells by task and configuration.
-        standing: Who stands where of those that are complete; None when nobody is.
+        standing: The ranks of the complete ones; None when none is complete.
         weights: Difficulty weights of the tasks that have some.
     """
     tasks = [task for task, row in cells.items() if any(cell.trials for cell in row.values())]

@@ -63,7 +63,7 @@ def standings(
     """Ranks configurations on each task and over the ranked ones.
 
     The tests of the ranked tasks and of the ranking over them are one family; each other task is
-    one by itself, so that whoever uploads a task takes no power from the others.
+    one by itself, so that an uploaded task takes no statistical power from the others.
 
     Args:
         cells: Cells by task and configuration.

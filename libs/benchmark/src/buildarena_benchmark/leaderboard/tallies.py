@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 UNKNOWN_TOKENS: Final = -1
-"""Stands in arrays for a number of tokens that nobody knows."""
+"""An unknown number of tokens, in arrays."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from buildarena_simulation import Trajectory
 
 _MOVING: Final = 0.5
-"""Slower machines stand, units/s: waiting makes no ride gentler."""
+"""Slower machines count as waiting, units/s: that makes no ride gentler."""
 
 _MOVING_SAMPLES: Final = 12
 """Speed is judged over so many samples, half a second."""

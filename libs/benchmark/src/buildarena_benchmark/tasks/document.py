@@ -68,7 +68,7 @@ def _known_set(chosen: str) -> str:
 Weight = Annotated[int, Field(ge=1, le=3)]
 Text = Annotated[str, AfterValidator(_plain)]
 Word = Annotated[str, Field(pattern=r"^[\w .,/²³·%°-]+$", min_length=1, max_length=60)]
-"""Stands in tables, plots and TeX: no sign that means something there."""
+"""Text for tables, plots and TeX: without characters that have a meaning there."""
 ModuleName = Annotated[str, AfterValidator(_known_module)]
 ModuleSet = Annotated[str, AfterValidator(_known_set)]
 ModuleNames = Annotated[tuple[ModuleName, ...], Field(min_length=1, max_length=50)]

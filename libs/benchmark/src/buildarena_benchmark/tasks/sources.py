@@ -1,7 +1,7 @@
-"""YAML texts that people write: read with care, and every mistake named with its line.
+"""YAML texts that people write, read with bounds; every mistake is reported with its line.
 
 Nothing in a text can make reading it costly: its size and depth are bounded, and anchors, aliases
-and merge keys, with which a few lines can stand for gigabytes, are refused.
+and merge keys, with which a few lines can expand to gigabytes, are refused.
 """
 
 import re

@@ -49,7 +49,7 @@ def driven_distances(
         path: (T, 2) or (T, 3) of what is transported.
 
     Returns:
-        None where the trajectory does not tell what bears the wheels, or how they move.
+        None where the trajectory has no forces on the wheels, or not how they move.
     """
     bearing = trajectory.bearing
     index = {block: i for i, block in enumerate(trajectory.block_ids)}
