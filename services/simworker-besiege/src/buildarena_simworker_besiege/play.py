@@ -1,4 +1,4 @@
-"""Plays one run: load, start, read the log until it ends, stop, clean up; again if need be."""
+"""Plays one run: load, start, read the log until it ends, stop, clean up; repeated if needed."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ class Played:
 
     Attributes:
         run: What was played.
-        log: What the game said.
-        trajectory: What that tells.
-        pace: Seconds of the game's time that passed in a second of the wall clock's.
+        log: What the game printed.
+        trajectory: The trajectory in it.
+        pace: Seconds of game time per second of wall-clock time.
         faults: What went wrong in earlier attempts.
     """
 
@@ -135,7 +135,7 @@ def _follow(
     """Reads the log until the run is over.
 
     Raises:
-        DesktopError: It does not begin, or stands still, or its script fails.
+        DesktopError: It does not begin, or stalls, or its script fails.
     """
     started = heard = time.monotonic()
     newest = 0.0

@@ -14,7 +14,7 @@ from pydantic_settings import BaseSettings, SettingsConfigDict
 from buildarena_simworker_besiege.time_limits import TimeLimits
 
 LEVEL_FIELD = "{level}"
-"""Stands in the game's command for the level file to open; "" for the sandbox."""
+"""Placeholder in the game's command: the level file to open, or "" for the sandbox."""
 
 
 class BesiegeSettings(BaseSettings):

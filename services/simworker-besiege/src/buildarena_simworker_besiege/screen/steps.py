@@ -32,7 +32,7 @@ def take_step(
         act: Does it; must be harmless when done twice.
         finding: None once its effect is seen; otherwise what is seen instead.
         timeout_s: How long the effect may take.
-        recover: Takes away what may be in the way, before the next attempt.
+        recover: Clears what may block the step, before the next attempt.
         attempts: How often to act.
 
     Raises:

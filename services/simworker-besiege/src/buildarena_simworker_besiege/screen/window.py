@@ -1,7 +1,7 @@
 """A game with a window, driven by mouse and keyboard.
 
-What the published runner does step by step is kept; each step is verified by what can be seen: the
-clipboard, the pixels near what was clicked, the log.
+The steps are those of the published runner; each is verified by what can be seen: the clipboard,
+the pixels near what was clicked, the log.
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ class WindowDesktop:
 
     def start(self, run: GameRun) -> None:
         """Shows the Lua panel and starts."""
-        del run  # the log tells whose lines they are
+        del run  # each line of the log names its run
         if self._log_file is not None:
             self._log_file.skip()
         else:
@@ -124,11 +124,11 @@ class WindowDesktop:
         self._click("start")
 
     def new_log(self, run: GameRun) -> GameLog:
-        """What the run's lines are gathered in."""
+        """An empty log that collects the run's lines."""
         return GameLog(run.run_id)
 
     def trajectory(self, log: RunLog, machine: Machine, scenario: Scenario) -> Trajectory:
-        """What the lines tell of the run."""
+        """The run's trajectory from its lines."""
         assert isinstance(log, GameLog)  # noqa: S101 - it is of `new_log`
         game, mod = self._settings.game, self._settings.mod
         return trajectory_of(log, machine, scenario, game=game, mod=mod)
