@@ -23,7 +23,7 @@ class TrialSource(Protocol):
     """
 
     def take(self) -> TrialRequest | None:
-        """What is to be run; None when an earlier trial with the same input told its outcome.
+        """What is to be run; None when an earlier trial with the same input has the outcome.
 
         Raises:
             PermanentError: The job can't be done.
@@ -57,7 +57,7 @@ def run_trial(simulator: Simulator, trial: TrialRequest) -> TrialResult:
 
 
 def do_trial(simulator: Simulator, leased: TrialSource) -> None:
-    """Takes, runs and hands over a trial; what shows a fault is kept before it is reported.
+    """Takes, runs and hands over a trial; evidence of a fault is stored before it is reported.
 
     Raises:
         TransientError: The simulator failed; the trial is to be run again.

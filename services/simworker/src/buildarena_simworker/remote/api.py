@@ -31,7 +31,7 @@ from buildarena_simworker.remote.errors import LeaseLostError, RefusedError, Unr
 
 TIMEOUT_S: Final = 15.0
 PATIENCE_S: Final = 15 * 60.0
-"""How long an outcome is kept for an API that does not answer."""
+"""How long the runner retries to send an outcome to an API that does not answer."""
 LONGEST_PAUSE_S: Final = 5.0
 LOOPBACK: Final = ("127.0.0.1", "::1", "localhost")
 BUSY: Final = (429, 500, 502, 503, 504)

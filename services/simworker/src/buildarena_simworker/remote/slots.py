@@ -57,7 +57,7 @@ class Heartbeats:
 
     Args:
         api: Where they are.
-        about: What the runner says of itself, at each beat.
+        about: What the runner reports of itself, at each beat.
         lease_s: How long a lease lives without.
     """
 
@@ -190,7 +190,7 @@ class Slot:
         api: Where trials come from.
         beats: Keeps its leases alive.
         simulator: What runs trials.
-        about: What the runner says of itself when it asks for one.
+        about: What the runner reports of itself when it requests one.
         stopping: Whether it is to take no more.
         stop_all: Ends the whole runner for a reason that will not change.
     """
