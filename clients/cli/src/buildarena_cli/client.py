@@ -44,7 +44,7 @@ class Client(ApiClient):
             super().__init__(url, key)
 
     def get_in_state(self, path: str, state: str) -> Any:
-        """As get_patiently, once what is there says that it is in a state."""
+        """As get_patiently, once the answer's state is this one."""
         while (answer := self.get_patiently(path))["state"] != state:
             time.sleep(STATE_POLL_S)
         return answer
@@ -72,7 +72,7 @@ class RefusedError(CommandError):
 
 
 class UnreachableError(CommandError, errors.UnreachableError):
-    """The service does not answer now; it may later. Whoever watches goes on."""
+    """The service does not answer at present; it may later, so commands that watch continue."""
 
 
 @contextlib.contextmanager

@@ -21,7 +21,7 @@ LISTED: Final = {"job": "jobs", "sweep": "sweeps"}
 
 
 def whole_id(client: Client, kind: str, word: str) -> str:
-    """The id that a word of the command line stands for.
+    """The id that a word of the command line names.
 
     Args:
         client: The API, asked when the word is no whole id.

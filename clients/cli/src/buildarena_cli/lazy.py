@@ -1,7 +1,7 @@
 """Groups of commands that are loaded when they are named.
 
 Loading every command takes half a second and more; help and completion need their names and first
-sentences only, which stand in `buildarena_cli.command_table`.
+sentences only, which are in `buildarena_cli.command_table`.
 """
 
 from __future__ import annotations

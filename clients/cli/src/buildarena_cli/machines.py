@@ -39,7 +39,7 @@ DialectOption = Annotated[
 
 
 def read_machine(file: Path, dialect: str | None = None) -> Machine:
-    """The machine of a file; what of it was not understood is told on standard error.
+    """The machine of a file; what was not understood is printed to standard error.
 
     Args:
         file: A machine file of the game's, a machine document or an action log.

@@ -142,7 +142,7 @@ def _tools(simulators: Sequence[Mapping[str, Any]]) -> list[types.Tool]:
                 ["session", *tool.parameters.get("required", [])],
             ),
         )
-        # Sessions of tasks that tell their modules refuse to have them looked up.
+        # Sessions of tasks with inline modules refuse lookups.
         for tool in building_tools(on_demand=True)
     ]
     return managing + building

@@ -36,7 +36,7 @@ class SpecFile:
     """A file of fields that the API takes.
 
     Attributes:
-        source: What the file says, with lines.
+        source: The file's content, with lines.
         content: What is sent: the file's fields, some of them overridden.
         overridden: Fields that the command line gave.
     """
@@ -46,7 +46,7 @@ class SpecFile:
     overridden: frozenset[str] = field(default_factory=frozenset)
 
     def with_words(self, values: Mapping[str, Any]) -> SpecFile:
-        """The same file with values from the command line in the place of its fields."""
+        """The same file with values from the command line instead of its fields."""
         return replace(self, content={**self.content, **values}, overridden=frozenset(values))
 
     def refusal(self, issues: Sequence[ValidationIssue]) -> CommandError:
@@ -54,7 +54,7 @@ class SpecFile:
         return CommandError("\n".join(self._line(issue) for issue in issues))
 
     def refused(self, error: RefusedError) -> CommandError:
-        """What the service says against the content, in words."""
+        """The service's objections to the content, in words."""
         if not error.errors:
             return error
         return self.refusal(
@@ -101,7 +101,7 @@ def read_fields(file: Path) -> SpecFile:
 
 
 def read_sweep(file: Path, flags: Mapping[str, Any]) -> SpecFile:
-    """A sweep file with what flags put in the place of its fields.
+    """A sweep file with the values of flags instead of its fields.
 
     Args:
         file: The file.

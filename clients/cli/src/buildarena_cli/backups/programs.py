@@ -22,7 +22,7 @@ def run_program(name: str, url: str, *words: str) -> None:
 
     Args:
         name: The program.
-        url: The database; its password stands in no list of processes.
+        url: The database; its password does not appear in lists of processes.
         words: Further arguments.
 
     Raises:

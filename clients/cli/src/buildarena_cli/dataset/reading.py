@@ -1,4 +1,4 @@
-"""What a dataset is made of, asked of the service job by job."""
+"""The contents of a dataset, requested from the service job by job."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class Fetched:
     Attributes:
         job: Its figures.
         task: The task in the job's version; None where the service has it no more.
-        machine: Its machine document, as it is kept.
+        machine: Its machine document, as it is stored.
         transcript: Its transcript.
     """
 

@@ -12,7 +12,7 @@ from buildarena_pipeline.replays.from_document import CONTROL, PROGRAMMED
 from buildarena_pipeline.replays.from_turns import replay_of_turns
 
 SESSION: Final = "session"
-"""Who carries out what a controller's program says."""
+"""The role whose turn carries out a controller's program."""
 
 Turns = Sequence[Mapping[str, Any]]
 Document = Mapping[str, Any]

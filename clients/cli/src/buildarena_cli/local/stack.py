@@ -280,7 +280,7 @@ def _without_files(environment: Mapping[str, str]) -> dict[str, str]:
 
 
 def _locked(lock: IO[str]) -> None:
-    """Takes the lock; whoever only looks whether it is taken has it for a moment."""
+    """Takes the lock; a process that only checks whether it is taken holds it for a moment."""
     for _ in range(LOCK_TRIES - 1):
         with contextlib.suppress(OSError):
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)

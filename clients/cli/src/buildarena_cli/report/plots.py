@@ -82,7 +82,7 @@ def radar_plot(rows: Sequence[OverallRow]) -> Figure:
             linewidth=2,
             label=row.model,
         )
-    # The first label stands on top, so that of six none is beside the circle at its widest.
+    # The first label is on top, so that of six none is beside the circle at its widest.
     axes.set_theta_offset(math.pi / 2)
     axes.set_xticks(angles, [name.capitalize() for name in names])
     axes.tick_params(axis="x", pad=20)

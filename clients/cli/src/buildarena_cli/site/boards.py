@@ -15,7 +15,7 @@ SCORING_POLICIES: Final = (None, "published")
 """How pages ask for our scoring policy, and for the other."""
 EXPORTS: Final = {"csv": "csv", "parquet": "parquet", "latex": "tex"}
 MAX_COMPARED: Final = 20
-"""Models of a track whose comparisons are kept: each with each other is asked for."""
+"""Models of a track whose comparisons are stored: each with each other is requested."""
 LISTED_SWEEPS: Final = 50
 """As many as a page of sweeps shows."""
 BOARD: Final = "/v1/leaderboard"

@@ -1,6 +1,6 @@
-"""The folder of a site: each content once, and nothing that looks whole before it is.
+"""The folder of a site: each content once, and nothing that looks complete before it is.
 
-``data`` holds answers under the hash of their content, ``jobs`` an index for each kept job,
+``data`` holds answers under the hash of their content, ``jobs`` an index for each stored job,
 ``assets`` the pages' scripts. ``site.json`` and ``index.html`` are written last; until then an
 older site in the folder stays as it was, and a new one has no page to open.
 """
@@ -104,15 +104,14 @@ class Folder:
         partial.replace(target)
 
     def job_answers(self, job_id: str, digest: str) -> dict[str, str | None] | None:
-        """The kept answers of a job.
+        """The stored answers of a job.
 
         Args:
             job_id: The job.
-            digest: Of what the job was when they were kept.
+            digest: Of the job when they were stored.
 
         Returns:
-            Paths of files by what is asked for; None when they are not all here, or the job was
-            another then.
+            Paths of files by request; None when some are missing, or the job has changed since.
         """
         try:
             stored = json.loads((self.path / job_file(job_id)).read_bytes())
@@ -124,7 +123,7 @@ class Folder:
         return answers if whole and stored.get("digest") == digest else None
 
     def keep_job(self, job_id: str, digest: str, answers: Mapping[str, str | None]) -> None:
-        """Keeps the index of a job's answers; a later run finds it."""
+        """Stores the index of a job's answers; a later run finds it."""
         self.write(job_file(job_id), as_json({"digest": digest, "answers": dict(answers)}))
 
     def remove_others(self, wanted: set[str]) -> None:

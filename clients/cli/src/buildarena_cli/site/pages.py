@@ -56,7 +56,7 @@ def page_files(folder: Path) -> list[Path]:
 
 
 def first_page(folder: Path) -> str:
-    """The first page of a site: it finds its files beside itself, and reads kept answers.
+    """The first page of a site: it finds its files beside itself, and reads stored answers.
 
     Raises:
         CommandError: The built page is not as expected: pages and program are of two versions.

@@ -28,7 +28,7 @@ SAMPLED: Final = 24
 """Jobs at most whose size is measured before the others are asked for."""
 SAMPLED_OF_A_KIND: Final = 2
 INDEX_OF_A_JOB: Final = 2_500
-"""Bytes of the file that says where a job's answers are, about."""
+"""Approximate bytes of the file that says where a job's answers are."""
 NO_JEKYLL: Final = ".nojekyll"
 """Tells GitHub's pages to leave every file as it is."""
 
@@ -113,7 +113,7 @@ def plan_site(
 
 
 def write_site(client: Client, plan: Plan, folder: Folder) -> int:
-    """Writes a site; one that is broken off goes on when it is written again.
+    """Writes a site; an interrupted one continues when it is written again.
 
     Args:
         client: The API.
@@ -209,7 +209,7 @@ def _many(count: int, what: str) -> str:
 
 
 def _kind(job: Job) -> tuple[str, str]:
-    """What tells most about how large a job's answers are."""
+    """What best predicts the size of a job's answers."""
     return job["task"], job["outcome"]
 
 

@@ -68,7 +68,7 @@ def overview(board: Mapping[str, Any], *, published: bool = False) -> None:
 
     Args:
         board: The API's answer.
-        published: Whether the paper's figures stand below ours.
+        published: Whether the paper's figures are printed below ours.
     """
     ranks = {(row["model"], row["configuration"]): row["rank"] for row in board["overall"]}
     rows: dict[tuple[str, str], dict[str, Any]] = {}
