@@ -1,8 +1,8 @@
 """Answers as data frames of pandas or polars, which are loaded when they are asked for.
 
 Columns and their types come from the contract, so that a frame without rows has them too. Times are
-UTC, figures are floats, and what is missing is missing: NaN, NaT, `<NA>`, null. What stands inside
-another document is a column of its own, named by its path: ``usage.requests``, ``metrics.load``.
+UTC, figures are floats, and what is missing is missing: NaN, NaT, `<NA>`, null. A field of an inner
+document is a separate column, named by its path: ``usage.requests``, ``metrics.load``.
 Lists of texts are lists; anything else is JSON.
 """
 
@@ -138,7 +138,7 @@ def _pandas(library: Any, data: Mapping[str, list[Any]], columns: Columns) -> An
 
 
 def _pandas_type(kind: str, values: list[Any]) -> str:
-    # An older service may not say what the contract says it must.
+    # An older service may leave out what the contract requires.
     kind = _maybe(kind) if None in values else kind
     return PANDAS.get(kind) or PANDAS[kind.removesuffix("?")]
 
@@ -213,7 +213,7 @@ def _flat(row: Mapping[str, Any], columns: Columns, prefix: str = "") -> Iterabl
 
 
 def _with_inner_columns(rows: list[dict[str, Any]], columns: Columns) -> Columns:
-    """The columns; in the place of those that hold documents, what stands in these."""
+    """The columns; those that hold documents are replaced by a column for each inner field."""
     typed: Columns = {}
     for name, kind in columns.items():
         if not kind.startswith("dict"):
