@@ -119,7 +119,7 @@ def _packed(document: dict[str, Any]) -> str:
 
 
 def _finite(value: Any) -> Any:
-    """A value without figures that JSON can't hold: a trial that blew up has such."""
+    """A value without the numbers that JSON can't hold: a trial that diverged has some."""
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, dict):

@@ -99,7 +99,7 @@ def simulate(
 
     Raises:
         ValueError: There is no such task or engine.
-        SimulationError: The engine failed, which says nothing of the machine.
+        SimulationError: The engine failed, which is not the machine's fault.
     """
     chosen = chosen_task(task)
     require_engine(engine)
@@ -129,8 +129,8 @@ def simulate_all(
 
     Raises:
         ValueError: There is no such task or engine, or there are fewer processes than one.
-        SimulationError: The engine failed on a machine, which says nothing of it. What came of the
-            others is kept by `buildarena_environment.Evaluator`, which this is made of.
+        SimulationError: The engine failed on a machine, which is not the machine's fault. To keep
+            the results of the others, use `buildarena_environment.Evaluator`.
     """
     chosen, copies = chosen_task(task), [machine.copy() for machine in machines]
     require_engine(engine)
