@@ -25,7 +25,7 @@ Fitted: full-size decks wedge between terrain walls with thousands of newtons.
 """
 
 MAX_SPIN: Final = 30.0
-"""Fastest spin of a free piece, rad/s; wheels on their axles may spin faster.
+"""Fastest spin of a free component, rad/s; wheels on their axles may spin faster.
 
 Ours: game engines bound spin likewise; it keeps the explicit gyroscopic terms of a tumbling rocket
 from gaining energy.

@@ -158,7 +158,7 @@ class Holding:
             near = np.linalg.norm(points[4] - shape.center)
             if near < reach + np.linalg.norm(shape.half_extents) + np.ptp(points, axis=0).max():
                 candidates.append((float(distances(points, [shape])[0]), other, name))
-        candidates += self._pieces(points, c, clusters, motion, reach)
+        candidates += self._near_blocks(points, c, clusters, motion, reach)
         nearest = min(candidates, default=None)
         if nearest is not None and nearest[0] <= reach:
             hold = Hold(grip=k, block=block, other=nearest[1], point=grips.tips[k])
@@ -180,10 +180,10 @@ class Holding:
                 ),
             )
 
-    def _pieces(
+    def _near_blocks(
         self, points: FloatArray, c: int, clusters: Clusters, motion: Motion, reach: float
     ) -> list[tuple[float, int, str]]:
-        """Blocks of other pieces within reach: distance, block, id."""
+        """Blocks of other components within reach: distance, block, id."""
         candidates = []
         structure = self._world.structure
         far = clusters.root[clusters.cluster_of] != clusters.root[c]

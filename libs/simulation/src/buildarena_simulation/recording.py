@@ -106,14 +106,14 @@ class Recorder:
             yield samples[0][0], [motion for _, motion in samples]
 
     def _pieces(self) -> NDArray[np.int16]:
-        """(T, N) the articulated piece each tracked block belongs to, by its first block."""
+        """(T, N) the articulated component each tracked block belongs to, by its first block."""
         rows = []
         for clusters, motions in self._runs():
             first = np.array([blocks[0] for blocks in clusters.blocks])
             lowest = np.full(len(clusters), len(self._structure), dtype=np.int64)
             np.minimum.at(lowest, clusters.root, first)
-            piece = lowest[clusters.root][clusters.cluster_of[self._tracked]]
-            rows.append(np.tile(piece.astype(np.int16), (len(motions), 1)))
+            component = lowest[clusters.root][clusters.cluster_of[self._tracked]]
+            rows.append(np.tile(component.astype(np.int16), (len(motions), 1)))
         return np.concatenate(rows)
 
     def _poses(self) -> tuple[FloatArray, FloatArray]:

@@ -1,6 +1,6 @@
 """Joint loads: from the wrenches on the blocks to the force and moment in every joint.
 
-Wrenches are in mass·g (moments in mass·g·unit), low-pass filtered in the axes of their piece's
+Wrenches are in mass·g (moments in mass·g·unit), low-pass filtered in the axes of their component's
 root cluster (not of a spinning wheel, where a steady load would look like a rotating one).
 `docs/physics.md` derives the equations.
 """

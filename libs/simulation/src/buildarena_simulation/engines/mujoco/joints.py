@@ -125,21 +125,21 @@ def drag_apart(
     data: "mujoco.MjData",
     bodies: tuple[Clusters, IntArray],
     motion: Motion,
-    pieces: Sequence[Sequence[int]],
+    components: Sequence[Sequence[int]],
 ) -> None:
-    """Applies the drag of every cluster of some pieces until it is called again.
+    """Applies the drag of every cluster of some components until it is called again.
 
     Args:
         model: The model.
         data: Its state; the applied generalised forces are written.
         bodies: The clusters, and (C,) the body of each.
         motion: The clusters' motion.
-        pieces: The clusters of each piece.
+        components: The clusters of each component.
     """
     clusters, body_of = bodies
     centers = motion.centers_of_mass(clusters)
     data.qfrc_applied[:] = 0.0
-    for c in (c for piece in pieces for c in piece):
+    for c in (c for component in components for c in component):
         turn = motion.rotation[c]
         force = -clusters.linear_drag[c] * clusters.mass[c] * motion.velocity[c]
         slowed = clusters.inertia[c] @ (turn.T @ motion.spin[c])

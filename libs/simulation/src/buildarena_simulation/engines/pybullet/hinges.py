@@ -13,8 +13,8 @@ from buildarena_simulation.structure.vectors import cross, turn_about
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class HingedPiece:
-    """A multibody of an engine; its links are the piece's clusters in order.
+class HingedComponent:
+    """A multibody of an engine; its links are the component's clusters in order.
 
     Attributes:
         body: The engine's id of it.

@@ -233,8 +233,8 @@ class Articulation:
     def _reset(self, link: int, place: float, rate: float) -> None:
         pybullet.resetJointState(self.body, link, float(place), float(rate), **self.client)
 
-    def _motor(self, link: int, mode: int, **figures: Any) -> None:
-        pybullet.setJointMotorControl2(self.body, link, mode, **figures, **self.client)
+    def _motor(self, link: int, mode: int, **parameters: Any) -> None:
+        pybullet.setJointMotorControl2(self.body, link, mode, **parameters, **self.client)
 
     def add_gears(self) -> None:
         """Lets the cogs that engage turn each other."""

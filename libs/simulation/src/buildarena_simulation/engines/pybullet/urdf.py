@@ -1,4 +1,4 @@
-"""URDF text of one articulated piece.
+"""URDF text of one articulated component.
 
 Each link's inertial frame is the principal frame of its cluster. A newline follows every tag: long
 URDF lines fail to parse.
@@ -22,12 +22,12 @@ def urdf_of(
     axes: FloatArray,
     moments: FloatArray,
 ) -> str:
-    """The URDF of a piece whose joints are all at 0 in the machine frame.
+    """The URDF of a component whose joints are all at 0 in the machine frame.
 
     Args:
         structure: The machine.
         clusters: Its clusters.
-        solids: The collision shapes of the piece's clusters, its root first.
+        solids: The collision shapes of the component's clusters, its root first.
         axes: (C, 3, 3) machine_from_principal.
         moments: (C, 3) principal moments of inertia.
     """

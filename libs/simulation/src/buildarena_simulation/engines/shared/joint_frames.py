@@ -50,9 +50,9 @@ def has_joints(structure: Structure) -> bool:
     return bool((moving & ~structure.joints.simple).any())
 
 
-def is_simple_piece(structure: Structure, clusters: Clusters, piece: Sequence[int]) -> bool:
-    """Whether all joints of a piece, given root first, are axles whose angles do not matter."""
-    return all(is_simple(structure, clusters, c) for c in piece[1:])
+def is_simple_component(structure: Structure, clusters: Clusters, component: Sequence[int]) -> bool:
+    """Whether all joints of a component, given root first, are axles whose angles do not matter."""
+    return all(is_simple(structure, clusters, c) for c in component[1:])
 
 
 def sign_of(clusters: Clusters, c: int) -> float:
