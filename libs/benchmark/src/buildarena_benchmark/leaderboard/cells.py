@@ -24,7 +24,7 @@ from buildarena_benchmark.statistics import (
     pass_hat_k,
 )
 
-TRIES: Final = (1, 2, 4, 8)
+PASS_K: Final = (1, 2, 4, 8)
 """The k of pass@k and pass^k."""
 
 
@@ -195,8 +195,8 @@ def summarise_tallies(
             [*costs.tolist(), *[None] * (number - len(costs))], successes
         ),
         invalid_action_rate=refused / actions if actions else None,
-        pass_at=_tries(pass_at_k, successes, number),
-        pass_all=_tries(pass_hat_k, successes, number),
+        pass_at=_pass_chances(pass_at_k, successes, number),
+        pass_all=_pass_chances(pass_hat_k, successes, number),
         outcomes=outcomes,
         reasons=_counts((tally.reason, tally.number) for tally in counted if tally.reason),
         refusals=_counts(item for tally in counted for item in tally.refusals.items()),
@@ -276,8 +276,8 @@ def _mean_total(totals: Iterable[Total]) -> float | None:
     return float(sum(total.sum for total in listed)) / known if known else None
 
 
-def _tries(
+def _pass_chances(
     estimate: Callable[[int, int, int], float | None], successes: int, trials: int
 ) -> dict[str, float]:
-    chances = {str(k): estimate(successes, trials, k) for k in TRIES}
+    chances = {str(k): estimate(successes, trials, k) for k in PASS_K}
     return {k: chance for k, chance in chances.items() if chance is not None}

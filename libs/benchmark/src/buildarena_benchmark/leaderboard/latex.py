@@ -98,8 +98,8 @@ def _category(cells: Cells, category: str, columns: Sequence[Column]) -> list[st
             texts.append(_marked(shown, bounds, more=column.more))
     lines = [rf"\multirow{{{len(models)}}}{{*}}{{{_escaped(category.capitalize())}}}"]
     for number, model in enumerate(models):
-        figures = " & ".join(shown[number] for shown in texts)
-        lines.append(rf"& {_escaped(model)} & {figures} \\")
+        values = " & ".join(shown[number] for shown in texts)
+        lines.append(rf"& {_escaped(model)} & {values} \\")
     return lines
 
 

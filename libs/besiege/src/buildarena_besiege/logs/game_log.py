@@ -130,8 +130,8 @@ class GameLog:
         if self._prefix not in row:
             self._note_complaint(row)
             return
-        for piece in self._begins.split(row):
-            text = piece.strip(_AROUND)
+        for segment in self._begins.split(row):
+            text = segment.strip(_AROUND)
             if text in self._lines:
                 continue
             line = line_of(text, self._prefix)

@@ -104,14 +104,14 @@ def dialect(version: str) -> Dialect:
 
 def _spoken(module: Module, definition: Mapping[str, Any]) -> Module:
     """A module with the interface's name, labels and figures."""
-    figures: dict[str, Any] = {
-        name: tuple(figure) if isinstance(figure, list) else figure
-        for name, figure in definition["figures"].get(module.name, {}).items()
+    values: dict[str, Any] = {
+        name: tuple(value) if isinstance(value, list) else value
+        for name, value in definition["figures"].get(module.name, {}).items()
     }
     faces = tuple(
         replace(face, label=f"{definition['faces']}{index}")
         for index, face in enumerate(module.faces)
     )
     return structs.replace(
-        module, name=definition["names"].get(module.name, module.name), faces=faces, **figures
+        module, name=definition["names"].get(module.name, module.name), faces=faces, **values
     )
