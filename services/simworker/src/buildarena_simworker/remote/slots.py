@@ -279,6 +279,6 @@ class Slot:
 def hand_back(api: RunnerApi, lease: HeldLease) -> None:
     """Gives a lease back at shutdown, if the API answers soon."""
     try:
-        api.end(lease, "hand-back", patience_s=HAND_BACK_S, although_stopping=True)
+        api.end(lease, "hand-back", retry_for_s=HAND_BACK_S, although_stopping=True)
     except RemoteError as error:
         log.info("not_handed_back", job=lease.job_id, error=str(error))
