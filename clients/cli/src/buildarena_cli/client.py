@@ -16,7 +16,7 @@ from buildarena_client.paths import HEALTH
 from buildarena_client.retries import RetryPolicy
 
 T = TypeVar("T")
-PATIENCE_S = RetryPolicy().restart_s
+RESTART_S = RetryPolicy().restart_s
 """How long a watching command waits for a service that is being restarted."""
 STATE_POLL_S = 0.3
 
@@ -104,4 +104,4 @@ def _line(error: dict[str, Any]) -> str:
     return errors.described(error) + (near if error["choices"] else "")
 
 
-__all__ = ["HEALTH", "PATIENCE_S", "Client", "RefusedError", "UnreachableError", "at"]
+__all__ = ["HEALTH", "RESTART_S", "Client", "RefusedError", "UnreachableError", "at"]

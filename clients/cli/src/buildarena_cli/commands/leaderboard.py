@@ -26,7 +26,7 @@ from buildarena_cli.terminal.output import columns, number, print_json, print_ta
 
 COMPARED = ("first", "second", "diff %", "95 %", "pairs", "p success", "p indicator")
 COMPARISON = columns(
-    "task", *COMPARED, figures=COMPARED, leaving=("pairs", "p indicator", "p success", "95 %")
+    "task", *COMPARED, numeric=COMPARED, leaving=("pairs", "p indicator", "p success", "95 %")
 )
 
 LevelOption = Annotated[list[int] | None, typer.Option("--level", help="Only these levels.")]

@@ -24,7 +24,7 @@ MEBIBYTE = 1024 * 1024
 FOLLOW_EVERY_S = 0.2
 PROCESSES = columns(
     *("process", "pid", "MiB", "ports", "since"),
-    figures=("pid", "MiB"),
+    numeric=("pid", "MiB"),
     leaving=("since", "ports", "MiB"),
 )
 

@@ -23,7 +23,7 @@ MEBIBYTE: Final = 1024 * 1024
 MAX_LISTED: Final = 500
 COLUMNS = columns(
     *("worker", "queues", "state", "version", "MiB", "since"),
-    figures=("MiB",),
+    numeric=("MiB",),
     leaving=("since", "MiB", "version"),
 )
 ApiOption = Annotated[

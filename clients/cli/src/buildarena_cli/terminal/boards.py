@@ -50,7 +50,7 @@ PUBLISHED = ("model", *RESULTS, "parts", "requests", "tokens")
 LEAVING = ("requests", "parts", "tokens", "USD", "best", "of it 95 %", "95 %", "indicator")
 OVERALL = columns(
     *("#", "model", "place", "mean rank", "success", "USD", "front"),
-    figures=("#", "place", "mean rank", "success", "USD"),
+    numeric=("#", "place", "mean rank", "success", "USD"),
     leaving=("front", "USD", "mean rank", "place", "success"),
 )
 
@@ -123,9 +123,9 @@ def _print_rows(
     title: str,
     notes: Sequence[str] = (),
 ) -> None:
-    figures = [name for name in names if name != "model"]
+    numeric = [name for name in names if name != "model"]
     cells = [[ROW[name](row) for name in names] for row in rows]
-    shown = columns(*names, figures=figures, leaving=LEAVING)
+    shown = columns(*names, numeric=numeric, leaving=LEAVING)
     print_table(shown, cells, title=title, notes=notes)
 
 

@@ -36,18 +36,18 @@ class Column:
     leaves: int = 0
 
 
-def columns(*names: str, figures: Sequence[str] = (), leaving: Sequence[str] = ()) -> list[Column]:
+def columns(*names: str, numeric: Sequence[str] = (), leaving: Sequence[str] = ()) -> list[Column]:
     """Columns by their names.
 
     Args:
         names: All of them, from left to right.
-        figures: Those aligned to the right.
+        numeric: Those aligned to the right.
         leaving: Those that give way, the first to go first.
     """
     return [
         Column(
             name=name,
-            right=name in figures,
+            right=name in numeric,
             leaves=leaving.index(name) + 1 if name in leaving else 0,
         )
         for name in names
