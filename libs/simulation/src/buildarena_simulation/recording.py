@@ -163,7 +163,7 @@ class Recorder:
             joint_peaks=breaking.peaks(),
             joint_loads=rounded_loads(np.array(self._loads)),
             breaks=tuple(breaking.breaks),
-            events=breaking.told_events(),
+            events=breaking.all_events(),
             engine=engine,
             engine_version=engine_version,
             simulation_version=simulation_version,

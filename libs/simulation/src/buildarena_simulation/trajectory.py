@@ -59,7 +59,7 @@ class Break:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Event:
-    """Something that let go or took hold as it was made to; a break is none.
+    """A release or a grab that the machine was made for; a break is not an event.
 
     Attributes:
         time_s: When, seconds.
@@ -138,7 +138,7 @@ class Trajectory:
             the instant before, in the order of `joint_peaks`: above 1 where it broke, 0 from then
             on. None where no simulator of ours ran, and in files of schemas 1 and 2.
         breaks: In order of time.
-        events: What let go or took hold as it was made to, in order of time.
+        events: Releases and grabs that the machine was made for, in order of time.
         engine: Name of the engine.
         engine_version: Version of the engine's library.
         simulation_version: Version of the shared model.

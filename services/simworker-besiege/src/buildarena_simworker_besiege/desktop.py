@@ -1,4 +1,4 @@
-"""What the runner asks of a game, however it is driven."""
+"""What the runner asks of a game, whether it has a window or not."""
 
 from __future__ import annotations
 

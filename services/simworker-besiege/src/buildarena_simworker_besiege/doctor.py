@@ -103,7 +103,7 @@ def _mod(settings: BesiegeSettings) -> Finding:
 
 
 def _lua_mod(folder: Path) -> Path | None:
-    """A mod of that kind, by its folder's name or what its manifest says."""
+    """A mod of that kind, recognised by its folder's name or its manifest."""
     for mod in sorted(folder.iterdir()):
         if not mod.is_dir():
             continue

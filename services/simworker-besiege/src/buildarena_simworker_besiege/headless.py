@@ -1,4 +1,4 @@
-"""A game without a window, driven over TCP by a plugin, that tells its state on standard output.
+"""A game without a window, driven over TCP by a plugin, that prints its state to standard output.
 
 Source: the BesiegeField project's protocol. Frames from us: a length of four bytes, little-endian,
 and the UTF-8 text "CODE ARGUMENT". Lines from the game: anything with "BesiegeAgent" and
@@ -110,13 +110,13 @@ class HeadlessDesktop:
         return self._log
 
     def trajectory(self, log: RunLog, machine: Machine, scenario: Scenario) -> Trajectory:
-        """What the lines tell of the run."""
+        """The run's trajectory from its lines."""
         assert isinstance(log, StateLog)  # noqa: S101 - it is of `new_log`
         game, mod = self._settings.game, self._settings.mod
         return log.trajectory(machine, scenario, game=game, mod=mod)
 
     def read_log(self) -> str:
-        """The lines since the last call; keys whose time has come are pressed or let go."""
+        """The lines since the last call; keys that are due are pressed or released."""
         now = self._game_time()
         while self._running and self._edges and self._edges[0][0] <= now + 1e-9:
             _, key, down = self._edges.pop(0)

@@ -80,7 +80,7 @@ def play(
         make_run: Prepares the run for an attempt, each with a run id of its own: lines of an
             attempt that failed are never taken for another's.
         read: Makes the trajectory of a log; raises `LogIncompleteError` if it cannot be trusted.
-        require_held: Raises when the job is somebody else's; the game is cleaned up then, too.
+        require_held: Raises when the lease is lost; the game is cleaned up then, too.
         limits: How long to wait.
 
     Raises:

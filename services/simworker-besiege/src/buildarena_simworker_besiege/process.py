@@ -23,7 +23,7 @@ END_S: Final = 5.0
 class GameProcess:
     """The one game that this runner plays.
 
-    What it knows is kept in a file: a runner that follows a dead one finds the same game.
+    What it knows is stored in a file: a runner that follows a dead one finds the same game.
 
     Args:
         settings: The command that starts it, and where to keep its pid.

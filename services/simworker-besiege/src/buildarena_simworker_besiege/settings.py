@@ -92,7 +92,7 @@ class BesiegeSettings(BaseSettings):
 
     @property
     def calibration_file(self) -> Path:
-        """Where the calibration is kept."""
+        """The file of the calibration."""
         return self.calibration or self.state / "calibration.json"
 
     def words(self, level: Path | None) -> list[str]:

@@ -26,7 +26,7 @@ class BoardQuery:
         since: Only jobs that ended then or later.
         until: Only jobs that ended before.
         policy: The scoring policy: how flags are read.
-        overall: Tasks that the overall ranking is over, as far as they are on the board.
+        overall: Tasks of the overall ranking, if they are on the board.
     """
 
     tasks: frozenset[str] | None = None

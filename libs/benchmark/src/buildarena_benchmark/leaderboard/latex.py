@@ -111,7 +111,7 @@ def _scaled(row: Figures | None, column: Column) -> float | None:
 
 def _marked(values: Sequence[float | None], bounds: Sequence[bool], *, more: bool) -> list[str]:
     known = sorted((value for value in values if value is not None), reverse=more)
-    # Where nobody has anything there is no best.
+    # Where all values are zero there is no best.
     places = [value for value in known if value != 0.0 or not more][:2]
     texts = []
     for value, bound in zip(values, bounds, strict=True):

@@ -24,9 +24,9 @@ from buildarena_benchmark.statistics import (
 )
 
 MAX_CACHED_TESTS: Final = 256
-"""Tasks whose tests are kept: the present ones, and those of recent filters."""
+"""Tasks whose tests are cached: the present ones, and those of recent filters."""
 MAX_CACHED_PAIRS: Final = 100_000
-"""Tests of single pairs that are kept, and as many of before: some 200 bytes each."""
+"""Tests of single pairs that are cached, and as many older ones: some 200 bytes each."""
 
 PairTest = tuple[float, float, bool]
 """Evidence, p-value, and whether anything varies, as in `PairTests`."""
@@ -48,7 +48,7 @@ class Standings:
     """The standings of a board.
 
     Attributes:
-        tasks: By task, of those where anybody has counted trials.
+        tasks: By task, of those that have counted trials.
         overall: Over the ranked tasks, of those who have counted trials on all; None when nobody
             has.
     """

@@ -76,7 +76,7 @@ def cost_per_success(costs_usd: Sequence[float | None], successes: int) -> float
     """US dollars spent for each success, failures included.
 
     Args:
-        costs_usd: Cost of each trial; None where nobody knows it.
+        costs_usd: Cost of each trial; None where it is unknown.
         successes: How many of them succeeded.
 
     Returns:

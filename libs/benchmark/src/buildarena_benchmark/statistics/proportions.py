@@ -18,7 +18,7 @@ def quantile(level: float = LEVEL) -> float:
 def exact_interval(
     successes: int, trials: int, level: float = LEVEL, *, at_least: int = 0
 ) -> tuple[float, float]:
-    """The Clopper-Pearson interval of a success rate: it covers at least as often as it says.
+    """The Clopper-Pearson interval of a success rate: it covers at least as often as its level.
 
     Args:
         successes: How many trials succeeded.

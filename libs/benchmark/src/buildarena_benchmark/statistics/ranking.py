@@ -112,7 +112,7 @@ def adjusted(family: Sequence[PairTests]) -> list[Floats]:
 def rank_models(
     figures: tuple[Floats, Floats], tests: PairTests, p_values: Floats, *, level: float = LEVEL
 ) -> Ranking:
-    """Ranks models by their figures, with what the tests of all pairs can tell apart.
+    """Ranks models by their figures, with ties where the tests of pairs show no difference.
 
     A model is better than another beyond chance when its mean rank is smaller, the evidence
     points the same way, and the adjusted p-value is at most the level's error.

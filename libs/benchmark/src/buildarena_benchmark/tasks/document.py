@@ -1,8 +1,8 @@
 """The task file's format, as pydantic models.
 
 Whatever a task file may say is declared here, so that its schema, its errors and its hash all come
-from one place. A task may come from a stranger: what it says cannot make a trial long or large,
-and what nobody could ever pass is refused.
+from one place. A task may come from an untrusted user: it cannot make a trial long or large, and
+one that no machine can pass is refused.
 """
 
 import unicodedata
@@ -111,7 +111,7 @@ class Constraints(Document):
 
     @property
     def on_demand(self) -> bool:
-        """Whether builders look modules up by tools instead of being told them."""
+        """Whether builders look modules up by tools instead of reading them in the prompt."""
         return self.module_list == "on_demand"
 
     @property

@@ -49,7 +49,7 @@ class Source:
         return self._located(path)[1]
 
     def issues(self, error: ValidationError, model: type[BaseModel]) -> tuple[ValidationIssue, ...]:
-        """What the schema says against the content, in words, with lines and valid choices."""
+        """The schema's objections to the content, in words, with lines and valid choices."""
         schema = model.model_json_schema()
         issues = [self._issue(item, schema) for item in error.errors(include_url=False)]
         return tuple(dict.fromkeys(issues))
@@ -117,7 +117,7 @@ def read_source(text: str, *, origin: str, max_bytes: int = MAX_BYTES) -> Source
 
 
 def read_model(text: str, model: type[_Model], *, origin: str) -> _Model:
-    """What a YAML text says, as a model.
+    """The content of a YAML text, as a model.
 
     Raises:
         SourceError: It cannot be read, or is not what the model wants.

@@ -1,4 +1,4 @@
-"""Finds what an action's arguments name, or says what there is instead."""
+"""Finds what an action's arguments name; refusals name the valid choices."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ class Dialect:
         kinds: what it calls a kind of outcome, where it differs.
         connector_center: how far off its start a connector is shown, along that face's normal,
             units.
-        keeps_lost_mounts: whether a block whose base was removed is still told to sit there.
+        keeps_lost_mounts: whether a block whose base was removed is still reported to sit there.
         modules: our names by its names, where they differ.
         faces: what its face labels begin with, before the face's index; "" where they are ours.
     """

@@ -128,13 +128,13 @@ class RunnerApi:
         self._chunk_bytes = 1 << 20
 
     def facts(self, *, retry_for_s: float | None = None) -> dict[str, Any]:
-        """What the API says of key, versions and limits; waits for it until it answers."""
+        """Key, versions and limits from the API; waits until it answers."""
         facts: dict[str, Any] = self._json("GET", "/v1/runner", retry_for_s=retry_for_s)
         self._chunk_bytes = int(facts["piece_bytes"])
         return facts
 
     def lease(self, about: Mapping[str, Any], wait_s: float) -> dict[str, Any] | None:
-        """The next trial, or None when there is none for so long; waits for an API that is away."""
+        """The next trial, or None if none comes in time; waits for an API that does not answer."""
         answer: dict[str, Any] | None = self._json(
             "POST",
             "/v1/runner/leases",
@@ -220,7 +220,7 @@ class RunnerApi:
         Raises:
             LeaseLostError: 409.
             RefusedError: Any other refusal that will not change.
-            UnreachableError: There was none for so long, or the runner is asked to stop.
+            UnreachableError: None came in time, or the runner is asked to stop.
         """
         never = threading.Event()
         stopping = never if although_stopping else self._stopping

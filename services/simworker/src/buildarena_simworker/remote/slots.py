@@ -34,7 +34,7 @@ HAND_BACK_S: Final = 3.0
 WAIT_S: Final = 20.0
 """How long the API may keep a request for a trial."""
 PAUSE_S: Final = 1.0
-"""After what nobody foresaw a slot pauses, so that it does not meet it again and again."""
+"""After an unexpected error a slot pauses, so that it does not meet it again at once."""
 LONGEST_DETAIL: Final = 2000
 
 log = structlog.get_logger(__name__)
@@ -261,7 +261,7 @@ class Slot:
         self, active: _Active, leased: LeasedOverHttp, error: TransientError | PermanentError
     ) -> None:
         if active.lost.is_set():
-            return  # it was broken off, and is nobody's fault
+            return  # it was interrupted, which is not a fault
         log.warning("fault", reason=error.reason, detail=str(error))
         detail = str(error)[:LONGEST_DETAIL] or error.reason
         body: dict[str, Any] = {"reason": error.reason, "detail": detail}
