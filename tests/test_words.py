@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 import subprocess
 from pathlib import Path
@@ -73,6 +74,11 @@ WORDS = (
     (r"\bconduct\.md\b", "guidelines"),
     (r"(?-i:\bServiceFigures\b|\bJobFigures\b)", "metrics"),
     (r"\bis told in\b|\bso much as\b", "a plain sentence"),
+    (r"\bas it is said\b", "a plain sentence"),
+    (r"\bscreen[./](hands|eyes)\b|(?-i:\bHands\()", "screen.input, screen.capture"),
+    (r"\bhands and eyes\b|\beyes and hands\b", "input and capture"),
+    (r"\bHingedPiece\b|\bis_simple_piece\b", "component"),
+    (r"(?-i:\b_?LOCK_TRIES\b|\b_GUID_TRIES\b)", "attempts"),
 )
 INSTEAD = {f"word{number}": instead for number, (_, instead) in enumerate(WORDS)}
 PATTERN = re.compile(
@@ -82,6 +88,21 @@ PATTERN = re.compile(
     re.IGNORECASE,
 )
 """All old words at once, looked for where a word begins: a group for each says which one it is."""
+
+EMPTY_NAMES = frozenset({"found", "one", "again", "kept", "told", "said", "given"})
+"""Names of variables that do not say what they hold."""
+NAMED_PACKAGES = (
+    "libs/besiege",
+    "libs/benchmark",
+    "libs/geometry",
+    "libs/simulation",
+    "services/simworker",
+    "services/simworker-besiege",
+    "clients/buildarena",
+    "clients/cli",
+    "clients/python",
+)
+"""Packages without such names."""
 
 
 def tracked() -> list[str]:
@@ -113,6 +134,20 @@ def test_old_words_do_not_come_back() -> None:
     assert len(names) > 300
     found = [line for name in names for line in findings(name, (ROOT / name).read_text())]
     assert not found, "\n" + "\n".join(found)
+
+
+@pytest.mark.parametrize("package", NAMED_PACKAGES)
+def test_variables_say_what_they_hold(package: str) -> None:
+    files = sorted((ROOT / package / "src").rglob("*.py"))
+    assert files
+    empty = [
+        f"{file.relative_to(ROOT)}:{node.lineno}: {name}"
+        for file in files
+        for node in ast.walk(ast.parse(file.read_text()))
+        if isinstance(node, ast.Name | ast.arg)
+        and (name := node.id if isinstance(node, ast.Name) else node.arg) in EMPTY_NAMES
+    ]
+    assert not empty, "\n" + "\n".join(empty)
 
 
 @pytest.mark.parametrize(

@@ -174,7 +174,7 @@ def test_the_doctor_says_what_a_runner_lacks(context, url, tmp_path, monkeypatch
     assert not checked(None)["key"]
     assert not checked(ADMIN)["key"]
     assert not checked("two words")["settings"]
-    monkeypatch.setattr("buildarena_simworker.remote.doctor.PATIENCE_S", 0.2)
+    monkeypatch.setattr("buildarena_simworker.remote.doctor.RETRY_FOR_S", 0.2)
     assert not checked(None, "http://127.0.0.1:9")["api"]
 
 

@@ -31,7 +31,7 @@ def test_a_beam_is_one_cluster_and_a_car_five() -> None:
     assert len(_clusters(structure_of(beam(7)))) == 1
     clusters = _clusters(structure_of(car()))
     assert len(clusters) == 5
-    assert len(clusters.pieces) == 1
+    assert len(clusters.components) == 1
     assert (clusters.parent[1:] == 0).all()
     assert clusters.seated_is_outer[1:].all()
 
@@ -93,7 +93,7 @@ def test_a_joint_moved_too_far_apart_does_not_hold() -> None:
     assert len(_clusters(structure_of(draft.machine))) == 1
     draft.do("shift_block", block_id=block, shift_real=[0, 0.3, 0])
     draft.do("shift_block", block_id=block, shift_real=[0, 0.3, 0])
-    assert len(_clusters(structure_of(draft.machine)).pieces) == 2
+    assert len(_clusters(structure_of(draft.machine)).components) == 2
 
 
 def test_mass_and_inertia_are_those_of_the_blocks_and_brace_halves() -> None:

@@ -111,9 +111,9 @@ class GamePlayed:
 
     def _point_at_the_middle(self) -> None:
         program = (
-            "from buildarena_simworker_besiege.screen.hands import Hands;"
+            "from buildarena_simworker_besiege.screen.input import ScreenInput;"
             "from buildarena_simworker_besiege.screen.windows import open_windows;"
-            "h = Hands(); a = open_windows().find('besiege');"
+            "h = ScreenInput(); a = open_windows().find('besiege');"
             "h.move(a.left + a.width // 2, a.top + a.height // 2)"
         )
         subprocess.run(

@@ -19,7 +19,7 @@ from buildarena_benchmark.leaderboard import (
     counted_trials,
     ranked_board,
 )
-from buildarena_benchmark.leaderboard.cells import TRIES
+from buildarena_benchmark.leaderboard.cells import PASS_K
 from buildarena_benchmark.outcomes import SIMULATED, Outcome
 from buildarena_benchmark.statistics import (
     cost_per_success,
@@ -112,8 +112,8 @@ def plain_summary(
         cost_usd_mean=mean.of(lambda t: t.cost_usd),
         cost_per_success_usd=cost_per_success([t.cost_usd for t in counted], successes),
         invalid_action_rate=refused / actions if actions else None,
-        pass_at=_tries(pass_at_k, successes, number),
-        pass_all=_tries(pass_hat_k, successes, number),
+        pass_at=_pass_chances(pass_at_k, successes, number),
+        pass_all=_pass_chances(pass_hat_k, successes, number),
         outcomes=dict(sorted(outcomes.items())),
         reasons=dict(sorted(Counter(t.reason for t in counted if t.reason).items())),
         refusals=_refusals(counted),
@@ -141,10 +141,10 @@ class _Means:
         return math.fsum(values) / len(values) if values else None
 
 
-def _tries(
+def _pass_chances(
     estimate: Callable[[int, int, int], float | None], successes: int, trials: int
 ) -> dict[str, float]:
-    found = {str(k): estimate(successes, trials, k) for k in TRIES}
+    found = {str(k): estimate(successes, trials, k) for k in PASS_K}
     return {k: chance for k, chance in found.items() if chance is not None}
 
 

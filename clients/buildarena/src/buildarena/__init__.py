@@ -49,9 +49,9 @@ def __getattr__(name: str) -> Any:
     """Loads what is asked for."""
     if name not in _PLACES:
         raise AttributeError(f"module 'buildarena' has no {name!r}; it has {', '.join(_PLACES)}")
-    found = getattr(import_module(f"buildarena.{_PLACES[name]}"), name)
-    globals()[name] = found
-    return found
+    attribute = getattr(import_module(f"buildarena.{_PLACES[name]}"), name)
+    globals()[name] = attribute
+    return attribute
 
 
 def __dir__() -> list[str]:

@@ -94,8 +94,8 @@ def _method(action: Action) -> Callable[..., Feedback]:
     signature = _signature(action)
 
     def carry_out(self: Machine, *values: Any, **named: Any) -> Feedback:
-        given = signature.bind(self, *values, **named).arguments
-        arguments = {name: value for name, value in given.items() if name != "self"}
+        bound = signature.bind(self, *values, **named).arguments
+        arguments = {name: value for name, value in bound.items() if name != "self"}
         return _feedback(self.act(action.definition.name, arguments))
 
     carry_out.__name__ = action.definition.name
@@ -119,7 +119,7 @@ def _signature(action: Action) -> inspect.Signature:
 def _type(schema: Any) -> str:
     kind = schema.get("type")
     if isinstance(kind, list):
-        return " | ".join(TYPES.get(one, "None") for one in kind)
+        return " | ".join(TYPES.get(member, "None") for member in kind)
     return TYPES.get(kind, "object")
 
 

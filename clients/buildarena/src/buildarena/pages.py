@@ -83,7 +83,7 @@ class Shown:
             f"<!doctype html><html><head>{title}"
             f'<meta http-equiv="Content-Security-Policy" content="{POLICY}"></head>'
             '<body><div id="root">This is drawn by a script.</div>'
-            f'<script type="text/plain" id="given">{_packed(self._given())}</script>'
+            f'<script type="text/plain" id="given">{_packed(self._document())}</script>'
             f'<script type="text/plain" id="viewer">{_viewer()}</script>'
             f"<script>{LOADER}</script></body></html>"
         )
@@ -101,7 +101,7 @@ class Shown:
             f'style="max-height: {self.height}px; background: white">'
         )
 
-    def _given(self) -> dict[str, Any]:
+    def _document(self) -> dict[str, Any]:
         from buildarena_api.scenes import machine_scene
 
         scenario = None if self.task is None else self.task.scenario.model_dump(mode="json")
@@ -113,18 +113,18 @@ class Shown:
         }
 
 
-def _packed(given: dict[str, Any]) -> str:
+def _packed(document: dict[str, Any]) -> str:
     """JSON, gzipped, in base64: of its letters none ends an element."""
-    return _packed_bytes(json.dumps(_finite(given), allow_nan=False).encode())
+    return _packed_bytes(json.dumps(_finite(document), allow_nan=False).encode())
 
 
 def _finite(value: Any) -> Any:
-    """A value without figures that JSON can't hold: a trial that blew up has such."""
+    """A value without the numbers that JSON can't hold: a trial that diverged has some."""
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, dict):
-        return {name: _finite(one) for name, one in value.items()}
-    return [_finite(one) for one in value] if isinstance(value, list | tuple) else value
+        return {name: _finite(item) for name, item in value.items()}
+    return [_finite(item) for item in value] if isinstance(value, list | tuple) else value
 
 
 @cache

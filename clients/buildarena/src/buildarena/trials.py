@@ -99,7 +99,7 @@ def simulate(
 
     Raises:
         ValueError: There is no such task or engine.
-        SimulationError: The engine failed, which says nothing of the machine.
+        SimulationError: The engine failed, which is not the machine's fault.
     """
     chosen = chosen_task(task)
     require_engine(engine)
@@ -129,17 +129,19 @@ def simulate_all(
 
     Raises:
         ValueError: There is no such task or engine, or there are fewer processes than one.
-        SimulationError: The engine failed on a machine, which says nothing of it. What came of the
-            others is kept by `buildarena_environment.Evaluator`, which this is made of.
+        SimulationError: The engine failed on a machine, which is not the machine's fault. To keep
+            the results of the others, use `buildarena_environment.Evaluator`.
     """
     chosen, copies = chosen_task(task), [machine.copy() for machine in machines]
     require_engine(engine)
     trials = []
     with Evaluator(chosen, engine, seed=seed, processes=processes, trajectories=True) as evaluator:
-        for number, (machine, found) in enumerate(zip(copies, evaluator.map(copies), strict=True)):
-            if found.trial is None:
-                raise SimulationError(f"machine {number} could not be tried: {found.error}")
-            trials.append(_shown_trial(chosen, machine, found.trial))
+        for number, (machine, evaluated) in enumerate(
+            zip(copies, evaluator.map(copies), strict=True)
+        ):
+            if evaluated.trial is None:
+                raise SimulationError(f"machine {number} could not be tried: {evaluated.error}")
+            trials.append(_shown_trial(chosen, machine, evaluated.trial))
     return trials
 
 

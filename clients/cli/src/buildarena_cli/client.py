@@ -16,7 +16,7 @@ from buildarena_client.paths import HEALTH
 from buildarena_client.retries import RetryPolicy
 
 T = TypeVar("T")
-PATIENCE_S = RetryPolicy().restart_s
+RESTART_S = RetryPolicy().restart_s
 """How long a watching command waits for a service that is being restarted."""
 STATE_POLL_S = 0.3
 
@@ -44,7 +44,7 @@ class Client(ApiClient):
             super().__init__(url, key)
 
     def get_in_state(self, path: str, state: str) -> Any:
-        """As get_patiently, once what is there says that it is in a state."""
+        """As get_patiently, once the answer's state is this one."""
         while (answer := self.get_patiently(path))["state"] != state:
             time.sleep(STATE_POLL_S)
         return answer
@@ -72,7 +72,7 @@ class RefusedError(CommandError):
 
 
 class UnreachableError(CommandError, errors.UnreachableError):
-    """The service does not answer now; it may later. Whoever watches goes on."""
+    """The service does not answer at present; it may later, so commands that watch continue."""
 
 
 @contextlib.contextmanager
@@ -104,4 +104,4 @@ def _line(error: dict[str, Any]) -> str:
     return errors.described(error) + (near if error["choices"] else "")
 
 
-__all__ = ["HEALTH", "PATIENCE_S", "Client", "RefusedError", "UnreachableError", "at"]
+__all__ = ["HEALTH", "RESTART_S", "Client", "RefusedError", "UnreachableError", "at"]

@@ -16,9 +16,9 @@ DEFAULT_PORT: Final = 8321
 DEFAULT_DATA: Final = ".buildarena"
 
 
-def data_folder(given: Path | None) -> Path:
+def data_folder(chosen: Path | None) -> Path:
     """The data folder: the given one, or BUILDARENA_DATA, or the default."""
-    return given or Path(os.environ.get("BUILDARENA_DATA") or DEFAULT_DATA)
+    return chosen or Path(os.environ.get("BUILDARENA_DATA") or DEFAULT_DATA)
 
 
 __all__ = ["DEFAULT_DATA", "DEFAULT_PORT", "DEFAULT_URL", "KEY_VARIABLE", "data_folder"]

@@ -20,54 +20,53 @@ LISTED: Final = {"job": "jobs", "sweep": "sweeps"}
 """Kinds that the API lists by ``id_prefix``; of keys it lists all."""
 
 
-def whole_id(client: Client, kind: str, given: str) -> str:
-    """The id that a word of the command line stands for.
+def whole_id(client: Client, kind: str, word: str) -> str:
+    """The id that a word of the command line names.
 
     Args:
         client: The API, asked when the word is no whole id.
         kind: One of KINDS.
-        given: An id, or the beginning of one, with or without ``kind_``.
+        word: An id, or the beginning of one, with or without ``kind_``.
 
     Raises:
         CommandError: It is no id of this kind, or nothing or more than one thing begins like it.
     """
-    prefix = checked_prefix(kind, given)
+    prefix = checked_prefix(kind, word)
     if len(prefix) == len(kind) + 1 + DIGITS:
         return prefix
-    found = candidates(client, kind, prefix)
-    if not found:
+    ids = candidates(client, kind, prefix)
+    if not ids:
         raise CommandError(f"no {kind}'s id begins with {prefix!r}")
-    if len(found) > 1:
-        more = " …" if len(found) > MAX_CANDIDATES else ""
-        shown = ", ".join(found[:MAX_CANDIDATES])
+    if len(ids) > 1:
+        more = " …" if len(ids) > MAX_CANDIDATES else ""
+        shown = ", ".join(ids[:MAX_CANDIDATES])
         raise CommandError(f"several {kind}s' ids begin with {prefix!r}: {shown}{more}")
-    return found[0]
+    return ids[0]
 
 
-def checked_id(kind: str, given: object) -> str:
+def checked_id(kind: str, value: object) -> str:
     """An id that is whole, as a program gives it.
 
     Raises:
         CommandError: It is no id of this kind.
     """
-    if not isinstance(given, str) or not re.fullmatch(rf"{kind}_[0-9a-f]{{{DIGITS}}}", given):
-        raise CommandError(f"{given!r} is not the id of a {kind}, such as {kind}_{EXAMPLE}")
-    return given
+    if not isinstance(value, str) or not re.fullmatch(rf"{kind}_[0-9a-f]{{{DIGITS}}}", value):
+        raise CommandError(f"{value!r} is not the id of a {kind}, such as {kind}_{EXAMPLE}")
+    return value
 
 
-def checked_prefix(kind: str, given: str) -> str:
+def checked_prefix(kind: str, word: str) -> str:
     """The beginning of an id, with its ``kind_``.
 
     Raises:
         CommandError: No id of this kind begins like that.
     """
-    match = re.fullmatch(rf"(?:{kind}_)?([0-9a-f]{{1,{DIGITS}}})", given)
+    match = re.fullmatch(rf"(?:{kind}_)?([0-9a-f]{{1,{DIGITS}}})", word)
     if match is None:
-        wrong = given.partition("_")[0]
-        hint = did_you_mean(wrong, KINDS) if "_" in given and wrong not in KINDS else ""
+        wrong = word.partition("_")[0]
+        hint = did_you_mean(wrong, KINDS) if "_" in word and wrong not in KINDS else ""
         raise CommandError(
-            f"{given!r} is not the id of a {kind} (such as {kind}_{EXAMPLE}, "
-            f"or its beginning){hint}"
+            f"{word!r} is not the id of a {kind} (such as {kind}_{EXAMPLE}, or its beginning){hint}"
         )
     return f"{kind}_{match[1]}"
 

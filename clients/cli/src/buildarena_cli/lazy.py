@@ -1,7 +1,7 @@
 """Groups of commands that are loaded when they are named.
 
 Loading every command takes half a second and more; help and completion need their names and first
-sentences only, which stand in `buildarena_cli.command_table`.
+sentences only, which are in `buildarena_cli.command_table`.
 """
 
 from __future__ import annotations
@@ -107,11 +107,11 @@ def new_group(text: str) -> typer.Typer:
 
 
 def _load(name: str, entry: Entry) -> Any:
-    found = getattr(import_module(f"buildarena_cli.commands.{entry.module}"), entry.attribute)
-    if isinstance(found, typer.Typer):
-        group = get_group(found)
+    target = getattr(import_module(f"buildarena_cli.commands.{entry.module}"), entry.attribute)
+    if isinstance(target, typer.Typer):
+        group = get_group(target)
         group.name = name
         return group
     alone = typer.Typer(rich_markup_mode=None, add_completion=False, pretty_exceptions_enable=False)
-    alone.command(name, context_settings=CONTEXT)(found)
+    alone.command(name, context_settings=CONTEXT)(target)
     return get_command(alone)

@@ -39,7 +39,7 @@ DialectOption = Annotated[
 
 
 def read_machine(file: Path, dialect: str | None = None) -> Machine:
-    """The machine of a file; what of it was not understood is told on standard error.
+    """The machine of a file; what was not understood is printed to standard error.
 
     Args:
         file: A machine file of the game's, a machine document or an action log.
@@ -51,10 +51,10 @@ def read_machine(file: Path, dialect: str | None = None) -> Machine:
         DocumentError: It is none of these, the document is wrong, or an action is refused.
         ValueError: There is no such dialect.
     """
-    found = read_imported(file, dialect)
-    for remark in found.not_understood:
+    imported = read_imported(file, dialect)
+    for remark in imported.not_understood:
         warn(f"{file}: {remark}")
-    return found.machine
+    return imported.machine
 
 
 def read_imported(file: Path, dialect: str | None = None) -> ImportedMachine:

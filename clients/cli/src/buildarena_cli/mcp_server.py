@@ -55,14 +55,14 @@ def make_server(client: Client) -> Server[Any]:
     async def call_tool(
         _: ServerRequestContext[Any], params: types.CallToolRequestParams
     ) -> types.CallToolResult:
-        given = dict(params.arguments or {})
+        arguments = dict(params.arguments or {})
         tool = machine_tools.find(params.name)
         try:
             if tool is not None:
-                async with turns[str(given.get("session"))]:
-                    answer = await asyncio.to_thread(_act, client, tool, given)
+                async with turns[str(arguments.get("session"))]:
+                    answer = await asyncio.to_thread(_act, client, tool, arguments)
             else:
-                answer = await asyncio.to_thread(_manage, client, params.name, given)
+                answer = await asyncio.to_thread(_manage, client, params.name, arguments)
         except (CommandError, KeyError) as error:
             text = f"missing argument {error}" if isinstance(error, KeyError) else str(error)
             return _result(text, failed=True)
@@ -142,7 +142,7 @@ def _tools(simulators: Sequence[Mapping[str, Any]]) -> list[types.Tool]:
                 ["session", *tool.parameters.get("required", [])],
             ),
         )
-        # Sessions of tasks that tell their modules refuse to have them looked up.
+        # Sessions of tasks with inline modules refuse lookups.
         for tool in building_tools(on_demand=True)
     ]
     return managing + building
@@ -152,25 +152,25 @@ def _object(properties: Mapping[str, Any], required: list[str]) -> dict[str, Any
     return {"type": "object", "properties": dict(properties), "required": required}
 
 
-def _act(client: Client, tool: str, given: dict[str, Any]) -> types.CallToolResult:
-    session, machine = given.pop("session"), given.pop("machine", MAIN)
-    body = {"tool": tool, "arguments": given, "machine": machine}
+def _act(client: Client, tool: str, arguments: dict[str, Any]) -> types.CallToolResult:
+    session, machine = arguments.pop("session"), arguments.pop("machine", MAIN)
+    body = {"tool": tool, "arguments": arguments, "machine": machine}
     done = client.post(at("sessions", checked_id("job", session), "calls"), body)
     return _result(done["feedback"], failed=not done["ok"])
 
 
-def _manage(client: Client, tool: str, given: Arguments) -> types.CallToolResult:
+def _manage(client: Client, tool: str, arguments: Arguments) -> types.CallToolResult:
     if tool == "list_tasks":
         tasks = client.get("/v1/tasks")
         return _result("\n".join(f"{task['name']}: {task['title']}" for task in tasks))
     if tool == "open_session":
-        opened = client.post("/v1/sessions", given)
+        opened = client.post("/v1/sessions", arguments)
         return _result(_opened(opened))
     if tool == "submit":
-        job = client.post(at("sessions", checked_id("job", given["session"]), "submit"), {})
+        job = client.post(at("sessions", checked_id("job", arguments["session"]), "submit"), {})
         return _result(_ended(job))
     if tool == "get_result":
-        return _result(_ended(client.get(at("jobs", checked_id("job", given["session"])))))
+        return _result(_ended(client.get(at("jobs", checked_id("job", arguments["session"])))))
     return _result(f"there is no tool {tool!r}", failed=True)
 
 

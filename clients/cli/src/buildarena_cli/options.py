@@ -82,9 +82,9 @@ def budget_of(
     max_cost_usd: float | None, max_tokens: int | None, max_requests: int | None
 ) -> dict[str, Any] | None:
     """The budget that options name; None when they name none."""
-    given = {
+    limits = {
         "max_cost_usd": max_cost_usd,
         "max_tokens": max_tokens,
         "max_requests": max_requests,
     }
-    return {name: value for name, value in given.items() if value is not None} or None
+    return {name: value for name, value in limits.items() if value is not None} or None

@@ -25,14 +25,16 @@ def suggested_words(word: str, choices: Iterable[str]) -> list[str]:
         part = len(word) > 1 and word.lower() in re.split(r"[/:. _-]", choice.lower())
         likeness[choice] = 1.0 if part else matcher.ratio()
     least = max(LIKENESS, max(likeness.values(), default=0.0) - SPREAD)
-    found = sorted(likeness, key=lambda choice: -likeness[choice])
-    return [choice for choice in found if choice != word and likeness[choice] >= least][:MAX_WORDS]
+    closest = sorted(likeness, key=lambda choice: -likeness[choice])
+    return [choice for choice in closest if choice != word and likeness[choice] >= least][
+        :MAX_WORDS
+    ]
 
 
 def did_you_mean(word: str, choices: Iterable[str]) -> str:
     """`; did you mean …?` with the near words, or nothing."""
-    found = suggested_words(word, choices)
-    return f"; did you mean {' or '.join(found)}?" if found else ""
+    near = suggested_words(word, choices)
+    return f"; did you mean {' or '.join(near)}?" if near else ""
 
 
 def suggested_field(field: str, message: str, choices: Iterable[str]) -> str:

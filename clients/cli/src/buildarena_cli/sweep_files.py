@@ -36,7 +36,7 @@ class SpecFile:
     """A file of fields that the API takes.
 
     Attributes:
-        source: What the file says, with lines.
+        source: The file's content, with lines.
         content: What is sent: the file's fields, some of them overridden.
         overridden: Fields that the command line gave.
     """
@@ -45,16 +45,16 @@ class SpecFile:
     content: dict[str, Any]
     overridden: frozenset[str] = field(default_factory=frozenset)
 
-    def with_words(self, given: Mapping[str, Any]) -> SpecFile:
-        """The same file with values from the command line in the place of its fields."""
-        return replace(self, content={**self.content, **given}, overridden=frozenset(given))
+    def with_words(self, values: Mapping[str, Any]) -> SpecFile:
+        """The same file with values from the command line instead of its fields."""
+        return replace(self, content={**self.content, **values}, overridden=frozenset(values))
 
     def refusal(self, issues: Sequence[ValidationIssue]) -> CommandError:
         """Issues in words, each with its line of the file or the flag that it came from."""
         return CommandError("\n".join(self._line(issue) for issue in issues))
 
     def refused(self, error: RefusedError) -> CommandError:
-        """What the service says against the content, in words."""
+        """The service's objections to the content, in words."""
         if not error.errors:
             return error
         return self.refusal(
@@ -74,8 +74,10 @@ class SpecFile:
         near = suggested_field(issue.path, issue.message, issue.choices)
         if top not in self.overridden:
             return issue.describe(self.source.origin) + near
-        given = ValidationIssue(path=issue.path, message=issue.message, choices=issue.choices)
-        return given.describe(FLAGS[str(top)]) + near
+        without_line = ValidationIssue(
+            path=issue.path, message=issue.message, choices=issue.choices
+        )
+        return without_line.describe(FLAGS[str(top)]) + near
 
 
 def read_fields(file: Path) -> SpecFile:
@@ -99,7 +101,7 @@ def read_fields(file: Path) -> SpecFile:
 
 
 def read_sweep(file: Path, flags: Mapping[str, Any]) -> SpecFile:
-    """A sweep file with what flags put in the place of its fields.
+    """A sweep file with the values of flags instead of its fields.
 
     Args:
         file: The file.
@@ -108,11 +110,11 @@ def read_sweep(file: Path, flags: Mapping[str, Any]) -> SpecFile:
     Raises:
         CommandError: The file, or what the flags make of it, is not a sweep.
     """
-    given = {name: value for name, value in flags.items() if value is not None}
-    sweep = read_fields(file).with_words(given)
-    for one, other in (("samples", "seeds"), ("seeds", "samples")):
-        if one in given:
-            sweep.content.pop(other, None)
+    values = {name: value for name, value in flags.items() if value is not None}
+    sweep = read_fields(file).with_words(values)
+    for given_field, replaced_field in (("samples", "seeds"), ("seeds", "samples")):
+        if given_field in values:
+            sweep.content.pop(replaced_field, None)
     try:
         SweepSpec.model_validate(sweep.content)
     except ValidationError as error:

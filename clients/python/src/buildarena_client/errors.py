@@ -46,7 +46,7 @@ class NotAnApiError(ClientError):
 
 
 class DamagedError(ClientError):
-    """Bytes that arrived have another hash than those that were kept."""
+    """Bytes arrived with another hash than the stored ones."""
 
 
 class RefusedError(ClientError):
@@ -107,11 +107,11 @@ KINDS: Final[Mapping[int, type[RefusedError]]] = {
     422: InvalidError,
     HTTPStatus.TOO_MANY_REQUESTS: TooManyRequestsError,
 }
-"""Errors by status; numbers whose names changed between versions of Python stand as numbers."""
+"""Errors by status; statuses whose names differ between versions of Python are numbers here."""
 
 
 def kind_of(status: int) -> type[RefusedError]:
-    """The error that a status stands for."""
+    """The error for a status."""
     usual = ServiceFaultError if status >= HTTPStatus.INTERNAL_SERVER_ERROR else RefusedError
     return KINDS.get(status, usual)
 

@@ -12,7 +12,7 @@ from buildarena_client.errors import DamagedError
 
 
 class WholeFile:
-    """A file that is there when everything was written, and as it was kept.
+    """A file that appears only when it is complete and has its hash.
 
     Args:
         target: Where.
@@ -51,7 +51,7 @@ class WholeFile:
 
 
 def require_hash(data: bytes, sha256: str, name: str) -> bytes:
-    """Bytes that arrived as they were kept.
+    """Bytes that arrived as they were stored.
 
     Raises:
         DamagedError: They did not.
@@ -60,6 +60,6 @@ def require_hash(data: bytes, sha256: str, name: str) -> bytes:
     return data
 
 
-def _compare(found: str, expected: str | None, name: str) -> None:
-    if expected is not None and found != expected:
+def _compare(digest: str, expected: str | None, name: str) -> None:
+    if expected is not None and digest != expected:
         raise DamagedError(f"{name} arrived damaged: its hash differs")

@@ -1,8 +1,8 @@
 """Answers as data frames of pandas or polars, which are loaded when they are asked for.
 
 Columns and their types come from the contract, so that a frame without rows has them too. Times are
-UTC, figures are floats, and what is missing is missing: NaN, NaT, `<NA>`, null. What stands inside
-another document is a column of its own, named by its path: ``usage.requests``, ``metrics.load``.
+UTC, figures are floats, and what is missing is missing: NaN, NaT, `<NA>`, null. A field of an inner
+document is a separate column, named by its path: ``usage.requests``, ``metrics.load``.
 Lists of texts are lists; anything else is JSON.
 """
 
@@ -124,7 +124,7 @@ def _made(rows: Iterable[Mapping[str, Any]], columns: Columns, kind: Kind) -> An
     except ImportError as error:
         raise MissingLibraryError(f"a {kind} frame", library=kind, extra=kind) from error
     flat = [dict(_flat(row, columns)) for row in rows]
-    typed = _with_found(flat, columns)
+    typed = _with_inner_columns(flat, columns)
     data = {name: [_value(row.get(name), of) for row in flat] for name, of in typed.items()}
     return _pandas(library, data, typed) if kind == "pandas" else _polars(library, data, typed)
 
@@ -138,7 +138,7 @@ def _pandas(library: Any, data: Mapping[str, list[Any]], columns: Columns) -> An
 
 
 def _pandas_type(kind: str, values: list[Any]) -> str:
-    # An older service may not say what the contract says it must.
+    # An older service may leave out what the contract requires.
     kind = _maybe(kind) if None in values else kind
     return PANDAS.get(kind) or PANDAS[kind.removesuffix("?")]
 
@@ -159,16 +159,19 @@ def _polars(library: Any, data: Mapping[str, list[Any]], columns: Columns) -> An
 
 def _columns(row_type: Any, prefix: str = "") -> Columns:
     """Columns of a document; those of documents in it by their path."""
-    found: Columns = {}
+    columns: Columns = {}
     for name, hint in get_type_hints(row_type, include_extras=True).items():
         kind, missing = _required(hint)
         if is_typeddict(kind):
             # The whole document may be missing, and with it what it must have.
             inner = _columns(kind, f"{prefix}{name}.")
-            found |= {of: _maybe(one) if missing else one for of, one in inner.items()}
+            columns |= {
+                of: _maybe(column_kind) if missing else column_kind
+                for of, column_kind in inner.items()
+            }
         else:
-            found[prefix + name] = _maybe(_kind(kind)) if missing else _kind(kind)
-    return found
+            columns[prefix + name] = _maybe(_kind(kind)) if missing else _kind(kind)
+    return columns
 
 
 def _maybe(kind: str) -> str:
@@ -181,7 +184,7 @@ def _required(hint: Any) -> tuple[Any, bool]:
         return _required(get_args(hint)[0])[0], True
     if get_origin(hint) not in UNIONS:
         return hint, False
-    kinds = [one for one in get_args(hint) if one is not type(None)]
+    kinds = [argument for argument in get_args(hint) if argument is not type(None)]
     return (kinds[0] if len(kinds) == 1 else object), len(kinds) < len(get_args(hint))
 
 
@@ -209,28 +212,28 @@ def _flat(row: Mapping[str, Any], columns: Columns, prefix: str = "") -> Iterabl
             yield path, value
 
 
-def _with_found(rows: list[dict[str, Any]], columns: Columns) -> Columns:
-    """The columns; in the place of those that hold documents, what stands in these."""
+def _with_inner_columns(rows: list[dict[str, Any]], columns: Columns) -> Columns:
+    """The columns; those that hold documents are replaced by a column for each inner field."""
     typed: Columns = {}
     for name, kind in columns.items():
         if not kind.startswith("dict"):
             typed[name] = kind
             continue
         inside = dict.fromkeys(key for row in rows for key in row if key.startswith(f"{name}."))
-        typed |= {key: _found_kind([row.get(key) for row in rows]) for key in inside}
+        typed |= {key: _kind_of_values([row.get(key) for row in rows]) for key in inside}
     return typed
 
 
-def _found_kind(values: list[Any]) -> str:
+def _kind_of_values(values: list[Any]) -> str:
     """The type of what the contract leaves open."""
     kinds = {type(value) for value in values if value is not None}
     if kinds == {int, float}:
         kinds = {float}
     if len(kinds) == 1 and (only := kinds.pop()) in SCALARS:
         return SCALARS[only] + "?"
-    given = [value for value in values if value is not None]
-    texts = all(isinstance(v, list) and all(isinstance(t, str) for t in v) for v in given)
-    return "list?" if given and texts else "json?"
+    present = [value for value in values if value is not None]
+    texts = all(isinstance(v, list) and all(isinstance(t, str) for t in v) for v in present)
+    return "list?" if present and texts else "json?"
 
 
 def _value(value: Any, kind: str) -> Any:

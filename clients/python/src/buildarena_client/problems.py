@@ -1,4 +1,4 @@
-"""What an answer that is no success says, as an error."""
+"""Errors from answers that are not a success."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ HIDDEN = "[key]"
 
 
 def require_success(request: Request, response: Response, *, key: str | None) -> Response:
-    """The answer, as long as it is a success.
+    """The answer, if it is a success.
 
     Args:
         request: What was asked.
         response: What was answered.
-        key: Never repeated, whatever the answer says.
+        key: Hidden in messages, even where the answer repeats it.
 
     Raises:
         UnavailableError: The service can't answer now.

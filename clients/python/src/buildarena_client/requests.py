@@ -47,10 +47,10 @@ class Request:
             if not (value.isascii() and value.isprintable()):
                 raise BadArgumentError(f"{value!r} can't be sent as {name}: use printable ASCII")
         path = checked_path(self.path)
-        given = {name: _text(v) for name, v in self.params.items() if v is not None}
-        if not given:
+        query = {name: _text(v) for name, v in self.params.items() if v is not None}
+        if not query:
             return path
-        return path + ("&" if "?" in path else "?") + urlencode(given, doseq=True)
+        return path + ("&" if "?" in path else "?") + urlencode(query, doseq=True)
 
     @property
     def about_health(self) -> bool:
@@ -112,5 +112,5 @@ def _text(value: Any) -> Any:
     if isinstance(value, datetime):
         return value.isoformat()
     if isinstance(value, (list, tuple, set, frozenset)):
-        return [_text(one) for one in value]
+        return [_text(item) for item in value]
     return value

@@ -1,7 +1,7 @@
 """What a task allows: checked on the machine, not only asked for.
 
-Every road by which a machine can come to a trial passes here: sessions of models, external agents'
-submissions, verification of what an archive brought, and the command `machine simulate`.
+Every machine is checked here before a trial: those of models' sessions, of external agents'
+submissions, of imported archives that are verified, and of the command `machine simulate`.
 """
 
 from __future__ import annotations
@@ -64,16 +64,16 @@ def _violated(problem: Callable[[Task, Machine], str | None]) -> Check:
     """A check of what the task itself says."""
 
     def check(task: Task, machine: Machine) -> Broken | None:
-        found = problem(task, machine)
-        return None if found is None else ("constraint_violated", found)
+        violation = problem(task, machine)
+        return None if violation is None else ("constraint_violated", violation)
 
     return check
 
 
 def _loose(task: Task, machine: Machine) -> Broken | None:
     del task  # every task asks for one machine
-    found = _unjoined(machine)
-    return None if found is None else ("unjoined_parts", found)
+    unjoined = _unjoined(machine)
+    return None if unjoined is None else ("unjoined_parts", unjoined)
 
 
 def _wrong_modules(task: Task, machine: Machine) -> str | None:
@@ -97,10 +97,10 @@ def _wrong_structures(task: Task, machine: Machine) -> str | None:
     the task asks for one.
     """
     used = {block.structure for block in machine.blocks.values()}
-    placed = {key: found for key, found in machine.sub_structures.items() if key in used}
+    placed = {key: structure for key, structure in machine.sub_structures.items() if key in used}
     copies = len(placed) or 1
     least, most = task.constraints.min_sub_structures, task.constraints.max_sub_structures
-    kinds = len({found.source for found in placed.values()}) or 1
+    kinds = len({structure.source for structure in placed.values()}) or 1
     count = copies if most == 1 or copies < least else kinds
     if copies < least or count > most:
         allowed = str(most) if least == most else f"{least} to {most}"

@@ -49,7 +49,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _form(machine: Machine, name: str | None) -> dict[str, Any]:
     if name is None:
         return normal_form(machine)
-    # Tasks are the benchmark's, which stands beside this package: the command alone looks there.
+    # Tasks are in the benchmark, which this package does not import: only this command does.
     benchmark = import_module("buildarena_benchmark")
     known = benchmark.builtin_tasks()
     if name in known:

@@ -16,4 +16,4 @@ class MachineFileError(BesiegeError, ValueError):
 
 
 class LogIncompleteError(BesiegeError, ValueError):
-    """A log does not tell a whole trial; the message says what is missing."""
+    """A log is not of a whole trial; the message says what is missing."""

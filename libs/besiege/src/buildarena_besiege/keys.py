@@ -92,7 +92,7 @@ def bindings_of(machine: Machine, control: Control | None) -> dict[str, dict[str
         control: The trial's; where cannons are held, each also fires with the key for that.
     """
     fired_by_us = control is not None and control.mode == "held" and control.from_s > 0.0
-    found: dict[str, dict[str, tuple[str, ...]]] = {}
+    bound: dict[str, dict[str, tuple[str, ...]]] = {}
     for block in machine.blocks.values():
         bindings = {action: tuple(keys) for action, keys in block.bindings.items()}
         for keys in bindings.values():
@@ -101,8 +101,8 @@ def bindings_of(machine: Machine, control: Control | None) -> dict[str, dict[str
         if fired_by_us and block.module.thrust is not None:
             action = block.module.thrust.action
             bindings[action] = (*bindings.get(action, ()), HELD_KEY)
-        found[block.id] = bindings
-    return found
+        bound[block.id] = bindings
+    return bound
 
 
 def cannons(machine: Machine) -> tuple[str, ...]:

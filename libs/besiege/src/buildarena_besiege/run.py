@@ -45,7 +45,7 @@ class GameRun:
 
     Attributes:
         name: Stem of the machine file, which is typed into the load box.
-        run_id: Stands in every line of the log.
+        run_id: Part of every line of the log.
         machine_file: The .bsg with the script inside.
         script: The same Lua script.
         tracked: Ids of the blocks the script reports, the cargo apart.
@@ -53,8 +53,8 @@ class GameRun:
         set_ground: Whether "set ground" must be clicked before the start.
         level: The level to be opened (.blv); None for the flat sandbox.
         key_changes: What the script does to keys: time in seconds, key, whether it goes down.
-        needs_script: Whether a score needs what only the script does or tells: the cargo's growing
-            mass, or which cannons burn.
+        needs_script: Whether a score needs what only the script does or reports: the cargo's
+            growing mass, or which cannons burn.
     """
 
     name: str
@@ -104,7 +104,7 @@ def prepare_run(
         machine: The machine.
         scenario: What it is put through; it decides everything about the run.
         name: Stem of the machine file: lower case letters, digits, "-" and "_".
-        run_id: Of this run; stands in every line of the log.
+        run_id: Of this run; part of every line of the log.
         controls: The control sequence; the machine's own if left out.
         on_ground: Whether the file itself puts a machine onto the ground that starts there, for a
             game that has no button for it.
@@ -238,7 +238,9 @@ def _reported(
     machine: Machine, scenario: Scenario, tracked: tuple[str, ...], references: Mapping[str, str]
 ) -> tuple[Reported, ...]:
     hot = set(cannons(machine))
-    blocks = [Reported(reference=references[one], burns=one in hot) for one in tracked]
+    blocks = [
+        Reported(reference=references[block_id], burns=block_id in hot) for block_id in tracked
+    ]
     if scenario.cargo is not None:
         blocks.append(Reported(reference=references[CARGO_ID], cargo=True))
     return tuple(blocks)
@@ -267,7 +269,7 @@ def _require_run_id(run_id: str) -> None:
 
 
 def _require_sayable(scenario: Scenario) -> None:
-    """Refuses what a machine file cannot say: its machines stand, with the cargo above them.
+    """Refuses what a machine file cannot express: machines start at rest, below their cargo.
 
     Raises:
         MachineNotPlayableError: The scenario is another; the message says what it asks for.

@@ -37,7 +37,7 @@ def game_start(machine: Machine, scenario: Scenario) -> Start:
     pose = Pose(position=besiege_point(put.position), quaternion=besiege_turn(put.rotation))
     position = np.array(pose.xyz)
     if not isinstance(scenario.placement, SpanPlacement):
-        # "Set ground" moves a machine down only; ours stands just as high above the floor.
+        # "Set ground" moves a machine down only; ours starts at the same height above the floor.
         position[2] = ours.position[2]
     axes = [pose.direction(axis) for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))]
     rotation = np.array(axes).T

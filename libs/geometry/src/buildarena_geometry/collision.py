@@ -105,11 +105,11 @@ class CollisionWorld:
 
     def _touched_by(self, solid: Solid, world_from_block: Pose) -> set[str]:
         request = fcl.CollisionRequest(num_max_contacts=_ALL_CONTACTS, enable_contact=True)
-        found = fcl.CollisionData(request, fcl.CollisionResult())
+        collisions = fcl.CollisionData(request, fcl.CollisionResult())
         probe = fcl.CollisionObject(_probe(solid), _transform(solid, world_from_block))
-        self._tree.collide(probe, found, fcl.defaultCollisionCallback)
+        self._tree.collide(probe, collisions, fcl.defaultCollisionCallback)
         touched = set()
-        for contact in found.result.contacts:
+        for contact in collisions.result.contacts:
             if contact.penetration_depth >= TOUCHING:
                 # One side is the probe, which no block owns.
                 touched.add(self._owners.get(id(contact.o1)) or self._owners[id(contact.o2)])
@@ -126,9 +126,9 @@ def unwanted(
         blocks: all blocks by id, with those of the pairs where they overlap.
     """
     return [
-        (one, other)
-        for one, other in pairs
-        if not (_reaches_into(blocks[one], other) or _reaches_into(blocks[other], one))
+        (first, second)
+        for first, second in pairs
+        if not (_reaches_into(blocks[first], second) or _reaches_into(blocks[second], first))
     ]
 
 

@@ -40,7 +40,7 @@ def flames_touch(
 
 
 def heating(state: MachineState) -> Mapping[str, tuple[str, ...]]:
-    """What heats each cannon where the machine stands as it is built.
+    """What heats each cannon while the machine is as it was built.
 
     Returns:
         For each block that a flame can heat, in the order of the blocks, the ids of the blocks
@@ -53,11 +53,11 @@ def heating(state: MachineState) -> Mapping[str, tuple[str, ...]]:
     bodies = [(cannon.id, cannon, sphere) for cannon in cannons for sphere in _body(cannon)]
     fires = [(torch.id, torch, flame) for torch in torches for flame in torch.module.flames]
     touching = flames_touch(*_spheres(bodies), *_spheres(fires))
-    found: dict[str, dict[str, None]] = {cannon.id: {} for cannon in cannons}
+    heated: dict[str, dict[str, None]] = {cannon.id: {} for cannon in cannons}
     for row, column in np.argwhere(touching):
-        found[bodies[row][0]][fires[column][0]] = None
+        heated[bodies[row][0]][fires[column][0]] = None
     order = {torch.id: place for place, torch in enumerate(torches)}
-    return {cannon: tuple(sorted(by, key=order.__getitem__)) for cannon, by in found.items()}
+    return {cannon: tuple(sorted(by, key=order.__getitem__)) for cannon, by in heated.items()}
 
 
 def heatable(block: Block) -> bool:

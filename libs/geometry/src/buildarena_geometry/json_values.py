@@ -21,7 +21,7 @@ def is_storable(text: str) -> bool:
 def levels(value: object) -> Iterator[list[object]]:
     """A JSON value level by level: itself, then what it holds, then what that holds, and so on.
 
-    A level is collected when it is asked for, so that whoever stops reads no deeper.
+    A level is collected only when it is asked for, so a caller that stops reads no deeper.
 
     Args:
         value: JSON as Python has it: objects are dicts, arrays lists or tuples.

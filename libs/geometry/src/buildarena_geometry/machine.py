@@ -92,7 +92,9 @@ class Machine:
     def restored(cls, logged: LoggedState) -> Self:
         """The machine that a value describes, which is known to be sound."""
         machine = object.__new__(cls)
-        machine._available = {name: cls.restored(one) for name, one in logged.available.items()}
+        machine._available = {
+            name: cls.restored(available) for name, available in logged.available.items()
+        }
         machine._state = logged.state
         machine._records = list(logged.records)
         machine._world = None  # built from the state when the first action asks for it
@@ -302,7 +304,7 @@ class Machine:
 
 def replay(log: ActionLog) -> Machine:
     """The machine that results from doing a log's actions again, refused ones included."""
-    available = {name: Machine.restored(one) for name, one in log.available.items()}
+    available = {name: Machine.restored(logged) for name, logged in log.available.items()}
     machine = Machine(catalogue=log.catalogue, available=available)
     for record in log:
         machine.act(record.name, record.arguments)
@@ -327,9 +329,9 @@ def _overlap(change: Change, pairs: list[tuple[str, str]]) -> RefusalError:
     else:
         named = "; ".join(f"{mine} and {other}" for mine, other in pairs)
         text = f"{change.attempt} would make blocks overlap: {named}."
-    tried = attempted(change.after.blocks[found] for found in change.placed)
+    tried = attempted(change.after.blocks[block_id] for block_id in change.placed)
     return RefusalError(Cause.OVERLAP, text, tuple(pairs), tried)
 
 
 def _blocks(state: MachineState, ids: list[str]) -> str:
-    return listing(f"block {found} ({state.blocks[found].module.name})" for found in ids)
+    return listing(f"block {block_id} ({state.blocks[block_id].module.name})" for block_id in ids)

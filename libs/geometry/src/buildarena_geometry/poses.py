@@ -1,6 +1,6 @@
 """Rigid poses in three dimensions.
 
-Poses are kept as plain floats, not arrays: a machine's actions compose a handful of them each, and
+Poses are plain floats, not arrays: a machine's actions compose a handful of them each, and
 at three numbers a time Python's own arithmetic is faster than an array's.
 """
 

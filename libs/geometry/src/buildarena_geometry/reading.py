@@ -1,4 +1,4 @@
-"""Reads JSON values that people wrote into typed structs, and says where they went wrong."""
+"""Reads JSON values that people wrote into typed structs; errors name the place."""
 
 from __future__ import annotations
 

@@ -112,8 +112,8 @@ class MachineState:
 
     def children(self, block: Block) -> list[Block]:
         """The blocks that sit on a block."""
-        found = (self.occupants.get((block.id, face.label)) for face in block.module.faces)
-        return [self.blocks[child] for child in found if child is not None]
+        children = (self.occupants.get((block.id, face.label)) for face in block.module.faces)
+        return [self.blocks[child] for child in children if child is not None]
 
     def joint(self, part: Block) -> Joint | None:
         """What holds a block to the face it sits on; None where it sits on none."""
@@ -167,13 +167,13 @@ class MachineState:
 
     def keys_in_use(self) -> tuple[str, ...]:
         """The keys that are bound to some action, in the order of the blocks."""
-        bound = (key for one in self.powered() for keys in one.bindings.values() for key in keys)
+        bound = (key for part in self.powered() for keys in part.bindings.values() for key in keys)
         return tuple(dict.fromkeys(bound))
 
     def powered(self) -> tuple[Block | Connector, ...]:
         """The blocks, then the connectors, that take keys."""
         parts: tuple[Block | Connector, ...] = (*self.blocks.values(), *self.connectors.values())
-        return tuple(one for one in parts if one.module.actions)
+        return tuple(part for part in parts if part.module.actions)
 
     def with_blocks(self, *changed: Block) -> MachineState:
         """The state in which these blocks are new or different, and connectors on them follow."""

@@ -49,7 +49,7 @@ class Step:
 
 
 def step(machine: Machine, name: object, arguments: object) -> Step:
-    """Has a machine carry out an action, and tells what that changed."""
+    """Carries out an action on a machine, and returns what that changed."""
     before = machine.state
     outcome = machine.act(name, arguments)
     if isinstance(outcome, Refused):

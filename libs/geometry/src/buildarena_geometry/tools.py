@@ -29,7 +29,7 @@ from buildarena_geometry.outcomes import Cause
 GROUPS = ("build", "refine", "assemble", "control", "query")
 """What every builder has."""
 LOOKUP = "lookup"
-"""What builders have besides where they look modules up instead of being told them."""
+"""What builders also have where they look modules up on demand."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,7 +40,7 @@ class ToolDefinition:
         name: the action's name.
         description: what it does.
         parameters: JSON schema of its arguments, an object.
-        group: one of `GROUPS`, or `LOOKUP`; empty for what is no action of a machine.
+        group: one of `GROUPS`, or `LOOKUP`; empty for a tool that is not a machine's action.
     """
 
     name: str

@@ -1,8 +1,8 @@
 """Trajectories as Arrow IPC streams, for pages that draw them.
 
-One record batch, a row per instant. What has several figures an instant is a fixed-size list, block
-after block, so that a reader has each column as one flat array. What is no series stands as JSON in
-the schema's metadata under the key `buildarena.trajectory`, as it does in the Parquet file.
+One record batch, a row per instant. Several values per instant are a fixed-size list, block after
+block, so that a reader has each column as one flat array. Everything that is not a series is JSON
+in the schema's metadata under the key `buildarena.trajectory`, as in the Parquet file.
 """
 
 import io

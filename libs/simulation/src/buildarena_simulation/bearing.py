@@ -24,7 +24,7 @@ class BearingMeter:
         self.now: NDArray[np.float64] = np.zeros(self._surfaces + 1 + len(self._wheels))
 
     def read(self, other: IntArray, surface: IntArray, forces: PointForces) -> None:
-        """Takes the contacts as they stand.
+        """Takes the present contacts.
 
         Args:
             other: (K,) as in `ContactForces`.

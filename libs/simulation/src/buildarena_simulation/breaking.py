@@ -127,8 +127,8 @@ class BreakingModel:
             self._fall_apart(engine)
         return held
 
-    def told_events(self) -> tuple[Event, ...]:
-        """What let go or took hold so far, in order of time."""
+    def all_events(self) -> tuple[Event, ...]:
+        """Releases and grabs so far, in order of time."""
         holds = [] if self.holding is None else self.holding.events
         return tuple(sorted([*self.events, *holds], key=lambda event: event.time_s))
 

@@ -1,6 +1,6 @@
 """Constants of the world and the model, with where each comes from.
 
-What belongs to a type of module (thrust, flame, motor, friction, drag) stands in the module file.
+What belongs to a type of module (thrust, flame, motor, friction, drag) is in the module file.
 
 Lengths are in units (the edge of a small block), masses in mass units, times in seconds. Forces
 of joints are in mass·g (the weight of one mass unit is 1), moments in mass·g·unit, so that they do
@@ -25,7 +25,7 @@ Fitted: full-size decks wedge between terrain walls with thousands of newtons.
 """
 
 MAX_SPIN: Final = 30.0
-"""Fastest spin of a free piece, rad/s; wheels on their axles may spin faster.
+"""Fastest spin of a free component, rad/s; wheels on their axles may spin faster.
 
 Ours: game engines bound spin likewise; it keeps the explicit gyroscopic terms of a tumbling rocket
 from gaining energy.

@@ -34,7 +34,7 @@ class KeyHold(Protocol):
 def varied_presses(
     keys: Sequence[KeyHold], control: Control, seed: int
 ) -> tuple[Sequence[KeyHold], Control]:
-    """The same presses, each pressed and let go a little late, as by a hand or a runner.
+    """The same presses, each pressed and released a little late, as by a hand or a runner.
 
     Args:
         keys: The control sequence.
@@ -54,7 +54,7 @@ def varied_presses(
 
 
 def ended_presses(keys: Sequence[KeyHold], control: Control) -> Sequence[KeyHold]:
-    """The presses of a trial that lets go of every key at a time; all of them in others.
+    """The presses, cut where the scenario releases every key; all of them if it does not.
 
     Args:
         keys: The control sequence.
@@ -174,9 +174,9 @@ def _targets(
         lags[w] = motor.lag_per_s
     targets = lagged(targets, lags, time_step_s)
     for d, block in enumerate(structure.joints.driven):
-        found = _driven(structure.parts[block], partial(held, int(block)), step_count, time_step_s)
-        if found is not None:
-            targets[:, d] = found
+        driven = _driven(structure.parts[block], partial(held, int(block)), step_count, time_step_s)
+        if driven is not None:
+            targets[:, d] = driven
     return targets
 
 

@@ -1,4 +1,4 @@
-"""What the keys make of blocks that push, hold a height, contract or let go."""
+"""How keys control blocks that push, hold a height, contract or let go."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -22,7 +22,7 @@ _NONE: Final = PointForces(
 
 
 class Holding:
-    """What the grips hold: they take the first thing that comes near until they are told to let go.
+    """What the grips hold: the first thing that comes near, until they are made to release it.
 
     Args:
         world: The machine and what is around it.
@@ -59,8 +59,8 @@ class Holding:
             clusters: The clusters.
             motion: Where they are.
             cargo: Where the cargo is, if there is one.
-            grab: (G,) whether each grip is told to hold again.
-            release: (G,) whether each is told to let go; it wins over `grab`.
+            grab: (G,) whether each grip shall hold again.
+            release: (G,) whether each shall let go; it wins over `grab`.
             time_s: Time now, seconds.
 
         Returns:
@@ -126,7 +126,7 @@ class Holding:
         """Vertical forces of what is held, upwards: of the ground on grips, of grips on the cargo.
 
         Returns:
-            Both in mass·g, as `Bearing` tells them; terrain that is held counts as ground.
+            Both in mass·g, as in `Bearing`; terrain that is held counts as ground.
         """
         on = dict.fromkeys((WORLD, CARGO), 0.0)
         for hold, wrench in self._borne:
@@ -151,15 +151,15 @@ class Holding:
         grips, block = self._grips, self._grips.blocks[k]
         c = int(clusters.cluster_of[block])
         points = motion.position[c] + grips.places[k] @ motion.rotation[c].T
-        reach, found = float(grips.reach[k]), []
+        reach, candidates = float(grips.reach[k]), []
         if self._world.ground:
-            found.append((max(0.0, float(points[:, 2].min())), WORLD, "ground"))
+            candidates.append((max(0.0, float(points[:, 2].min())), WORLD, "ground"))
         for name, other, shape in self._things(cargo):
             near = np.linalg.norm(points[4] - shape.center)
             if near < reach + np.linalg.norm(shape.half_extents) + np.ptp(points, axis=0).max():
-                found.append((float(distances(points, [shape])[0]), other, name))
-        found += self._pieces(points, c, clusters, motion, reach)
-        nearest = min(found, default=None)
+                candidates.append((float(distances(points, [shape])[0]), other, name))
+        candidates += self._near_blocks(points, c, clusters, motion, reach)
+        nearest = min(candidates, default=None)
         if nearest is not None and nearest[0] <= reach:
             hold = Hold(grip=k, block=block, other=nearest[1], point=grips.tips[k])
             self._held[k] = (hold, nearest[2])
@@ -180,11 +180,11 @@ class Holding:
                 ),
             )
 
-    def _pieces(
+    def _near_blocks(
         self, points: FloatArray, c: int, clusters: Clusters, motion: Motion, reach: float
     ) -> list[tuple[float, int, str]]:
-        """Blocks of other pieces within reach: distance, block, id."""
-        found = []
+        """Blocks of other components within reach: distance, block, id."""
+        candidates = []
         structure = self._world.structure
         far = clusters.root[clusters.cluster_of] != clusters.root[c]
         for block in np.flatnonzero(far).tolist():
@@ -193,8 +193,8 @@ class Holding:
             shapes: Sequence[Shape] = structure.parts[block].shapes
             near = float(distances(local, shapes).min())
             if near <= reach:
-                found.append((near, block, structure.parts[block].id))
-        return found
+                candidates.append((near, block, structure.parts[block].id))
+        return candidates
 
 
 def _as_forces(point: FloatArray, wrench: FloatArray) -> Iterator[tuple[FloatArray, FloatArray]]:

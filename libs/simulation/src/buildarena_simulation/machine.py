@@ -75,7 +75,7 @@ def structure_of(machine: "Machine") -> Structure:
         ropes.append(
             Rope(
                 **_span(connector, index),
-                mass=sum(one.module.mass for one in alike),
+                mass=sum(winch.module.mass for winch in alike),
                 share=share,
             )
         )

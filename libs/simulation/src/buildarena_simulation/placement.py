@@ -74,8 +74,8 @@ def start_digest(start: Start) -> str:
         arrays += [start.cargo.size, start.cargo.position]
     if start.velocity.any():
         arrays.append(start.velocity)
-    figures = np.concatenate([np.asarray(array, np.float64).ravel() for array in arrays])
-    return hashlib.sha256(figures.tobytes()).hexdigest()[:16]
+    values = np.concatenate([np.asarray(array, np.float64).ravel() for array in arrays])
+    return hashlib.sha256(values.tobytes()).hexdigest()[:16]
 
 
 def _velocity_of(placement: Placement) -> FloatArray:

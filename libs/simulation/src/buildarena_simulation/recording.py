@@ -88,7 +88,7 @@ class Recorder:
 
     @property
     def cargo_now(self) -> NDArray[np.float32] | None:
-        """(3,) where the cargo was at the last sample, as the trajectory tells it."""
+        """(3,) where the cargo was at the last sample, rounded as in the trajectory."""
         if self._cargo_size is None:
             return None
         return rounded_positions(self._cargo_position[self._row - 1])
@@ -106,14 +106,14 @@ class Recorder:
             yield samples[0][0], [motion for _, motion in samples]
 
     def _pieces(self) -> NDArray[np.int16]:
-        """(T, N) the articulated piece each tracked block belongs to, by its first block."""
+        """(T, N) the articulated component each tracked block belongs to, by its first block."""
         rows = []
         for clusters, motions in self._runs():
             first = np.array([blocks[0] for blocks in clusters.blocks])
             lowest = np.full(len(clusters), len(self._structure), dtype=np.int64)
             np.minimum.at(lowest, clusters.root, first)
-            piece = lowest[clusters.root][clusters.cluster_of[self._tracked]]
-            rows.append(np.tile(piece.astype(np.int16), (len(motions), 1)))
+            component = lowest[clusters.root][clusters.cluster_of[self._tracked]]
+            rows.append(np.tile(component.astype(np.int16), (len(motions), 1)))
         return np.concatenate(rows)
 
     def _poses(self) -> tuple[FloatArray, FloatArray]:
@@ -138,24 +138,24 @@ class Recorder:
         simulation_version: str,
         settings: Mapping[str, Setting],
     ) -> Trajectory:
-        """The trajectory of all samples kept."""
+        """The trajectory of all recorded samples."""
         has_cargo = self._cargo_size is not None
-        kept = slice(self._row)
-        turns = self._cargo_quaternion[kept]
+        recorded = slice(self._row)
+        turns = self._cargo_quaternion[recorded]
         quaternion = np.where(turns[:, :1] < 0, -turns, turns)
         structure = self._structure
         positions, quaternions = self._poses()
         return Trajectory(
-            time_s=self._time_s[kept],
+            time_s=self._time_s[recorded],
             block_ids=self._ids,
             positions=rounded_positions(positions),
             quaternions=rounded_quaternions(quaternions),
-            cargo_position=rounded_positions(self._cargo_position[kept]) if has_cargo else None,
+            cargo_position=rounded_positions(self._cargo_position[recorded]) if has_cargo else None,
             cargo_quaternion=rounded_quaternions(quaternion) if has_cargo else None,
-            cargo_mass=self._cargo_mass[kept] if has_cargo else None,
+            cargo_mass=self._cargo_mass[recorded] if has_cargo else None,
             cargo_size=self._cargo_size,
             cannon_ids=tuple(structure.block_ids[i] for i in structure.cannons),
-            heated=self._heated[kept],
+            heated=self._heated[recorded],
             pieces=self._pieces(),
             bearing=breaking.bearing.series(
                 np.array(self._bearing), tuple(structure.block_ids[i] for i in structure.wheels)
@@ -163,7 +163,7 @@ class Recorder:
             joint_peaks=breaking.peaks(),
             joint_loads=rounded_loads(np.array(self._loads)),
             breaks=tuple(breaking.breaks),
-            events=breaking.told_events(),
+            events=breaking.all_events(),
             engine=engine,
             engine_version=engine_version,
             simulation_version=simulation_version,

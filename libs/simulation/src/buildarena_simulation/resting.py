@@ -144,7 +144,7 @@ class FaceFinder:
         c = clusters.cluster_of[self._block]
         center = motion.position[c] + turned(motion.rotation[c], self._center)
         rotation = motion.rotation[c] @ self._rotation
-        found = [
+        faces = [
             self._resting(center, rotation, (top, np.eye(3), half[:2]), (WORLD, surface))
             for surface, top, half in self._tops
         ]
@@ -152,10 +152,10 @@ class FaceFinder:
             turn = rotation_of(cargo.quaternion) @ np.diag([1.0, -1.0, -1.0])
             bottom = cargo.position + turn[:, 2] * self._cargo_half[2]
             frame = (bottom, turn, self._cargo_half[:2])
-            found.append(self._resting(center, rotation, frame, (CARGO, -1)))
-        found = [columns for columns in found if len(columns[0])] or [_NONE]
+            faces.append(self._resting(center, rotation, frame, (CARGO, -1)))
+        faces = [columns for columns in faces if len(columns[0])] or [_NONE]
         block, other, surface, normal, point, corners, area = (
-            np.concatenate(column) for column in zip(*found, strict=True)
+            np.concatenate(column) for column in zip(*faces, strict=True)
         )
         return RestingFaces(
             block=block,
@@ -198,29 +198,32 @@ class FaceFinder:
         low = np.maximum(local[:, :2] - across, -size)
         high = np.minimum(local[:, :2] + across, size)
         wide = high - low > _OVERLAP
-        kept = (
+        touching = (
             (np.abs(local[:, 2] - reach) < _GAP)
             & (cosines.max(axis=1) > _LEVEL)
             & wide[:, 0]
             & wide[:, 1]
         ).nonzero()[0]
-        if not len(kept):
+        if not len(touching):
             return _NONE
-        rows = near[kept]
-        corners = self._corners(local[kept], turn[kept], half[kept], size)
+        rows = near[touching]
+        corners = self._corners(local[touching], turn[touching], half[touching], size)
         plane = axes[:, :2].T
         count = len(rows)
         # A turned face is smaller than its bounding rectangle; its overlap in proportion.
-        face = half.prod(axis=1)[kept] / half[np.arange(len(half)), cosines.argmax(axis=1)][kept]
-        share = face / across[kept].prod(axis=1)
+        face = (
+            half.prod(axis=1)[touching]
+            / half[np.arange(len(half)), cosines.argmax(axis=1)][touching]
+        )
+        share = face / across[touching].prod(axis=1)
         return (
             self._block[rows],
             np.full(count, numbers[0], dtype=np.int64),
             np.full(count, numbers[1], dtype=np.int64),
             np.full((count, 3), axes[:, 2]),
-            middle + ((low + high) / 2)[kept] @ plane,
+            middle + ((low + high) / 2)[touching] @ plane,
             middle + corners @ plane,
-            (high - low)[kept].prod(axis=1) * share,
+            (high - low)[touching].prod(axis=1) * share,
         )
 
     def _corners(

@@ -55,7 +55,8 @@ def require_engine(name: str) -> str:
     """The name of an engine, if that is installed.
 
     Raises:
-        UnknownEngineError: It is not; the message says which are, and how the default comes here.
+        UnknownEngineError: It is not; the message names those that are, and how to install the
+            default.
     """
     if name in ENGINES:
         return name
@@ -89,10 +90,10 @@ def simulate(
         controls: A control sequence to use in place of the machine's own.
         start: Where machine and cargo start, in place of where the scenario puts them.
         seed: Varies the start as a fair repetition would, see `start_of`; None for the exact one.
-        substeps: Into how many each of the engine's usual steps is divided, to tell a result of
-            the model from one of the steps.
-        until: Ends the trial after the first sample for which it says so; by default it lasts as
-            long as the scenario says.
+        substeps: Into how many each of the engine's usual steps is divided, to distinguish a
+            result of the model from one of the step size.
+        until: Ends the trial after the first sample for which it is true; by default it lasts for
+            the scenario's duration.
         on_progress: Called now and then with the share of the trial that is done, 0 to 1.
 
     Returns:
@@ -147,7 +148,7 @@ def simulate_structure(
         until: See `simulate`.
         on_progress: Called now and then with the share of the trial that is done.
     """
-    given, placed = scenario, start is not None
+    unvaried, placed = scenario, start is not None
     if start is None:
         start = start_of(structure, scenario, seed)
     else:
@@ -182,7 +183,7 @@ def simulate_structure(
                 "effective_key_presses": effective_presses(bindings, controls),
                 **({} if seed is None else {"seed": seed}),
                 **({"start": start_digest(start)} if placed else {}),
-                "scenario": hashlib.sha256(given.model_dump_json().encode()).hexdigest()[:16],
+                "scenario": hashlib.sha256(unvaried.model_dump_json().encode()).hexdigest()[:16],
             },
         )
     except BuildarenaSimulationError:

@@ -59,7 +59,7 @@ class Break:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Event:
-    """Something that let go or took hold as it was made to; a break is none.
+    """A release or a grab that the machine was made for; a break is not an event.
 
     Attributes:
         time_s: When, seconds.
@@ -138,7 +138,7 @@ class Trajectory:
             the instant before, in the order of `joint_peaks`: above 1 where it broke, 0 from then
             on. None where no simulator of ours ran, and in files of schemas 1 and 2.
         breaks: In order of time.
-        events: What let go or took hold as it was made to, in order of time.
+        events: Releases and grabs that the machine was made for, in order of time.
         engine: Name of the engine.
         engine_version: Version of the engine's library.
         simulation_version: Version of the shared model.
@@ -200,5 +200,5 @@ def rounded_quaternions(quaternions: NDArray[np.float64]) -> NDArray[np.float32]
 
 
 def rounded_loads(loads: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Shares of strength as they are stored: upwards, so that one that breaks a joint tells so."""
+    """Shares of strength as they are stored: rounded up, so a breaking load still shows as one."""
     return (np.ceil(loads / LOAD_GRAIN) * LOAD_GRAIN).astype(np.float32)

@@ -27,12 +27,12 @@ def main() -> None:
     )
     doctor = commands.add_parser("doctor", help="what this machine lacks to play the game")
     doctor.add_argument("--json", action="store_true", help="print the findings as JSON")
-    given = parser.parse_args()
+    options = parser.parse_args()
     settings = BesiegeSettings()
     try:
-        if given.command == "doctor":
-            sys.exit(_doctor(settings, as_json=given.json))
-        sys.exit(_calibrate(settings, ask=not given.defaults, only_try=given.only_try))
+        if options.command == "doctor":
+            sys.exit(_doctor(settings, as_json=options.json))
+        sys.exit(_calibrate(settings, ask=not options.defaults, only_try=options.only_try))
     except (NotSetUpError, DesktopError) as error:
         sys.exit(f"error: {error}")
 
@@ -40,30 +40,30 @@ def main() -> None:
 def _doctor(settings: BesiegeSettings, *, as_json: bool) -> int:
     findings = examine(settings)
     if as_json:
-        _say(json.dumps([asdict(found) for found in findings], indent=2))
+        _say(json.dumps([asdict(finding) for finding in findings], indent=2))
     else:
-        for found in findings:
-            advice = f" - {found.advice}" if found.advice else ""
-            _say(f"{'ok' if found.ok else '!!'}  {found.name}: {found.detail}{advice}")
-    return 0 if all(found.ok for found in findings) else 1
+        for finding in findings:
+            advice = f" - {finding.advice}" if finding.advice else ""
+            _say(f"{'ok' if finding.ok else '!!'}  {finding.name}: {finding.detail}{advice}")
+    return 0 if all(finding.ok for finding in findings) else 1
 
 
 def _calibrate(settings: BesiegeSettings, *, ask: bool, only_try: bool) -> int:
     from buildarena_simworker_besiege.calibrate import ask_positions, try_out
-    from buildarena_simworker_besiege.screen.hands import Hands
+    from buildarena_simworker_besiege.screen.input import ScreenInput
     from buildarena_simworker_besiege.screen.windows import open_windows
 
     file = settings.calibration_file
     if not only_try:
         before = load_calibration(file) if file.exists() else Calibration()
-        found = before
+        calibration = before
         if ask:
-            hands, windows = Hands(settings.pace), open_windows()
-            found = ask_positions(
-                hands, windows, settings.title, ask=input, tell=_say, before=before
+            screen_input, windows = ScreenInput(settings.pace), open_windows()
+            calibration = ask_positions(
+                screen_input, windows, settings.title, ask=input, tell=_say, before=before
             )
-        found.save(file)
-        _say(f"saved {file}, calibration {found.digest}")
+        calibration.save(file)
+        _say(f"saved {file}, calibration {calibration.digest}")
     desktop, _ = make_desktop(settings)
     _say("Trying it: hands off mouse and keyboard.")
     try:

@@ -13,7 +13,7 @@ from buildarena_simworker_besiege.desktop import Desktop
 from buildarena_simworker_besiege.errors import DesktopError, NotSetUpError
 from buildarena_simworker_besiege.play import RunFailedError, play
 from buildarena_simworker_besiege.screen.calibration import POSITIONS, Calibration
-from buildarena_simworker_besiege.screen.hands import Hands
+from buildarena_simworker_besiege.screen.input import ScreenInput
 from buildarena_simworker_besiege.screen.windows import Area, Windows
 from buildarena_simworker_besiege.time_limits import TimeLimits
 
@@ -33,17 +33,23 @@ Tell = Callable[[str], None]
 
 
 def ask_positions(
-    hands: Hands, windows: Windows, title: str, *, ask: Ask, tell: Tell, before: Calibration
+    screen_input: ScreenInput,
+    windows: Windows,
+    title: str,
+    *,
+    ask: Ask,
+    tell: Tell,
+    before: Calibration,
 ) -> Calibration:
-    """Asks for each place; whoever answers points at it with the mouse.
+    """Asks for each place; a person points at it with the mouse.
 
     Args:
-        hands: Tells where the mouse is.
+        screen_input: Tells where the mouse is.
         windows: The screen's windows.
         title: Part of the window's title.
         ask: Shows a question and gives the answer.
         tell: Shows a line.
-        before: Positions that are kept where nothing else is said.
+        before: Positions that are kept unless the answer changes them.
 
     Raises:
         NotSetUpError: There is no such window.
@@ -60,9 +66,9 @@ def ask_positions(
             if answer.strip().casefold() == KEEP:
                 break
             window = _window(windows, title)
-            found = _fractions(hands.position(), window)
-            if found is not None:
-                places[name] = found
+            position = _fractions(screen_input.position(), window)
+            if position is not None:
+                places[name] = position
                 break
             tell("The mouse is not over the game's window.")
     window = _window(windows, title)

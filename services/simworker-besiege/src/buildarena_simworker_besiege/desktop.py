@@ -1,4 +1,4 @@
-"""What the runner asks of a game, however it is driven."""
+"""What the runner asks of a game, whether it has a window or not."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from buildarena_simulation import Scenario, Trajectory
 
 
 class RunLog(Protocol):
-    """What a game said of one run; `buildarena_besiege.GameLog` is one."""
+    """What a game printed about one run; `buildarena_besiege.GameLog` is one."""
 
     @property
     def begun(self) -> bool:
@@ -29,14 +29,14 @@ class RunLog(Protocol):
         """Lines that speak of an error of the script."""
 
     def read(self, text: str) -> None:
-        """Takes in what the game showed."""
+        """Adds what the game showed."""
 
     def text(self) -> str:
-        """Every line that counts: what is kept."""
+        """Every line that counts, to be stored."""
 
 
 class Desktop(Protocol):
-    """Hands on one running game.
+    """Controls one running game.
 
     Each call returns when its effect was seen, and raises `DesktopError` when it was not.
     """
@@ -54,7 +54,7 @@ class Desktop(Protocol):
         """
 
     def prepare(self, run: GameRun) -> None:
-        """Brings a game to the front that has the run's level open, and no machine in it."""
+        """Brings a game to the front, with the run's level open and without a machine."""
 
     def load(self, run: GameRun) -> None:
         """Loads the run's machine file and puts the machine where it starts."""
@@ -63,32 +63,32 @@ class Desktop(Protocol):
         """Starts the simulation; the log window, if there is one, shows the run's lines."""
 
     def new_log(self, run: GameRun) -> RunLog:
-        """What the run's lines are gathered in."""
+        """An empty log that collects the run's lines."""
 
     def trajectory(self, log: RunLog, machine: Machine, scenario: Scenario) -> Trajectory:
-        """What the log tells of the run.
+        """The run's trajectory from its log.
 
         Raises:
             LogIncompleteError: Something that a score needs is missing.
         """
 
     def read_log(self) -> str:
-        """What the log shows now, or has shown since it was read last."""
+        """What the log shows, or what came since it was read last."""
 
     def stop(self) -> None:
         """Stops the simulation."""
 
     def clear(self) -> None:
-        """Takes the machine out of the game."""
+        """Removes the machine from the game."""
 
     def recover(self) -> None:
-        """Takes away what may be in the way: dialogs, held keys, a lost focus."""
+        """Clears what may block a step: dialogs, held keys, a lost focus."""
 
     def is_alive(self) -> bool:
         """Whether the game still runs."""
 
     def restart(self) -> None:
-        """Ends the game, however it is, and starts it again.
+        """Ends the game, whatever its state, and starts it again.
 
         Raises:
             GameGoneError: The runner cannot start it.
@@ -98,4 +98,4 @@ class Desktop(Protocol):
         """A picture of the screen (PNG); None where there is no screen."""
 
     def close(self) -> None:
-        """Lets every key go, and ends a game that this runner started."""
+        """Releases every key, and ends a game that this runner started."""

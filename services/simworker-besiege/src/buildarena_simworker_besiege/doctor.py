@@ -91,9 +91,9 @@ def _mod(settings: BesiegeSettings) -> Finding:
         )
     for place in MOD_FOLDERS:
         folder = settings.folder / place
-        found = _lua_mod(folder) if folder.is_dir() else None
-        if found is not None:
-            return Finding(name=name, ok=True, detail=str(found))
+        mod = _lua_mod(folder) if folder.is_dir() else None
+        if mod is not None:
+            return Finding(name=name, ok=True, detail=str(mod))
     return Finding(
         name=name,
         ok=False,
@@ -103,7 +103,7 @@ def _mod(settings: BesiegeSettings) -> Finding:
 
 
 def _lua_mod(folder: Path) -> Path | None:
-    """A mod of that kind, by its folder's name or what its manifest says."""
+    """A mod of that kind, recognised by its folder's name or its manifest."""
     for mod in sorted(folder.iterdir()):
         if not mod.is_dir():
             continue
@@ -125,14 +125,15 @@ def _tried(name: str, detail: str, check: Callable[[], None]) -> Finding:
 
 
 def _display() -> None:
-    from buildarena_simworker_besiege.screen.hands import Hands
+    from buildarena_simworker_besiege.screen.capture import screenshot
+    from buildarena_simworker_besiege.screen.input import ScreenInput
 
-    hands = Hands()
+    screen_input = ScreenInput()
     try:
-        hands.screenshot()
-        hands.clear_clipboard()
+        screenshot()
+        screen_input.clear_clipboard()
     finally:
-        hands.close()
+        screen_input.close()
 
 
 def _calibration(settings: BesiegeSettings) -> None:

@@ -1,4 +1,4 @@
-"""A game without a window, driven over TCP by a plugin, that tells its state on standard output.
+"""A game without a window, driven over TCP by a plugin, that prints its state to standard output.
 
 Source: the BesiegeField project's protocol. Frames from us: a length of four bytes, little-endian,
 and the UTF-8 text "CODE ARGUMENT". Lines from the game: anything with "BesiegeAgent" and
@@ -59,7 +59,7 @@ class HeadlessDesktop:
         self._running = False
         self._log: StateLog | None = None
         self._first = ""
-        self._told_s, self._told_at = 0.0, 0.0
+        self._newest_s, self._newest_at = 0.0, 0.0
         self._edges: list[tuple[float, str, bool]] = []
 
     @property
@@ -101,7 +101,7 @@ class HeadlessDesktop:
         self._edges = sorted(run.key_changes, key=lambda edge: edge[0])
         self._send(TOGGLE, "")
         self._first = self._expect("SimulationStart", "start the simulation", self._limits.answer_s)
-        self._told_s, self._told_at = 0.0, time.monotonic()
+        self._newest_s, self._newest_at = 0.0, time.monotonic()
         self._running = True
 
     def new_log(self, run: GameRun) -> StateLog:
@@ -110,13 +110,13 @@ class HeadlessDesktop:
         return self._log
 
     def trajectory(self, log: RunLog, machine: Machine, scenario: Scenario) -> Trajectory:
-        """What the lines tell of the run."""
+        """The run's trajectory from its lines."""
         assert isinstance(log, StateLog)  # noqa: S101 - it is of `new_log`
         game, mod = self._settings.game, self._settings.mod
         return log.trajectory(machine, scenario, game=game, mod=mod)
 
     def read_log(self) -> str:
-        """The lines since the last call; keys whose time has come are pressed or let go."""
+        """The lines since the last call; keys that are due are pressed or released."""
         now = self._game_time()
         while self._running and self._edges and self._edges[0][0] <= now + 1e-9:
             _, key, down = self._edges.pop(0)
@@ -136,10 +136,10 @@ class HeadlessDesktop:
 
     def _game_time(self) -> float:
         """The newest line's time, and what has passed since, until the next line is due."""
-        told = 0.0 if self._log is None else self._log.time_s
-        if told != self._told_s:
-            self._told_s, self._told_at = told, time.monotonic()
-        return told + min(time.monotonic() - self._told_at, INTERVAL_S)
+        newest_s = 0.0 if self._log is None else self._log.time_s
+        if newest_s != self._newest_s:
+            self._newest_s, self._newest_at = newest_s, time.monotonic()
+        return newest_s + min(time.monotonic() - self._newest_at, INTERVAL_S)
 
     def stop(self) -> None:
         """Ends the simulation."""

@@ -1,4 +1,4 @@
-"""Plays one run: load, start, read the log until it ends, stop, clean up; again if need be."""
+"""Plays one run: load, start, read the log until it ends, stop, clean up; repeated if needed."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ class Played:
 
     Attributes:
         run: What was played.
-        log: What the game said.
-        trajectory: What that tells.
-        pace: Seconds of the game's time that passed in a second of the wall clock's.
+        log: What the game printed.
+        trajectory: The trajectory in it.
+        pace: Seconds of game time per second of wall-clock time.
         faults: What went wrong in earlier attempts.
     """
 
@@ -80,7 +80,7 @@ def play(
         make_run: Prepares the run for an attempt, each with a run id of its own: lines of an
             attempt that failed are never taken for another's.
         read: Makes the trajectory of a log; raises `LogIncompleteError` if it cannot be trusted.
-        require_held: Raises when the job is somebody else's; the game is cleaned up then, too.
+        require_held: Raises when the lease is lost; the game is cleaned up then, too.
         limits: How long to wait.
 
     Raises:
@@ -92,8 +92,8 @@ def play(
         run = make_run(attempt)
         desktop.require_able(run)
         try:
-            found, pace = _attempt(desktop, run, require_held, limits)
-            trajectory = read(run, found)
+            game_log, pace = _attempt(desktop, run, require_held, limits)
+            trajectory = read(run, game_log)
         except (DesktopError, LogIncompleteError) as error:
             log.warning("run_failed", attempt=attempt, error=str(error))
             faults.append(str(error))
@@ -103,7 +103,7 @@ def play(
         except BaseException:
             _start_clean(desktop, faults)
             raise
-        return Played(run=run, log=found, trajectory=trajectory, pace=pace, faults=tuple(faults))
+        return Played(run=run, log=game_log, trajectory=trajectory, pace=pace, faults=tuple(faults))
     raise RunFailedError("; ".join(dict.fromkeys(faults)), screenshots)
 
 
@@ -115,41 +115,41 @@ def _attempt(
     desktop.load(run)
     require_held()
     desktop.start(run)
-    found = desktop.new_log(run)
+    game_log = desktop.new_log(run)
     started = time.monotonic()
-    _follow(desktop, run, found, require_held, limits)
+    _follow(desktop, run, game_log, require_held, limits)
     elapsed = time.monotonic() - started
     desktop.stop()
-    found.read(desktop.read_log())
+    game_log.read(desktop.read_log())
     desktop.clear()
-    return found, run.duration_s / max(elapsed, 1e-3)
+    return game_log, run.duration_s / max(elapsed, 1e-3)
 
 
 def _follow(
     desktop: Desktop,
     run: GameRun,
-    found: RunLog,
+    game_log: RunLog,
     require_held: Callable[[], None],
     limits: TimeLimits,
 ) -> None:
     """Reads the log until the run is over.
 
     Raises:
-        DesktopError: It does not begin, or stands still, or its script fails.
+        DesktopError: It does not begin, or stalls, or its script fails.
     """
     started = heard = time.monotonic()
     newest = 0.0
-    while not _is_over(found, run):
+    while not _is_over(game_log, run):
         require_held()
-        found.read(desktop.read_log())
+        game_log.read(desktop.read_log())
         now = time.monotonic()
-        if found.complaints:
-            raise StepFailedError("run the script", f"the game says {found.complaints[0]!r}")
-        if found.time_s > newest:
-            newest, heard = found.time_s, now
+        if game_log.complaints:
+            raise StepFailedError("run the script", f"the game says {game_log.complaints[0]!r}")
+        if game_log.time_s > newest:
+            newest, heard = game_log.time_s, now
         if not desktop.is_alive():
             raise GameGoneError("the game ended while the machine ran")
-        if not found.begun and now - started > limits.begin_s:
+        if not game_log.begun and now - started > limits.begin_s:
             raise StepFailedError("start the simulation", "its first line did not appear")
         if now - heard > limits.stall_s:
             raise StepFailedError(
@@ -160,8 +160,8 @@ def _follow(
         time.sleep(POLL_S)
 
 
-def _is_over(found: RunLog, run: GameRun) -> bool:
-    return found.ended or found.time_s >= run.duration_s
+def _is_over(game_log: RunLog, run: GameRun) -> bool:
+    return game_log.ended or game_log.time_s >= run.duration_s
 
 
 def _pictures(desktop: Desktop) -> list[bytes]:

@@ -23,7 +23,7 @@ END_S: Final = 5.0
 class GameProcess:
     """The one game that this runner plays.
 
-    What it knows is kept in a file: a runner that follows a dead one finds the same game.
+    What it knows is stored in a file: a runner that follows a dead one finds the same game.
 
     Args:
         settings: The command that starts it, and where to keep its pid.
@@ -56,11 +56,11 @@ class GameProcess:
     @property
     def level(self) -> str | None:
         """Digest of the level it was started with; None when it was not started here."""
-        return None if self._found() is None else str(self._known().get("level"))
+        return None if self._process() is None else str(self._known().get("level"))
 
     def is_running(self) -> bool:
         """Whether the game that was started here still runs."""
-        return self._found() is not None
+        return self._process() is not None
 
     def start(
         self, level: bytes | None, *, piped: bool = False, words: list[str] | None = None
@@ -106,11 +106,11 @@ class GameProcess:
 
     def kill(self) -> None:
         """Ends it and everything it started."""
-        found = self._found()
-        if found is not None:
-            family = [found]
+        process = self._process()
+        if process is not None:
+            family = [process]
             with suppress(psutil.NoSuchProcess):
-                family += found.children(recursive=True)
+                family += process.children(recursive=True)
             for member in family:
                 with suppress(psutil.NoSuchProcess):
                     member.terminate()
@@ -142,7 +142,7 @@ class GameProcess:
             return {}
         return known if isinstance(known, dict) else {}
 
-    def _found(self) -> psutil.Process | None:
+    def _process(self) -> psutil.Process | None:
         known = self._known()
         try:
             process = psutil.Process(int(known["pid"]))

@@ -1,4 +1,4 @@
-"""Hands on the game of this machine, as its settings say."""
+"""The desktop of the game on this machine, as its settings say."""
 
 from __future__ import annotations
 
@@ -27,17 +27,17 @@ def make_desktop(settings: BesiegeSettings) -> tuple[Desktop, Mapping[str, Any]]
         from buildarena_simworker_besiege.headless import HeadlessDesktop
 
         return HeadlessDesktop(settings), {"desktop": "headless"}
-    from buildarena_simworker_besiege.screen.hands import Hands
+    from buildarena_simworker_besiege.screen.input import ScreenInput
     from buildarena_simworker_besiege.screen.window import WindowDesktop
     from buildarena_simworker_besiege.screen.windows import open_windows
 
     calibration = load_calibration(settings.calibration_file)
-    hands = Hands(settings.pace)
-    desktop = WindowDesktop(settings, calibration, hands, open_windows())
+    screen_input = ScreenInput(settings.pace)
+    desktop = WindowDesktop(settings, calibration, screen_input, open_windows())
     facts = {
         "desktop": "window",
         "calibration": calibration.digest,
-        "screen": "x".join(map(str, hands.screen_size())),
+        "screen": "x".join(map(str, screen_input.screen_size())),
         "log": "window" if settings.log_file is None else "file",
     }
     return desktop, facts

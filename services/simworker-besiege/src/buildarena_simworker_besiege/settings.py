@@ -14,7 +14,7 @@ from pydantic_settings import BaseSettings, SettingsConfigDict
 from buildarena_simworker_besiege.time_limits import TimeLimits
 
 LEVEL_FIELD = "{level}"
-"""Stands in the game's command for the level file to open; "" for the sandbox."""
+"""Placeholder in the game's command: the level file to open, or "" for the sandbox."""
 
 
 class BesiegeSettings(BaseSettings):
@@ -87,12 +87,12 @@ class BesiegeSettings(BaseSettings):
             return None
         # Source: the published projects; the game's builds differ in where they look.
         places = ("SavedMachines", "Besiege_Data/SavedMachines", "Contents/SavedMachines")
-        found = [self.folder / place for place in places if (self.folder / place).is_dir()]
-        return found[0] if found else self.folder / places[0]
+        folders = [self.folder / place for place in places if (self.folder / place).is_dir()]
+        return folders[0] if folders else self.folder / places[0]
 
     @property
     def calibration_file(self) -> Path:
-        """Where the calibration is kept."""
+        """The file of the calibration."""
         return self.calibration or self.state / "calibration.json"
 
     def words(self, level: Path | None) -> list[str]:

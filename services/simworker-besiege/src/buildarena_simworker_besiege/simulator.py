@@ -35,7 +35,7 @@ class BesiegeSimulator:
 
     Args:
         settings: Versions and folders.
-        desktop: Hands on the game.
+        desktop: Controls the game.
         facts: What else a manifest should hold: calibration, screen.
     """
 
@@ -84,8 +84,8 @@ class BesiegeSimulator:
             played = play(
                 self._desktop,
                 make_run,
-                lambda run, found: require_placed(
-                    self._desktop.trajectory(found, trial.machine, trial.task.scenario),
+                lambda run, game_log: require_placed(
+                    self._desktop.trajectory(game_log, trial.machine, trial.task.scenario),
                     trial.machine,
                     run,
                 ),
@@ -124,7 +124,7 @@ def describe(name: str) -> InstalledSimulator:
         kind="game",
         make=besiege_simulator,
         version=lambda settings: settings.besiege_version,
-        examine=_found,
+        examine=_examined,
         single=True,
         repeatable=False,
     )
@@ -149,7 +149,7 @@ def besiege_simulator(settings: Settings) -> BesiegeSimulator:
     return BesiegeSimulator(own, desktop, facts)
 
 
-def _found(settings: Settings) -> tuple[str, str]:
+def _examined(settings: Settings) -> tuple[str, str]:
     version = settings.besiege_version
     if version is None:
         advice = "see `python -m buildarena_simworker_besiege doctor`"

@@ -25,8 +25,8 @@ class TimeLimits:
     begin_s: float = 15.0
     stall_s: float = 15.0
 
-    def scaled(self, patience: float) -> TimeLimits:
+    def scaled(self, factor: float) -> TimeLimits:
         """Limits so many times as long."""
         return TimeLimits(
-            **{field.name: patience * getattr(self, field.name) for field in fields(self)}
+            **{field.name: factor * getattr(self, field.name) for field in fields(self)}
         )

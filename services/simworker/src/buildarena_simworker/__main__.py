@@ -31,15 +31,15 @@ def main() -> None:
     parser.add_argument("--allow-http", action="store_true", help="send the key unencrypted")
     parser.add_argument("--check", action="store_true", help="only see whether it could work")
     parser.add_argument("--json", action="store_true", help="print the checks as JSON")
-    given = parser.parse_args()
+    options = parser.parse_args()
     try:
         settings = load_settings()
-        if given.check:
-            _check(given)
-        elif given.api is not None:
-            _serve_api(given, settings)
+        if options.check:
+            _check(options)
+        elif options.api is not None:
+            _serve_api(options, settings)
         else:
-            _serve_database(given.simulator, settings)
+            _serve_database(options.simulator, settings)
     except StartupError as error:
         sys.exit(f"simulation worker: {error}")
 
@@ -71,28 +71,28 @@ def _serve_database(simulator: str, settings: Settings) -> None:
     )
 
 
-def _check(given: argparse.Namespace) -> None:
+def _check(options: argparse.Namespace) -> None:
     from buildarena_simworker.remote.doctor import examined, printed
 
-    if given.api is None:
+    if options.api is None:
         raise StartupError("--check needs --api URL")
     checks = examined(
-        given.api,
-        given.simulator,
-        key_file=given.key_file,
-        ca_file=given.ca_file,
-        allow_http=given.allow_http,
+        options.api,
+        options.simulator,
+        key_file=options.key_file,
+        ca_file=options.ca_file,
+        allow_http=options.allow_http,
     )
-    sys.stdout.write(printed(checks, as_json=given.json))
+    sys.stdout.write(printed(checks, as_json=options.json))
     sys.exit(0 if all(check["ok"] for check in checks) else 1)
 
 
-def _serve_api(given: argparse.Namespace, settings: Settings) -> None:
+def _serve_api(options: argparse.Namespace, settings: Settings) -> None:
     from buildarena_simworker.remote.process import RunnerOptions, read_key, serve
 
-    name: str = given.simulator
+    name: str = options.simulator
     described = installed_simulators()[name]
-    if described.single and (given.at_once or 1) > 1:
+    if described.single and (options.at_once or 1) > 1:
         raise StartupError(
             f"{name} runs one trial at a time, so --at-once is 1: start a runner per machine"
         )
@@ -100,15 +100,15 @@ def _serve_api(given: argparse.Namespace, settings: Settings) -> None:
     make = partial(described.make_isolated or described.make, settings)
     serve(
         RunnerOptions(
-            url=given.api,
-            key=read_key(given.key_file),
+            url=options.api,
+            key=read_key(options.key_file),
             simulator=name,
             version=str(first.versions["simulation"]),
             make=(lambda: first) if described.single else make,
-            at_once=given.at_once or (1 if described.single else settings.simulations_per_worker),
+            at_once=options.at_once or (1 if described.single else settings.simulations_per_worker),
             announced=announced(described),
-            ca_file=given.ca_file,
-            allow_http=given.allow_http,
+            ca_file=options.ca_file,
+            allow_http=options.allow_http,
             log_level=settings.log_level,
         )
     )

@@ -17,7 +17,7 @@ def engine_simulator(name: str) -> InstalledSimulator:
         make=lambda _: EngineSimulator(name),
         make_isolated=lambda _: _isolated(name),
         version=lambda _: SIMULATION_VERSION,
-        examine=lambda _: _found(name),
+        examine=lambda _: _examined(name),
         available=name in ENGINES,
     )
 
@@ -28,7 +28,7 @@ def _isolated(name: str) -> Simulator:
     return EngineSimulator(name, pool)
 
 
-def _found(name: str) -> tuple[str, str]:
+def _examined(name: str) -> tuple[str, str]:
     try:
         return f"{name} {engine_version(name)}", ""
     except Exception as error:  # noqa: BLE001 - whatever keeps it from being loaded

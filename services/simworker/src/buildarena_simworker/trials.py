@@ -17,13 +17,13 @@ from buildarena_pipeline.runtime.trials import File, TrialResult
 
 
 class TrialSource(Protocol):
-    """A trial that somebody leased: where it comes from and where its outcome goes.
+    """A leased trial: where it comes from and where its outcome goes.
 
     Workers beside the database have one implementation, those that reach only the API another.
     """
 
     def take(self) -> TrialRequest | None:
-        """What is to be run; None when an earlier trial with the same input told its outcome.
+        """What is to be run; None when an earlier trial with the same input has the outcome.
 
         Raises:
             PermanentError: The job can't be done.
@@ -33,7 +33,7 @@ class TrialSource(Protocol):
         """Hands the outcome over, to be scored.
 
         Raises:
-            StaleLeaseError: The job is somebody else's by now; nothing was written.
+            StaleLeaseError: Another worker has the job; nothing was written.
         """
 
     def keep_evidence(self, files: dict[str, File]) -> None:
@@ -46,7 +46,7 @@ def run_trial(simulator: Simulator, trial: TrialRequest) -> TrialResult:
     Raises:
         SimulatorFaultError: The simulator failed.
         PermanentError: It never will be able to run this job.
-        StaleLeaseError: The job is somebody else's by now.
+        StaleLeaseError: Another worker has the job.
     """
     started = time.perf_counter()
     try:
@@ -57,12 +57,12 @@ def run_trial(simulator: Simulator, trial: TrialRequest) -> TrialResult:
 
 
 def do_trial(simulator: Simulator, leased: TrialSource) -> None:
-    """Takes, runs and hands over a trial; what shows a fault is kept before it is reported.
+    """Takes, runs and hands over a trial; evidence of a fault is stored before it is reported.
 
     Raises:
         TransientError: The simulator failed; the trial is to be run again.
         PermanentError: The job can't be done.
-        StaleLeaseError: The job is somebody else's by now.
+        StaleLeaseError: Another worker has the job.
     """
     trial = leased.take()
     if trial is None:

@@ -45,10 +45,12 @@ def copy_artifacts(source: ArtifactStore, target: ArtifactStore, hashes: Sequenc
         return target.put(data, "").size
 
     with ThreadPoolExecutor(AT_ONCE) as pool:
-        found = dict(zip(hashes, pool.map(size_of, hashes), strict=True))
-    sizes = {digest: size for digest, size in found.items() if isinstance(size, int)}
+        outcomes = dict(zip(hashes, pool.map(size_of, hashes), strict=True))
+    sizes = {digest: size for digest, size in outcomes.items() if isinstance(size, int)}
     return Copied(
         sizes=sizes,
-        missing={digest: said for digest, said in found.items() if isinstance(said, str)},
+        missing={
+            digest: problem for digest, problem in outcomes.items() if isinstance(problem, str)
+        },
         new=sum(digest not in there for digest in sizes),
     )

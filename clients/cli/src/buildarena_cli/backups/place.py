@@ -30,7 +30,7 @@ MANIFEST: Final = "manifest.json"
 DUMP: Final = "database.dump"
 LIST: Final = "artifacts.txt"
 FORMAT: Final = 1
-PIECE: Final = 8 * 1024 * 1024
+CHUNK_BYTES: Final = 8 * 1024 * 1024
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -116,16 +116,16 @@ class BackupPlace:
         obstore.put(self._store, path, data)
 
     def send(self, path: str, file: Path) -> None:
-        """Writes a file of any size, in pieces."""
+        """Writes a file of any size, in chunks."""
         obstore.put(self._store, path, file)
 
     def fetch(self, path: str, file: Path) -> str:
         """Reads a file of any size into another; returns its SHA-256."""
         digest = hashlib.sha256()
         with file.open("wb") as out:
-            for piece in obstore.get(self._store, path).stream(min_chunk_size=PIECE):
-                digest.update(piece)
-                out.write(piece)
+            for chunk in obstore.get(self._store, path).stream(min_chunk_size=CHUNK_BYTES):
+                digest.update(chunk)
+                out.write(chunk)
         return digest.hexdigest()
 
     def _paths(self) -> Iterator[str]:

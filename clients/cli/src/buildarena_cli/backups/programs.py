@@ -22,7 +22,7 @@ def run_program(name: str, url: str, *words: str) -> None:
 
     Args:
         name: The program.
-        url: The database; its password stands in no list of processes.
+        url: The database; its password does not appear in lists of processes.
         words: Further arguments.
 
     Raises:
@@ -36,8 +36,8 @@ def run_program(name: str, url: str, *words: str) -> None:
         check=False,
     )
     if done.returncode:
-        said = done.stderr.strip().splitlines() or [f"exit code {done.returncode}"]
-        raise CommandError(f"{name}: {' '.join(said[-3:])}")
+        complaint = done.stderr.strip().splitlines() or [f"exit code {done.returncode}"]
+        raise CommandError(f"{name}: {' '.join(complaint[-3:])}")
 
 
 def _program(name: str) -> Path:
@@ -45,19 +45,19 @@ def _program(name: str) -> Path:
         folder = installed_postgres() / "bin"
     except StartupError:
         folder = None
-    found = shutil.which(name, path=str(folder)) if folder else None
-    found = found or shutil.which(name)
-    if found is None:
+    program = shutil.which(name, path=str(folder)) if folder else None
+    program = program or shutil.which(name)
+    if program is None:
         raise CommandError(
             f"{name} is not installed: install Postgres' client programs, of the server's version "
             "or a newer one"
         )
-    return Path(found)
+    return Path(program)
 
 
 def _environment(url: str) -> Mapping[str, str]:
     parsed = make_url(url)
-    given = {
+    connection = {
         "PGHOST": parsed.host,
         "PGPORT": str(parsed.port) if parsed.port else None,
         "PGUSER": parsed.username,
@@ -66,5 +66,5 @@ def _environment(url: str) -> Mapping[str, str]:
         "PGSSLMODE": str(parsed.query["sslmode"]) if "sslmode" in parsed.query else None,
         "PGCONNECT_TIMEOUT": "10",
     }
-    kept = {name: os.environ[name] for name in PASSED_ON if name in os.environ}
-    return kept | {name: value for name, value in given.items() if value is not None}
+    passed_on = {name: os.environ[name] for name in PASSED_ON if name in os.environ}
+    return passed_on | {name: value for name, value in connection.items() if value is not None}

@@ -55,13 +55,14 @@ def restore_backup(
             sha256, listed = place.fetch(f"{name}/{DUMP}", dump), place.read(f"{name}/{LIST}")
         except (BaseError, OSError) as error:
             raise CommandError(f"backup {name} can't be read: {error}") from error
-        for what, found, said in (
+        for what, actual, expected in (
             (DUMP, sha256, manifest.dump_sha256),
             (LIST, hashlib.sha256(listed).hexdigest(), manifest.list_sha256),
         ):
-            if found != said:
+            if actual != expected:
                 raise CommandError(
-                    f"{name}/{what} is damaged: its SHA-256 is {found}, the manifest says {said}"
+                    f"{name}/{what} is damaged: its SHA-256 is {actual}, "
+                    f"the manifest says {expected}"
                 )
         hashes = [line.split()[0] for line in listed.decode().splitlines()]
         tell(f"copying {len(hashes):,} artifacts")

@@ -20,7 +20,7 @@ from buildarena_pipeline import __version__
 from buildarena_store import ArtifactStore, Database
 from buildarena_store.artifacts.collecting import LOCK, referenced
 
-PIECE: Final = 1024 * 1024
+CHUNK_BYTES: Final = 1024 * 1024
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -115,6 +115,6 @@ def write_backup(
 def _hash_of(file: Path) -> str:
     digest = hashlib.sha256()
     with file.open("rb") as opened:
-        while piece := opened.read(PIECE):
-            digest.update(piece)
+        while chunk := opened.read(CHUNK_BYTES):
+            digest.update(chunk)
     return digest.hexdigest()

@@ -1,4 +1,4 @@
-"""The commands of the artifact store, for whoever runs the service."""
+"""The commands of the artifact store, for operators of the service."""
 
 from __future__ import annotations
 

@@ -127,11 +127,11 @@ def _sayable() -> Iterator[None]:
 
 
 def _list(place: BackupPlace, *, as_json: bool) -> None:
-    found = [(name, place.manifest(name)) for name in place.names()]
+    backups = [(name, place.manifest(name)) for name in place.names()]
     if as_json:
-        print_json([{"name": name, **asdict(manifest)} for name, manifest in found])
+        print_json([{"name": name, **asdict(manifest)} for name, manifest in backups])
         return
-    for name, made in found:
+    for name, made in backups:
         say(f"{name}  {made.artifacts:,} artifacts  {made.artifact_bytes / MEBIBYTE:,.1f} MiB")
-    if not found:
+    if not backups:
         say(f"there is no whole backup in {place.location}")

@@ -66,8 +66,8 @@ def score_log(
 
     with shown_errors():
         chosen, played = chosen_task(task), read_machine(machine)
-        told = log.read_bytes().decode("utf-8-sig", "replace")
-        trajectory = _trajectory(told, played, chosen, where=str(log), run=run)
+        text = log.read_bytes().decode("utf-8-sig", "replace")
+        trajectory = _trajectory(text, played, chosen, where=str(log), run=run)
         result = score(chosen, played, trajectory)
         if as_json:
             print_json(score_report(chosen, result, trajectory))
@@ -76,9 +76,9 @@ def score_log(
 
 
 def _trajectory(
-    told: str, machine: Machine, task: Task, *, where: str, run: str | None
+    text: str, machine: Machine, task: Task, *, where: str, run: str | None
 ) -> Trajectory:
-    """The trajectory of a log, which is told apart by content."""
+    """The trajectory of a log, whose kind is recognised by its content."""
     from buildarena_besiege import (
         GameLog,
         looks_published,
@@ -87,17 +87,17 @@ def _trajectory(
         trajectory_of,
     )
 
-    runs = run_ids(told)
+    runs = run_ids(text)
     if not runs:
-        if looks_published(told):
-            return published_trajectory(told, machine, task.scenario)
+        if looks_published(text):
+            return published_trajectory(text, machine, task.scenario)
         raise CommandError(f"{where}: neither a log of ours nor one of the published runner")
     if run is None and len(runs) > 1:
         raise CommandError(f"{where}: of {len(runs)} runs; name one by --run: {', '.join(runs)}")
     if run is not None and run not in runs:
         raise CommandError(f"{where}: no run {run!r}; there are {', '.join(runs)}")
     log = GameLog(run or runs[0])
-    log.read(told)
+    log.read(text)
     return trajectory_of(log, machine, task.scenario, game="unknown", mod="unknown")
 
 
@@ -113,8 +113,8 @@ def calibrate(
     ] = False,
 ) -> None:
     """Find out where to click in this machine's game, and try it."""
-    given = [*(["--defaults"] if defaults else []), *(["--try"] if only_try else [])]
-    exec_module([*RUNNER, "calibrate", *given])
+    options = [*(["--defaults"] if defaults else []), *(["--try"] if only_try else [])]
+    exec_module([*RUNNER, "calibrate", *options])
 
 
 @app.command("doctor")
@@ -136,12 +136,12 @@ def show_agreement(
     client = Client(url)
     if track is None:
         known = client.get("/v1/leaderboard")["tracks"]
-        track = next((one for one in known if "/besiege-" in one), None)
+        track = next((name for name in known if "/besiege-" in name), None)
         if track is None:
             raise CommandError("no job was scored in the game yet, so there is nothing to compare")
-    found = client.get("/v1/leaderboard/agreement", track=track)
+    agreement = client.get("/v1/leaderboard/agreement", track=track)
     if as_json:
-        print_json(found)
+        print_json(agreement)
         return
     rows = [
         (
@@ -152,10 +152,10 @@ def show_agreement(
             number(row["kappa"], 2),
             "" if row["near"] is None else f"{row['near']:.0%}",
         )
-        for row in found["rows"]
+        for row in agreement["rows"]
     ]
     heads = ("task", "engine", "trials", "same verdict", "kappa", "indicator within a quarter")
-    print_table(columns(*heads), rows, title=emphasised(str(found["track"])))
+    print_table(columns(*heads), rows, title=emphasised(str(agreement["track"])))
 
 
 RUNNER = ("buildarena_simworker_besiege",)

@@ -119,15 +119,16 @@ def _dataset(client: Client, out: Path, *, licence: str, sweeps: list[str], **fi
 
 
 def _require_none(options: dict[str, Any], why: str) -> None:
-    given = [option for option, value in options.items() if value]
-    if given:
-        raise CommandError(f"{given[0]} {why}", code=USAGE)
+    used = [option for option, value in options.items() if value]
+    if used:
+        raise CommandError(f"{used[0]} {why}", code=USAGE)
 
 
-def _known_licence(given: str) -> str:
-    if given.lower() not in LICENCES:
+def _known_licence(licence: str) -> str:
+    if licence.lower() not in LICENCES:
         raise CommandError(
-            f"no licence {given!r}; there are {', '.join(LICENCES)}{did_you_mean(given, LICENCES)}",
+            f"no licence {licence!r}; there are {', '.join(LICENCES)}"
+            f"{did_you_mean(licence, LICENCES)}",
             code=USAGE,
         )
-    return given.lower()
+    return licence.lower()

@@ -18,7 +18,7 @@ from buildarena_client.errors import DamagedError
 from buildarena_client.files import require_hash
 
 COLUMNS = columns(
-    "file", "type", "bytes", "sha256", figures=("bytes",), leaving=("sha256", "type", "bytes")
+    "file", "type", "bytes", "sha256", numeric=("bytes",), leaving=("sha256", "type", "bytes")
 )
 ENDINGS = {"application/json": ".json", "application/vnd.apache.parquet": ".parquet"}
 

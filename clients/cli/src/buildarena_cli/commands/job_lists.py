@@ -21,7 +21,7 @@ from buildarena_cli.terminal.output import columns, minute_of, number, print_jso
 MAX_LIMIT = 1000
 COLUMNS = columns(
     *("job", "task", "model", "seed", "state", "reason", "flags", "indicator", "created"),
-    figures=("seed", "indicator"),
+    numeric=("seed", "indicator"),
     leaving=("created", "flags", "reason", "seed", "indicator", "model", "task", "state"),
 )
 

@@ -90,8 +90,8 @@ def verify_job(job_id: JobId, *, url: UrlOption = DEFAULT_URL, as_json: JsonOpti
     else:
         for entry in report["checks"]:
             mark = "ok" if entry["ok"] else "!!"
-            kept, found = entry["kept"], entry["found"]
-            shown = kept if entry["ok"] else f"kept {kept}, found {found}"
+            stored, computed = entry["kept"], entry["found"]
+            shown = stored if entry["ok"] else f"kept {stored}, found {computed}"
             say(f"{mark}  {entry['name']:<32} {shown}")
         say("Every figure is the same." if report["ok"] else "Some figures differ.")
     raise typer.Exit(DONE if report["ok"] else FAILED)

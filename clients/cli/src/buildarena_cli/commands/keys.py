@@ -64,8 +64,8 @@ def create_key(
     budget = budget_of(max_cost_usd, max_tokens, max_requests)
     body: dict[str, Any] = {"name": name, "scopes": scope, "days": days, "budget": budget}
     # Left out where they are not asked for: services of before runner keys do not know them.
-    given = {"simulators": simulator, "job_owners": jobs_of}
-    made = Client(url).post("/v1/keys", body | {k: v for k, v in given.items() if v})
+    restrictions = {"simulators": simulator, "job_owners": jobs_of}
+    made = Client(url).post("/v1/keys", body | {k: v for k, v in restrictions.items() if v})
     if as_json:
         print_json(made)
         return
@@ -76,11 +76,11 @@ def create_key(
 @app.command("list")
 def list_keys(*, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) -> None:
     """List all keys, including revoked and expired ones."""
-    found = Client(url).get("/v1/keys")
+    keys = Client(url).get("/v1/keys")
     if as_json:
-        print_json(found)
+        print_json(keys)
         return
-    print_table(COLUMNS, [_row(key) for key in found])
+    print_table(COLUMNS, [_row(key) for key in keys])
 
 
 @app.command("rotate")
@@ -138,10 +138,10 @@ def set_budget(
 
 
 def _hours(text: str) -> float:
-    found = re.fullmatch(r"([0-9]{1,6})([mhd]?)", text)
-    if found is None or (not found[2] and int(found[1])):
+    match = re.fullmatch(r"([0-9]{1,6})([mhd]?)", text)
+    if match is None or (not match[2] and int(match[1])):
         raise CommandError(f"--overlap {text!r} is not a time; give one such as 30m, 24h, 7d or 0")
-    return int(found[1]) * {"m": 1 / 60, "h": 1, "d": 24, "": 0}[found[2]]
+    return int(match[1]) * {"m": 1 / 60, "h": 1, "d": 24, "": 0}[match[2]]
 
 
 def spent(budget: Mapping[str, Any] | None) -> str:

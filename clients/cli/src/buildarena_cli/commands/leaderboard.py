@@ -26,7 +26,7 @@ from buildarena_cli.terminal.output import columns, number, print_json, print_ta
 
 COMPARED = ("first", "second", "diff %", "95 %", "pairs", "p success", "p indicator")
 COMPARISON = columns(
-    "task", *COMPARED, figures=COMPARED, leaving=("pairs", "p indicator", "p success", "95 %")
+    "task", *COMPARED, numeric=COMPARED, leaving=("pairs", "p indicator", "p success", "95 %")
 )
 
 LevelOption = Annotated[list[int] | None, typer.Option("--level", help="Only these levels.")]
@@ -173,10 +173,10 @@ def audit(
         print_json({"scored": accepted["scored"], "checked": checked, "differences": differences})
     else:
         say(f"{checked} of {accepted['scored']} results checked")
-        for found in differences:
-            for entry in found["checks"]:
+        for difference in differences:
+            for entry in difference["checks"]:
                 say(
-                    f"!!  {found['job_id']} {entry['name']}: kept {entry['kept']}, "
+                    f"!!  {difference['job_id']} {entry['name']}: kept {entry['kept']}, "
                     f"found {entry['found']}"
                 )
         if not differences:

@@ -14,12 +14,12 @@ COLUMNS = columns("model", "provider", "snapshot", leaving=("snapshot", "provide
 @app.command("list")
 def list_models(*, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) -> None:
     """List the models of the registry."""
-    found = Client(url).get("/v1/models")
+    models = Client(url).get("/v1/models")
     if as_json:
-        print_json(found)
+        print_json(models)
         return
     print_table(
         COLUMNS,
-        [(m["name"] + ("*" if m["baseline"] else ""), m["provider"], m["model"]) for m in found],
-        notes=["* baseline"] if any(m["baseline"] for m in found) else [],
+        [(m["name"] + ("*" if m["baseline"] else ""), m["provider"], m["model"]) for m in models],
+        notes=["* baseline"] if any(m["baseline"] for m in models) else [],
     )

@@ -70,15 +70,15 @@ def collect(client: Client, ids: Sequence[str], policy: str = "ours") -> Any:
     from buildarena_cli.report.custom_tasks import read_tasks
     from buildarena_cli.report.material import Material
 
-    found = [client.get(at("sweeps", id_)) for id_ in dict.fromkeys(ids)]
-    variants = {sweep["id"]: variant(sweep["spec"]) for sweep in found}
+    sweeps = [client.get(at("sweeps", id_)) for id_ in dict.fromkeys(ids)]
+    variants = {sweep["id"]: variant(sweep["spec"]) for sweep in sweeps}
     several = len(set(variants.values())) > 1
     registry = {entry["name"]: entry["model"] for entry in client.get("/v1/models")}
     trials: dict[str, EndedJob] = {}
     rounds: dict[str, list[tuple[bool, float]]] = {}
     snapshots: dict[str, str] = {}
     verdicts: dict[tuple[str, str], dict[str, tuple[bool, float]]] = {}
-    for sweep in found:
+    for sweep in sweeps:
         named = variants[sweep["id"]] or "main"
         for result in client.get(at("sweeps", sweep["id"], "results")):
             row = f"{result['model']} ({named})" if several else result["model"]
@@ -92,10 +92,10 @@ def collect(client: Client, ids: Sequence[str], policy: str = "ours") -> Any:
                 tried = verdicts.setdefault((result["task"], made["machine"]), {})
                 tried[sweep["spec"]["simulator"]] = _verdict(made, ScoringPolicy(policy))
             trials[result["job_id"]] = _trial(result, row)
-    progress = [sweep["progress"] for sweep in found]
+    progress = [sweep["progress"] for sweep in sweeps]
     return Material(
         policy=ScoringPolicy(policy),
-        title=", ".join(dict.fromkeys(sweep["name"] for sweep in found)),
+        title=", ".join(dict.fromkeys(sweep["name"] for sweep in sweeps)),
         tasks=read_tasks(client, list(trials.values())),
         trials=list(trials.values()),
         rounds=rounds,
@@ -110,12 +110,14 @@ def variant(spec: Mapping[str, Any]) -> str:
     from buildarena_simulation import DEFAULT_ENGINE
 
     main = {"simulator": DEFAULT_ENGINE, **PLAIN}
-    given = {name: spec.get(name, plain) for name, plain in main.items()}
-    loop = given["closed_loop"]
+    settings = {name: spec.get(name, plain) for name, plain in main.items()}
+    loop = settings["closed_loop"]
     parts = [
-        given[name] for name in ("workflow", "simulator", "prompts") if given[name] != main[name]
+        settings[name]
+        for name in ("workflow", "simulator", "prompts")
+        if settings[name] != main[name]
     ]
-    if given["one_shot"]:
+    if settings["one_shot"]:
         parts.append("one-shot")
     if loop:
         parts.append(f"{loop['rounds']} rounds" + (" + analyst" if loop["analyst"] else ""))

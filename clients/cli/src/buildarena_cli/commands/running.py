@@ -24,7 +24,7 @@ MEBIBYTE = 1024 * 1024
 FOLLOW_EVERY_S = 0.2
 PROCESSES = columns(
     *("process", "pid", "MiB", "ports", "since"),
-    figures=("pid", "MiB"),
+    numeric=("pid", "MiB"),
     leaving=("since", "ports", "MiB"),
 )
 
@@ -71,8 +71,8 @@ def complete_process(ctx: typer.Context, incomplete: str) -> list[str]:
     """Processes that have a log."""
     from buildarena_cli.local.service import log_files
 
-    given = ctx.params.get("data")
-    folder = data_folder(Path(given) if given else None)
+    data = ctx.params.get("data")
+    folder = data_folder(Path(data) if data else None)
     return [name for name in log_files(folder) if name.startswith(incomplete)]
 
 

@@ -143,9 +143,11 @@ def _settings(data: Path | None, port: int | None, *, require_keys: bool | None 
     from buildarena_pipeline.errors import StartupError
     from buildarena_pipeline.runtime.settings import load_settings
 
-    given: dict[str, Any] = {"data": data, "port": port, "require_keys": require_keys}
+    options: dict[str, Any] = {"data": data, "port": port, "require_keys": require_keys}
     try:
-        return load_settings(**{name: value for name, value in given.items() if value is not None})
+        return load_settings(
+            **{name: value for name, value in options.items() if value is not None}
+        )
     except StartupError as error:
         raise CommandError(str(error)) from error
 

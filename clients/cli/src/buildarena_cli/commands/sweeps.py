@@ -37,12 +37,12 @@ app = new_group("Submit and watch sweeps.")
 MAX_LIMIT = 100
 LIST = columns(
     *("sweep", "name", "state", "ended", "jobs", "outcomes", "USD", "created"),
-    figures=("ended", "jobs", "USD"),
+    numeric=("ended", "jobs", "USD"),
     leaving=("created", "outcomes", "USD", "name", "jobs", "ended", "state"),
 )
 ESTIMATE = columns(
     *("model", "jobs", "requests", "tokens in", "tokens out", "USD"),
-    figures=("jobs", "requests", "tokens in", "tokens out", "USD"),
+    numeric=("jobs", "requests", "tokens in", "tokens out", "USD"),
     leaving=("tokens in", "tokens out", "requests", "jobs"),
 )
 

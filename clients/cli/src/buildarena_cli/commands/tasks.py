@@ -29,9 +29,9 @@ TaskFile = Annotated[Path, typer.Argument(help="YAML file of the task.")]
 @app.command("list")
 def list_tasks(*, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) -> None:
     """List the tasks; custom ones are marked."""
-    found = Client(url).get("/v1/tasks")
+    tasks = Client(url).get("/v1/tasks")
     if as_json:
-        print_json(found)
+        print_json(tasks)
         return
     print_table(
         COLUMNS,
@@ -42,9 +42,9 @@ def list_tasks(*, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) -> 
                 in_words(task["indicator"], task["unit"]),
                 task["version"],
             )
-            for task in found
+            for task in tasks
         ],
-        notes=["+ custom task, added by a user"] if any(t["custom"] for t in found) else [],
+        notes=["+ custom task, added by a user"] if any(t["custom"] for t in tasks) else [],
     )
 
 

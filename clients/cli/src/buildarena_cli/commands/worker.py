@@ -23,7 +23,7 @@ MEBIBYTE: Final = 1024 * 1024
 MAX_LISTED: Final = 500
 COLUMNS = columns(
     *("worker", "queues", "state", "version", "MiB", "since"),
-    figures=("MiB",),
+    numeric=("MiB",),
     leaving=("since", "MiB", "version"),
 )
 ApiOption = Annotated[
@@ -62,12 +62,12 @@ def start_worker(
     It uses the servers that BUILDARENA_* name; with --api it is a runner, which needs neither
     database nor broker.
     """
-    given = _options({"--key-file": key_file, "--ca-file": ca_file, "--at-once": at_once})
-    given += ["--allow-http"] * allow_http
+    options = _options({"--key-file": key_file, "--ca-file": ca_file, "--at-once": at_once})
+    options += ["--allow-http"] * allow_http
     if api is not None:
-        exec_module([*_remote(queue), "--api", api, *given])
-    if given:
-        raise CommandError(f"{given[0]}: only with --api URL")
+        exec_module([*_remote(queue), "--api", api, *options])
+    if options:
+        raise CommandError(f"{options[0]}: only with --api URL")
     exec_module(_known(queue))
 
 
@@ -148,9 +148,9 @@ def _remote(queue: str) -> list[str]:
     return words
 
 
-def _options(given: Mapping[str, object]) -> list[str]:
+def _options(flags: Mapping[str, object]) -> list[str]:
     """Options that are given, as words."""
-    return [word for name, value in given.items() if value for word in (name, str(value))]
+    return [word for name, value in flags.items() if value for word in (name, str(value))]
 
 
 def _row(worker: dict[str, Any]) -> list[str]:

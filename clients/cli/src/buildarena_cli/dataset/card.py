@@ -38,8 +38,8 @@ def card(counts: Counts) -> str:
         outcomes=sorted(counts.outcomes.items()),
         cells=sorted(counts.cells.items()),
         licences=sorted(counts.licences.items()),
-        jobs=_told(JOBS),
-        actions=_told(ACTIONS),
+        jobs=_column_rows(JOBS),
+        actions=_column_rows(ACTIONS),
         flags=known_flags().values(),
         code=Markup,
     )
@@ -73,7 +73,7 @@ def _escaped(value: Any) -> Any:
     return markdown_cell(value) if type(value) is str else value
 
 
-def _told(columns: Sequence[Column]) -> list[tuple[str, str, str]]:
+def _column_rows(columns: Sequence[Column]) -> list[tuple[str, str, str]]:
     return [(column.name, _type(column.type), column.meaning) for column in columns]
 
 

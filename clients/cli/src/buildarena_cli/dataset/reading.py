@@ -1,4 +1,4 @@
-"""What a dataset is made of, asked of the service job by job."""
+"""The contents of a dataset, requested from the service job by job."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class Fetched:
     Attributes:
         job: Its figures.
         task: The task in the job's version; None where the service has it no more.
-        machine: Its machine document, as it is kept.
+        machine: Its machine document, as it is stored.
         transcript: Its transcript.
     """
 
@@ -109,9 +109,9 @@ class Reader:
                 for id_ in self._ids():
                     waiting.append(pool.submit(self._fetched, id_))
                     if len(waiting) == AHEAD:
-                        yield from _found(waiting.pop(0))
+                        yield from _fetched_jobs(waiting.pop(0))
                 while waiting:
-                    yield from _found(waiting.pop(0))
+                    yield from _fetched_jobs(waiting.pop(0))
             finally:
                 for future in waiting:
                     future.cancel()
@@ -128,7 +128,7 @@ class Reader:
 
     def _listed(self, sweep: str | None) -> Iterator[Mapping[str, Any]]:
         filters = self._filters
-        one = {
+        single = {
             "task": filters.tasks[0] if len(filters.tasks) == 1 else None,
             "model": filters.models[0] if len(filters.models) == 1 else None,
         }
@@ -141,7 +141,7 @@ class Reader:
             sort="created",
             order="asc",
             limit=PAGE,
-            **one,
+            **single,
         )
         for page in pages:
             yield from page["jobs"]
@@ -152,9 +152,9 @@ class Reader:
         job = None if answer is None else json.loads(answer)
         if job is None or job["state"] != "done":
             return None
-        kept = job["artifacts"]
-        machine = ask(self._client, at("jobs", job_id, "machine")) if "machine" in kept else None
-        if machine is not None and sha256(machine).hexdigest() != kept["machine"]:
+        hashes = job["artifacts"]
+        machine = ask(self._client, at("jobs", job_id, "machine")) if "machine" in hashes else None
+        if machine is not None and sha256(machine).hexdigest() != hashes["machine"]:
             raise CommandError(f"the machine of {job_id} arrived damaged: its hash differs")
         return Fetched(
             job=job,
@@ -171,7 +171,7 @@ class Reader:
             return self._tasks[name, version]
 
 
-def _found(future: Future[Fetched | None]) -> Iterator[Fetched]:
+def _fetched_jobs(future: Future[Fetched | None]) -> Iterator[Fetched]:
     fetched = future.result()
     if fetched is not None:
         yield fetched

@@ -12,7 +12,7 @@ from buildarena_pipeline.replays.from_document import CONTROL, PROGRAMMED
 from buildarena_pipeline.replays.from_turns import replay_of_turns
 
 SESSION: Final = "session"
-"""Who carries out what a controller's program says."""
+"""The role whose turn carries out a controller's program."""
 
 Turns = Sequence[Mapping[str, Any]]
 Document = Mapping[str, Any]
@@ -36,10 +36,10 @@ def replayed_hash(turns: Turns, document: Document | None) -> str | None:
         return None
     if machine is None or not machine.started:
         return None
-    again = machine.copy()
+    replayed = machine.copy()
     for name, arguments in _program(turns, document):
-        again.act(name, arguments)
-    return parts_hash(again.to_document())
+        replayed.act(name, arguments)
+    return parts_hash(replayed.to_document())
 
 
 def action_rows(job_id: str, turns: Turns, document: Document | None) -> list[dict[str, Any]]:
@@ -83,6 +83,6 @@ def _row(
 def _without_logs(document: Document) -> dict[str, Any]:
     parts = {name: value for name, value in document.items() if name != "log"}
     parts["available"] = {
-        name: _without_logs(one) for name, one in document.get("available", {}).items()
+        name: _without_logs(machine) for name, machine in document.get("available", {}).items()
     }
     return parts

@@ -57,9 +57,9 @@ def rows_of(fetched: Fetched, *, tools: str, licence: str) -> Rows:
     try:
         return _rows_of(fetched, tools=tools, licence=licence)
     except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
-        told = f"{type(error).__name__}: {error}"
+        problem = f"{type(error).__name__}: {error}"
         raise CommandError(
-            f"{fetched.job['id']} has documents that can't be read ({told}): leave it out by a "
+            f"{fetched.job['id']} has documents that can't be read ({problem}): leave it out by a "
             "filter, such as --sweep"
         ) from error
 
@@ -107,14 +107,14 @@ def _turns(transcript: bytes) -> list[dict[str, Any]]:
 
 
 def _of_task(task: Mapping[str, Any] | None) -> dict[str, Any]:
-    told = task or {}
+    known = task or {}
     return {
-        "task_title": told.get("title"),
-        "category": told.get("category"),
-        "level": told.get("level"),
-        "custom_task": told.get("custom"),
-        "indicator_name": told.get("indicator"),
-        "indicator_unit": told.get("unit"),
+        "task_title": known.get("title"),
+        "category": known.get("category"),
+        "level": known.get("level"),
+        "custom_task": known.get("custom"),
+        "indicator_name": known.get("indicator"),
+        "indicator_unit": known.get("unit"),
     }
 
 

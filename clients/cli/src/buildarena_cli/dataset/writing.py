@@ -43,8 +43,8 @@ def write_dataset(fetched: Iterable[Fetched], out: Path, *, licence: str) -> Cou
             _Table(folder / FILES["jobs"], JOBS) as jobs,
             _Table(folder / FILES["actions"], ACTIONS) as actions,
         ):
-            for one in fetched:
-                rows = rows_of(one, tools=definitions, licence=licence)
+            for job in fetched:
+                rows = rows_of(job, tools=definitions, licence=licence)
                 jobs.add(rows.job)
                 for action in rows.actions:
                     actions.add(action)
@@ -64,11 +64,11 @@ def check_place(out: Path) -> None:
     if out.exists() and not out.is_dir():
         raise CommandError(f"{out} is a file; with --dataset, --out names a folder")
     try:
-        found = sorted(entry.name for entry in out.iterdir()) if out.is_dir() else []
+        entries = sorted(entry.name for entry in out.iterdir()) if out.is_dir() else []
     except OSError as error:
         raise CommandError(f"{out} can't be read: {error.strerror}") from error
-    if found:
-        named = ", ".join(found[:MAX_NAMED]) + (" …" if len(found) > MAX_NAMED else "")
+    if entries:
+        named = ", ".join(entries[:MAX_NAMED]) + (" …" if len(entries) > MAX_NAMED else "")
         raise CommandError(f"{out} is not empty ({named}): name a new folder")
 
 

@@ -1,7 +1,7 @@
 """The service that runs on a data folder: found, started in the background, stopped, looked at.
 
-Whoever runs on a folder holds a lock on its file ``lock`` and notes in ``run.json`` what it is. The
-lock goes with its process however that ends; a note without a lock is of a run that is over.
+A service on a folder holds a lock on its file ``lock`` and describes itself in ``run.json``. The
+lock is released however its process ends; a ``run.json`` without a lock is of a run that is over.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class ProcessFacts:
 
 
 def is_running(data: Path) -> bool:
-    """Whether a service runs on a data folder, whatever its note says."""
+    """Whether a service runs on a data folder, whatever its ``run.json`` says."""
     try:
         with (data / LOCK).open("rb") as lock:
             fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
@@ -86,7 +86,7 @@ def is_running(data: Path) -> bool:
 
 
 def noted_run(data: Path) -> Run | None:
-    """What the last run on a data folder noted, be it over or not."""
+    """The last run on a data folder, whether it is over or not."""
     try:
         noted: dict[str, Any] = json.loads((data / RUN).read_text())
         return Run(
@@ -101,7 +101,7 @@ def noted_run(data: Path) -> Run | None:
 
 
 def running(data: Path) -> Run | None:
-    """The run that goes on on a data folder, if any."""
+    """The active run on a data folder, if any."""
     return noted_run(data) if is_running(data) else None
 
 

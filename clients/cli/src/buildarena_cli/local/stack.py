@@ -42,7 +42,7 @@ KEYS = ("admin_key", "previous_admin_key", "metrics_key")
 """Settings that are keys: no process gets them where none are asked for."""
 READY_WITHIN_S = 60.0
 MEMORY_EVERY_S = 0.5
-LOCK_TRIES = 5
+LOCK_ATTEMPTS = 5
 LOCK_AGAIN_S = 0.05
 
 
@@ -280,8 +280,8 @@ def _without_files(environment: Mapping[str, str]) -> dict[str, str]:
 
 
 def _locked(lock: IO[str]) -> None:
-    """Takes the lock; whoever only looks whether it is taken has it for a moment."""
-    for _ in range(LOCK_TRIES - 1):
+    """Takes the lock; a process that only checks whether it is taken holds it for a moment."""
+    for _ in range(LOCK_ATTEMPTS - 1):
         with contextlib.suppress(OSError):
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             return

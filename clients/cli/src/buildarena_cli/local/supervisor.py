@@ -124,7 +124,7 @@ class Supervisor:
                 f"{DEATHS_WITHIN_S:.0f} s, last with exit code {code}"
             )
             return
-        # The first restart is immediate; a process that goes on dying is given more and more time.
+        # The first restart is immediate; a process that keeps dying waits longer each time.
         if self._stop.wait(LOOK_EVERY_S * (2 ** (len(managed.deaths) - 1) - 1)):
             return
         with self._starting:

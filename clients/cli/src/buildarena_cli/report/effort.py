@@ -70,13 +70,13 @@ def rounds(material: Material) -> list[Block]:
         models.setdefault(trial.model, []).append(material.rounds[trial.job_id])
     blocks: list[Block] = []
     for task, models in runs.items():
-        looped = {model: found for model, found in models.items() if max(map(len, found)) > 1}
+        looped = {model: of_jobs for model, of_jobs in models.items() if max(map(len, of_jobs)) > 1}
         if not looped:
             continue
-        longest = max(len(run) for found in looped.values() for run in found)
+        longest = max(len(run) for of_jobs in looped.values() for run in of_jobs)
         curves = {
-            model: [_after(found, number_) for number_ in range(1, longest + 1)]
-            for model, found in looped.items()
+            model: [_after(of_jobs, number_) for number_ in range(1, longest + 1)]
+            for model, of_jobs in looped.items()
         }
         known = material.tasks.get(task)
         indicator = known.indicator if known else "indicator"
@@ -110,11 +110,11 @@ def simulators(material: Material) -> list[Block]:
                 for (name, _), tried in material.verdicts.items()
                 if name == task and first in tried and second in tried
             ]
-            found = agreement([t[first] for t in both], [t[second] for t in both])
-            if found is not None:
-                kappa, rho = number(found.kappa, 2), number(found.rank_correlation, 2)
-                same = percent(found.same_verdict)
-                rows.append((task, f"{first}, {second}", str(found.trials), same, kappa, rho))
+            agreed = agreement([t[first] for t in both], [t[second] for t in both])
+            if agreed is not None:
+                kappa, rho = number(agreed.kappa, 2), number(agreed.rank_correlation, 2)
+                same = percent(agreed.same_verdict)
+                rows.append((task, f"{first}, {second}", str(agreed.trials), same, kappa, rho))
     if not rows:
         return []
     columns = "task", "simulators", "machines", "same verdict", "kappa", "rank correlation"

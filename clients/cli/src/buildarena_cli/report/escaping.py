@@ -24,14 +24,14 @@ def one_line(text: str) -> str:
 
 def markdown_cell(text: str) -> str:
     """A text inside a line of Markdown, where nothing of it is markup."""
-    return MARKDOWN.sub(lambda found: f"\\{found[0]}", one_line(text))
+    return MARKDOWN.sub(lambda match: f"\\{match[0]}", one_line(text))
 
 
 def markdown_line(text: str) -> str:
     """A text that begins a line of Markdown."""
     escaped = markdown_cell(text).lstrip()
     return LINE_START.sub(
-        lambda found: f"{found[0]}\\" if found[0].isdigit() else f"\\{found[0]}", escaped
+        lambda match: f"{match[0]}\\" if match[0].isdigit() else f"\\{match[0]}", escaped
     )
 
 
@@ -40,6 +40,6 @@ def typst_string(text: str) -> str:
 
     Words that no page is wide enough for get places to break at.
     """
-    broken = LONG_WORD.sub(lambda found: found[0] + BREAK, one_line(text))
+    broken = LONG_WORD.sub(lambda match: match[0] + BREAK, one_line(text))
     escaped = broken.replace("\\", "\\\\").replace('"', '\\"')
     return f'"{escaped}"'

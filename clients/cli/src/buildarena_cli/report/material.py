@@ -79,13 +79,13 @@ def paper_rows(
     cells: Mapping[str, Sequence[Cell]], snapshots: Mapping[str, str]
 ) -> dict[str, dict[str, PublishedRow]]:
     """The paper's rows by task and by the name that the same snapshot has in this report."""
-    found: dict[str, dict[str, PublishedRow]] = {}
+    by_task: dict[str, dict[str, PublishedRow]] = {}
     for task, row in cells.items():
         by_snapshot = {paper.snapshot: paper for paper in published_rows().get(task, ())}
         names = {cell.model for cell in row}
-        found[task] = {
+        by_task[task] = {
             name: by_snapshot[snapshots[name]]
             for name in names
             if snapshots.get(name) in by_snapshot
         }
-    return found
+    return by_task

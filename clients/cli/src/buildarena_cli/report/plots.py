@@ -82,7 +82,7 @@ def radar_plot(rows: Sequence[OverallRow]) -> Figure:
             linewidth=2,
             label=row.model,
         )
-    # The first label stands on top, so that of six none is beside the circle at its widest.
+    # The first label is on top, so that of six none is beside the circle at its widest.
     axes.set_theta_offset(math.pi / 2)
     axes.set_xticks(angles, [name.capitalize() for name in names])
     axes.tick_params(axis="x", pad=20)
@@ -140,8 +140,8 @@ def cost_plot(bins: Mapping[str, Sequence[TokenBin]]) -> Figure:
 
     figure = Figure(figsize=(9, 3.4), layout="constrained")
     panels = figure.subplots(1, len(bins), squeeze=False, sharey=True)[0]
-    for axes, (category, found) in zip(panels, bins.items(), strict=True):
-        filled = [b for b in found if b.trials]
+    for axes, (category, category_bins) in zip(panels, bins.items(), strict=True):
+        filled = [b for b in category_bins if b.trials]
         centres = [math.sqrt(b.low * b.high) for b in filled]
         axes.plot(centres, [b.mean for b in filled], "o-", color=COLOURS[0], label="mean")
         axes.plot(centres, [b.median for b in filled], "s--", color=COLOURS[1], label="median")

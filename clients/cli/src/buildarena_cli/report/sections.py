@@ -38,13 +38,13 @@ def sections(material: Material) -> list[Block]:
     if not any(trial.scored for trial in material.trials):
         return [*blocks, *_failures(material, {}), Paragraph(text="No job was scored.")]
     tasks = material.tasks.values()
-    kept = TrackBoard(
+    track_board = TrackBoard(
         {task.name: task.version for task in tasks},
         {task.name: task.difficulty for task in tasks if task.difficulty},
     )
     for trial in material.trials:
-        kept.put(trial)
-    board = kept.board(BoardQuery(policy=material.policy))
+        track_board.put(trial)
+    board = track_board.board(BoardQuery(policy=material.policy))
     cells = {task.task: [row.cell for row in task.rows] for task in board.tasks}
     return [
         *blocks,
@@ -205,9 +205,9 @@ def _dimensions(board: Board) -> list[Block]:
 
 def _failures(material: Material, cells: Mapping[str, Sequence[Cell]]) -> list[Block]:
     # A row of a report is one name, whatever limits its jobs had.
-    found = failure_rows(replace(trial, configuration="") for trial in material.trials)
-    outcomes = {row.model: row.outcomes for row in found}
-    refusals = {row.model: row.refusals for row in found}
+    failures = failure_rows(replace(trial, configuration="") for trial in material.trials)
+    outcomes = {row.model: row.outcomes for row in failures}
+    refusals = {row.model: row.refusals for row in failures}
     if not outcomes:
         return []
     blocks: list[Block] = [
@@ -237,7 +237,7 @@ def _failures(material: Material, cells: Mapping[str, Sequence[Cell]]) -> list[B
                         f"{row.refused_actions:,}",
                         percent(row.refused_actions / row.actions if row.actions else None),
                     )
-                    for row in found
+                    for row in failures
                 ],
             ),
             Plot(

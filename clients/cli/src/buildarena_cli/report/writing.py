@@ -127,13 +127,13 @@ def _long_columns(grid: Grid) -> list[bool]:
 
 def _sections(blocks: Sequence[Block]) -> list[list[Block]]:
     """The blocks in groups that lie on pages of one direction; only tables need broad ones."""
-    found: list[list[Block]] = []
+    sections: list[list[Block]] = []
     for block in blocks:
-        before = type(found[-1][-1]) if found else None
-        if isinstance(block, Heading) or not found or {before, type(block)} == {Plot, Grid}:
-            found.append([])
-        found[-1].append(block)
-    return found
+        before = type(sections[-1][-1]) if sections else None
+        if isinstance(block, Heading) or not sections or {before, type(block)} == {Plot, Grid}:
+            sections.append([])
+        sections[-1].append(block)
+    return sections
 
 
 WRITERS: Final = {".html": _write_html, ".md": _write_markdown, ".pdf": _write_pdf}

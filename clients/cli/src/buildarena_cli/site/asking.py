@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from buildarena_cli.client import PATIENCE_S, Client, RefusedError, UnreachableError
+from buildarena_cli.client import RESTART_S, Client, RefusedError, UnreachableError
 from buildarena_cli.errors import CommandError
 from buildarena_cli.site.folder import as_json
 
@@ -37,9 +37,9 @@ def question(path: str, params: Mapping[str, Any] | None = None) -> str:
     """Path and parameters as pages look them up: decoded, the parameters in order."""
     words = sorted(
         f"{name}={value}"
-        for name, given in (params or {}).items()
+        for name, param in (params or {}).items()
         for value in (
-            given if isinstance(given, Sequence) and not isinstance(given, str) else [given]
+            param if isinstance(param, Sequence) and not isinstance(param, str) else [param]
         )
         if value is not None
     )
@@ -58,7 +58,7 @@ def ask(client: Client, path: str, *, accept: str | None = None, **params: Any) 
     Raises:
         TooLargeError: The answer is larger than the service gives.
     """
-    deadline = time.monotonic() + PATIENCE_S
+    deadline = time.monotonic() + RESTART_S
     while True:
         try:
             return client.get_bytes(path, accept=accept, **params)

@@ -15,7 +15,7 @@ SCORING_POLICIES: Final = (None, "published")
 """How pages ask for our scoring policy, and for the other."""
 EXPORTS: Final = {"csv": "csv", "parquet": "parquet", "latex": "tex"}
 MAX_COMPARED: Final = 20
-"""Models of a track whose comparisons are kept: each with each other is asked for."""
+"""Models of a track whose comparisons are stored: each with each other is requested."""
 LISTED_SWEEPS: Final = 50
 """As many as a page of sweeps shows."""
 BOARD: Final = "/v1/leaderboard"
@@ -118,7 +118,7 @@ class Collected:
     def _models(self) -> None:
         used = {job["model"] for job in self._scope.jobs}
         listed = self._client.get("/v1/models")
-        self._put("/v1/models", document([one for one in listed if one["name"] in used]))
+        self._put("/v1/models", document([model for model in listed if model["name"] in used]))
 
     def _sweeps(self) -> None:
         sweeps = list(self._scope.sweeps)
@@ -134,10 +134,10 @@ class Collected:
             self._put(key, None if content is None else Answer(content))
 
 
-def rows_of(scope: Scope, kept: Sequence[Job]) -> Answer:
+def rows_of(scope: Scope, chosen: Sequence[Job]) -> Answer:
     """All jobs as rows of lists, and which of them are kept whole."""
     return document(
-        {"jobs": list(scope.jobs), "kept": [job["id"] for job in kept], "sweeps": scope.places}
+        {"jobs": list(scope.jobs), "kept": [job["id"] for job in chosen], "sweeps": scope.places}
     )
 
 

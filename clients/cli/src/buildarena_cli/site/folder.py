@@ -1,6 +1,6 @@
-"""The folder of a site: each content once, and nothing that looks whole before it is.
+"""The folder of a site: each content once, and nothing that looks complete before it is.
 
-``data`` holds answers under the hash of their content, ``jobs`` an index for each kept job,
+``data`` holds answers under the hash of their content, ``jobs`` an index for each stored job,
 ``assets`` the pages' scripts. ``site.json`` and ``index.html`` are written last; until then an
 older site in the folder stays as it was, and a new one has no page to open.
 """
@@ -48,8 +48,8 @@ class Folder:
             raise CommandError(f"{path} is a file; --out names a folder")
         marker = path / MARKER
         if marker.is_file():
-            found = marker.read_text(encoding="utf-8", errors="replace").strip()
-            if found not in {VERSION, ""}:
+            version = marker.read_text(encoding="utf-8", errors="replace").strip()
+            if version not in {VERSION, ""}:
                 raise CommandError(f"{path} holds a site of another version of this program")
         elif path.is_dir():
             others = sorted(entry.name for entry in path.iterdir())
@@ -104,27 +104,26 @@ class Folder:
         partial.replace(target)
 
     def job_answers(self, job_id: str, digest: str) -> dict[str, str | None] | None:
-        """The kept answers of a job.
+        """The stored answers of a job.
 
         Args:
             job_id: The job.
-            digest: Of what the job was when they were kept.
+            digest: Of the job when they were stored.
 
         Returns:
-            Paths of files by what is asked for; None when they are not all here, or the job was
-            another then.
+            Paths of files by request; None when some are missing, or the job has changed since.
         """
         try:
-            kept = json.loads((self.path / job_file(job_id)).read_bytes())
-            answers: dict[str, str | None] = dict(kept["answers"])
+            stored = json.loads((self.path / job_file(job_id)).read_bytes())
+            answers: dict[str, str | None] = dict(stored["answers"])
         except (OSError, ValueError, KeyError, TypeError):
             return None
         names = [name for name in answers.values() if name is not None]
         whole = all(_CONTENT.fullmatch(name) and (self.path / name).is_file() for name in names)
-        return answers if whole and kept.get("digest") == digest else None
+        return answers if whole and stored.get("digest") == digest else None
 
     def keep_job(self, job_id: str, digest: str, answers: Mapping[str, str | None]) -> None:
-        """Keeps the index of a job's answers; a later run finds it."""
+        """Stores the index of a job's answers; a later run finds it."""
         self.write(job_file(job_id), as_json({"digest": digest, "answers": dict(answers)}))
 
     def remove_others(self, wanted: set[str]) -> None:

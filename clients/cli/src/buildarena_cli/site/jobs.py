@@ -21,7 +21,7 @@ def job_answers(client: Client, job_id: str) -> Answers:
         client: The API.
         job_id: The job.
     """
-    found: Answers = {}
+    answers: Answers = {}
 
     def put(
         rest: str = "", *, ending: str = "json", accept: str | None = None, **asked: object
@@ -33,10 +33,10 @@ def job_answers(client: Client, job_id: str) -> Answers:
             # Pages say of a file without an entry that it was left out.
             return
         key = question("/".join(["/v1/jobs", *parts]), asked)
-        found[key] = None if content is None else Answer(content, ending)
+        answers[key] = None if content is None else Answer(content, ending)
 
     put()
-    detail = found[f"/v1/jobs/{job_id}"]
+    detail = answers[f"/v1/jobs/{job_id}"]
     artifacts = {} if detail is None else json.loads(detail.content)["artifacts"]
     put("transcript")
     put("replay")
@@ -47,20 +47,20 @@ def job_answers(client: Client, job_id: str) -> Answers:
     if "machine" in artifacts:
         put("machine.glb", ending="glb", accept="model/gltf-binary")
         put("thumbnail.png", ending="png", accept="image/png")
-    _files(client, job_id, found)
-    return found
+    _files(client, job_id, answers)
+    return answers
 
 
-def _files(client: Client, job_id: str, found: Answers) -> None:
+def _files(client: Client, job_id: str, answers: Answers) -> None:
     """The list of a job's files, and those files; trajectories are there as trials already."""
     listed = ask(client, at("jobs", job_id, "artifacts"))
     files = [] if listed is None else json.loads(listed)
-    kept = [file for file in files if ROLLOUT.fullmatch(file["name"]) is None]
-    found[f"/v1/jobs/{job_id}/artifacts"] = Answer(
-        json.dumps(kept, ensure_ascii=False, separators=(",", ":")).encode()
+    others = [file for file in files if ROLLOUT.fullmatch(file["name"]) is None]
+    answers[f"/v1/jobs/{job_id}/artifacts"] = Answer(
+        json.dumps(others, ensure_ascii=False, separators=(",", ":")).encode()
     )
-    for file in kept:
+    for file in others:
         content = ask(client, at("jobs", job_id, "artifacts", file["name"]))
         key = f"/v1/jobs/{job_id}/artifacts/{file['name']}"
         ending = ENDINGS.get(file["media_type"], "bin")
-        found[key] = None if content is None else Answer(content, ending)
+        answers[key] = None if content is None else Answer(content, ending)

@@ -35,8 +35,8 @@ def built_pages() -> Path:
     Raises:
         CommandError: They were not built.
     """
-    found = find_spec("buildarena_api")
-    for place in (found.submodule_search_locations or ()) if found else ():
+    package = find_spec("buildarena_api")
+    for place in (package.submodule_search_locations or ()) if package else ():
         folder = Path(place, "pages")
         if (folder / INDEX).is_file():
             return folder
@@ -56,7 +56,7 @@ def page_files(folder: Path) -> list[Path]:
 
 
 def first_page(folder: Path) -> str:
-    """The first page of a site: it finds its files beside itself, and reads kept answers.
+    """The first page of a site: it finds its files beside itself, and reads stored answers.
 
     Raises:
         CommandError: The built page is not as expected: pages and program are of two versions.

@@ -63,14 +63,14 @@ def read_scope(client: Client, sweeps: Sequence[str], track: str | None) -> Scop
     """
     if len(sweeps) > MAX_SWEEPS:
         raise CommandError(f"a site holds {MAX_SWEEPS} sweeps at most; these are {len(sweeps)}")
-    found = [client.get(at("sweeps", id_)) for id_ in dict.fromkeys(sweeps)]
+    documents = [client.get(at("sweeps", id_)) for id_ in dict.fromkeys(sweeps)]
     board = client.get("/v1/leaderboard", sweep=list(sweeps) or None)
     if track is not None and track not in board["tracks"]:
         choices = ", ".join(board["tracks"]) or "none: no job has ended"
         raise CommandError(f"there is no track {track!r} with ended jobs; choose from {choices}")
     jobs: dict[str, Job] = {}
     members: dict[str, list[str]] = {}
-    for sweep in [sweep["id"] for sweep in found] or [None]:
+    for sweep in [sweep["id"] for sweep in documents] or [None]:
         rows = [
             job
             for page in client.pages("/v1/jobs", sweep=sweep, track=track, limit=PAGE)
@@ -85,7 +85,7 @@ def read_scope(client: Client, sweeps: Sequence[str], track: str | None) -> Scop
     if not any(job["state"] == "done" for job in ordered):
         raise CommandError("none of these jobs has ended: there is no board to publish yet")
     return Scope(
-        sweeps=sorted(found, key=lambda sweep: str(sweep["created_at"]), reverse=True),
+        sweeps=sorted(documents, key=lambda sweep: str(sweep["created_at"]), reverse=True),
         track=track,
         tracks=[track] if track is not None else board["tracks"],
         jobs=ordered,
@@ -94,20 +94,20 @@ def read_scope(client: Client, sweeps: Sequence[str], track: str | None) -> Scop
     )
 
 
-def read_choice(given: str) -> int | None:
+def read_choice(choice: str) -> int | None:
     """How many jobs of a cell are kept whole; None means all.
 
     Args:
-        given: One of CHOICES, or a number.
+        choice: One of CHOICES, or a number.
 
     Raises:
         CommandError: It is neither.
     """
-    if given.isdecimal() and given.isascii():
-        return int(given)
-    if given not in CHOICES:
-        raise CommandError(f"--jobs: {given!r} is none of {', '.join(CHOICES)} or a number")
-    return {EVERY: None, "best": 1, "none": 0}[given]
+    if choice.isdecimal() and choice.isascii():
+        return int(choice)
+    if choice not in CHOICES:
+        raise CommandError(f"--jobs: {choice!r} is none of {', '.join(CHOICES)} or a number")
+    return {EVERY: None, "best": 1, "none": 0}[choice]
 
 
 def chosen_jobs(scope: Scope, per_cell: int | None) -> list[Job]:

@@ -28,7 +28,7 @@ SAMPLED: Final = 24
 """Jobs at most whose size is measured before the others are asked for."""
 SAMPLED_OF_A_KIND: Final = 2
 INDEX_OF_A_JOB: Final = 2_500
-"""Bytes of the file that says where a job's answers are, about."""
+"""Approximate bytes of the file that says where a job's answers are."""
 NO_JEKYLL: Final = ".nojekyll"
 """Tells GitHub's pages to leave every file as it is."""
 
@@ -95,7 +95,7 @@ def plan_site(
     with counted("sizes", len(sample)) as done:
         sampled = _every(lambda job: job_answers(client, job["id"]), sample, done)
     answers = [*collected.answers.values(), rows_of(scope, chosen)]
-    files = {name for kept in here.values() for name in kept.values() if name is not None}
+    files = {name for names in here.values() for name in names.values() if name is not None}
     return Plan(
         scope=scope,
         chosen=chosen,
@@ -113,7 +113,7 @@ def plan_site(
 
 
 def write_site(client: Client, plan: Plan, folder: Folder) -> int:
-    """Writes a site; one that is broken off goes on when it is written again.
+    """Writes a site; an interrupted one continues when it is written again.
 
     Args:
         client: The API.
@@ -135,9 +135,9 @@ def write_site(client: Client, plan: Plan, folder: Folder) -> int:
         answers = _keep(folder, plan.boards)
         rows = rows_of(plan.scope, plan.chosen)
         stored_rows = folder.keep(rows.content, rows.ending)
-        kept = _keep_jobs(client, plan, folder)
-        wanted.update(job_file(job_id) for job_id in kept)
-        for names in (answers, *kept.values()):
+        job_names = _keep_jobs(client, plan, folder)
+        wanted.update(job_file(job_id) for job_id in job_names)
+        for names in (answers, *job_names.values()):
             wanted.update(name for name in names.values() if name is not None)
         wanted.add(stored_rows)
         folder.write(SITE, as_json(_site(plan, answers, stored_rows)))
@@ -150,8 +150,8 @@ def _keep_jobs(client: Client, plan: Plan, folder: Folder) -> dict[str, Mapping[
     def keep(job: Job) -> Mapping[str, str | None]:
         if job["id"] in plan.here:
             return plan.here[job["id"]]
-        found = plan.sampled.get(job["id"]) or job_answers(client, job["id"])
-        names = _keep(folder, found)
+        answers = plan.sampled.get(job["id"]) or job_answers(client, job["id"])
+        names = _keep(folder, answers)
         folder.keep_job(job["id"], digest_of(job), names)
         return names
 
@@ -170,15 +170,15 @@ def _every(
     work: Callable[[Job], Result], jobs: Sequence[Job], done: Callable[[], None]
 ) -> dict[str, Result]:
     """What work finds for each job, some at a time; the first error ends it."""
-    found: dict[str, Result] = {}
+    results: dict[str, Result] = {}
     pool = ThreadPoolExecutor(AT_ONCE)
     try:
         for job, result in zip(jobs, pool.map(work, jobs), strict=True):
-            found[job["id"]] = result
+            results[job["id"]] = result
             done()
     finally:
         pool.shutdown(cancel_futures=True)
-    return found
+    return results
 
 
 def _site(plan: Plan, answers: Mapping[str, str | None], rows: str) -> dict[str, Any]:
@@ -196,12 +196,12 @@ def _site(plan: Plan, answers: Mapping[str, str | None], rows: str) -> dict[str,
 
 def _left_out(scope: Scope, chosen: Sequence[Job]) -> list[str]:
     ended = len(scope.ended)
-    said = []
+    remarks = []
     if open_ := len(scope.jobs) - ended:
-        said.append(f"{_many(open_, 'job')} had not ended.")
+        remarks.append(f"{_many(open_, 'job')} had not ended.")
     if rest := ended - len(chosen):
-        said.append(f"Of {_many(rest, 'job')} only the results are kept.")
-    return said
+        remarks.append(f"Of {_many(rest, 'job')} only the results are kept.")
+    return remarks
 
 
 def _many(count: int, what: str) -> str:
@@ -209,7 +209,7 @@ def _many(count: int, what: str) -> str:
 
 
 def _kind(job: Job) -> tuple[str, str]:
-    """What tells most about how large a job's answers are."""
+    """What best predicts the size of a job's answers."""
     return job["task"], job["outcome"]
 
 
@@ -218,15 +218,15 @@ def _sample(jobs: Sequence[Job]) -> list[Job]:
     kinds: dict[tuple[str, str], list[Job]] = {}
     for job in jobs:
         kinds.setdefault(_kind(job), []).append(job)
-    firsts = [found[:SAMPLED_OF_A_KIND] for found in kinds.values()]
+    firsts = [jobs_of_kind[:SAMPLED_OF_A_KIND] for jobs_of_kind in kinds.values()]
     rounds = itertools.zip_longest(*firsts)
     return [job for turn in rounds for job in turn if job is not None][:SAMPLED]
 
 
 def _size(answers: Sequence[Answer | None]) -> int:
     """Bytes of answers, equal ones counted once."""
-    kept = {name_of(a.content, a.ending): len(a.content) for a in answers if a is not None}
-    return sum(kept.values())
+    sizes = {name_of(a.content, a.ending): len(a.content) for a in answers if a is not None}
+    return sum(sizes.values())
 
 
 def _estimated(jobs: Sequence[Job], sampled: Mapping[str, Answers]) -> int:
@@ -234,7 +234,7 @@ def _estimated(jobs: Sequence[Job], sampled: Mapping[str, Answers]) -> int:
     sizes: dict[tuple[str, str], list[int]] = {}
     for job in jobs:
         if job["id"] in sampled:
-            found = list(sampled[job["id"]].values())
-            sizes.setdefault(_kind(job), []).append(_size(found))
-    every = [size for found in sizes.values() for size in found]
+            job_files = list(sampled[job["id"]].values())
+            sizes.setdefault(_kind(job), []).append(_size(job_files))
+    every = [size for kind_sizes in sizes.values() for size in kind_sizes]
     return round(sum(fmean(sizes.get(_kind(job), every)) for job in jobs)) if every else 0

@@ -50,7 +50,7 @@ PUBLISHED = ("model", *RESULTS, "parts", "requests", "tokens")
 LEAVING = ("requests", "parts", "tokens", "USD", "best", "of it 95 %", "95 %", "indicator")
 OVERALL = columns(
     *("#", "model", "place", "mean rank", "success", "USD", "front"),
-    figures=("#", "place", "mean rank", "success", "USD"),
+    numeric=("#", "place", "mean rank", "success", "USD"),
     leaving=("front", "USD", "mean rank", "place", "success"),
 )
 
@@ -68,7 +68,7 @@ def overview(board: Mapping[str, Any], *, published: bool = False) -> None:
 
     Args:
         board: The API's answer.
-        published: Whether the paper's figures stand below ours.
+        published: Whether the paper's figures are printed below ours.
     """
     ranks = {(row["model"], row["configuration"]): row["rank"] for row in board["overall"]}
     rows: dict[tuple[str, str], dict[str, Any]] = {}
@@ -123,9 +123,9 @@ def _print_rows(
     title: str,
     notes: Sequence[str] = (),
 ) -> None:
-    figures = [name for name in names if name != "model"]
+    numeric = [name for name in names if name != "model"]
     cells = [[ROW[name](row) for name in names] for row in rows]
-    shown = columns(*names, figures=figures, leaving=LEAVING)
+    shown = columns(*names, numeric=numeric, leaving=LEAVING)
     print_table(shown, cells, title=title, notes=notes)
 
 
@@ -294,13 +294,13 @@ def _marked(rows: Sequence[Mapping[str, Any]]) -> str:
 
 def _remarks(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     """What is shown of flags, where there are some."""
-    found = []
+    remarks = []
     if any(map(_is_censored, rows)):
-        found.append("≥ cargos that never fell may weigh more")
+        remarks.append("≥ cargos that never fell may weigh more")
     counts = _flags(rows)
     if counts:
-        found.append("flags: " + ", ".join(f"{n} {flag}" for flag, n in sorted(counts.items())))
-    return found
+        remarks.append("flags: " + ", ".join(f"{n} {flag}" for flag, n in sorted(counts.items())))
+    return remarks
 
 
 def _flags(rows: Sequence[Mapping[str, Any]]) -> Counter[str]:
@@ -313,12 +313,12 @@ def _flags(rows: Sequence[Mapping[str, Any]]) -> Counter[str]:
 def _policy(board: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> list[str]:
     """What the board's flags say, and what was done about them."""
     counts = _flags(rows)
-    found = [
+    remarks = [
         f"  {flag['name']}: {flag['meaning']}" for flag in board["flags"] if counts[flag["name"]]
     ]
     if board["policy"] != "ours":
-        found.append("what the published evaluation calls hacked is left out, as it does itself")
-    return found
+        remarks.append("what the published evaluation calls hacked is left out, as it does itself")
+    return remarks
 
 
 def _imports(rows: Sequence[Mapping[str, Any]]) -> list[str]:

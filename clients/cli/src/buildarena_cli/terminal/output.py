@@ -36,18 +36,18 @@ class Column:
     leaves: int = 0
 
 
-def columns(*names: str, figures: Sequence[str] = (), leaving: Sequence[str] = ()) -> list[Column]:
+def columns(*names: str, numeric: Sequence[str] = (), leaving: Sequence[str] = ()) -> list[Column]:
     """Columns by their names.
 
     Args:
         names: All of them, from left to right.
-        figures: Those aligned to the right.
+        numeric: Those aligned to the right.
         leaving: Those that give way, the first to go first.
     """
     return [
         Column(
             name=name,
-            right=name in figures,
+            right=name in numeric,
             leaves=leaving.index(name) + 1 if name in leaving else 0,
         )
         for name in names
@@ -85,13 +85,13 @@ def print_table(
         notes: Lines below on a terminal; a pipe gets headings and rows alone.
     """
     cells = [[_cell(text) for text in row] for row in rows]
-    kept = list(range(len(shown)))
+    fitting = list(range(len(shown)))
     if is_terminal():
-        kept = _fitting(shown, cells, terminal_width())
-    widths = [max(width_of(line[i]) for line in [_names(shown), *cells]) for i in kept]
-    lines = [_line(shown, kept, widths, row) for row in cells]
-    head = _line(shown, kept, widths, _names(shown))
-    gone = [column.name for i, column in enumerate(shown) if i not in kept]
+        fitting = _fitting(shown, cells, terminal_width())
+    widths = [max(width_of(line[i]) for line in [_names(shown), *cells]) for i in fitting]
+    lines = [_line(shown, fitting, widths, row) for row in cells]
+    head = _line(shown, fitting, widths, _names(shown))
+    gone = [column.name for i, column in enumerate(shown) if i not in fitting]
     below = [*notes, *([f"too narrow for: {', '.join(gone)}"] if gone else [])]
     if not is_terminal():
         below = []
@@ -178,20 +178,21 @@ def _names(shown: Sequence[Column]) -> list[str]:
 def _fitting(shown: Sequence[Column], cells: Sequence[Sequence[str]], room: int) -> list[int]:
     """Which columns fit: those that may leave do so one by one, in their order."""
     widths = [max(width_of(line[i]) for line in [_names(shown), *cells]) for i in range(len(shown))]
-    kept = list(range(len(shown)))
-    for i in sorted(kept, key=lambda i: shown[i].leaves):
-        if sum(widths[k] for k in kept) + len(GAP) * (len(kept) - 1) <= room:
+    fitting = list(range(len(shown)))
+    for i in sorted(fitting, key=lambda i: shown[i].leaves):
+        if sum(widths[k] for k in fitting) + len(GAP) * (len(fitting) - 1) <= room:
             break
         if shown[i].leaves:
-            kept.remove(i)
-    return kept
+            fitting.remove(i)
+    return fitting
 
 
 def _line(
-    shown: Sequence[Column], kept: Sequence[int], widths: Sequence[int], row: Sequence[str]
+    shown: Sequence[Column], fitting: Sequence[int], widths: Sequence[int], row: Sequence[str]
 ) -> str:
     parts = [
-        padded(row[i], width, right=shown[i].right) for i, width in zip(kept, widths, strict=True)
+        padded(row[i], width, right=shown[i].right)
+        for i, width in zip(fitting, widths, strict=True)
     ]
     return GAP.join(parts).rstrip()
 

@@ -1,4 +1,4 @@
-"""Leaderboards and what stands beside them."""
+"""Leaderboards, and other results over many jobs."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class Boards(Sender):
-    """Leaderboards and what stands beside them."""
+    """Leaderboards, and other results over many jobs."""
 
     async def leaderboard(self, **filters: Unpack[BoardFilters]) -> Board:
         """One track's leaderboard, on each task and overall.

@@ -48,8 +48,8 @@ class Catalogue(Sender):
         Args:
             source: A YAML file, or the YAML itself as text.
         """
-        given = bytes(source, "utf-8") if isinstance(source, str) else source
-        return cast("TaskDetail", await self.upload("/v1/tasks", given, "application/yaml"))
+        content = bytes(source, "utf-8") if isinstance(source, str) else source
+        return cast("TaskDetail", await self.upload("/v1/tasks", content, "application/yaml"))
 
     async def models(self) -> list[ModelView]:
         """The models that jobs can name."""
@@ -65,8 +65,8 @@ class Catalogue(Sender):
             task: Those that builders of a task may use.
             version: The task's; the newest by default.
         """
-        found = await self.get("/v1/modules", set=of_set, task=task, version=version)
-        return cast("list[ModuleView]", found)
+        modules = await self.get("/v1/modules", set=of_set, task=task, version=version)
+        return cast("list[ModuleView]", modules)
 
     async def simulators(self) -> list[SimulatorView]:
         """What jobs can name as their simulator, and whether it is served at the moment."""

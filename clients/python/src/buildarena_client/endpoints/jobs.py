@@ -94,7 +94,9 @@ class Jobs(Sender):
             TimedOutError: It is not within the time.
         """
         path = at("verifications", verification_id)
-        answer = await self._when(path, lambda found: found["state"] == "done", timeout_s)
+        answer = await self._when(
+            path, lambda verification: verification["state"] == "done", timeout_s
+        )
         return cast("VerificationView", answer)
 
     async def transcript(self, job_id: str) -> Any:
@@ -159,8 +161,8 @@ class Jobs(Sender):
         return self._events(at("jobs", job_id, "events"), after)
 
     async def _file(self, job_id: str, name: str) -> JobFileView:
-        found = await self.artifacts(job_id)
-        known = {file["name"]: file for file in found}
+        files = await self.artifacts(job_id)
+        known = {file["name"]: file for file in files}
         if name not in known:
             has = ", ".join(known) or "none yet"
             raise BadArgumentError(f"{job_id} has no file {name!r}; it has {has}")
@@ -169,8 +171,8 @@ class Jobs(Sender):
     async def _when(self, path: str, ended: Callable[[Any], bool], timeout_s: float | None) -> Any:
         started = time.monotonic()
         while True:
-            found = await self.get_patiently(path)
-            if ended(found):
-                return found
-            require_time(found["id"], started, timeout_s)
+            document = await self.get_patiently(path)
+            if ended(document):
+                return document
+            require_time(document["id"], started, timeout_s)
             await self._transport.pause(POLL_S)

@@ -1,4 +1,4 @@
-"""Requests that are sent again where they may be: what all endpoints are made of."""
+"""Requests that are repeated where they may be: the base of all endpoints."""
 
 from __future__ import annotations
 

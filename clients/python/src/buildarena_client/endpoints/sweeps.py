@@ -60,7 +60,7 @@ class Sweeps(Sender):
 
         Args:
             spec: Fields of a sweep, or the YAML file that has them.
-            resume: Whether an earlier sweep of just these jobs goes on instead.
+            resume: Whether an earlier sweep of exactly these jobs continues instead.
             request_key: The same key with the same sweep gives the first submission's answer; a
                 key of its own by default, so that a submission whose answer was lost is sent again
                 and still stored once.
@@ -125,7 +125,7 @@ class Sweeps(Sender):
     def sweep_events(self, sweep_id: str, *, after: int = 0) -> AsyncGenerator[Event, None]:
         """What happens to a sweep and its jobs, from the beginning; waits for more.
 
-        A stream that is cut goes on where it was.
+        A stream that is cut continues where it was.
 
         Args:
             sweep_id: The sweep.

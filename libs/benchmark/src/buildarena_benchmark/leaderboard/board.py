@@ -26,7 +26,7 @@ class BoardQuery:
         since: Only jobs that ended then or later.
         until: Only jobs that ended before.
         policy: The scoring policy: how flags are read.
-        overall: Tasks that the overall ranking is over, as far as they are on the board.
+        overall: Tasks of the overall ranking, if they are on the board.
     """
 
     tasks: frozenset[str] | None = None
@@ -129,12 +129,12 @@ def choose_cells(
     outdated: dict[str, list[CellKey]] = {}
     known = list(versions)
     for task in sorted(by_task, key=lambda t: (_place(known, t), t)):
-        found = by_task[task]
+        by_version = by_task[task]
         version = versions.get(task, "")
-        if version not in found:
-            version = max(found, key=lambda v: (_newest(found[v]), v))
-        shown[task, version] = sorted(head.key for head in found[version])
-        outdated[task] = [head.key for v in found if v != version for head in found[v]]
+        if version not in by_version:
+            version = max(by_version, key=lambda v: (_newest(by_version[v]), v))
+        shown[task, version] = sorted(head.key for head in by_version[version])
+        outdated[task] = [head.key for v in by_version if v != version for head in by_version[v]]
     return ChosenCells(shown=shown, outdated=outdated)
 
 
@@ -165,19 +165,19 @@ def ranked_board(
     def ranked(task: str) -> bool:
         return overall is None or task in overall
 
-    found = standings(cells, ranked, tests)
+    ranks = standings(cells, ranked, tests)
     boards = [
         TaskBoard(
             task=task,
             version=version,
             outdated=outdated.get(task, 0),
-            rows=_ranked(cells[task], found.tasks.get(task)),
+            rows=_ranked(cells[task], ranks.tasks.get(task)),
         )
         for task, version in chosen.shown
         if cells[task]
     ]
     filled = {task: row for task, row in cells.items() if row and ranked(task)}
-    return Board(tasks=boards, overall=overall_rows(filled, found.overall, weights))
+    return Board(tasks=boards, overall=overall_rows(filled, ranks.overall, weights))
 
 
 class TrackBoard:

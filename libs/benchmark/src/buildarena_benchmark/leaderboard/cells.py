@@ -24,7 +24,7 @@ from buildarena_benchmark.statistics import (
     pass_hat_k,
 )
 
-TRIES: Final = (1, 2, 4, 8)
+PASS_K: Final = (1, 2, 4, 8)
 """The k of pass@k and pass^k."""
 
 
@@ -146,10 +146,10 @@ def summarise(trials: Sequence[EndedJob], *, policy: ScoringPolicy = ScoringPoli
 
 
 def summarise_tallies(
-    name: CellName, given: Sequence[Tally], *, policy: ScoringPolicy = ScoringPolicy.OURS
+    name: CellName, all_tallies: Sequence[Tally], *, policy: ScoringPolicy = ScoringPolicy.OURS
 ) -> Cell:
     """Summarises a cell's tallies, whose order does not matter."""
-    tallies = [tally for tally in given if not tally.unverified]
+    tallies = [tally for tally in all_tallies if not tally.unverified]
     scored = [tally for tally in tallies if tally.scored]
     counted = counted_tallies(tallies, policy=policy)
     number, ended = _number(counted), _number(tallies)
@@ -172,8 +172,8 @@ def summarise_tallies(
         cancelled=outcomes.get(Outcome.CANCELLED, 0),
         flagged=_number(tally for tally in scored if _is_flagged(tally, policy)),
         flags=_counts((flag, tally.number) for tally in scored for flag in set(tally.flags)),
-        imported=_number(tally for tally in given if tally.imported),
-        unverified=_number(given) - ended,
+        imported=_number(tally for tally in all_tallies if tally.imported),
+        unverified=_number(all_tallies) - ended,
         simulated=_number(tally for tally in counted if tally.outcome in SIMULATED),
         successes=successes,
         success_rate=successes / number if number else None,
@@ -195,8 +195,8 @@ def summarise_tallies(
             [*costs.tolist(), *[None] * (number - len(costs))], successes
         ),
         invalid_action_rate=refused / actions if actions else None,
-        pass_at=_tries(pass_at_k, successes, number),
-        pass_all=_tries(pass_hat_k, successes, number),
+        pass_at=_pass_chances(pass_at_k, successes, number),
+        pass_all=_pass_chances(pass_hat_k, successes, number),
         outcomes=outcomes,
         reasons=_counts((tally.reason, tally.number) for tally in counted if tally.reason),
         refusals=_counts(item for tally in counted for item in tally.refusals.items()),
@@ -237,10 +237,10 @@ def _number(tallies: Iterable[Tally]) -> int:
 
 
 def _counts(items: Iterable[tuple[str, int]]) -> dict[str, int]:
-    found: dict[str, int] = {}
+    counts: dict[str, int] = {}
     for name, number in items:
-        found[name] = found.get(name, 0) + number
-    return dict(sorted(found.items()))
+        counts[name] = counts.get(name, 0) + number
+    return dict(sorted(counts.items()))
 
 
 def _figures(counted: Sequence[Tally]) -> NDArray[np.float64]:
@@ -271,13 +271,13 @@ def _mean(values: NDArray[np.float64]) -> float | None:
 
 
 def _mean_total(totals: Iterable[Total]) -> float | None:
-    found = list(totals)
-    known = sum(total.known for total in found)
-    return float(sum(total.sum for total in found)) / known if known else None
+    listed = list(totals)
+    known = sum(total.known for total in listed)
+    return float(sum(total.sum for total in listed)) / known if known else None
 
 
-def _tries(
+def _pass_chances(
     estimate: Callable[[int, int, int], float | None], successes: int, trials: int
 ) -> dict[str, float]:
-    found = {str(k): estimate(successes, trials, k) for k in TRIES}
-    return {k: chance for k, chance in found.items() if chance is not None}
+    chances = {str(k): estimate(successes, trials, k) for k in PASS_K}
+    return {k: chance for k, chance in chances.items() if chance is not None}

@@ -87,10 +87,10 @@ def compare_models(
 
 
 def _by_task(trials: Iterable[EndedJob]) -> dict[str, list[EndedJob]]:
-    found: dict[str, list[EndedJob]] = {}
+    by_task: dict[str, list[EndedJob]] = {}
     for trial in trials:
-        found.setdefault(trial.task, []).append(trial)
-    return found
+        by_task.setdefault(trial.task, []).append(trial)
+    return by_task
 
 
 def _compare_task(

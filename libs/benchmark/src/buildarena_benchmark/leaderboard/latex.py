@@ -98,8 +98,8 @@ def _category(cells: Cells, category: str, columns: Sequence[Column]) -> list[st
             texts.append(_marked(shown, bounds, more=column.more))
     lines = [rf"\multirow{{{len(models)}}}{{*}}{{{_escaped(category.capitalize())}}}"]
     for number, model in enumerate(models):
-        figures = " & ".join(shown[number] for shown in texts)
-        lines.append(rf"& {_escaped(model)} & {figures} \\")
+        values = " & ".join(shown[number] for shown in texts)
+        lines.append(rf"& {_escaped(model)} & {values} \\")
     return lines
 
 
@@ -111,17 +111,17 @@ def _scaled(row: Figures | None, column: Column) -> float | None:
 
 def _marked(values: Sequence[float | None], bounds: Sequence[bool], *, more: bool) -> list[str]:
     known = sorted((value for value in values if value is not None), reverse=more)
-    # Where nobody has anything there is no best.
+    # Where all values are zero there is no best.
     places = [value for value in known if value != 0.0 or not more][:2]
-    found = []
+    texts = []
     for value, bound in zip(values, bounds, strict=True):
         text = "--" if value is None else (r"$\geq$" if bound else "") + f"{value:.1f}"
         if places and value == places[0]:
             text = rf"\textbf{{{text}}}"
         elif len(places) > 1 and value == places[1]:
             text = rf"\underline{{{text}}}"
-        found.append(text)
-    return found
+        texts.append(text)
+    return texts
 
 
 def _escaped(text: str) -> str:

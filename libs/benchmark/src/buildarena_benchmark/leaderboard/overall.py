@@ -60,7 +60,7 @@ def overall_rows(
 
     Args:
         cells: Cells by task and configuration.
-        standing: Who stands where of those that are complete; None when nobody is.
+        standing: The ranks of the complete ones; None when none is complete.
         weights: Difficulty weights of the tasks that have some.
     """
     tasks = [task for task, row in cells.items() if any(cell.trials for cell in row.values())]
@@ -118,12 +118,12 @@ def dimension_scores(
         if models > 1:
             scores[number] = (models - _single_task_ranks(row)) / (models - 1)
     names = dict.fromkeys(name for task in weights for name in task)
-    found: list[dict[str, float]] = [{} for _ in range(models)]
+    by_model: list[dict[str, float]] = [{} for _ in range(models)]
     for name in names:
         weight = np.array([task.get(name, 0) for task in weights], float)
         for model in range(models):
-            found[model][name] = float(weight @ scores[:, model] / weight.sum())
-    return found
+            by_model[model][name] = float(weight @ scores[:, model] / weight.sum())
+    return by_model
 
 
 def _single_task_ranks(row: Sequence[Cell]) -> NDArray[np.float64]:

@@ -40,7 +40,7 @@ def failure_rows(trials: Iterable[EndedJob]) -> list[FailureRow]:
     rows: dict[tuple[str, str], list[EndedJob]] = {}
     for trial in trials:
         rows.setdefault((trial.model, trial.configuration), []).append(trial)
-    return [failure_row(*key, tallied(found)) for key, found in rows.items()]
+    return [failure_row(*key, tallied(jobs)) for key, jobs in rows.items()]
 
 
 def failure_row(model: str, configuration: str, tallies: Iterable[Tally]) -> FailureRow:
@@ -68,7 +68,7 @@ def cost_bins(
     by_task: dict[str, list[EndedJob]] = {}
     for trial in trials:
         by_task.setdefault(trial.task, []).append(trial)
-    tallies = {task: tallied(found) for task, found in by_task.items()}
+    tallies = {task: tallied(jobs) for task, jobs in by_task.items()}
     return cost_bins_of(tallies, policy=policy, categories=categories)
 
 
@@ -76,9 +76,9 @@ def cost_bins_of(
     tallies: Mapping[str, Iterable[Tally]], *, policy: ScoringPolicy, categories: Mapping[str, str]
 ) -> dict[str, list[TokenBin]]:
     """The same from the tallies of each task."""
-    found: dict[str, list[NDArray[np.float64]]] = {}
-    for task, given in tallies.items():
-        counted = counted_tallies(given, policy=policy)
+    pairs_by_category: dict[str, list[NDArray[np.float64]]] = {}
+    for task, task_tallies in tallies.items():
+        counted = counted_tallies(task_tallies, policy=policy)
         if not counted:
             continue
         indicators = np.concatenate([tally.indicators for tally in counted])
@@ -87,8 +87,12 @@ def cost_bins_of(
         relative = indicators / top if top > 0 else np.zeros_like(indicators)
         used = tokens > 0
         pairs = np.stack([tokens[used], relative[used]], axis=1)
-        found.setdefault(categories.get(task, task), []).append(pairs)
-    return {category: _bins(parts) for category, parts in found.items() if any(map(len, parts))}
+        pairs_by_category.setdefault(categories.get(task, task), []).append(pairs)
+    return {
+        category: _bins(parts)
+        for category, parts in pairs_by_category.items()
+        if any(map(len, parts))
+    }
 
 
 def _bins(parts: Sequence[NDArray[np.float64]]) -> list[TokenBin]:

@@ -65,7 +65,7 @@ def published_rows() -> Mapping[str, Sequence[PublishedRow]]:
     for line in csv.DictReader(text.splitlines()):
         row = _row(line)
         rows.setdefault(row.task, []).append(row)
-    return MappingProxyType({task: tuple(found) for task, found in rows.items()})
+    return MappingProxyType({task: tuple(task_rows) for task, task_rows in rows.items()})
 
 
 @cache
@@ -88,7 +88,7 @@ def published_overall() -> tuple[Sequence[str], Ranking]:
 
 
 def _trials(row: PublishedRow) -> NDArray[np.float64]:
-    """What the counts tell of the trials: (N, 1) float64, 1 for a success."""
+    """The trials behind the counts: (N, 1) float64, 1 for a success."""
     return (np.arange(row.trials) < row.successes).astype(float)[:, None]
 
 

@@ -24,9 +24,9 @@ from buildarena_benchmark.statistics import (
 )
 
 MAX_CACHED_TESTS: Final = 256
-"""Tasks whose tests are kept: the present ones, and those of recent filters."""
+"""Tasks whose tests are cached: the present ones, and those of recent filters."""
 MAX_CACHED_PAIRS: Final = 100_000
-"""Tests of single pairs that are kept, and as many of before: some 200 bytes each."""
+"""Tests of single pairs that are cached, and as many older ones: some 200 bytes each."""
 
 PairTest = tuple[float, float, bool]
 """Evidence, p-value, and whether anything varies, as in `PairTests`."""
@@ -48,7 +48,7 @@ class Standings:
     """The standings of a board.
 
     Attributes:
-        tasks: By task, of those where anybody has counted trials.
+        tasks: By task, of those that have counted trials.
         overall: Over the ranked tasks, of those who have counted trials on all; None when nobody
             has.
     """
@@ -63,7 +63,7 @@ def standings(
     """Ranks configurations on each task and over the ranked ones.
 
     The tests of the ranked tasks and of the ranking over them are one family; each other task is
-    one by itself, so that whoever uploads a task takes no power from the others.
+    one by itself, so that an uploaded task takes no statistical power from the others.
 
     Args:
         cells: Cells by task and configuration.
@@ -75,12 +75,12 @@ def standings(
         for task, row in cells.items()
     }
     counted = {task: row for task, row in counted.items() if row}
-    found = {task: tests.of(list(row.values())) for task, row in counted.items()}
+    tested = {task: tests.of(list(row.values())) for task, row in counted.items()}
     over = [task for task in counted if ranked(task)]
     complete = [name for name in _names(counted, over) if all(name in counted[t] for t in over)]
-    together = _over_tasks(counted, found, over, complete) if complete else None
-    p_values = {task: adjusted([found[task]])[0] for task in counted if task not in over}
-    family = [found[task] for task in over]
+    together = _over_tasks(counted, tested, over, complete) if complete else None
+    p_values = {task: adjusted([tested[task]])[0] for task in counted if task not in over}
+    family = [tested[task] for task in over]
     overall = None
     if together is None:
         own = adjusted(family)
@@ -98,7 +98,7 @@ def standings(
         tasks={
             task: Standing(
                 names=list(row),
-                ranking=rank_models(_figures([list(row.values())]), found[task], p_values[task]),
+                ranking=rank_models(_figures([list(row.values())]), tested[task], p_values[task]),
             )
             for task, row in counted.items()
         },
@@ -121,19 +121,19 @@ class TestCache:
     def of(self, cells: Sequence[Cell]) -> PairTests:
         """The tests of all pairs of cells, in the order of `itertools.combinations`."""
         key = tuple(cell.figures_hash for cell in cells)
-        found = self._rows.get(key)
-        if found is None:
-            found = self._tested(cells)
+        row_tests = self._rows.get(key)
+        if row_tests is None:
+            row_tests = self._tested(cells)
             if len(self._rows) >= MAX_CACHED_TESTS:
                 self._rows.clear()
-            self._rows[key] = found
-        return found
+            self._rows[key] = row_tests
+        return row_tests
 
     def _tested(self, cells: Sequence[Cell]) -> PairTests:
         pairs = list(combinations(cells, 2))
         names = [(a.figures_hash, b.figures_hash) for a, b in pairs]
-        found = [self._known(name) for name in names]
-        missing = [place for place, test in enumerate(found) if test is None]
+        results = [self._known(name) for name in names]
+        missing = [place for place, test in enumerate(results) if test is None]
         made = pair_tests([(pairs[i][0].figures, pairs[i][1].figures) for i in missing])
         for place, *test in zip(
             missing,
@@ -142,9 +142,9 @@ class TestCache:
             made.informative.tolist(),
             strict=True,
         ):
-            found[place] = (test[0], test[1], test[2])
+            results[place] = (test[0], test[1], test[2])
             self._keep(names[place], (test[0], test[1], test[2]))
-        columns = np.array(found, float).reshape(-1, 3)
+        columns = np.array(results, float).reshape(-1, 3)
         return PairTests(
             z=columns[:, 0], p_value=columns[:, 1], informative=columns[:, 2].astype(bool)
         )
@@ -174,13 +174,13 @@ def _places(row: Row, complete: Sequence[str]) -> list[int]:
 
 def _over_tasks(
     counted: Mapping[str, Row],
-    found: Mapping[str, PairTests],
+    tested: Mapping[str, PairTests],
     over: Sequence[str],
     complete: Sequence[str],
 ) -> PairTests:
     chosen = []
     for task in over:
-        places, tests = _places(counted[task], complete), found[task]
+        places, tests = _places(counted[task], complete), tested[task]
         chosen.append(
             PairTests(
                 z=tests.z[places],

@@ -1,4 +1,4 @@
-"""Tallies: the trials of one cell, without their names, as far as figures are made of them."""
+"""Tallies: the trials of one cell without their names, reduced to what its figures need."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 UNKNOWN_TOKENS: Final = -1
-"""Stands in arrays for a number of tokens that nobody knows."""
+"""An unknown number of tokens, in arrays."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,8 +46,8 @@ class Tally:
         imported: Whether they came from another service's archive.
         unverified: Whether their figures were not found again here since.
         indicators: (N,) float64, of each trial.
-        costs_usd: (N,) float64, of each trial; not a number where nobody knows it.
-        output_tokens: (N,) int64, of each trial; -1 where nobody knows it.
+        costs_usd: (N,) float64, of each trial; not a number where unknown.
+        output_tokens: (N,) int64, of each trial; -1 where unknown.
         requests: Model requests.
         input_tokens: Tokens sent.
         parts: Parts of their machines.
@@ -94,7 +94,7 @@ def tallied(trials: Iterable[EndedJob]) -> list[Tally]:
     kinds: dict[Kind, list[EndedJob]] = {}
     for trial in trials:
         kinds.setdefault(_kind(trial), []).append(trial)
-    return [_tally(kind, found) for kind, found in kinds.items()]
+    return [_tally(kind, jobs) for kind, jobs in kinds.items()]
 
 
 def _kind(trial: EndedJob) -> Kind:

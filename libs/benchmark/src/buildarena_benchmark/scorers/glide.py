@@ -1,4 +1,4 @@
-"""Glide: how far a machine flies that is let go in the air, and how gently it lands."""
+"""Glide: how far a machine that is released in the air flies, and how gently it lands."""
 
 from typing import TYPE_CHECKING, Final, Literal
 
@@ -32,7 +32,7 @@ _LAST_SAMPLES: Final = 3
 
 
 class GlideScoring(Document):
-    """How far a machine that is let go in the air flies, and how gently it lands.
+    """How far a machine that is released in the air flies, and how gently it lands.
 
     Attributes:
         min_range: The horizontal distance to where it lands must exceed it, units.

@@ -81,7 +81,7 @@ def judge(
     rise = float(late.mean() - early.mean()) if len(early) and len(late) else 0.0
     indicator = float(highest.max())
     success = indicator > scoring.min_height and rise > scoring.min_rise
-    # Up to the top only: how a rocket falls apart when it comes down says nothing of its rise.
+    # Up to the top only: how a rocket falls apart when it comes down does not concern its rise.
     ratio, cannons = thrust_to_weight(machine, trajectory, joined, int(highest.argmax()) + 1)
     body = positions[:, starting_block(machine, trajectory)]
     sideways = np.linalg.norm(body[:, :2] - body[0, :2], axis=1)

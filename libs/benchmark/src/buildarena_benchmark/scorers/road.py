@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from buildarena_simulation import Trajectory
 
 _MOVING: Final = 0.5
-"""Slower machines stand, units/s: waiting makes no ride gentler."""
+"""Slower machines count as waiting, units/s: that makes no ride gentler."""
 
 _MOVING_SAMPLES: Final = 12
 """Speed is judged over so many samples, half a second."""
@@ -102,8 +102,8 @@ def judge(
     reach = np.zeros_like(ahead) if driven is None else driven
     counted = np.minimum(ahead, np.minimum(reach, moved_upright(trajectory, joined, path)))
     keeps, shift = _keeps_cargo(scoring, machine, trajectory, path)
-    kept = np.where(keeps, counted, 0.0)
-    distance, farthest = float(kept.max(initial=0.0)), int(kept.argmax())
+    distances = np.where(keeps, counted, 0.0)
+    distance, farthest = float(distances.max(initial=0.0)), int(distances.argmax())
     rms = _ride(scoring, trajectory, path, farthest)
     far = distance > scoring.min_distance
     flags = {

@@ -134,7 +134,7 @@ class Scorer:
 
 
 def undriven(scenario: Scenario) -> str | None:
-    """Why a machine that keys move cannot pass: nobody presses any."""
+    """Why a machine that is moved by keys cannot pass: no key is pressed."""
     if scenario.control.mode == "agent":
         return None
     return "nobody presses a key: scenario.control.mode must be agent"

@@ -72,7 +72,7 @@ def thrust_to_weight(
     Args:
         machine: The machine.
         trajectory: The trial.
-        joined: As `joined_to_start` says.
+        joined: As from `joined_to_start`.
         samples: How many samples a cannon must stay joined for.
     """
     settled = trajectory.heated[trajectory.time_s >= _WARM_UP_S]

@@ -71,7 +71,7 @@ def judge(
     """The indicator is the height held, times the cargo's mass.
 
     The height is the least of the cargo's heights above where it stood, over the best stretch of
-    time after all keys were let go in which it varies little, the machine is whole, bears the
+    time after all keys were released in which it varies little, the machine is whole, bears the
     cargo, and stands on the ground with it.
 
     Args:

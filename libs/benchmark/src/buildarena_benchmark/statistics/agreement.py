@@ -54,8 +54,8 @@ def agreement(
     values_1, values_2 = (np.array([v for _, v in side], float) for side in (first, second))
     varied = np.ptp(values_1) > 0 and np.ptp(values_2) > 0
     both = [
-        abs(one - other) <= NEAR * max(abs(one), abs(other))
-        for (good, one), (fine, other) in zip(first, second, strict=True)
+        abs(left - right) <= NEAR * max(abs(left), abs(right))
+        for (good, left), (fine, right) in zip(first, second, strict=True)
         if good and fine
     ]
     return Agreement(

@@ -89,10 +89,10 @@ def holm(p_values: Sequence[float]) -> list[float]:
     Source:
         S. Holm, Scand. J. Stat. 6 (1979) 65.
     """
-    given = np.asarray(p_values, float)
-    order = np.argsort(given, kind="stable")
-    steps = np.minimum(1.0, np.arange(len(given), 0, -1) * given[order])
-    adjusted = np.empty_like(given)
+    values = np.asarray(p_values, float)
+    order = np.argsort(values, kind="stable")
+    steps = np.minimum(1.0, np.arange(len(values), 0, -1) * values[order])
+    adjusted = np.empty_like(values)
     adjusted[order] = np.maximum.accumulate(steps) if len(steps) else steps
     return [float(p) for p in adjusted]
 

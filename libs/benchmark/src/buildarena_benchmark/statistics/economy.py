@@ -57,10 +57,10 @@ def token_bins(output_tokens: Floats, indicators: Floats, *, bins: int = 8) -> l
     edges = np.logspace(low, high, bins + 1) if high > low else np.array([tokens[0], tokens[0]])
     edges[0], edges[-1] = tokens.min(), tokens.max()
     place = np.clip(np.searchsorted(edges, tokens, side="right") - 1, 0, len(edges) - 2)
-    found = []
+    binned = []
     for number in range(len(edges) - 1):
         inside = performance[place == number]
-        found.append(
+        binned.append(
             TokenBin(
                 low=float(edges[number]),
                 high=float(edges[number + 1]),
@@ -69,14 +69,14 @@ def token_bins(output_tokens: Floats, indicators: Floats, *, bins: int = 8) -> l
                 median=float(np.median(inside)) if len(inside) else None,
             )
         )
-    return found
+    return binned
 
 
 def cost_per_success(costs_usd: Sequence[float | None], successes: int) -> float | None:
     """US dollars spent for each success, failures included.
 
     Args:
-        costs_usd: Cost of each trial; None where nobody knows it.
+        costs_usd: Cost of each trial; None where it is unknown.
         successes: How many of them succeeded.
 
     Returns:

@@ -63,15 +63,15 @@ def pair_tests(pairs: Sequence[tuple[Floats, Floats]]) -> PairTests:
         J. Robinson, J. R. Stat. Soc. B 44 (1982) 91; I. M. Skovgaard, J. Appl. Probab. 24 (1987)
         875; B. L. Welch, Biometrika 34 (1947) 28.
     """
-    found = np.zeros((3, len(pairs)))
+    results = np.zeros((3, len(pairs)))
     distinct: dict[int, _Sample] = {}
     samples = [tuple(_sample(side, distinct) for side in pair) for pair in pairs]
     for width, places in _by_width(samples).items():
         step = max(1, MAX_TABLE // width)
         for start in range(0, len(places), step):
             some = places[start : start + step]
-            found[:, some] = _tested([(samples[i][0], samples[i][1]) for i in some], width)
-    return PairTests(z=found[0], p_value=found[1], informative=found[2].astype(bool))
+            results[:, some] = _tested([(samples[i][0], samples[i][1]) for i in some], width)
+    return PairTests(z=results[0], p_value=results[1], informative=results[2].astype(bool))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,12 +100,12 @@ def _sample(trials: Floats, known: dict[int, _Sample]) -> _Sample:
 
 def _by_width(samples: Sequence[tuple[_Sample, ...]]) -> dict[int, list[int]]:
     """Places of pairs by the width of their table; a width follows from the pair alone."""
-    found: dict[int, list[int]] = {}
+    by_width: dict[int, list[int]] = {}
     for place, pair in enumerate(samples):
         length = max(1, sum(len(side.times) for side in pair))
         step = max(MIN_STEP, 1 << max(0, length.bit_length() - 4))
-        found.setdefault(-(-length // step) * step, []).append(place)
-    return found
+        by_width.setdefault(-(-length // step) * step, []).append(place)
+    return by_width
 
 
 def _tested(pairs: Sequence[tuple[_Sample, _Sample]], width: int) -> Floats:
@@ -151,12 +151,12 @@ class _Weights:
     def of(pairs: Sequence[tuple[_Sample, _Sample]], width: int) -> _Weights:
         figures = np.zeros((2, len(pairs), width))
         first, second = np.zeros((len(pairs), width)), np.zeros((len(pairs), width))
-        for number, (one, other) in enumerate(pairs):
-            middle, end = len(one.times), len(one.times) + len(other.times)
-            figures[:, number, :middle] = one.figures.T
-            figures[:, number, middle:end] = other.figures.T
-            first[number, :middle] = one.times
-            second[number, middle:end] = other.times
+        for number, (left, right) in enumerate(pairs):
+            middle, end = len(left.times), len(left.times) + len(right.times)
+            figures[:, number, :middle] = left.figures.T
+            figures[:, number, middle:end] = right.figures.T
+            first[number, :middle] = left.times
+            second[number, middle:end] = right.times
         times = first + second
         success, indicator = (_standardised(figure, times) for figure in figures)
         weight = _standardised(success + indicator, times)
@@ -237,9 +237,9 @@ def _saddlepoint(
     open_ = np.arange(len(weight))
     for _ in range(MAX_STEPS):
         own = shift[open_], tilt[open_]
-        found = _dealt(*own, weight, times)
-        missing = number[open_] - found.number, reached[open_] - found.reached
-        a, b, c = found.variance, found.products, found.squares
+        moments = _dealt(*own, weight, times)
+        missing = number[open_] - moments.number, reached[open_] - moments.reached
+        a, b, c = moments.variance, moments.products, moments.squares
         determinant = np.maximum(a * c - b * b, np.finfo(float).tiny)
         steps = (
             (c * missing[0] - b * missing[1]) / determinant,
@@ -309,6 +309,6 @@ def _welch(table: _Weights, total: Floats) -> Floats:
         squares = _sums((table.weight - mean[:, None]) ** 2, side)
         error += np.where(count > 1, squares / (np.maximum(count - 1, 1) * count), np.inf)
     with np.errstate(divide="ignore", invalid="ignore"):
-        found = np.abs(means[0] - means[1]) / np.sqrt(error)
-    statistic: Floats = np.nan_to_num(found, nan=0.0, posinf=np.inf)
+        ratio = np.abs(means[0] - means[1]) / np.sqrt(error)
+    statistic: Floats = np.nan_to_num(ratio, nan=0.0, posinf=np.inf)
     return statistic

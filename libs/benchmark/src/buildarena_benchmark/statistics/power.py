@@ -13,7 +13,7 @@ POWER: Final = 0.8
 def trials_needed(
     first: float, second: float, *, error: float = ERROR, power: float = POWER
 ) -> int | None:
-    """Trials of each model that are needed to tell two success rates apart; None if equal.
+    """Trials of each model that are needed to distinguish two success rates; None if equal.
 
     Source:
         J. Cohen, Statistical Power Analysis (1988), section 6.4: the difference of the rates'

@@ -18,7 +18,7 @@ def quantile(level: float = LEVEL) -> float:
 def exact_interval(
     successes: int, trials: int, level: float = LEVEL, *, at_least: int = 0
 ) -> tuple[float, float]:
-    """The Clopper-Pearson interval of a success rate: it covers at least as often as it says.
+    """The Clopper-Pearson interval of a success rate: it covers at least as often as its level.
 
     Args:
         successes: How many trials succeeded.
@@ -56,10 +56,10 @@ def _conditional_low(
     from scipy.special import betainc
 
     def excess(rate: float) -> float:
-        given = float(betainc(at_least, trials - at_least + 1, rate))
-        if given == 0.0:
+        any_success = float(betainc(at_least, trials - at_least + 1, rate))
+        if any_success == 0.0:
             return -tail
-        return float(betainc(successes, trials - successes + 1, rate)) / given - tail
+        return float(betainc(successes, trials - successes + 1, rate)) / any_success - tail
 
     return float(brentq(excess, 0.0, most)) if excess(most) > 0 else most
 

@@ -106,13 +106,13 @@ def adjusted(family: Sequence[PairTests]) -> list[Floats]:
     """P-values of all tests of a family, adjusted such that any false finding is unlikely."""
     sizes = [len(tests.p_value) for tests in family]
     p_values = holm([float(p) for tests in family for p in tests.p_value])
-    return [np.array(found) for found in _split(p_values, sizes)]
+    return [np.array(part) for part in _split(p_values, sizes)]
 
 
 def rank_models(
     figures: tuple[Floats, Floats], tests: PairTests, p_values: Floats, *, level: float = LEVEL
 ) -> Ranking:
-    """Ranks models by their figures, with what the tests of all pairs can tell apart.
+    """Ranks models by their figures, with ties where the tests of pairs show no difference.
 
     A model is better than another beyond chance when its mean rank is smaller, the evidence
     points the same way, and the adjusted p-value is at most the level's error.

@@ -1,8 +1,8 @@
 """The task file's format, as pydantic models.
 
 Whatever a task file may say is declared here, so that its schema, its errors and its hash all come
-from one place. A task may come from a stranger: what it says cannot make a trial long or large,
-and what nobody could ever pass is refused.
+from one place. A task may come from an untrusted user: it cannot make a trial long or large, and
+one that no machine can pass is refused.
 """
 
 import unicodedata
@@ -68,7 +68,7 @@ def _known_set(chosen: str) -> str:
 Weight = Annotated[int, Field(ge=1, le=3)]
 Text = Annotated[str, AfterValidator(_plain)]
 Word = Annotated[str, Field(pattern=r"^[\w .,/²³·%°-]+$", min_length=1, max_length=60)]
-"""Stands in tables, plots and TeX: no sign that means something there."""
+"""Text for tables, plots and TeX: without characters that have a meaning there."""
 ModuleName = Annotated[str, AfterValidator(_known_module)]
 ModuleSet = Annotated[str, AfterValidator(_known_set)]
 ModuleNames = Annotated[tuple[ModuleName, ...], Field(min_length=1, max_length=50)]
@@ -98,19 +98,20 @@ class Constraints(Document):
     modules: (
         Annotated[
             Annotated[ModuleSet, Tag("set")] | Annotated[ModuleNames, Tag("names")],
-            Discriminator(lambda given: "set" if isinstance(given, str) else "names"),
+            Discriminator(lambda value: "set" if isinstance(value, str) else "names"),
         ]
         | None
     ) = None
     module_list: Annotated[
-        Literal["inline", "on_demand"], BeforeValidator(lambda said: _FORMER_LISTS.get(said, said))
+        Literal["inline", "on_demand"],
+        BeforeValidator(lambda value: _FORMER_LISTS.get(value, value)),
     ] = "inline"
     min_modules: dict[ModuleName, Annotated[int, Field(ge=1, le=1000)]] = Field(default={})
     min_wheels: Count = 0
 
     @property
     def on_demand(self) -> bool:
-        """Whether builders look modules up by tools instead of being told them."""
+        """Whether builders look modules up by tools instead of reading them in the prompt."""
         return self.module_list == "on_demand"
 
     @property

@@ -1,7 +1,7 @@
-"""YAML texts that people write: read with care, and every mistake named with its line.
+"""YAML texts that people write, read with bounds; every mistake is reported with its line.
 
 Nothing in a text can make reading it costly: its size and depth are bounded, and anchors, aliases
-and merge keys, with which a few lines can stand for gigabytes, are refused.
+and merge keys, with which a few lines can expand to gigabytes, are refused.
 """
 
 import re
@@ -49,10 +49,10 @@ class Source:
         return self._located(path)[1]
 
     def issues(self, error: ValidationError, model: type[BaseModel]) -> tuple[ValidationIssue, ...]:
-        """What the schema says against the content, in words, with lines and valid choices."""
+        """The schema's objections to the content, in words, with lines and valid choices."""
         schema = model.model_json_schema()
-        found = [self._issue(item, schema) for item in error.errors(include_url=False)]
-        return tuple(dict.fromkeys(found))
+        issues = [self._issue(item, schema) for item in error.errors(include_url=False)]
+        return tuple(dict.fromkeys(issues))
 
     def _issue(self, item: ErrorDetails, schema: _Schema) -> ValidationIssue:
         field, line = self._located(item["loc"])
@@ -117,7 +117,7 @@ def read_source(text: str, *, origin: str, max_bytes: int = MAX_BYTES) -> Source
 
 
 def read_model(text: str, model: type[_Model], *, origin: str) -> _Model:
-    """What a YAML text says, as a model.
+    """The content of a YAML text, as a model.
 
     Raises:
         SourceError: It cannot be read, or is not what the model wants.
@@ -231,8 +231,8 @@ def _resolved(part: _Schema, schema: _Schema) -> _Schema:
     reference = part.get("$ref")
     if reference is None:
         return part
-    found: _Schema = schema["$defs"][reference.rsplit("/", 1)[1]]
-    return found
+    resolved: _Schema = schema["$defs"][reference.rsplit("/", 1)[1]]
+    return resolved
 
 
 def _tag(option: _Schema) -> str | None:

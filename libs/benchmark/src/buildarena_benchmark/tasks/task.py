@@ -26,7 +26,7 @@ class Task:
         title: One line for people.
         category: Group the task belongs to, such as "support".
         level: Difficulty within the category, from 1.
-        statement: Markdown that tells a builder all that is needed.
+        statement: Markdown with everything that a builder needs to know.
         constraints: What a machine may be made of.
         scenario: What a machine is put through.
         scoring: The scorer's name and thresholds.
@@ -57,7 +57,7 @@ class Task:
         return self.scenario.control.mode
 
     def as_document(self) -> Mapping[str, Any]:
-        """All that a task file says, defaults included, as JSON values."""
+        """All fields of a task file, defaults included, as JSON values."""
         return {
             "name": self.name,
             "title": self.title,

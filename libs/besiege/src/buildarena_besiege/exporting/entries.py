@@ -34,15 +34,15 @@ def block_entries(block: Block, keys: Mapping[str, Sequence[str]]) -> list[Entry
     lists = key_lists(module, keys)
     if module.kind == "start":
         return [("Integer", "bmt-version", 1), *lists]
-    given: list[Entry] = [
+    typed_entries: list[Entry] = [
         (kind, key, typed(kind, value)) for kind, key, value in module.besiege_data
     ]
-    before = [entry for entry in given if entry[1] in _BEFORE_KEYS]
-    after = [entry for entry in given if entry[1] not in _BEFORE_KEYS]
-    found = [*before, *lists, *after]
+    before = [entry for entry in typed_entries if entry[1] in _BEFORE_KEYS]
+    after = [entry for entry in typed_entries if entry[1] not in _BEFORE_KEYS]
+    entries = [*before, *lists, *after]
     if module.spins:
-        found.append(("Boolean", "flipped", block.flipped))
-    return found
+        entries.append(("Boolean", "flipped", block.flipped))
+    return entries
 
 
 def key_lists(module: Module, keys: Mapping[str, Sequence[str]]) -> list[Entry]:

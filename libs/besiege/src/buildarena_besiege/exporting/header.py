@@ -1,8 +1,8 @@
-"""What a script's first lines tell of the machine that its file's blocks cannot.
+"""The description of a machine in a script's first lines.
 
-A machine file names no block, tells nothing of faces and keeps no control sequence. Our scripts
-begin with a comment that holds all this as JSON, tied to the blocks by their guids and by a digest
-of their places, so that it is believed only as long as nobody has moved a block.
+A machine file has no names of blocks, no faces and no control sequence. Our scripts begin with a
+comment that holds all this as JSON, tied to the blocks by their guids and by a digest of their
+positions, so that it counts only as long as nobody has moved a block.
 """
 
 from __future__ import annotations
@@ -51,7 +51,8 @@ def header_lines(
         },
         "control_sequence": [[press.time_s, press.key, press.hold_for_s] for press in presses],
         "structures": [
-            [found.letter, found.source, found.root] for found in state.structures.values()
+            [structure.letter, structure.source, structure.root]
+            for structure in state.structures.values()
         ],
         "structures_made": state.structures_made,
         "next_id": state.next_id,
@@ -77,35 +78,35 @@ def places_digest(parts: Iterable[tuple[str, Vector, Quaternion]]) -> str:
 
 def _signed(rotation: Quaternion) -> tuple[float, ...]:
     """Of a rotation's two quaternions the one whose first component that shows is positive."""
-    first = next((one for one in rotation if round(one, _DIGITS)), 1.0)
-    return tuple(one if first > 0.0 else -one for one in rotation)
+    first = next((number for number in rotation if round(number, _DIGITS)), 1.0)
+    return tuple(number if first > 0.0 else -number for number in rotation)
 
 
 def _shown(numbers: tuple[float, ...]) -> str:
-    return " ".join(f"{round(one, _DIGITS) + 0.0:.{_DIGITS}f}" for one in numbers)
+    return " ".join(f"{round(number, _DIGITS) + 0.0:.{_DIGITS}f}" for number in numbers)
 
 
 def _part(part: Block | Connector, record: BlockRecord) -> dict[str, Any]:
-    found: dict[str, Any] = {"id": part.id}
+    common: dict[str, Any] = {"id": part.id}
     if part.structure:
-        found["structure"] = part.structure
+        common["structure"] = part.structure
     if part.note:
-        found["note"] = part.note
+        common["note"] = part.note
     if not isinstance(part, Block):
         pose = part.world_from_connector
         return {
-            **found,
+            **common,
             "start": list(part.start),
             "end": list(part.end),
             "pose": [*pose.xyz, *pose.wxyz],
             "span": list(part.span),
         }
     if part.mount is not None:
-        found["mount"] = list(part.mount)
+        common["mount"] = list(part.mount)
     if part.lost_mount is not None:
-        found["lost_mount"] = list(part.lost_mount)
+        common["lost_mount"] = list(part.lost_mount)
     written = {key: value for kind, key, value in record.entries if kind == "StringArray"}
     bound = [tuple(dict.fromkeys(keys)) for keys in part.bindings.values()]
     if sorted(bound) != sorted(value for value in written.values() if isinstance(value, tuple)):
-        found["bindings"] = {action: list(keys) for action, keys in part.bindings.items()}
-    return found
+        common["bindings"] = {action: list(keys) for action, keys in part.bindings.items()}
+    return common

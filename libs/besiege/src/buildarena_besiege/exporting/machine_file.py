@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 BSG_VERSION: Final = "1.4"
 INDENT: Final = "    "
 _NO_SCALE: Final = (1.0, 1.0, 1.0)
-_GUID_TRIES: Final = 100
+_GUID_ATTEMPTS: Final = 100
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,7 +97,7 @@ class Guids:
         Raises:
             ValueError: The source repeats itself.
         """
-        for _ in range(_GUID_TRIES):
+        for _ in range(_GUID_ATTEMPTS):
             guid = str(self._new())
             if guid[:8] not in self._used:
                 self._used.add(guid[:8])
@@ -127,7 +127,9 @@ def block_records(
         for part in parts_in_file_order(machine)
     ]
     if cargo is not None:
-        module = next(one for one in machine.catalogue.values() if one.besiege_id == CARGO)
+        module = next(
+            candidate for candidate in machine.catalogue.values() if candidate.besiege_id == CARGO
+        )
         records.append(_cargo_record(module, guids.draw(), cargo))
     _require_finite(records)
     return records

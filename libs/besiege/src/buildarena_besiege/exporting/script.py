@@ -44,8 +44,8 @@ class Reported:
 
     Attributes:
         reference: its reference key; "0" for the machine's first block.
-        burns: whether the script also tells if it burns.
-        cargo: whether it is the cargo, whose mass is told.
+        burns: whether the script also reports if it burns.
+        cargo: whether it is the cargo, whose mass is reported.
     """
 
     reference: str
@@ -91,7 +91,7 @@ def script_text(
     if cargo is not None:
         parts.append(_cargo(cargo, cargo_reference))
     if telling is not None:
-        parts += [_told(telling), _REPORT]
+        parts += [_telling_tables(telling), _REPORT]
     calls = ["  updates = updates + 1", "  move_keys()"]
     if cargo is not None:
         calls.insert(1, "  weigh()")
@@ -131,7 +131,7 @@ def _cargo(cargo: Cargo, reference: str) -> str:
     )
 
 
-def _told(telling: Telling) -> str:
+def _telling_tables(telling: Telling) -> str:
     rows = [
         f"  {{{_reference(block)}, {str(block.burns).lower()}, {str(block.cargo).lower()}}},"
         for block in telling.blocks

@@ -63,7 +63,7 @@ class Part:
         bindings: the keys of its actions.
         start: of a connector: where it begins, in its own frame, units.
         end: of a connector: where it ends, in its own frame, units.
-        end_rotation: of a connector: its end face's frame as the file has it; None if not told.
+        end_rotation: of a connector: its end face's frame as the file has it; None without one.
     """
 
     number: int
@@ -88,12 +88,14 @@ def part_of(block: FileBlock, catalogue: Catalogue, remarks: Remarks) -> Part | 
     Raises:
         MachineFileError: A number of it is not one.
     """
-    module = next((one for one in catalogue.values() if one.besiege_id == block.type), None)
+    module = next(
+        (candidate for candidate in catalogue.values() if candidate.besiege_id == block.type), None
+    )
     if module is None:
         remarks.add(f"block {block.number}: no module is of the game's type {block.type}: left out")
         return None
     where = f"block {block.number} ({module.name})"
-    scaled = any(abs(one - 1.0) > _SAME for one in block.scale)
+    scaled = any(abs(factor - 1.0) > _SAME for factor in block.scale)
     if module.kind == "cargo" or (module.besiege_id == CARGO and scaled):
         remarks.add(f"{where}: {CARGO_LEFT_OUT}")
         return None
@@ -120,16 +122,18 @@ def part_of(block: FileBlock, catalogue: Catalogue, remarks: Remarks) -> Part | 
 
 
 def _ends(block: FileBlock, where: str) -> dict[str, Vector]:
-    found: dict[str, Vector] = {}
+    ends: dict[str, Vector] = {}
     for entry in block.entries:
         if entry.key in _ENDS or (entry.key == "end-rotation" and len(entry.components) == 3):  # noqa: PLR2004
             if len(entry.components) != 3:  # noqa: PLR2004  x, y and z
                 raise MachineFileError(f"{where}: {entry.key} has no X, Y and Z")
-            x, y, z = (number_of(one, f"{where}: {entry.key}") for one in entry.components)
-            found[entry.key] = (x, y, z)
-    if "end-position" not in found:
+            x, y, z = (
+                number_of(component, f"{where}: {entry.key}") for component in entry.components
+            )
+            ends[entry.key] = (x, y, z)
+    if "end-position" not in ends:
         raise MachineFileError(f"{where}: it has no end-position")
-    return found
+    return ends
 
 
 def _bindings(block: FileBlock, module: Module) -> Iterator[tuple[str, tuple[str, ...]]]:
@@ -199,4 +203,4 @@ def _is(text: str, value: str | float | bool) -> bool:
 
 
 def _numbers(vector: Vector) -> str:
-    return " ".join(f"{one:g}" for one in vector)
+    return " ".join(f"{number:g}" for number in vector)

@@ -1,4 +1,4 @@
-"""Reads machine files (.bsg): our own back as they were, anybody's as far as they can be."""
+"""Reads machine files (.bsg): our own exactly, others' as far as they are understood."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class ImportedMachine:
     Attributes:
         machine: The machine.
         name: What the file calls it.
-        not_understood: What the file says that the machine does not hold, a sentence each.
+        not_understood: What the file has and the machine cannot hold, a sentence each.
     """
 
     machine: Machine
@@ -72,8 +72,8 @@ def read_machine_file(data: bytes, *, catalogue: Catalogue | None = None) -> Imp
     """
     file, remarks = parse_file(data), Remarks()
     header = _header(file, remarks)
-    found = [part_of(block, catalogue or module_set("all"), remarks) for block in file.blocks]
-    parts = _without_cargo([part for part in found if part is not None], header, remarks)
+    placed = [part_of(block, catalogue or module_set("all"), remarks) for block in file.blocks]
+    parts = _without_cargo([part for part in placed if part is not None], header, remarks)
     catalogue = catalogue or smallest_set({part.module.name for part in parts})
     if not any(part.module.kind == "start" for part in parts):
         raise MachineFileError("the file has no starting block (type 0)")
@@ -96,16 +96,16 @@ def _without_cargo(
     others = [part for part in parts if part.module.kind != "connector"]
     if not any(part.module.besiege_id == CARGO for part in others):
         return parts
-    told = None if header is None else header.get("parts")
-    if isinstance(told, dict):
-        loose = {part.number for part in others if part.guid not in told}
+    described = None if header is None else header.get("parts")
+    if isinstance(described, dict):
+        loose = {part.number for part in others if part.guid not in described}
     else:
         mounts = mounts_of(others, faces_of(others))
-        loose = {one.number for one, mount in zip(others, mounts, strict=True) if mount is None}
+        loose = {other.number for other, mount in zip(others, mounts, strict=True) if mount is None}
     for part in others:
         if part.module.besiege_id == CARGO and part.number in loose:
             remarks.add(f"{part.name}: {CARGO_LEFT_OUT}")
-            parts = [one for one in parts if one.number != part.number]
+            parts = [other for other in parts if other.number != part.number]
     return parts
 
 
@@ -119,7 +119,9 @@ def _header(file: FileMachine, remarks: Remarks) -> dict[str, Any] | None:
             remarks.add(f"the machine wants mods: {shown(' '.join((entry.text, *entry.items)))}")
         elif entry.key not in _OWN_DATA:
             remarks.add(f"the machine's data {shown(entry.key or entry.text)} is not understood")
-    script = next((one.text for one in file.entries if one.key == "lua_data"), "")
+    script = next(
+        (text_entry.text for text_entry in file.entries if text_entry.key == "lua_data"), ""
+    )
     try:
         header = header_of(script)
     except HeaderError as error:
@@ -226,7 +228,7 @@ class _Placed:
             "version": 1,
             "blocks": [self._block(i) for i in self._based_first()],
             "joints": [],
-            "connectors": [one for link in self._links for one in self._link(link)],
+            "connectors": [connector for link in self._links for connector in self._link(link)],
             "control_sequence": [],
             "structures": [
                 {"letter": self._letters[i], "source": f"part {self._letters[i]}", "root": root}
@@ -240,7 +242,8 @@ class _Placed:
             "log": [],
         }
         document["available"] = {
-            one["source"]: sub_document(document, one["letter"]) for one in document["structures"]
+            structure["source"]: sub_document(document, structure["letter"])
+            for structure in document["structures"]
         }
         return document
 
@@ -316,10 +319,10 @@ def _letters(mounts: Sequence[Seat | None], starts: int) -> list[str]:
     """The sub-structure of each block by the starting block it leads to; "" of a single machine."""
     if starts < 2:  # noqa: PLR2004  one machine has no sub-structures
         return [""] * len(mounts)
-    found = []
+    letters = []
     for i in range(len(mounts)):
         at = i
         while (mount := mounts[at]) is not None:
             at = mount[0]
-        found.append(sub_structure_letter(at if at < starts else 0))
-    return found
+        letters.append(sub_structure_letter(at if at < starts else 0))
+    return letters

@@ -1,6 +1,6 @@
-"""What our own scripts tell of the machine they play, read back and doubted.
+"""The description of a machine in our own scripts, read back and checked.
 
-Nothing in it is believed unless every word of it fits the blocks of the file.
+It is used only if all of it fits the blocks of the file.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def header_of(script: str) -> dict[str, Any] | None:
 
 def is_untouched(header: dict[str, Any], file: FileMachine) -> bool:
     """Whether the blocks are where they were when the script was written."""
-    places = ((one.guid, one.position, one.rotation) for one in file.blocks)
+    places = ((block.guid, block.position, block.rotation) for block in file.blocks)
     return bool(header.get("digest") == places_digest(places))
 
 
@@ -69,12 +69,16 @@ def described_machine(
         HeaderError: They do not fit, or are no sound machine.
     """
     try:
-        told = header["parts"]
-        by_id = {told[part.guid]["id"]: (part, told[part.guid]) for part in parts}
+        described = header["parts"]
+        by_id = {described[part.guid]["id"]: (part, described[part.guid]) for part in parts}
         order = header["order"]
-        if len(by_id) != len(parts) or sorted(order) != sorted(by_id) or len(told) != len(parts):
+        if (
+            len(by_id) != len(parts)
+            or sorted(order) != sorted(by_id)
+            or len(described) != len(parts)
+        ):
             raise HeaderError("it tells of other blocks than the file's")
-        entries = [_entry(*by_id[one]) for one in order]
+        entries = [_entry(*by_id[block_id]) for block_id in order]
         document = {
             "version": 1,
             "blocks": [entry for entry in entries if "span" not in entry],
@@ -106,8 +110,11 @@ def described_machine(
 def _check_ends(link: Connector, part: Part) -> None:
     """Refuses a description whose connectors join other places than the file's."""
     ends = (part.pose.point(part.start), part.pose.point(part.end))
-    told = (link.start_xyz, link.end_xyz)
-    if any(distance(one, other) > _SAME_PLACE for one, other in zip(ends, told, strict=True)):
+    described = (link.start_xyz, link.end_xyz)
+    if any(
+        distance(end, described_end) > _SAME_PLACE
+        for end, described_end in zip(ends, described, strict=True)
+    ):
         raise HeaderError(f"{link.module.name} {link.id} joins other faces in the file")
 
 
@@ -119,41 +126,41 @@ def presses_of(header: dict[str, Any]) -> list[dict[str, Any]]:
     ]
 
 
-def _entry(part: Part, told: dict[str, Any]) -> dict[str, Any]:
-    found: dict[str, Any] = {
-        "id": told["id"],
+def _entry(part: Part, described: dict[str, Any]) -> dict[str, Any]:
+    common: dict[str, Any] = {
+        "id": described["id"],
         "module": part.module.name,
         "position": list(part.pose.xyz),
         "quaternion": list(part.pose.wxyz),
-        "structure": told.get("structure", ""),
-        "note": told.get("note", ""),
+        "structure": described.get("structure", ""),
+        "note": described.get("note", ""),
     }
     if part.module.kind == "connector":
-        pose = told["pose"]
+        pose = described["pose"]
         return {
-            **found,
+            **common,
             "position": pose[:3],
             "quaternion": pose[3:],
-            "start": told["start"],
-            "end": told["end"],
-            "span": told["span"],
+            "start": described["start"],
+            "end": described["end"],
+            "span": described["span"],
         }
     return {
-        **found,
-        "mount": told.get("mount"),
-        "lost_mount": told.get("lost_mount"),
+        **common,
+        "mount": described.get("mount"),
+        "lost_mount": described.get("lost_mount"),
         "flipped": part.flipped,
-        "bindings": told.get(
+        "bindings": described.get(
             "bindings", {action: list(keys) for action, keys in part.bindings.items()}
         ),
     }
 
 
 def _sources(document: dict[str, Any]) -> dict[str, Any]:
-    """The machines an assembly was made of, as its sub-structures are now."""
+    """The machines an assembly was made of, each as its sub-structure is in the assembly."""
     return {
-        one["source"]: sub_document(document, one["letter"])
-        for one in reversed(document["structures"])
+        structure["source"]: sub_document(document, structure["letter"])
+        for structure in reversed(document["structures"])
     }
 
 
@@ -161,21 +168,21 @@ def sub_document(document: dict[str, Any], letter: str) -> dict[str, Any]:
     """A sub-structure as a machine of its own: its blocks with the ids they had there."""
     prefix = f"{letter}_"
 
-    def inside(one: dict[str, Any]) -> bool:
-        faces = [one[name] for name in ("mount", "start", "end") if one.get(name)]
-        return one["id"].startswith(prefix) and all(face[0].startswith(prefix) for face in faces)
+    def inside(entry: dict[str, Any]) -> bool:
+        faces = [entry[name] for name in ("mount", "start", "end") if entry.get(name)]
+        return entry["id"].startswith(prefix) and all(face[0].startswith(prefix) for face in faces)
 
-    def renamed(one: dict[str, Any]) -> dict[str, Any]:
+    def renamed(entry: dict[str, Any]) -> dict[str, Any]:
         faces = {
-            name: [one[name][0].removeprefix(prefix), one[name][1]]
+            name: [entry[name][0].removeprefix(prefix), entry[name][1]]
             for name in ("mount", "lost_mount", "start", "end")
-            if one.get(name)
+            if entry.get(name)
         }
-        return {**one, **faces, "id": one["id"].removeprefix(prefix), "structure": ""}
+        return {**entry, **faces, "id": entry["id"].removeprefix(prefix), "structure": ""}
 
-    blocks = [renamed(one) for one in document["blocks"] if inside(one)]
-    connectors = [renamed(one) for one in document["connectors"] if inside(one)]
-    numbers = [int(one["id"]) for one in (*blocks, *connectors) if one["id"].isdecimal()]
+    blocks = [renamed(entry) for entry in document["blocks"] if inside(entry)]
+    connectors = [renamed(entry) for entry in document["connectors"] if inside(entry)]
+    numbers = [int(entry["id"]) for entry in (*blocks, *connectors) if entry["id"].isdecimal()]
     return {
         **document,
         "blocks": blocks,

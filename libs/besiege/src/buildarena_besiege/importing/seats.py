@@ -1,4 +1,4 @@
-"""Which face each block sits on, and which faces a connector joins, as far as places tell."""
+"""Which face each block sits on, and which faces a connector joins, derived from positions."""
 
 from __future__ import annotations
 
@@ -142,7 +142,7 @@ def _same_rotation(link: Part, parts: Sequence[Part], seat: Seat) -> bool:
 
 def _half_angles(angles: Vector) -> tuple[float, float, float, float]:
     """The quaternion of ZYZ angles, so that angles that mean one rotation compare equal."""
-    first, tilt, last = (math.radians(one) / 2 for one in (angles[0] - 270.0, *angles[1:]))
+    first, tilt, last = (math.radians(angle) / 2 for angle in (angles[0] - 270.0, *angles[1:]))
     cosine, sine = math.cos(tilt), math.sin(tilt)
     return (
         cosine * math.cos(first + last),

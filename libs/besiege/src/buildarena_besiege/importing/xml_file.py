@@ -85,7 +85,7 @@ class FileBlock:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FileMachine:
-    """Everything a machine file says."""
+    """The content of a machine file."""
 
     name: str
     version: str
@@ -96,7 +96,7 @@ class FileMachine:
 
 
 def parse_file(data: bytes) -> FileMachine:
-    """What a machine file says.
+    """The content of a machine file.
 
     Raises:
         MachineFileError: It is no machine file, or breaks a bound.
@@ -104,7 +104,7 @@ def parse_file(data: bytes) -> FileMachine:
     root = _tree(data)
     if root.tag != "Machine":
         raise MachineFileError(f"the file's root is {shown(root.tag)}, not Machine")
-    blocks = [one for part in root.findall("Blocks") for one in part]
+    blocks = [block for part in root.findall("Blocks") for block in part]
     if not blocks:
         raise MachineFileError("the file has no blocks")
     if len(blocks) > MAX_PARTS:
@@ -116,8 +116,10 @@ def parse_file(data: bytes) -> FileMachine:
         version=root.get("bsgVersion", ""),
         rotation=NO_ROTATION if placed is None else _rotation(placed, "Global"),
         entries=_entries(root.find("Data"), "the machine's Data"),
-        blocks=tuple(_block(one, number) for number, one in enumerate(blocks, start=1)),
-        strays=tuple(dict.fromkeys(str(one.tag) for one in root if one.tag not in known)),
+        blocks=tuple(_block(block, number) for number, block in enumerate(blocks, start=1)),
+        strays=tuple(
+            dict.fromkeys(str(element.tag) for element in root if element.tag not in known)
+        ),
     )
 
 
@@ -191,18 +193,18 @@ def _block(element: Element, number: int) -> FileBlock:
 
 
 def _vector(place: Element, tag: str, where: str, default: Vector) -> Vector:
-    found = place.find(tag)
-    if found is None:
+    vector = place.find(tag)
+    if vector is None:
         return default
-    x, y, z = (number_of(found.get(axis, ""), f"{where}: {tag} {axis}") for axis in "xyz")
+    x, y, z = (number_of(vector.get(axis, ""), f"{where}: {tag} {axis}") for axis in "xyz")
     return (x, y, z)
 
 
 def _rotation(place: Element, where: str) -> Quaternion:
-    found = place.find("Rotation")
-    if found is None:
+    rotation = place.find("Rotation")
+    if rotation is None:
         return NO_ROTATION
-    w, x, y, z = (number_of(found.get(axis, ""), f"{where}: Rotation {axis}") for axis in "wxyz")
+    w, x, y, z = (number_of(rotation.get(axis, ""), f"{where}: Rotation {axis}") for axis in "wxyz")
     length = math.hypot(w, x, y, z)
     if length < SHORTEST_QUATERNION:
         raise MachineFileError(f"{where}: its Rotation has no length")
@@ -214,12 +216,12 @@ def _entries(data: Element | None, where: str) -> tuple[FileEntry, ...]:
         return ()
     if len(data) > MAX_ENTRIES:
         raise MachineFileError(f"{where}: {len(data)} entries; at most {MAX_ENTRIES} are read")
-    found = [_entry(one) for one in data]
+    entries = [_entry(element) for element in data]
     stray = (data.text or "").strip()
     # The published library writes its own "None" there by accident.
     if stray not in {"", "None"}:
-        found.append(FileEntry(kind="text", key="", text=stray))
-    return tuple(found)
+        entries.append(FileEntry(kind="text", key="", text=stray))
+    return tuple(entries)
 
 
 def _entry(element: Element) -> FileEntry:

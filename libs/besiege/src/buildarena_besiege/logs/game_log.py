@@ -24,8 +24,8 @@ _LONGEST_COMPLAINT: Final = 500
 
 
 def run_ids(text: str) -> tuple[str, ...]:
-    """The ids of the runs whose begin lines stand whole in a text, in their order."""
-    marks = dict.fromkeys(found[1] for found in _BEGINNINGS.finditer(text))
+    """The ids of the runs whose begin lines are complete in a text, in their order."""
+    marks = dict.fromkeys(match[1] for match in _BEGINNINGS.finditer(text))
     return tuple(
         run
         for run in map(unquote, marks)
@@ -50,7 +50,7 @@ class GameLog:
     def __init__(self, run_id: str) -> None:
         self.run_id = run_id
         self._prefix = marked(run_id)
-        # Lines may be glued together: each begins where the run's mark stands.
+        # Lines may be glued together: each begins at the run's mark.
         self._begins = re.compile(f"(?={re.escape(self._prefix)},)")
         self._lines: dict[str, Line] = {}
         self._complaints: dict[str, None] = {}
@@ -130,8 +130,8 @@ class GameLog:
         if self._prefix not in row:
             self._note_complaint(row)
             return
-        for piece in self._begins.split(row):
-            text = piece.strip(_AROUND)
+        for segment in self._begins.split(row):
+            text = segment.strip(_AROUND)
             if text in self._lines:
                 continue
             line = line_of(text, self._prefix)

@@ -36,7 +36,7 @@ _END: Final = re.compile(rf",e,({_NUMBER})", re.ASCII)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Entry:
-    """What a sample line says of one block.
+    """One block in a sample line.
 
     Attributes:
         state: as written.
@@ -53,11 +53,11 @@ class Line:
 
     Attributes:
         kind: "b", "s" or "e".
-        update: the script's update it tells of; 0 of a begin line.
+        update: the script's update that it reports; 0 of a begin line.
         part: which part of a sample, from 1; 0 elsewhere.
         parts: how many parts the sample has; 0 elsewhere.
         fields: of a begin line: version, key presses, digest.
-        entries: of a sample line: what it says of each block, by number.
+        entries: of a sample line: the entry of each block, by number.
         text: the whole line.
     """
 
@@ -71,7 +71,7 @@ class Line:
 
     @property
     def key(self) -> tuple[int, int, int]:
-        """What it tells of; lines of one key must be alike. Sorts into the order of printing."""
+        """What it reports; lines of one key must be alike. Sorts into the order of printing."""
         return ("bse".index(self.kind), self.update, self.part)
 
 
@@ -91,16 +91,16 @@ def line_of(text: str, prefix: str) -> Line | None:
 
 
 def _read(text: str, rest: str) -> Line | None:
-    if found := _SAMPLE.fullmatch(rest):
-        update, part, parts = (int(found[i]) for i in (1, 2, 3))
+    if match := _SAMPLE.fullmatch(rest):
+        update, part, parts = (int(match[i]) for i in (1, 2, 3))
         sound = 1 <= part <= parts and update > 0
-        entries = _entries(found[4])
+        entries = _entries(match[4])
         line = Line(kind="s", text=text, update=update, part=part, parts=parts, entries=entries)
         return line if sound else None
-    if found := _END.fullmatch(rest):
-        return Line(kind="e", text=text, update=int(found[1]))
-    found = _BEGIN.fullmatch(rest)
-    return found and Line(kind="b", text=text, fields=tuple(int(found[i]) for i in (1, 2, 3)))
+    if match := _END.fullmatch(rest):
+        return Line(kind="e", text=text, update=int(match[1]))
+    match = _BEGIN.fullmatch(rest)
+    return match and Line(kind="b", text=text, fields=tuple(int(match[i]) for i in (1, 2, 3)))
 
 
 def _entries(text: str) -> tuple[tuple[int, Entry], ...]:

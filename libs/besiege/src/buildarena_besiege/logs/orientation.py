@@ -1,7 +1,7 @@
 """How a machine is turned, from where its blocks are, and from their roots to their centres.
 
-The game tells where a block's root is, and not how it is turned. Blocks that hold together move as
-one, so three of them that are not in a line tell the machine's rotation.
+The game reports where a block's root is, and not how it is turned. Blocks that hold together move
+as one, so three of them that are not in a line determine the machine's rotation.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 MIN_WIDTH: Final = 0.5
-"""Blocks that lie nearer to one line tell no rotation about it, units (root of summed squares)."""
+"""Blocks nearer to one line than this give no rotation about it, units (root of summed squares)."""
 
 
 MAX_MISFIT: Final = 0.25
@@ -36,7 +36,9 @@ def placed_quaternions(machine: Machine, block_ids: tuple[str, ...], turn: Quate
         block_ids: (N,) the blocks.
         turn: (w, x, y, z) how the game turns the machine, our components.
     """
-    rows = [multiply(turn, machine.blocks[one].world_from_block.wxyz) for one in block_ids]
+    rows = [
+        multiply(turn, machine.blocks[block_id].world_from_block.wxyz) for block_id in block_ids
+    ]
     return np.array(rows, np.float64).reshape(len(block_ids), 4)
 
 
@@ -51,7 +53,7 @@ def machine_rotations(built: Floats, roots: Floats, joined: NDArray[np.bool_]) -
         joined: (T, N) which blocks still hold together.
 
     Returns:
-        None when the blocks tell no rotation at the start, or lie otherwise than they were put.
+        None when the blocks give no rotation at the start, or are not where they were put.
 
     Source: W. Kabsch, Acta Cryst. A32 (1976) 922.
     """
@@ -69,13 +71,13 @@ def machine_rotations(built: Floats, roots: Floats, joined: NDArray[np.bool_]) -
     left, _, right = np.linalg.svd(np.einsum("tni,tnj->tij", after[known], before[known]))
     mirrored = np.linalg.det(left @ right) < 0.0
     left[mirrored, :, 2] *= -1.0
-    found = np.tile(np.eye(3), (len(roots), 1, 1))
-    found[known] = left @ right
-    fit = after[0] - before[0] @ found[0].T
+    rotations = np.tile(np.eye(3), (len(roots), 1, 1))
+    rotations[known] = left @ right
+    fit = after[0] - before[0] @ rotations[0].T
     if np.sqrt((fit**2).sum() / counts[0]) > MAX_MISFIT:
         return None
     latest = np.maximum.accumulate(np.where(known, np.arange(len(known)), 0))
-    return np.asarray(found[latest])
+    return np.asarray(rotations[latest])
 
 
 def turned(rotations: Floats, placed: Floats) -> Floats:
@@ -102,16 +104,16 @@ def centers_of(
         roots: (T, N, 3) their roots, units.
         turns: (T, N, 4) world_from_block.
     """
-    own = np.array([machine.blocks[one].module.center for one in block_ids], np.float64)
+    own = np.array([machine.blocks[block_id].module.center for block_id in block_ids], np.float64)
     vectors = np.concatenate([np.zeros((len(own), 1)), own.reshape(-1, 3)], axis=1)[None]
     conjugate = turns * np.array([1.0, -1.0, -1.0, -1.0])
     return np.asarray(roots + _product(_product(turns, vectors), conjugate)[..., 1:])
 
 
-def _product(one: Floats, other: Floats) -> Floats:
+def _product(left: Floats, right: Floats) -> Floats:
     """Quaternions (w, x, y, z) multiplied, the right one turning first."""
-    a, b, c, d = np.moveaxis(one, -1, 0)
-    e, f, g, h = np.moveaxis(other, -1, 0)
+    a, b, c, d = np.moveaxis(left, -1, 0)
+    e, f, g, h = np.moveaxis(right, -1, 0)
     return np.stack(
         [
             a * e - b * f - c * g - d * h,

@@ -57,8 +57,8 @@ Row = tuple[str, ...]
 
 
 @dataclass(slots=True)
-class _Told:
-    """What the rows tell of one block: by time label the distinct values, in tenths of a second."""
+class _BlockLog:
+    """The rows of one block: distinct values by time label, in tenths of a second."""
 
     places: dict[int, dict[tuple[float, ...], None]] = field(
         default_factory=lambda: defaultdict(dict)
@@ -67,7 +67,7 @@ class _Told:
 
 
 def published_trajectory(csv_text: str, machine: Machine, scenario: Scenario) -> Trajectory:
-    """The trajectory that a log of the published runner tells.
+    """The trajectory in a log of the published runner.
 
     It may end a little before the scenario does. Blocks it does not report are not tracked.
 
@@ -77,28 +77,28 @@ def published_trajectory(csv_text: str, machine: Machine, scenario: Scenario) ->
         scenario: What it was put through.
 
     Raises:
-        LogIncompleteError: It has gaps, ends too early, or tells of something else.
+        LogIncompleteError: It has gaps, ends too early, or is of another machine.
     """
-    told, complaint = _read(csv_text)
-    ids = tuple(block for block in machine.blocks if block in told and told[block].places)
+    reported, complaint = _read(csv_text)
+    ids = tuple(block for block in machine.blocks if block in reported and reported[block].places)
     cargo = scenario.cargo
     names = [*ids, *([CARGO_ID] if cargo is not None else [])]
-    _require_told(told, names, complaint)
-    end_s = min(max(max(told[name].places) for name in names) / 10, scenario.duration_s)
+    _require_reported(reported, names, complaint)
+    end_s = min(max(max(reported[name].places) for name in names) / 10, scenario.duration_s)
     if end_s < scenario.duration_s - EARLY_END_S:
         raise LogIncompleteError(
             f"The log ends at {end_s:g} s of {scenario.duration_s:g} s.{complaint}"
         )
     instants = sample_instants(end_s)
-    series = {name: _series(told[name], name, instants, end_s) for name in names}
-    burning = [_burning(told[block], instants) for block in ids]
+    series = {name: _series(reported[name], name, instants, end_s) for name in names}
+    burning = [_burning(reported[block], instants) for block in ids]
     samples = Samples(
-        of_roots=False,  # the published evaluation judges the heights as they are told
+        of_roots=False,  # the published evaluation judges the heights as they are logged
         block_ids=ids,
         positions=stacked([series[block][0] for block in ids], (len(instants), 0, 3)),
         burning=np.array(burning, dtype=bool).reshape(len(ids), len(instants)).T,
         cargo=None if cargo is None else series[CARGO_ID][0],
-        mass=None if cargo is None else _mass(told[CARGO_ID], cargo, instants),
+        mass=None if cargo is None else _mass(reported[CARGO_ID], cargo, instants),
         settings={
             "effective_key_presses": effective_presses(
                 [block.bindings for block in machine.blocks.values()], machine.control_sequence
@@ -106,25 +106,27 @@ def published_trajectory(csv_text: str, machine: Machine, scenario: Scenario) ->
             "longest_gap_s": round(max(gap for _, gap in series.values()), 6),
             "ends_at_s": end_s,
             "lag": "not told by the log",
-            "blocks_not_ours": len(set(told) - set(machine.blocks) - {CARGO_ID}),
+            "blocks_not_ours": len(set(reported) - set(machine.blocks) - {CARGO_ID}),
             "log": hashlib.sha256(csv_text.encode("utf-8", "replace")).hexdigest()[:16],
         },
     )
     return made_trajectory(samples, machine, scenario, version="published")
 
 
-def _require_told(told: dict[str, _Told], names: Sequence[str], complaint: str) -> None:
+def _require_reported(reported: dict[str, _BlockLog], names: Sequence[str], complaint: str) -> None:
     if not names:
         raise LogIncompleteError(f"The log tells nothing of any block of this machine.{complaint}")
     for name in names:
-        if name not in told or not told[name].places:
+        if name not in reported or not reported[name].places:
             raise LogIncompleteError(f"The log tells nothing of {_called(name)}.{complaint}")
-        _require_one_run(told[name], name)
+        _require_one_run(reported[name], name)
 
 
-def _series(told: _Told, name: str, instants: Floats, end_s: float) -> tuple[Floats, float]:
+def _series(
+    block_log: _BlockLog, name: str, instants: Floats, end_s: float
+) -> tuple[Floats, float]:
     """A block's positions at the trajectory's instants, and the longest gap, seconds."""
-    time_s, values = _places(told)
+    time_s, values = _places(block_log)
     gap = require_no_gap(
         time_s, name=_called(name), longest_s=LONGEST_GAP_S, first_s=0.0, last_s=end_s
     )
@@ -136,22 +138,22 @@ def looks_published(text: str) -> bool:
     return any(_is_sound(row) for row in _rows(text))
 
 
-def _read(text: str) -> tuple[dict[str, _Told], str]:
-    """What is told of each block, and a sentence about a Lua error among the rows."""
+def _read(text: str) -> tuple[dict[str, _BlockLog], str]:
+    """The rows of each block, and a sentence about a Lua error among them."""
     rows = list(_rows(text))
-    told: dict[str, _Told] = defaultdict(_Told)
+    reported: dict[str, _BlockLog] = defaultdict(_BlockLog)
     for label, *fields in _trusted([row for row in rows if _is_sound(row)]):
-        found = _NAME.fullmatch(fields[0])
-        if found is None:
+        match = _NAME.fullmatch(fields[0])
+        if match is None:
             continue
         time = round(float(label) * 10)
         if len(fields) == _PLACE_FIELDS - 1:
-            told[found[1]].places[time][tuple(map(float, fields[1:]))] = None
+            reported[match[1]].places[time][tuple(map(float, fields[1:]))] = None
         else:
-            told[found[1]].states[time][fields[1]] = None
+            reported[match[1]].states[time][fields[1]] = None
     errors = [row for row in rows if "lua" in ",".join(row).lower()]
     complaint = f" It speaks of an error: {', '.join(errors[0])[:200]!r}." if errors else ""
-    return told, complaint
+    return reported, complaint
 
 
 def _rows(text: str) -> Iterator[Row]:
@@ -187,71 +189,71 @@ def _trusted(rows: Sequence[Row]) -> Iterator[Row]:
         if later > earlier:
             edges |= {i, i + 1}
     inside = {row for i, row in enumerate(rows) if i not in edges}
-    # A run's very first and last samples stand at edges alone: they are kept where they fit in.
+    # A run's very first and last samples appear only at edges: they are kept where they fit in.
     least, most = min(times), max(times)
     for i, row in enumerate(rows):
         if i not in edges or row in inside or times[i] in {least, most}:
             yield row
 
 
-def _require_one_run(told: _Told, name: str) -> None:
-    for label, places in told.places.items():
+def _require_one_run(block_log: _BlockLog, name: str) -> None:
+    for label, places in block_log.places.items():
         if len(places) > _SAMPLES_A_LABEL:
             raise LogIncompleteError(
                 f"At {label / 10:g} s the log has {len(places)} different positions of "
                 f"{_called(name)}; one run prints at most {_SAMPLES_A_LABEL}."
             )
-    if _jumps(told) > _JUMPING_SHARE:
+    if _jumps(block_log) > _JUMPING_SHARE:
         raise LogIncompleteError(
             f"{_called(name).capitalize()} is at different positions at the same times: the log "
             "is of several runs."
         )
 
 
-def _jumps(told: _Told) -> float:
+def _jumps(block_log: _BlockLog) -> float:
     """The share of time labels within which a block moves more than from label to label."""
-    _, means = _places(told)
+    _, means = _places(block_log)
     spreads = np.array(
-        [np.ptp(list(told.places[label]), axis=0).max() for label in sorted(told.places)]
+        [np.ptp(list(block_log.places[label]), axis=0).max() for label in sorted(block_log.places)]
     )
     steps = np.abs(np.diff(means, axis=0)).max(axis=1) if len(means) > 1 else np.zeros(0)
     around = np.maximum(np.append(steps, 0.0), np.append(0.0, steps))
     return float((spreads > 2 * around + 4 * _GRAIN).mean())
 
 
-def _places(told: _Told) -> tuple[Floats, Floats]:
+def _places(block_log: _BlockLog) -> tuple[Floats, Floats]:
     """Times and mean positions of a block, in order of time."""
-    labels = sorted(told.places)
-    means = [np.mean(list(told.places[label]), axis=0) for label in labels]
+    labels = sorted(block_log.places)
+    means = [np.mean(list(block_log.places[label]), axis=0) for label in labels]
     return np.array(labels) / 10, np.array(means)
 
 
-def _burning(told: _Told, instants: Floats) -> NDArray[np.bool_]:
+def _burning(block_log: _BlockLog, instants: Floats) -> NDArray[np.bool_]:
     labels = sorted(
-        label for label, states in told.states.items() if states.keys() & {"true", "false"}
+        label for label, states in block_log.states.items() if states.keys() & {"true", "false"}
     )
     if not labels:
         return np.zeros(len(instants), dtype=bool)
-    burns = np.array(["true" in told.states[label] for label in labels])
+    burns = np.array(["true" in block_log.states[label] for label in labels])
     return latest(instants, np.array(labels) / 10, burns)
 
 
-def _mass(told: _Told, cargo: Cargo, instants: Floats) -> Floats:
+def _mass(cargo_log: _BlockLog, cargo: Cargo, instants: Floats) -> Floats:
     """(T,) the cargo's mass, of the rows that the scenario's ramp explains."""
     masses: dict[int, float] = {}
-    for label, states in told.states.items():
+    for label, states in cargo_log.states.items():
         time_s = label / 10
         low, high = (
             cargo.mass_at(max(time_s + side * _HALF_LABEL_S, 0.0)) + side * _GRAIN
             for side in (-1.0, 1.0)
         )
-        found = [
-            float(one)
-            for one in states
-            if _NUMBER.fullmatch(one) and min(low, high) <= float(one) <= max(low, high)
+        masses_of_label = [
+            float(state)
+            for state in states
+            if _NUMBER.fullmatch(state) and min(low, high) <= float(state) <= max(low, high)
         ]
-        if found:
-            masses[label] = sum(found) / len(found)
+        if masses_of_label:
+            masses[label] = sum(masses_of_label) / len(masses_of_label)
     labels = sorted(masses)
     if not labels:
         raise LogIncompleteError(

@@ -1,7 +1,7 @@
 """The log of a headless game: BesiegeField's GameStat lines on its standard output.
 
-Each line tells of all blocks in the order of the machine file, every 0.2 s. It holds no time, no
-run and no check sum, so its lines are taken in the order they come, each once.
+Each line has all blocks in the order of the machine file, every 0.2 s. It has no time, no run and
+no check sum, so the lines are taken in the order they come, each once.
 """
 
 from __future__ import annotations
@@ -44,12 +44,12 @@ Row = tuple[tuple[str, tuple[float, ...]], ...]
 
 
 class StateLog:
-    """What the game's standard output said of one run, piece by piece.
+    """The game's standard output about one run, read bit by bit.
 
     Reading begins with the first start of a simulation and stops with its end.
 
     Args:
-        run_id: The run's id; the lines themselves do not tell it.
+        run_id: The run's id, which the lines themselves do not have.
     """
 
     def __init__(self, run_id: str) -> None:
@@ -94,13 +94,13 @@ class StateLog:
     def trajectory(
         self, machine: Machine, scenario: Scenario, *, game: str, mod: str
     ) -> Trajectory:
-        """The trajectory that the log tells; see `trajectory_of`.
+        """The trajectory in the log; see `trajectory_of`.
 
-        The mass of a cargo is not told: it does not change in a game without a script. Nothing
-        tells whether cannons burn.
+        The mass of a cargo is not reported: it does not change in a game without a script. Whether
+        cannons burn is not reported either.
 
         Raises:
-            LogIncompleteError: Lines are missing, or tell of another machine.
+            LogIncompleteError: Lines are missing, or are of another machine.
         """
         if not self.begun:
             raise LogIncompleteError("The log does not tell of a simulation's start.")
@@ -113,7 +113,7 @@ class StateLog:
         order += [CARGO_ID] if scenario.cargo is not None else []
         rows = self._rows[:expected]
         _require_blocks(rows, len(order))
-        values = np.array([[one[1] for one in row] for row in rows], np.float64)
+        values = np.array([[entry[1] for entry in row] for row in rows], np.float64)
         time_s = np.arange(len(rows), dtype=np.float64) * INTERVAL_S
         instants = sample_instants(float(time_s[-1]))
         ids = tracked_blocks(machine, scenario)
@@ -122,14 +122,17 @@ class StateLog:
         samples = Samples(
             block_ids=ids,
             positions=stacked(
-                [resampled(instants, time_s, of_block[one][:, :3]) for one in ids],
+                [resampled(instants, time_s, of_block[block_id][:, :3]) for block_id in ids],
                 (len(instants), 0, 3),
             ),
             burning=np.zeros((len(instants), len(ids)), dtype=bool),
             cargo=None if cargo is None else resampled(instants, time_s, of_block[CARGO_ID][:, :3]),
             mass=None if cargo is None else np.full(len(instants), cargo.initial_mass),
             quaternions=stacked(
-                [_turns(machine.blocks[one].module, of_block[one], instants) for one in ids],
+                [
+                    _turns(machine.blocks[block_id].module, of_block[block_id], instants)
+                    for block_id in ids
+                ],
                 (len(instants), 0, 4),
             ),
             settings={
@@ -157,8 +160,8 @@ class StateLog:
                 self.begun = True
                 self._lines.append(line)
             return
-        if found := _STAT.search(line):
-            row = _row(found[1])
+        if match := _STAT.search(line):
+            row = _row(match[1])
             if row is not None:
                 self._rows.append(row)
                 self._lines.append(line)
@@ -171,20 +174,20 @@ class StateLog:
 
 
 def _row(text: str) -> Row | None:
-    """What a GameStat message tells; None if it is damaged. Goals are no blocks."""
-    found = []
+    """The blocks of a GameStat message; None if it is damaged. Goals are not blocks."""
+    blocks = []
     for part in text.strip().strip("|").split("|"):
         name, _, numbers = part.partition(":")
         if name.startswith("GOAL_"):
             continue
         try:
-            values = tuple(float(one) for one in numbers.split(","))
+            values = tuple(float(number) for number in numbers.split(","))
         except ValueError:
             return None
         if len(values) != _VALUES or not all(map(math.isfinite, values)):
             return None
-        found.append((name, values))
-    return tuple(found) or None
+        blocks.append((name, values))
+    return tuple(blocks) or None
 
 
 def _require_blocks(rows: list[Row], count: int) -> None:

@@ -54,15 +54,15 @@ JOINED_DRIFT: Final = 1.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Samples:
-    """Everything a log told, on the trajectory's own instants.
+    """All values in a log, at the trajectory's own instants.
 
     Attributes:
         block_ids: (N,) the tracked blocks.
         positions: (T, N, 3) Besiege's components, units.
-        burning: (T, N) bool; False where not told.
+        burning: (T, N) bool; False where not reported.
         cargo: (T, 3) Besiege's components, units; None without cargo.
         mass: (T,) the cargo's; None without cargo.
-        quaternions: (T, N, 4) world_from_block, where the log tells them.
+        quaternions: (T, N, 4) world_from_block, if the log has them.
         of_roots: Whether positions are those of the blocks' roots; otherwise of their centres.
     """
 
@@ -79,7 +79,7 @@ class Samples:
 def trajectory_of(
     log: GameLog, machine: Machine, scenario: Scenario, *, game: str, mod: str
 ) -> Trajectory:
-    """The trajectory that a run's log tells.
+    """The trajectory in a run's log.
 
     Args:
         log: The run's log.
@@ -94,14 +94,14 @@ def trajectory_of(
     tracked = tracked_blocks(machine, scenario)
     presses = _require_whole(log, machine, scenario, tracked)
     count = len(tracked) + (scenario.cargo is not None)
-    told = _told(log, scenario, count)
-    known = ~np.isnan(told[:, :, 0]) if count else np.ones((len(told), 0), dtype=bool)
-    filled, longest = _filled(told, known, _names(tracked, scenario))
+    reported = _log_samples(log, scenario, count)
+    known = ~np.isnan(reported[:, :, 0]) if count else np.ones((len(reported), 0), dtype=bool)
+    filled, longest = _filled(reported, known, _names(tracked, scenario))
     positions = filled[:, : len(tracked), 1:4]
     samples = Samples(
         block_ids=tracked,
         positions=positions,
-        burning=_latest(told[:, : len(tracked), 4], known[:, : len(tracked)]) > 0.0,
+        burning=_latest(reported[:, : len(tracked), 4], known[:, : len(tracked)]) > 0.0,
         cargo=filled[:, -1, 1:4] if scenario.cargo is not None else None,
         mass=filled[:, -1, 4] if scenario.cargo is not None else None,
         settings={
@@ -121,10 +121,10 @@ def made_trajectory(
 ) -> Trajectory:
     """The trajectory of samples that are complete.
 
-    The game tells where blocks' roots are; a cargo stands upright as far as is known.
+    The game reports where blocks' roots are; a cargo is taken to be upright.
 
     Args:
-        samples: What was told.
+        samples: What was reported.
         machine: The machine.
         scenario: What it was put through.
         version: Of game and mod.
@@ -175,7 +175,7 @@ def made_trajectory(
 def pieces_of(
     machine: Machine, block_ids: tuple[str, ...], positions: NDArray[np.float64]
 ) -> NDArray[np.int16] | None:
-    """(T, N) which piece each tracked block belongs to, as far as distances tell.
+    """(T, N) which piece each tracked block belongs to, as far as distances show.
 
     From the moment its distance from the first starting block differs by more than `JOINED_DRIFT`
     from that at the start, a block is a piece of its own.
@@ -189,7 +189,9 @@ def pieces_of(
         None if no starting block is tracked.
     """
     order = {block: number for number, block in enumerate(machine.blocks)}
-    starts = [i for i, one in enumerate(block_ids) if machine.blocks[one].module.kind == "start"]
+    starts = [
+        i for i, block_id in enumerate(block_ids) if machine.blocks[block_id].module.kind == "start"
+    ]
     if not starts:
         return None
     first = min(starts, key=lambda i: order[block_ids[i]])
@@ -227,23 +229,23 @@ def _require_whole(
     return presses
 
 
-def _told(log: GameLog, scenario: Scenario, count: int) -> NDArray[np.float64]:
-    """(T, count, 5) what the log tells: 1, position and state; NaN where it tells nothing."""
-    told = np.full((scenario.sample_count, count, 5), np.nan)
+def _log_samples(log: GameLog, scenario: Scenario, count: int) -> NDArray[np.float64]:
+    """(T, count, 5) the log's values: 1, position and state; NaN where it has none."""
+    reported = np.full((scenario.sample_count, count, 5), np.nan)
     parts = max(-(-count // BLOCKS_PER_LINE), 1)
     for line in log.lines:
         if line.kind != "s":
             continue
         row, rest = divmod(line.update, SAMPLE_EVERY)
-        if rest or row >= len(told) or line.parts != parts or not _fits(line, count):
+        if rest or row >= len(reported) or line.parts != parts or not _fits(line, count):
             raise LogIncompleteError(
                 f"The line of {line.update / UPDATES_PER_S:.2f} s tells of other blocks or moments "
                 "than this machine's."
             )
         for number, entry in line.entries:
             state = 0.0 if entry.state == "-" else float(entry.state)
-            told[row, number - 1] = (1.0, *entry.position, state)
-    return told
+            reported[row, number - 1] = (1.0, *entry.position, state)
+    return reported
 
 
 def _fits(line: Line, count: int) -> bool:
@@ -253,18 +255,18 @@ def _fits(line: Line, count: int) -> bool:
 
 
 def _filled(
-    told: NDArray[np.float64], known: NDArray[np.bool_], names: list[str]
+    reported: NDArray[np.float64], known: NDArray[np.bool_], names: list[str]
 ) -> tuple[NDArray[np.float64], int]:
-    """What was told with its short gaps filled, and the longest gap in samples."""
-    filled, longest = told.copy(), 0
-    rows = np.arange(len(told))
+    """The reported values with short gaps filled, and the longest gap in samples."""
+    filled, longest = reported.copy(), 0
+    rows = np.arange(len(reported))
     most = round(LONGEST_GAP_S * SAMPLE_RATE_HZ)
     for column, name in enumerate(names):
         seen = np.flatnonzero(known[:, column])
         if not len(seen):
             raise LogIncompleteError(f"The log tells nothing of {name}.")
-        # Nothing is told of the start itself: the first sample is one interval later.
-        bounds = np.concatenate([[0], seen, [len(told) - 1]])
+        # Nothing is reported of the start itself: the first sample is one interval later.
+        bounds = np.concatenate([[0], seen, [len(reported) - 1]])
         gaps = np.diff(bounds)
         worst = int(gaps.argmax())
         longest = max(longest, int(gaps[worst]))
@@ -274,20 +276,20 @@ def _filled(
                 f"Between {start:.2f} s and {end:.2f} s nothing is told of {name}; "
                 f"gaps of up to {LONGEST_GAP_S:g} s are filled."
             )
-        for component in range(1, told.shape[2]):
-            filled[:, column, component] = np.interp(rows, seen, told[seen, column, component])
+        for component in range(1, reported.shape[2]):
+            filled[:, column, component] = np.interp(rows, seen, reported[seen, column, component])
     return filled, longest
 
 
 def _latest(values: NDArray[np.float64], known: NDArray[np.bool_]) -> NDArray[np.float64]:
     """Each column's values, where not known the last known one, or the first."""
-    found = np.zeros(values.shape)
+    latest = np.zeros(values.shape)
     rows = np.arange(len(values))
     for column in range(values.shape[1]):
         seen = np.flatnonzero(known[:, column])
         at = seen[np.maximum(np.searchsorted(seen, rows, side="right") - 1, 0)]
-        found[:, column] = values[at, column]
-    return found
+        latest[:, column] = values[at, column]
+    return latest
 
 
 def _names(tracked: tuple[str, ...], scenario: Scenario) -> list[str]:
@@ -302,18 +304,18 @@ def _poses(
     pieces: NDArray[np.int16] | None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], str]:
     """(T, N, 3) centres, (T, N, 4) quaternions, and where the latter come from."""
-    ids, told = samples.block_ids, _ours(samples.positions)
+    ids, places = samples.block_ids, _ours(samples.positions)
     placed = placed_quaternions(machine, ids, turn)
     quaternions, source = samples.quaternions, "the log"
     if quaternions is None:
-        rotations = None if pieces is None else _rotations(machine, ids, turn, told, pieces)
+        rotations = None if pieces is None else _rotations(machine, ids, turn, places, pieces)
         if rotations is None:
-            quaternions, source = np.repeat(placed[None], len(told), axis=0), "as placed"
+            quaternions, source = np.repeat(placed[None], len(places), axis=0), "as placed"
         else:
             quaternions, source = turned(rotations, placed), "fitted to the blocks' places"
     if not samples.of_roots:
-        return told, quaternions, source
-    return centers_of(machine, ids, told, quaternions), quaternions, source
+        return places, quaternions, source
+    return centers_of(machine, ids, places, quaternions), quaternions, source
 
 
 def _rotations(
@@ -323,9 +325,11 @@ def _rotations(
     roots: NDArray[np.float64],
     pieces: NDArray[np.int16],
 ) -> NDArray[np.float64] | None:
-    """(T, 3, 3) how the machine is turned; None if its tracked blocks do not tell."""
+    """(T, 3, 3) how the machine is turned; None if its tracked blocks do not show it."""
     pose = Pose(quaternion=turn)
-    built = np.array([pose.point(machine.blocks[one].world_from_block.xyz) for one in block_ids])
+    built = np.array(
+        [pose.point(machine.blocks[block_id].world_from_block.xyz) for block_id in block_ids]
+    )
     own = list(machine.blocks).index
     start = next(i for i in block_ids if machine.blocks[i].module.kind == "start")
     return machine_rotations(built.reshape(-1, 3), roots, pieces == own(start))

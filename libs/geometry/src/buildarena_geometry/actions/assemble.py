@@ -81,9 +81,9 @@ def shift_machine(state: MachineState, machine_index: Name, position: Triple) ->
         machine_index: Letter of the sub-structure, such as "A".
         position: How far to move it [east, north, up].
     """
-    found = structure(state, machine_index)
+    moving = structure(state, machine_index)
     how = f"shifted by {point(position)}"
-    return _motion(state, found, Pose(position=position), how, turned=False)
+    return _motion(state, moving, Pose(position=position), how, turned=False)
 
 
 def rotate_machine(state: MachineState, machine_index: Name, rotation: Triple) -> Change:
@@ -94,10 +94,10 @@ def rotate_machine(state: MachineState, machine_index: Name, rotation: Triple) -
         rotation: [yaw, pitch, roll] in degrees: yaw turns north to east, pitch north down, roll up
             to east.
     """
-    found = structure(state, machine_index)
-    center = state.blocks[found.root].center_xyz
+    moving = structure(state, machine_index)
+    center = state.blocks[moving.root].center_xyz
     motion = turn_about(center, turned(rotation))
-    return _motion(state, found, motion, f"rotated by {point(rotation)}", turned=True)
+    return _motion(state, moving, motion, f"rotated by {point(rotation)}", turned=True)
 
 
 def remove_machine(state: MachineState, machine_index: Name) -> Change:
@@ -106,38 +106,40 @@ def remove_machine(state: MachineState, machine_index: Name) -> Change:
     Args:
         machine_index: Letter of the sub-structure, such as "A".
     """
-    found = structure(state, machine_index)
-    gone = state.members(found.letter)
+    removed = structure(state, machine_index)
+    gone = state.members(removed.letter)
     remaining, links = without(state, gone)
-    kept = {letter: other for letter, other in state.structures.items() if letter != found.letter}
-    after = replace(remaining, structures=kept)
+    others = {
+        letter: other for letter, other in state.structures.items() if letter != removed.letter
+    }
+    after = replace(remaining, structures=others)
     return Change(
         after=after,
         removed=(*(block.id for block in gone), *links),
         render=lambda: " ".join(
-            [f"Removed sub-structure {found.letter}.", *removal_sentences(state, after, links)]
+            [f"Removed sub-structure {removed.letter}.", *removal_sentences(state, after, links)]
         ),
     )
 
 
 def _motion(
-    state: MachineState, found: SubStructure, motion: Pose, how: str, *, turned: bool
+    state: MachineState, moving: SubStructure, motion: Pose, how: str, *, turned: bool
 ) -> Change:
-    members = state.members(found.letter)
+    members = state.members(moving.letter)
     moved = [replace(block, world_from_block=motion @ block.world_from_block) for block in members]
     ids = tuple(block.id for block in moved)
     after = state.with_blocks(*moved)
     connectors = {
-        key: moved_connector(link, motion) if link.structure == found.letter else link
+        key: moved_connector(link, motion) if link.structure == moving.letter else link
         for key, link in after.connectors.items()
     }
     after = replace(after, connectors=connectors)
-    sentence = f"Sub-structure {found.letter} {how}"
+    sentence = f"Sub-structure {moving.letter} {how}"
     return Change(
         after=after,
         placed=ids,
         attempt=sentence,
-        render=lambda: _moved(state, after, found.letter, f"{sentence}.", turned=turned),
+        render=lambda: _moved(state, after, moving.letter, f"{sentence}.", turned=turned),
     )
 
 

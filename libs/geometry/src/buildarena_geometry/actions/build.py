@@ -135,7 +135,7 @@ def connect_blocks(
     module = connector_module(state, connector)
     parts = (part(state, block_a), part(state, block_b))
     start_block, end_block = (
-        _with_face(found, label) for found, label in zip(parts, (face_a, face_b), strict=True)
+        _with_face(block, label) for block, label in zip(parts, (face_a, face_b), strict=True)
     )
     start_xyz, end_xyz = start_block.face_center(face_a), end_block.face_center(face_b)
     _check_distance((start_block, face_a), (end_block, face_b), dist(start_xyz, end_xyz))
@@ -171,16 +171,16 @@ def _new_block(state: MachineState, block: Block, note: str) -> Block:
     return replace(block, id=str(state.next_id), bindings=bindings, note=note)
 
 
-def _with_face(found: Block | Connector, label: str) -> Block:
-    if isinstance(found, Connector) or not found.module.faces:
-        raise RefusalError(Cause.NO_FACES, f"{words.heading(found)} has no faces to connect.")
-    if label not in found.module.face_of_label:
+def _with_face(part: Block | Connector, label: str) -> Block:
+    if isinstance(part, Connector) or not part.module.faces:
+        raise RefusalError(Cause.NO_FACES, f"{words.heading(part)} has no faces to connect.")
+    if label not in part.module.face_of_label:
         raise RefusalError(
             Cause.NO_SUCH_FACE,
-            f"{words.heading(found)} has no face {shown(label)}. "
-            f"Its faces: {words.named_faces(found, found.module.face_of_label)}.",
+            f"{words.heading(part)} has no face {shown(label)}. "
+            f"Its faces: {words.named_faces(part, part.module.face_of_label)}.",
         )
-    return found
+    return part
 
 
 def _check_distance(left: tuple[Block, str], right: tuple[Block, str], distance: float) -> None:

@@ -22,12 +22,12 @@ def list_modules(state: MachineState, category: Name) -> Change:
     Args:
         category: Name of the category.
     """
-    found = words.modules_of_category(state.catalogue)
-    name = CaselessNames(found).find(category)
+    categories = words.modules_of_category(state.catalogue)
+    name = CaselessNames(categories).find(category)
     if name is None:
         raise RefusalError(
             Cause.UNKNOWN_MODULE,
-            f"There is no category {shown(category)}. Categories: {listing(found)}.",
+            f"There is no category {shown(category)}. Categories: {listing(categories)}.",
         )
     return Change(after=state, render=lambda: words.category_text(state.catalogue, name))
 
@@ -39,18 +39,22 @@ def describe_module(state: MachineState, module: Name) -> Change:
         module: Name of the module, or several names with commas between them.
     """
     names = [name for name in module.split(",") if name.strip()] or [module]
-    found = {one.name: one for one in (_described(state, name.strip()) for name in names)}
+    modules = {
+        described.name: described
+        for described in (_described(state, name.strip()) for name in names)
+    }
     return Change(
-        after=state, render=lambda: "\n\n".join(words.module_text(one) for one in found.values())
+        after=state,
+        render=lambda: "\n\n".join(words.module_text(described) for described in modules.values()),
     )
 
 
 def _described(state: MachineState, name: str) -> Module:
-    found = state.catalogue.named(name)
-    if found is None or found.kind == "cargo":
-        known = [one.name for one in state.catalogue.values() if one.kind != "cargo"]
+    module = state.catalogue.named(name)
+    if module is None or module.kind == "cargo":
+        known = [other.name for other in state.catalogue.values() if other.kind != "cargo"]
         raise RefusalError(
             Cause.UNKNOWN_MODULE,
             f"There is no module {shown(name)}. Modules: {nearest(name, known)}.",
         )
-    return found
+    return module

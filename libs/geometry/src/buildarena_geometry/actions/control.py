@@ -97,18 +97,18 @@ def _bind(state: MachineState, block_id: str, written: str, key: str, *, keep: b
     part(state, block_id)
     if key not in KEYS:
         raise RefusalError(Cause.BAD_KEY, f"There is no key {shown(key)}. Keys: {KEYS_IN_WORDS}.")
-    found, action = powered(state, block_id, written)
-    had = found.bindings.get(action, ()) if keep else ()
+    target, action = powered(state, block_id, written)
+    had = target.bindings.get(action, ()) if keep else ()
     keys = had if key in had else (*had, key)
-    bindings = {**found.bindings, action: keys}
-    if isinstance(found, Connector):
-        links = {**state.connectors, found.id: replace(found, bindings=bindings)}
+    bindings = {**target.bindings, action: keys}
+    if isinstance(target, Connector):
+        links = {**state.connectors, target.id: replace(target, bindings=bindings)}
         after = replace(state, connectors=links)
     else:
-        bound = replace(found, bindings=bindings)
-        after = replace(state, blocks={**state.blocks, found.id: bound})
+        bound = replace(target, bindings=bindings)
+        after = replace(state, blocks={**state.blocks, target.id: bound})
     return Change(
         after=after,
-        touched=(found.id,),
-        render=lambda: f"Bound: {words.title(found)}, {action}: {listing(keys)}.",
+        touched=(target.id,),
+        render=lambda: f"Bound: {words.title(target)}, {action}: {listing(keys)}.",
     )

@@ -1,4 +1,4 @@
-"""Finds what an action's arguments name, or says what there is instead."""
+"""Finds what an action's arguments name; refusals name the valid choices."""
 
 from __future__ import annotations
 
@@ -41,13 +41,13 @@ def part(state: MachineState, part_id: str) -> Block | Connector:
         RefusalError: there is none.
     """
     require_started(state)
-    found = state.blocks.get(part_id) or state.connectors.get(part_id)
-    if found is None:
+    match = state.blocks.get(part_id) or state.connectors.get(part_id)
+    if match is None:
         ids = named([*state.blocks, *state.connectors])
         raise RefusalError(
             Cause.NO_SUCH_BLOCK, f"There is no block {shown(part_id)}. Blocks: {ids}."
         )
-    return found
+    return match
 
 
 def powered(state: MachineState, block_id: str, written: str) -> tuple[Block | Connector, str]:
@@ -56,21 +56,21 @@ def powered(state: MachineState, block_id: str, written: str) -> tuple[Block | C
     Raises:
         RefusalError: no such block, a block without keys, or one without this action.
     """
-    found = part(state, block_id)
-    actions = found.module.actions
+    target = part(state, block_id)
+    actions = target.module.actions
     if not actions:
-        keyed = named(one.id for one in state.powered())
+        keyed = named(other.id for other in state.powered())
         raise RefusalError(
             Cause.NO_LOCOMOTION,
-            f"{heading(found)} takes no keys. Blocks that do: {keyed}.",
+            f"{heading(target)} takes no keys. Blocks that do: {keyed}.",
         )
     action = CaselessNames(actions).find(written)
     if action is None:
         raise RefusalError(
             Cause.BAD_ACTION,
-            f"{heading(found)} has no action {shown(written)}; its actions: {listing(actions)}.",
+            f"{heading(target)} has no action {shown(written)}; its actions: {listing(actions)}.",
         )
-    return found, action
+    return target, action
 
 
 def attachable_module(state: MachineState, name: str) -> Module:
@@ -113,13 +113,13 @@ def structure(state: MachineState, letter: str) -> SubStructure:
     Raises:
         RefusalError: there is none.
     """
-    found = state.structures.get(letter)
-    if found is None:
+    match = state.structures.get(letter)
+    if match is None:
         there = f"Sub-structures: {named(state.structures)}."
         raise RefusalError(
             Cause.NO_SUCH_MACHINE, f"There is no sub-structure {shown(letter)}. {there}"
         )
-    return found
+    return match
 
 
 def nearest(written: str, choices: Sequence[str]) -> str:
@@ -128,11 +128,11 @@ def nearest(written: str, choices: Sequence[str]) -> str:
         return listing(choices)
     folded = {choice.casefold(): choice for choice in choices}
     words = " ".join(written[:_LONGEST_NAME].split()).casefold()
-    # Whoever writes "wheel" means one of the wheels, however long their names are.
+    # "wheel" means one of the wheels, however long their names are.
     within = [choice for fold, choice in folded.items() if words and words in fold]
     alike = get_close_matches(words, folded, n=_NEAREST, cutoff=0.0)
-    found = list(dict.fromkeys([*within, *(folded[fold] for fold in alike)]))[:_NEAREST]
-    return f"{listing(found)} and {len(choices) - len(found)} more"
+    close = list(dict.fromkeys([*within, *(folded[fold] for fold in alike)]))[:_NEAREST]
+    return f"{listing(close)} and {len(choices) - len(close)} more"
 
 
 def named(choices: Iterable[str]) -> str:

@@ -21,10 +21,10 @@ def get_block_details(state: MachineState, block_id: BlockId) -> Change:
     Args:
         block_id: Id of the block or connector.
     """
-    found = part(state, block_id)
-    if isinstance(found, Block):
-        return _answer(state, lambda: words.block_details(state, found))
-    return _answer(state, lambda: f"{words.connector_line(found)}.")
+    target = part(state, block_id)
+    if isinstance(target, Block):
+        return _answer(state, lambda: words.block_details(state, target))
+    return _answer(state, lambda: f"{words.connector_line(target)}.")
 
 
 def review_powered_blocks(state: MachineState) -> Change:

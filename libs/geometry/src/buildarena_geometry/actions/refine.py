@@ -23,18 +23,18 @@ def twist_block(state: MachineState, block_id: BlockId, angle: Number) -> Change
         block_id: Id of the block.
         angle: Degrees, clockwise seen from outside that face.
     """
-    found = part(state, block_id)
-    if found.module.kind == "start":
+    target = part(state, block_id)
+    if target.module.kind == "start":
         raise RefusalError(
             Cause.START_BLOCK,
-            f"{words.heading(found)} sits on no face and can't be twisted.",
+            f"{words.heading(target)} sits on no face and can't be twisted.",
         )
-    turn = about_axis(_seat_normal(state, found), -angle)
+    turn = about_axis(_seat_normal(state, target), -angle)
     how = f"by {plain(angle)}°"
-    if isinstance(found, Connector):
-        pose = found.world_from_connector.turned(turn)
-        return _move_connector(state, found, pose, f"Twisted {how}")
-    return _move(state, found, found.world_from_block.turned(turn), f"twisted {how}", turned=True)
+    if isinstance(target, Connector):
+        pose = target.world_from_connector.turned(turn)
+        return _move_connector(state, target, pose, f"Twisted {how}")
+    return _move(state, target, target.world_from_block.turned(turn), f"twisted {how}", turned=True)
 
 
 def shift_block(state: MachineState, block_id: BlockId, shift_real: Triple) -> Change:
@@ -44,7 +44,7 @@ def shift_block(state: MachineState, block_id: BlockId, shift_real: Triple) -> C
         block_id: Id of the block.
         shift_real: [east, north, up], each between -0.5 and 0.5.
     """
-    found = part(state, block_id)
+    target = part(state, block_id)
     if max(map(abs, shift_real)) > LARGEST_SHIFT:
         raise RefusalError(
             Cause.OUT_OF_RANGE,
@@ -52,11 +52,11 @@ def shift_block(state: MachineState, block_id: BlockId, shift_real: Triple) -> C
             f"not {point(shift_real)}.",
         )
     moved = f"by {point(shift_real)}"
-    if isinstance(found, Connector):
-        pose = found.world_from_connector.shifted(shift_real)
-        return _move_connector(state, found, pose, f"Shifted {moved}")
-    pose = found.world_from_block.shifted(shift_real)
-    return _move(state, found, pose, f"shifted {moved}", turned=False)
+    if isinstance(target, Connector):
+        pose = target.world_from_connector.shifted(shift_real)
+        return _move_connector(state, target, pose, f"Shifted {moved}")
+    pose = target.world_from_block.shifted(shift_real)
+    return _move(state, target, pose, f"shifted {moved}", turned=False)
 
 
 def flip_spin(state: MachineState, block_id: BlockId) -> Change:
@@ -65,14 +65,14 @@ def flip_spin(state: MachineState, block_id: BlockId) -> Change:
     Args:
         block_id: Id of the wheel.
     """
-    found = part(state, block_id)
-    if isinstance(found, Connector) or not found.module.spins:
+    target = part(state, block_id)
+    if isinstance(target, Connector) or not target.module.spins:
         wheels = listing(block.id for block in state.blocks.values() if block.module.spins)
         raise RefusalError(
             Cause.NOT_SPINNING,
-            f"{words.heading(found)} does not spin. Blocks that do: {wheels}.",
+            f"{words.heading(target)} does not spin. Blocks that do: {wheels}.",
         )
-    block = replace(found, flipped=not found.flipped)
+    block = replace(target, flipped=not target.flipped)
     after = state.with_blocks(block)
     return Change(
         after=after,
@@ -81,12 +81,12 @@ def flip_spin(state: MachineState, block_id: BlockId) -> Change:
     )
 
 
-def _seat_normal(state: MachineState, found: Block | Connector) -> Vector:
+def _seat_normal(state: MachineState, target: Block | Connector) -> Vector:
     """The present normal of the face a part sits on; its own axis if it sits on none."""
-    seat = found.start if isinstance(found, Connector) else found.mount
+    seat = target.start if isinstance(target, Connector) else target.mount
     if seat is None:
-        assert isinstance(found, Block)  # noqa: S101  only blocks can lose their seat
-        return found.axis_xyz
+        assert isinstance(target, Block)  # noqa: S101  only blocks can lose their seat
+        return target.axis_xyz
     return state.blocks[seat[0]].face_normal(seat[1])
 
 

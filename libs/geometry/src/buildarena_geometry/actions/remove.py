@@ -20,8 +20,8 @@ def remove_block(state: MachineState, block_id: BlockId) -> Change:
     """
     gone = part(state, block_id)
     if isinstance(gone, Connector):
-        kept = {key: link for key, link in state.connectors.items() if key != gone.id}
-        after = replace(state, connectors=kept)
+        connectors = {key: link for key, link in state.connectors.items() if key != gone.id}
+        after = replace(state, connectors=connectors)
         return _removal(state, after, gone, ())
     if gone.module.kind == "start":
         raise RefusalError(

@@ -30,7 +30,7 @@ class Dialect:
         kinds: what it calls a kind of outcome, where it differs.
         connector_center: how far off its start a connector is shown, along that face's normal,
             units.
-        keeps_lost_mounts: whether a block whose base was removed is still told to sit there.
+        keeps_lost_mounts: whether a block whose base was removed is still reported to sit there.
         modules: our names by its names, where they differ.
         faces: what its face labels begin with, before the face's index; "" where they are ours.
     """
@@ -73,8 +73,8 @@ class Dialect:
 def dialects() -> Mapping[str, Mapping[str, Any]]:
     """The interfaces by their version."""
     text = resources.files(__package__).joinpath("dialects.json").read_text(encoding="utf-8")
-    found: dict[str, dict[str, Any]] = json.loads(text)
-    return found
+    definitions: dict[str, dict[str, Any]] = json.loads(text)
+    return definitions
 
 
 @cache
@@ -86,29 +86,32 @@ def dialect(version: str) -> Dialect:
     """
     if version not in dialects():
         raise ValueError(f"there is no dialect {version!r}; they are {', '.join(dialects())}")
-    said = dialects()[version]
-    if said["set"] == "basic":
+    definition = dialects()[version]
+    if definition["set"] == "basic":
         return Dialect()
-    modules = tuple(_spoken(module, said) for module in module_set(said["set"]).values())
+    modules = tuple(
+        _spoken(module, definition) for module in module_set(definition["set"]).values()
+    )
     return Dialect(
         catalogue=Catalogue(modules),
-        kinds=said["kinds"],
-        connector_center=said["connector_center"],
-        keeps_lost_mounts=said["keeps_lost_mounts"],
-        modules={theirs: name for name, theirs in said["names"].items()},
-        faces=said["faces"],
+        kinds=definition["kinds"],
+        connector_center=definition["connector_center"],
+        keeps_lost_mounts=definition["keeps_lost_mounts"],
+        modules={theirs: name for name, theirs in definition["names"].items()},
+        faces=definition["faces"],
     )
 
 
-def _spoken(module: Module, said: Mapping[str, Any]) -> Module:
+def _spoken(module: Module, definition: Mapping[str, Any]) -> Module:
     """A module with the interface's name, labels and figures."""
-    figures: dict[str, Any] = {
-        name: tuple(figure) if isinstance(figure, list) else figure
-        for name, figure in said["figures"].get(module.name, {}).items()
+    values: dict[str, Any] = {
+        name: tuple(value) if isinstance(value, list) else value
+        for name, value in definition["figures"].get(module.name, {}).items()
     }
     faces = tuple(
-        replace(face, label=f"{said['faces']}{index}") for index, face in enumerate(module.faces)
+        replace(face, label=f"{definition['faces']}{index}")
+        for index, face in enumerate(module.faces)
     )
     return structs.replace(
-        module, name=said["names"].get(module.name, module.name), faces=faces, **figures
+        module, name=definition["names"].get(module.name, module.name), faces=faces, **values
     )

@@ -19,8 +19,8 @@ class ActionRecord(Form, frozen=True, kw_only=True):
 
     Attributes:
         name: the action's name.
-        arguments: JSON values. What could not be written down as JSON stands there as an object
-            {"unreadable": what it was}, which every action refuses just as it refused the original.
+        arguments: JSON values. A value that JSON cannot express is replaced by an object
+            {"unreadable": what it was}, which every action refuses as it refused the original.
         reason: why it was refused; None if it was accepted.
     """
 

@@ -46,7 +46,7 @@ class _Entry(Form, frozen=True, kw_only=True):
         return Pose(position=self.position, quaternion=self.quaternion)
 
     def __post_init__(self) -> None:
-        """Refuses places out of the world, and what is no rotation."""
+        """Refuses positions outside the world, and quaternions that are not rotations."""
         # A connector may begin on a face a little beyond the farthest block's root.
         if max(map(abs, self.position)) > 2 * LARGEST_NUMBER:
             refuse("position", f"a position within ±{LARGEST_NUMBER:.0f}", self.position)
@@ -90,8 +90,8 @@ def read_machine(
 
     Args:
         document: JSON values.
-        catalogue: the modules it is made of; if left out, all types are known, and the machine goes
-            on with the smallest set that has those it is made of.
+        catalogue: the modules it is made of; if left out, all types are known, and the machine
+            gets the smallest set that has all of its modules.
         where: what messages call the document.
         overlaps: whether blocks may overlap, as those of other programs' machines do; the actions
             of this library never make such a machine.

@@ -1,8 +1,8 @@
 """Machines as JSON documents.
 
-The parts are the truth of a document and are checked like a machine's; the log tells how it came
-to be. Quaternions and positions are written in full, so a machine that is read back equals the one
-that was written, bit for bit.
+The parts decide what the machine is, and are checked like a machine's; the log is its history.
+Quaternions and positions are written in full, so a machine that is read back equals the one that
+was written, bit for bit.
 """
 
 from __future__ import annotations
@@ -35,12 +35,14 @@ def machine_document(machine: LoggedState) -> dict[str, Any]:
             for press in state.control_sequence
         ],
         "structures": [
-            {"letter": found.letter, "source": found.source, "root": found.root}
-            for found in state.structures.values()
+            {"letter": structure.letter, "source": structure.source, "root": structure.root}
+            for structure in state.structures.values()
         ],
         "structures_made": state.structures_made,
         "next_id": state.next_id,
-        "available": {name: machine_document(one) for name, one in machine.available.items()},
+        "available": {
+            name: machine_document(available) for name, available in machine.available.items()
+        },
         "log": [
             {"name": record.name, "arguments": record.arguments, "reason": record.reason}
             for record in machine.records

@@ -43,8 +43,8 @@ class View:
     """From where a machine is drawn, and what is written into the drawing.
 
     Attributes:
-        azimuth_deg: where the eye stands, from south through east.
-        elevation_deg: how far above the horizon it stands.
+        azimuth_deg: direction of the viewer, from south through east.
+        elevation_deg: angle of the viewer above the horizon.
         scale: pixels a unit.
         compass: whether arrows show east, north and up.
         face_labels: ids of the blocks whose visible free faces are labelled.

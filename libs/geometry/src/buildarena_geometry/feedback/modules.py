@@ -78,12 +78,12 @@ def module_text(module: Module) -> str:
 
 def modules_of_category(catalogue: Catalogue) -> dict[str, list[Module]]:
     """The modules that builders may use by category; one may be in several."""
-    found: dict[str, list[Module]] = {}
+    categories: dict[str, list[Module]] = {}
     for module in catalogue.values():
         if module.kind != "cargo":
             for category in module.categories or (OTHER,):
-                found.setdefault(category, []).append(module)
-    return found
+                categories.setdefault(category, []).append(module)
+    return categories
 
 
 def _short_line(module: Module) -> str:

@@ -164,16 +164,16 @@ def control_sequence(state: MachineState) -> str:
 def control_config(state: MachineState) -> str:
     """Which key does what, block by block."""
     lines = [
-        f"{one.id} {one.module.name}: "
-        + "; ".join(f"{action} {listing(keys)}" for action, keys in one.bindings.items())
-        for one in state.powered()
+        f"{part.id} {part.module.name}: "
+        + "; ".join(f"{action} {listing(keys)}" for action, keys in part.bindings.items())
+        for part in state.powered()
     ]
     return "\n".join(lines) or "No block takes a key."
 
 
 def powered_blocks(state: MachineState) -> str:
     """The blocks and connectors that take keys, where they are and what they do."""
-    lines = list(block_lines(state, (one for one in state.blocks.values() if one.bindings)))
+    lines = list(block_lines(state, (block for block in state.blocks.values() if block.bindings)))
     lines.extend(connector_line(link) for link in state.connectors.values() if link.bindings)
     return "\n".join(lines) or "No block is powered."
 
@@ -193,7 +193,7 @@ def seats(before: MachineState, after: MachineState, moved_id: str) -> list[str]
         if joint is None or earlier is None:
             continue
         parted = parted or not joint.holds
-        # The moved block's own gap stands in its line.
+        # The moved block's own gap is in its line already.
         if joint.offset > FLUSH_OFFSET and block is not moved:
             sentences.append(f"Block {joint.part} is {_gap(joint)}.")
         if joint.offset <= FLUSH_OFFSET < earlier.offset:

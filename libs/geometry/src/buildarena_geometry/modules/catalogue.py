@@ -240,7 +240,7 @@ def _made(entry: ModuleEntry, usual: Module | None) -> Module:
     for name in ("thrust", "physics"):
         shared[name] = shared[name] or getattr(usual, name, None)
     if entry.joint is not None:
-        # A joint says all of how its module turns: one without a motor is free of the usual one.
+        # An entry with a joint describes how it turns, and gets no usual motor.
         joint_type = getattr(shared["physics"], "joint_type", None)
         shared["joint"] = checked_joint(entry.joint, joint_type)
     elif entry.motor is None and usual is not None:

@@ -26,7 +26,7 @@ _TWISTLESS = 150.0  # degrees; a constant-velocity joint bent right back has no 
 
 
 class Drive(Form, frozen=True, kw_only=True):
-    """What moves a joint: a servo for its speed or for where it stands.
+    """What moves a joint: a servo for its speed or for its position.
 
     Attributes:
         kind: whether it holds a speed, or a place that its keys move.

@@ -67,7 +67,7 @@ class Landmark(Form, frozen=True, kw_only=True):
     Attributes:
         name: what it is.
         along: how far it lies from the block's centre in the pointing direction, units.
-        radius: of the sphere it stands for, units; None for a mere point.
+        radius: of the sphere around it, units; None for a mere point.
         heats: whether it is a flame, a sphere that heats what it touches.
     """
 
@@ -186,7 +186,7 @@ class ModuleFields(Forces, frozen=True, kw_only=True):
         actions: what its keys can make it do.
         motor: what turns it on its axle; None for blocks that do not turn.
         joint: how it moves on the block it sits on; None for one that does not, and for an axle
-            whose motor says all there is to say.
+            that its motor describes completely.
         gear: its teeth; None for all but cogs.
         thrust: what pushes it; None for blocks that do not push.
         physics: how it behaves as a body; None for connectors and cargo, which a task describes.
@@ -201,7 +201,7 @@ class ModuleFields(Forces, frozen=True, kw_only=True):
         brief: what models read about it in a list; "" for the first sentence of its description.
         categories: the groups it is looked up in; the first one is its own.
         simulated: whether both engines have its physics; without, it can be built and not tried.
-        default_keys: the keys the game binds to its actions unless told otherwise, by action.
+        default_keys: the keys the game binds to its actions by default, by action.
         sources: where a figure comes from, by its name: a confidence ("known", "community",
             "chosen" or "unknown"), or that and the source or reason after a colon.
     """

@@ -36,7 +36,7 @@ def module_set(name: str) -> Catalogue:
     if name == "basic":
         return Catalogue(basic_modules())
     built = [module for module in basic_modules() if module.kind != "cargo"]
-    further = [one for one in extended_modules() if name == "all" or one.simulated]
+    further = [extended for extended in extended_modules() if name == "all" or extended.simulated]
     return Catalogue((*built, *further))
 
 
@@ -64,7 +64,7 @@ def smallest_set(names: Iterable[str]) -> Catalogue:
     wanted = set(names)
     for name in MODULE_SETS:
         # A ballast of the basic set is a task's cargo, which is no part of a machine.
-        placed = {one.name for one in module_set(name).values() if one.kind != "cargo"}
+        placed = {module.name for module in module_set(name).values() if module.kind != "cargo"}
         if wanted <= placed:
             return module_set(name)
     return module_set(MODULE_SETS[-1])

@@ -176,12 +176,12 @@ def quaternion_of(rotation: FloatArray) -> FloatArray:
 
 def rotation_of(quaternion: FloatArray) -> FloatArray:
     """The rotation matrix of a unit quaternion (w, x, y, z); (..., 4) to (..., 3, 3)."""
-    given = np.asarray(quaternion, dtype=np.float64)
-    one = given.ndim == 1
-    w, x, y, z = given.tolist() if one else np.moveaxis(given, -1, 0)
+    wxyz = np.asarray(quaternion, dtype=np.float64)
+    single = wxyz.ndim == 1
+    w, x, y, z = wxyz.tolist() if single else np.moveaxis(wxyz, -1, 0)
     rows = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
         [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
         [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
     ]
-    return np.array(rows) if one else np.stack([np.stack(r, axis=-1) for r in rows], axis=-2)
+    return np.array(rows) if single else np.stack([np.stack(r, axis=-1) for r in rows], axis=-2)

@@ -42,8 +42,8 @@ class Camera:
             target: (3,) world frame, units.
             distance: From the target, units.
             size: Width and height of the picture, pixels.
-            azimuth_deg: Where it stands: 0 east of the target, 90 north, degrees.
-            elevation_deg: How far above the horizon it stands, degrees.
+            azimuth_deg: Its direction from the target: 0 is east, 90 north, degrees.
+            elevation_deg: Its angle above the horizon, degrees.
         """
         azimuth, elevation = np.radians([azimuth_deg, elevation_deg])
         back = np.array(

@@ -43,7 +43,7 @@ def write_film(
         machine: The machine.
         scenario: What it was put through.
         trajectory: Its trajectory.
-        path: Where to; the ending says what: mp4, gif, or png for six pictures on one sheet.
+        path: Where to; its ending decides the format: mp4, gif, or png for six pictures on a sheet.
         on_progress: Called with the share that is done.
 
     Raises:

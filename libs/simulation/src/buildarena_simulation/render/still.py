@@ -1,4 +1,4 @@
-"""One picture of a machine as it stands at the start of its trial."""
+"""One picture of a machine at the start of its trial."""
 
 import io
 from typing import TYPE_CHECKING, Final
@@ -44,7 +44,7 @@ def still_png(machine: "Machine", scenario: "Scenario") -> bytes:
 
 
 def _standing(machine: "Machine", scenario: "Scenario") -> Trajectory:
-    """The trajectory of no time at all."""
+    """A trajectory of one instant."""
     structure = structure_of(machine)
     start = start_of(structure, scenario)
     return Trajectory(

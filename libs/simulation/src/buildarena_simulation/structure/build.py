@@ -212,7 +212,7 @@ def _far_joints(parts: Sequence[Part], links: Sequence[Link]) -> list[Link]:
     centers = np.array([body.center for body in bodies])
     rotations = np.array([body.rotation for body in bodies])
     halves = np.array([body.half_extents for body in bodies])
-    found = []
+    joints = []
     for i, part in enumerate(parts):
         if not part.module.grabs:
             continue
@@ -230,10 +230,10 @@ def _far_joints(parts: Sequence[Part], links: Sequence[Link]) -> list[Link]:
             if j != i and frozenset((i, j)) not in joined:
                 joined.add(frozenset((i, j)))
                 name = f"{part.id}~{parts[j].id}"
-                found.append(
+                joints.append(
                     Link(name=name, first=i, second=j, kind=JointKind.FAR_JOINT, start=tip, end=tip)
                 )
-    return found
+    return joints
 
 
 def _members(parts: Sequence[Part], links: Sequence[Link]) -> Members:

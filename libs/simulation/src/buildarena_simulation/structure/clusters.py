@@ -1,8 +1,8 @@
 """Rigid clusters, the moving joints between them, and their mass properties.
 
 Blocks joined rigidly form a *cluster*; clusters joined by moving joints (axles, hinges, sliders, …)
-form an articulated *piece*, a tree whose root is its largest cluster, or its heaviest where more
-than wheels moves.
+form an articulated *component*, a tree whose root is its largest cluster, or its heaviest where
+more than wheels moves.
 """
 
 from collections.abc import Iterable, Sequence
@@ -33,11 +33,11 @@ class Clusters:
     Attributes:
         cluster_of: (N,) cluster of each block.
         blocks: Per cluster, the indices of its blocks in ascending order.
-        parent: (C,) the cluster a joint hangs it on, -1 for a piece's root.
+        parent: (C,) the cluster a joint hangs it on, -1 for a component's root.
         joint: (C,) the member that is this joint, -1 for a root.
         seated: (C,) the block that sits by this joint (a wheel, a hinge, …), -1 for a root.
         seated_is_outer: (C,) whether that block belongs to this cluster rather than to its parent.
-        root: (C,) root cluster of its piece.
+        root: (C,) root cluster of its component.
         level: (C,) number of joints between it and its root.
         mass: (C,) mass units.
         center_of_mass: (C, 3) machine frame, units.
@@ -64,8 +64,8 @@ class Clusters:
         return len(self.blocks)
 
     @property
-    def pieces(self) -> tuple[tuple[int, ...], ...]:
-        """Clusters of each piece, its root first."""
+    def components(self) -> tuple[tuple[int, ...], ...]:
+        """Clusters of each component, its root first."""
         roots = np.flatnonzero(self.parent < 0)
         return tuple(tuple(np.flatnonzero(self.root == root).tolist()) for root in roots)
 
@@ -82,14 +82,16 @@ def find_clusters(structure: Structure, holds: BoolArray) -> Clusters:
         holds: (M,) which members still hold.
 
     Returns:
-        The clusters, ordered by piece (first block), parents before children.
+        The clusters, ordered by component (first block), parents before children.
     """
     members = structure.members
     moving = np.isin(members.kind, _MOVING)
     rigid = list(np.flatnonzero(holds & ~moving).tolist())
     joints = np.flatnonzero(holds & moving).tolist()
     while True:
-        groups = components(len(structure), ((members.first[k], members.second[k]) for k in rigid))
+        groups = connected_components(
+            len(structure), ((members.first[k], members.second[k]) for k in rigid)
+        )
         label = _labels(len(structure), groups)
         free = [k for k in joints if label[members.first[k]] != label[members.second[k]]]
         tree, locked = _grow_trees(structure, groups, label, free)
@@ -112,7 +114,7 @@ def _held_by_teeth(structure: Structure, label: Sequence[int], free: Sequence[in
     return held
 
 
-def components(count: int, edges: Iterable[tuple[int, int]]) -> list[list[int]]:
+def connected_components(count: int, edges: Iterable[tuple[int, int]]) -> list[list[int]]:
     """Connected components of a graph, each ascending, ordered by their smallest node."""
     leader = list(range(count))
 
@@ -154,9 +156,9 @@ def _grow_trees(
     edges = [(label[members.first[k]], label[members.second[k]]) for k in joints]
     tree: _Tree = []
     via: dict[int, int] = {}
-    for piece in components(len(groups), edges):
-        inside = [k for k, (a, _) in zip(joints, edges, strict=True) if a in piece]
-        root = _root(structure, groups, piece, inside)
+    for component in connected_components(len(groups), edges):
+        inside = [k for k, (a, _) in zip(joints, edges, strict=True) if a in component]
+        root = _root(structure, groups, component, inside)
         reached = {root}
         tree.append((root, -1, -1))
         waiting = [root]
@@ -185,10 +187,10 @@ def _grow_trees(
 def _root(
     structure: Structure,
     groups: Sequence[Sequence[int]],
-    piece: Sequence[int],
+    component: Sequence[int],
     joints: Sequence[int],
 ) -> int:
-    """The group that a piece's tree grows from.
+    """The group that a component's tree grows from.
 
     Where wheels are all that moves, it is the one of most blocks. Elsewhere it is the heaviest:
     what a joint bears follows from the motion of the outer side, and an error of the heavier side's
@@ -196,8 +198,8 @@ def _root(
     """
     simple = structure.joints.simple[structure.members.second[list(joints)]].all()
     if simple:
-        return max(piece, key=lambda g: (len(groups[g]), -g))
-    return max(piece, key=lambda g: (round(float(structure.masses[groups[g]].sum()), 9), -g))
+        return max(component, key=lambda g: (len(groups[g]), -g))
+    return max(component, key=lambda g: (round(float(structure.masses[groups[g]].sum()), 9), -g))
 
 
 def _path(parent: dict[int, int], via: dict[int, int], a: int, b: int) -> list[int]:

@@ -95,7 +95,7 @@ def mean_contacts(readings: Sequence[tuple[float, ContactForces]]) -> ContactFor
     """The mean of several readings.
 
     Args:
-        readings: Share of the time each stands for, and the reading.
+        readings: Each with the share of the time that it represents.
     """
     if len(readings) == 1:
         return readings[0][1]
@@ -195,10 +195,10 @@ def _spread(contacts: ContactForces, patches: _Patches) -> FloatArray:
         pulling = (spread * normal[of]).sum(axis=1) < 0.0
         if not pulling.any():
             return spread
-        kept = np.where(pulling, 0.0, weight)
-        whole = np.bincount(of, kept, minlength=count)
+        pushing = np.where(pulling, 0.0, weight)
+        whole = np.bincount(of, pushing, minlength=count)
         # A patch that would lose all its points stays as it was.
-        weight = np.where(whole[of] > 0.0, kept, weight)
+        weight = np.where(whole[of] > 0.0, pushing, weight)
     return spread
 
 

@@ -82,7 +82,7 @@ class ForceField:
         return summed_by(clusters.cluster_of[self.table.block], both, len(clusters))
 
     def taken(self, clusters: Clusters, motion: Motion) -> PointForces:
-        """The mean of the forces since the last call, as they stand on the blocks now."""
+        """The mean of the forces since the last call, at the blocks' present places."""
         table = self.table
         mean = self._sum / max(self._count, 1)
         self._sum, self._count = np.zeros_like(mean), 0

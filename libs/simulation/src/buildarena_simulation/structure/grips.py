@@ -53,18 +53,20 @@ class Grips:
 
 def grips_of(structure: Structure) -> Grips:
     """The blocks of a structure that hold."""
-    found = [
+    gripping = [
         (i, part, part.module.grip)
         for i, part in enumerate(structure.parts)
         if part.module.grip is not None
     ]
-    places = np.array([_end_of(part) for _, part, _ in found]).reshape(-1, len(_GRID), 3)
+    places = np.array([_end_of(part) for _, part, _ in gripping]).reshape(-1, len(_GRID), 3)
     return Grips(
-        blocks=tuple(i for i, _, _ in found),
+        blocks=tuple(i for i, _, _ in gripping),
         tips=places[:, len(_GRID) // 2],
         places=places,
-        reach=np.array([grip.reach for _, _, grip in found if grip]),
-        limits=np.array([(grip.force, grip.moment) for _, _, grip in found if grip]).reshape(-1, 2),
+        reach=np.array([grip.reach for _, _, grip in gripping if grip]),
+        limits=np.array([(grip.force, grip.moment) for _, _, grip in gripping if grip]).reshape(
+            -1, 2
+        ),
     )
 
 
@@ -77,15 +79,15 @@ def distances(points: FloatArray, shapes: Sequence[Shape]) -> FloatArray:
         points: (P, 3) in the frame of the shapes.
         shapes: The shapes.
     """
-    found = np.empty(len(shapes))
+    nearest = np.empty(len(shapes))
     for k, shape in enumerate(shapes):
         local = (points - shape.center) @ shape.rotation
         if shape.kind is ShapeKind.SPHERE:
             away = np.linalg.norm(local, axis=1) - shape.half_extents[0]
         else:
             away = np.linalg.norm(np.maximum(np.abs(local) - shape.half_extents, 0.0), axis=1)
-        found[k] = max(0.0, float(away.min()))
-    return found
+        nearest[k] = max(0.0, float(away.min()))
+    return nearest
 
 
 def _end_of(part: Part) -> FloatArray:

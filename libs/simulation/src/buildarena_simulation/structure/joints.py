@@ -40,18 +40,18 @@ def _is_driven(part: Part) -> bool:
 def _meshes(parts: Sequence[Part]) -> tuple[Mesh, ...]:
     """Cogs with parallel axes, beside each other, whose pitch circles touch."""
     cogs = [(i, part, part.module.gear) for i, part in enumerate(parts)]
-    found = []
-    for (i, first, one), (j, second, other) in combinations(cogs, 2):
-        if one is None or other is None:
+    meshes = []
+    for (i, first, first_gear), (j, second, second_gear) in combinations(cogs, 2):
+        if first_gear is None or second_gear is None:
             continue
         alike = float(first.axis @ second.axis)
         apart = second.shapes[0].center - first.shapes[0].center
         along = float(apart @ first.axis)
         distance = float(np.linalg.norm(apart - along * first.axis))
         thickness = first.shapes[0].half_extents[2] + second.shapes[0].half_extents[2]
-        touch = abs(distance - one.pitch_radius - other.pitch_radius) <= _MESH_SLACK
+        touch = abs(distance - first_gear.pitch_radius - second_gear.pitch_radius) <= _MESH_SLACK
         if touch and abs(alike) >= _PARALLEL and abs(along) < thickness - _MESH_SLACK:
             # On parallel axes cogs turn against each other, on opposite ones the same way.
-            ratio = -float(np.sign(alike)) * one.pitch_radius / other.pitch_radius
-            found.append(Mesh(first=i, second=j, ratio=ratio))
-    return tuple(found)
+            ratio = -float(np.sign(alike)) * first_gear.pitch_radius / second_gear.pitch_radius
+            meshes.append(Mesh(first=i, second=j, ratio=ratio))
+    return tuple(meshes)

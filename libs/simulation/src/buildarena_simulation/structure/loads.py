@@ -1,6 +1,6 @@
 """Joint loads: from the wrenches on the blocks to the force and moment in every joint.
 
-Wrenches are in mass·g (moments in mass·g·unit), low-pass filtered in the axes of their piece's
+Wrenches are in mass·g (moments in mass·g·unit), low-pass filtered in the axes of their component's
 root cluster (not of a spinning wheel, where a steady load would look like a rotating one).
 `docs/physics.md` derives the equations.
 """
@@ -74,7 +74,7 @@ class LoadModel:
             forces: Mean forces on the blocks, without gravity.
             motion: The clusters' motion now.
             elapsed_s: Time since the last evaluation, seconds.
-            seen_s: The part of it that the forces stand for, seconds.
+            seen_s: The part of it that the forces are the mean of, seconds.
 
         Returns:
             The loads of all members.

@@ -27,7 +27,7 @@ _NO_SEATS: Final = [JOINT_KINDS.index(JointKind.BRACE), JOINT_KINDS.index(JointK
 class OwnForces:
     """Who exerts what; R rows: W wings, P fans, L balloons, A that hold a height, D that let go.
 
-    The rows stand in this order; each block that lets go has two, its own and its base's.
+    The rows are in this order; each block that lets go has two, its own and its base's.
 
     Attributes:
         block: (R,) the block each acts on.

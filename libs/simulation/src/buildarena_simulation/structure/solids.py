@@ -29,7 +29,7 @@ class Solid:
         center: (3,) machine frame, units.
         rotation: (3, 3) machine_from_solid; a cylinder's axis is the third column.
         half_extents: (3,) as in `Shape`, a box's less the collision margin, units.
-        blocks: The blocks it stands for.
+        blocks: The blocks it represents.
         friction: Coefficient of its surface.
         is_wheel: Whether it is a wheel's.
     """
@@ -134,11 +134,11 @@ def _merged(boxes: Sequence[_Box]) -> list[_Box]:
     """The fewest boxes that joining runs along the axes, in some order, gives."""
     best = list(boxes)
     for order in permutations(range(3)):
-        found = list(boxes)
+        merged = list(boxes)
         for axis in order:
-            found = _joined(found, axis)
-        if len(found) < len(best):
-            best = found
+            merged = _joined(merged, axis)
+        if len(merged) < len(best):
+            best = merged
     return best
 
 
@@ -148,13 +148,13 @@ def _joined(boxes: Sequence[_Box], axis: int) -> list[_Box]:
     order = sorted(
         boxes, key=lambda box: (box[0][a], box[1][a], box[0][b], box[1][b], box[0][axis])
     )
-    found: list[_Box] = []
+    joined: list[_Box] = []
     for low, high, blocks in order:
-        if found:
-            before_low, before_high, before = found[-1]
+        if joined:
+            before_low, before_high, before = joined[-1]
             same = all(before_low[k] == low[k] and before_high[k] == high[k] for k in (a, b))
             if same and before_high[axis] == low[axis]:
-                found[-1] = (before_low, high, (*before, *blocks))
+                joined[-1] = (before_low, high, (*before, *blocks))
                 continue
-        found.append((low, high, blocks))
-    return found
+        joined.append((low, high, blocks))
+    return joined

@@ -69,10 +69,10 @@ class StiffnessModel:
         rows = np.concatenate([dof[self._first[inside]], dof[self._second[inside]]], axis=1)
         i = np.repeat(rows, 12, axis=1).reshape(-1)
         j = np.tile(rows, (1, 12)).reshape(-1)
-        kept = (i >= 0) & (j >= 0)
+        free = (i >= 0) & (j >= 0)
         size = int(dof.max()) + 1
         matrix = coo_matrix(
-            (self._element[inside].reshape(-1)[kept], (i[kept], j[kept])), shape=(size, size)
+            (self._element[inside].reshape(-1)[free], (i[free], j[free])), shape=(size, size)
         )
         factorization: _Factorization = splu(
             matrix.tocsc(),
@@ -137,10 +137,10 @@ class MemberForces:
             wanted = [block for block in key if block not in self._columns]
             if wanted:
                 self._solve_columns(wanted)
-            found = np.empty((len(key), 6, len(key), 6))
+            flexibility = np.empty((len(key), 6, len(key), 6))
             for k, block in enumerate(key):
-                found[:, :, k] = self._columns[block][blocks]
-            self._flexible = (key, found)
+                flexibility[:, :, k] = self._columns[block][blocks]
+            self._flexible = (key, flexibility)
         return self._flexible[1]
 
     def _solve_columns(self, blocks: Sequence[int]) -> None:
@@ -148,12 +148,12 @@ class MemberForces:
         loads = np.zeros((count, 6, len(blocks), 6))
         for k, block in enumerate(blocks):
             loads[block, :, k] = np.eye(6)
-        found = np.zeros_like(loads)
+        displacements = np.zeros_like(loads)
         if self._solver is not None:
             rhs = np.asfortranarray(loads[self._free].reshape(-1, 6 * len(blocks)))
-            found[self._free] = self._solver.solve(rhs).reshape(-1, 6, len(blocks), 6)
+            displacements[self._free] = self._solver.solve(rhs).reshape(-1, 6, len(blocks), 6)
         for k, block in enumerate(blocks):
-            self._columns[block] = np.ascontiguousarray(found[:, :, k])
+            self._columns[block] = np.ascontiguousarray(displacements[:, :, k])
 
     def solve(self, wrenches: FloatArray) -> FloatArray:
         """Forces and moments in the members.

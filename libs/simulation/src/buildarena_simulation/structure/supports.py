@@ -1,10 +1,9 @@
 """How terrain bears a structure that bends: unilateral supports on an elastic structure.
 
-What ground and terrain push on one cluster is known as a resultant; which block gets how much of
-it is for the structure's own stiffness to say. A beam that sags over a gap leaves its far ends
-without load and stands on the gap's edges, however long it is. So the normal forces f >= 0 at the
-corners of all resting faces are those of least elastic energy among all that have the same
-resultant force and moment.
+Ground and terrain push on one cluster with a known resultant; the structure's own stiffness decides
+how much of it each block gets. A beam that sags over a gap rests on the gap's edges and leaves its
+far ends without load, however long it is. So the normal forces f >= 0 at the corners of all resting
+faces are those of least elastic energy among all that have the same resultant force and moment.
 """
 
 from collections.abc import Sequence
@@ -111,20 +110,20 @@ class EdgeSupports:
             Contacts and forces, one row each; the first rows are those given.
         """
         first_face = len(contacts.block) - len(corners)
-        found: list[tuple[IntArray, _Candidates]] = []
+        patches: list[tuple[IntArray, _Candidates]] = []
         of = self._cluster_of[contacts.block]
         resting = contacts.other[first_face:] == WORLD
         for c in sorted(set(of[first_face:][resting].tolist())):
             rows = self._patch(contacts, of, first_face, c)
             candidates = _candidates(contacts, spread, corners, rows, first_face)
             if (candidates.block != candidates.block[0]).any() and self._matters(candidates):
-                found.append((rows, candidates))
-        if not found:
+                patches.append((rows, candidates))
+        if not patches:
             return contacts, spread
         displaced = structure.displacements(together([spread, *others]), motion)
         force = spread.force.copy()
         added: list[tuple[_Candidates, FloatArray]] = []
-        for rows, candidates in found:
+        for rows, candidates in patches:
             normal = contacts.normal[rows[-1]]
             pushes = self._pushes(candidates, normal, structure, motion, displaced)
             if pushes is not None:
@@ -256,14 +255,14 @@ class _LeastEnergy:
         self._bearing: BoolArray = np.ones(len(h), dtype=bool)
         self._factors: tuple[bytes, object] = (b"", None)
 
-    def solve(self, target: FloatArray, given: FloatArray) -> FloatArray | None:
+    def solve(self, target: FloatArray, forces: FloatArray) -> FloatArray | None:
         """The forces; None if none have the resultant.
 
         Args:
             target: (P,).
-            given: (P,) forces with the resultant that is wanted.
+            forces: (P,) forces with the resultant that is wanted.
         """
-        bearing, wanted = self._bearing, self._balance @ given
+        bearing, wanted = self._bearing, self._balance @ forces
         scale = float(np.abs(wanted).max()) + 1e-12
         for turn in range(_ROUNDS):
             if not bearing.any():

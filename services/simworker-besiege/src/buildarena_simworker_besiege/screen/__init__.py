@@ -1,1 +1,1 @@
-"""A game with a window: hands, eyes, and the steps that are only done when they were seen."""
+"""A game with a window: input, capture, and steps that count as done only when seen."""

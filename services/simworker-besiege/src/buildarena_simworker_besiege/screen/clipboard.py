@@ -60,10 +60,10 @@ class _X11Clipboard:
     """On X11 a program that copied something hands it over itself, while it lives and answers."""
 
     def __init__(self) -> None:
-        found = shutil.which("xclip")
-        if found is None:
+        program = shutil.which("xclip")
+        if program is None:
             raise NotSetUpError("the clipboard needs the program xclip: install it")
-        self._words = [found, "-selection", "clipboard"]
+        self._words = [program, "-selection", "clipboard"]
         self._owner: subprocess.Popen[bytes] | None = None
 
     def put(self, text: str) -> None:

@@ -12,7 +12,7 @@ from buildarena_simworker_besiege.errors import StepFailedError
 
 log = structlog.get_logger(__name__)
 
-TRIES: Final = 3
+ATTEMPTS: Final = 3
 POLL_S: Final = 0.1
 
 
@@ -23,7 +23,7 @@ def take_step(
     *,
     timeout_s: float,
     recover: Callable[[], None],
-    tries: int = TRIES,
+    attempts: int = ATTEMPTS,
 ) -> None:
     """Acts until the effect is seen.
 
@@ -32,22 +32,22 @@ def take_step(
         act: Does it; must be harmless when done twice.
         finding: None once its effect is seen; otherwise what is seen instead.
         timeout_s: How long the effect may take.
-        recover: Takes away what may be in the way, before the next try.
-        tries: How often to act.
+        recover: Clears what may block the step, before the next attempt.
+        attempts: How often to act.
 
     Raises:
         StepFailedError: The effect was never seen.
     """
-    found: str | None = None
-    for attempt in range(tries):
+    seen: str | None = None
+    for attempt in range(attempts):
         if attempt:
-            log.info("step_again", step=name, finding=found)
+            log.info("step_again", step=name, finding=seen)
             recover()
         act()
-        found = wait_for(finding, timeout_s=timeout_s)
-        if found is None:
+        seen = wait_for(finding, timeout_s=timeout_s)
+        if seen is None:
             return
-    raise StepFailedError(name, str(found))
+    raise StepFailedError(name, str(seen))
 
 
 def wait_for(finding: Callable[[], str | None], *, timeout_s: float) -> str | None:
@@ -62,7 +62,7 @@ def wait_for(finding: Callable[[], str | None], *, timeout_s: float) -> str | No
     """
     ends = time.monotonic() + timeout_s
     while True:
-        found = finding()
-        if found is None or time.monotonic() >= ends:
-            return found
+        seen = finding()
+        if seen is None or time.monotonic() >= ends:
+            return seen
         time.sleep(POLL_S)

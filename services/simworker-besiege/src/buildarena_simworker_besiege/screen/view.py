@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 from buildarena_simworker_besiege.errors import GameGoneError
 from buildarena_simworker_besiege.screen.calibration import Calibration
-from buildarena_simworker_besiege.screen.hands import Hands, difference
+from buildarena_simworker_besiege.screen.capture import difference, picture
 from buildarena_simworker_besiege.screen.windows import Area, Windows
 
 if TYPE_CHECKING:
@@ -24,16 +24,12 @@ class View:
     Args:
         title: Part of its title.
         calibration: Where its places are.
-        hands: The eyes among them.
         windows: The screen's windows.
     """
 
-    def __init__(
-        self, title: str, calibration: Calibration, hands: Hands, windows: Windows
-    ) -> None:
+    def __init__(self, title: str, calibration: Calibration, windows: Windows) -> None:
         self._title = title
         self._places = calibration.positions
-        self._hands = hands
         self._windows = windows
 
     def point(self, place: str) -> tuple[int, int]:
@@ -53,7 +49,7 @@ class View:
         x, y = self.point(place)
         left = min(max(x - width // 2, window.left), window.left + window.width - width)
         top = min(max(y - height // 2, window.top), window.top + window.height - height)
-        return self._hands.picture(Area(left, top, width, height))
+        return picture(Area(left, top, width, height))
 
     def differs(self, place: str, before: Image) -> bool:
         """Whether the window looks different there now."""
@@ -61,7 +57,7 @@ class View:
 
     def whole(self) -> Image:
         """All that the window shows."""
-        return self._hands.picture(self._window())
+        return picture(self._window())
 
     def _window(self) -> Area:
         window = self._windows.find(self._title)

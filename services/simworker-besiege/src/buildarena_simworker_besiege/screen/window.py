@@ -1,7 +1,7 @@
 """A game with a window, driven by mouse and keyboard.
 
-What the published runner does step by step is kept; each step is verified by what can be seen: the
-clipboard, the pixels near what was clicked, the log.
+The steps are those of the published runner; each is verified by what can be seen: the clipboard,
+the pixels near what was clicked, the log.
 """
 
 from __future__ import annotations
@@ -23,8 +23,9 @@ from buildarena_simworker_besiege.errors import (
 from buildarena_simworker_besiege.log_sources import LogFile
 from buildarena_simworker_besiege.process import GameProcess
 from buildarena_simworker_besiege.screen.calibration import Calibration
-from buildarena_simworker_besiege.screen.hands import SELECT, Hands, difference
-from buildarena_simworker_besiege.screen.steps import TRIES, take_step, wait_for
+from buildarena_simworker_besiege.screen.capture import difference, screenshot
+from buildarena_simworker_besiege.screen.input import SELECT, ScreenInput
+from buildarena_simworker_besiege.screen.steps import ATTEMPTS, take_step, wait_for
 from buildarena_simworker_besiege.screen.view import View
 from buildarena_simworker_besiege.screen.windows import Windows
 from buildarena_simworker_besiege.settings import BesiegeSettings, level_digest
@@ -44,7 +45,7 @@ class WindowDesktop:
     Args:
         settings: Title, folders and command.
         calibration: Where to click.
-        hands: Mouse, keyboard and eyes.
+        screen_input: Mouse, keyboard and clipboard.
         windows: The screen's windows.
     """
 
@@ -52,13 +53,13 @@ class WindowDesktop:
         self,
         settings: BesiegeSettings,
         calibration: Calibration,
-        hands: Hands,
+        screen_input: ScreenInput,
         windows: Windows,
     ) -> None:
         self._settings = settings
         self._limits = settings.time_limits
-        self._view = View(settings.title, calibration, hands, windows)
-        self._hands = hands
+        self._view = View(settings.title, calibration, windows)
+        self._input = screen_input
         self._windows = windows
         self._process = GameProcess(settings)
         self._traces = Traces(settings.state)
@@ -87,7 +88,7 @@ class WindowDesktop:
 
     def prepare(self, run: GameRun) -> None:
         """Brings an empty game with the run's level to the front."""
-        self._hands.release_all()
+        self._input.release_all()
         left = self._traces.left
         self._traces.remove()
         other_level = self._settings.opens_levels and self._process.level != level_digest(run.level)
@@ -106,28 +107,28 @@ class WindowDesktop:
         if folder is None or not folder.is_dir():
             raise DesktopError(f"the folder of machine files {folder} does not exist")
         self._traces.put(folder / f"{run.name}.bsg", run.machine_file)
-        self._by_tries(lambda: self._load_by_name(run.name))
+        self._by_attempts(lambda: self._load_by_name(run.name))
         if run.set_ground:
             self._click("set_ground")
-            self._hands.wait(0.5)
+            self._input.wait(0.5)
 
     def start(self, run: GameRun) -> None:
         """Shows the Lua panel and starts."""
-        del run  # the log tells whose lines they are
+        del run  # each line of the log names its run
         if self._log_file is not None:
             self._log_file.skip()
         else:
             self._opened("show the Lua panel", None, "log_window")
             self._panel_shown = True
-        self._hands.wait(0.3)
+        self._input.wait(0.3)
         self._click("start")
 
     def new_log(self, run: GameRun) -> GameLog:
-        """What the run's lines are gathered in."""
+        """An empty log that collects the run's lines."""
         return GameLog(run.run_id)
 
     def trajectory(self, log: RunLog, machine: Machine, scenario: Scenario) -> Trajectory:
-        """What the lines tell of the run."""
+        """The run's trajectory from its lines."""
         assert isinstance(log, GameLog)  # noqa: S101 - it is of `new_log`
         game, mod = self._settings.game, self._settings.mod
         return trajectory_of(log, machine, scenario, game=game, mod=mod)
@@ -137,7 +138,7 @@ class WindowDesktop:
         if self._log_file is not None:
             return self._log_file.read()
         self._click("log_window")
-        return self._hands.copy_all() or ""
+        return self._input.copy_all() or ""
 
     def stop(self) -> None:
         """Stops the simulation: its lines come to an end."""
@@ -149,21 +150,21 @@ class WindowDesktop:
     def clear(self) -> None:
         """Deletes the machine, until the window looks as it did without one."""
         self._click("empty_space")
-        self._hands.wait(0.3)
+        self._input.wait(0.3)
         if self._panel_shown:
-            self._hands.hotkey("ctrl", "l")
+            self._input.hotkey("ctrl", "l")
             self._panel_shown = False
-            self._hands.wait(0.3)
+            self._input.wait(0.3)
         self._step("delete the machine", self._delete, self._still_there)
         self._traces.remove()
 
     def recover(self) -> None:
         """Closes dialogs and takes the keyboard back."""
-        self._hands.release_all()
-        self._hands.press("escape")
-        self._hands.wait(0.2)
+        self._input.release_all()
+        self._input.press("escape")
+        self._input.wait(0.2)
         self._windows.raise_(self._settings.title)
-        self._hands.wait(0.2)
+        self._input.wait(0.2)
 
     def is_alive(self) -> bool:
         """Whether the game has a window, and runs, if it was started here."""
@@ -173,7 +174,7 @@ class WindowDesktop:
 
     def restart(self) -> None:
         """Kills the game and starts it again with the level it had."""
-        self._hands.release_all()
+        self._input.release_all()
         if not self._process.can_start:
             raise GameGoneError(
                 "the game must be restarted, and BUILDARENA_BESIEGE_COMMAND is not set: "
@@ -184,11 +185,11 @@ class WindowDesktop:
 
     def screenshot(self) -> bytes | None:
         """The whole screen."""
-        return self._hands.screenshot()
+        return screenshot()
 
     def close(self) -> None:
         """Lets go of the keys, and ends the game if it was started here."""
-        self._hands.close()
+        self._input.close()
         self._process.kill()
         self._traces.remove()
 
@@ -203,7 +204,7 @@ class WindowDesktop:
                 f"the game showed no window with {title!r} in its title within "
                 f"{self._limits.start_s:.0f} s: {finding}"
             )
-        self._hands.wait(1.0)
+        self._input.wait(1.0)
 
     def _no_window(self, title: str) -> str | None:
         if not self._process.is_running():
@@ -231,17 +232,17 @@ class WindowDesktop:
             lambda: self._windows.raise_(title),
             lambda: None if self._windows.is_active(title) else "another window has the keyboard",
         )
-        self._hands.wait(0.5)
+        self._input.wait(0.5)
 
     def _tidy(self) -> None:
         """Takes out of a game what a dead runner left, by hand."""
         self.recover()
         self._click("empty_space")
         self._click("delete")
-        self._hands.wait(0.5)
+        self._input.wait(0.5)
         self._click("confirm")
-        self._hands.wait(0.5)
-        self._hands.press("escape")
+        self._input.wait(0.5)
+        self._input.press("escape")
 
     def _load_by_name(self, name: str) -> None:
         """Opens the list of machines, types the name, loads; a failure leaves the list closed."""
@@ -257,32 +258,32 @@ class WindowDesktop:
                 else "the list of machines stayed open, so the game did not find or read its file"
             ),
             timeout_s=self._limits.load_s,
-            tries=1,
+            attempts=1,
         )
         self._saw_machine(name)
 
     def _type_name(self, name: str) -> None:
         def retype() -> None:
             self._click("name_box")
-            self._hands.wait(0.5)
-            self._hands.hotkey(SELECT, "a")
-            self._hands.wait(0.2)
-            self._hands.press("backspace")
-            self._hands.wait(0.2)
-            self._hands.write(name)
-            self._hands.wait(0.1 * len(name))
+            self._input.wait(0.5)
+            self._input.hotkey(SELECT, "a")
+            self._input.wait(0.2)
+            self._input.press("backspace")
+            self._input.wait(0.2)
+            self._input.write(name)
+            self._input.wait(0.1 * len(name))
 
         def read_back() -> str | None:
-            found = self._hands.copy_all()
-            if found is not None and found != name and found.casefold() == name:
-                self._hands.press("capslock")
-            return None if found == name else f"{found!r} stands there instead"
+            typed = self._input.copy_all()
+            if typed is not None and typed != name and typed.casefold() == name:
+                self._input.press("capslock")
+            return None if typed == name else f"{typed!r} stands there instead"
 
-        self._step(f"type the name {name}", retype, read_back, timeout_s=0.0, tries=1)
+        self._step(f"type the name {name}", retype, read_back, timeout_s=0.0, attempts=1)
 
-    def _by_tries(self, act: Callable[[], None]) -> None:
+    def _by_attempts(self, act: Callable[[], None]) -> None:
         """Does something of several steps again from its beginning when one of them fails."""
-        for left in reversed(range(TRIES)):
+        for left in reversed(range(ATTEMPTS)):
             try:
                 act()
             except StepFailedError:
@@ -313,17 +314,17 @@ class WindowDesktop:
 
     def _delete(self) -> None:
         self._click("delete")
-        self._hands.wait(0.5)
+        self._input.wait(0.5)
         self._click("confirm")
-        self._hands.wait(0.5)
+        self._input.wait(0.5)
 
     def _click_start(self) -> None:
         self._click("start")
-        self._hands.wait(0.5)
+        self._input.wait(0.5)
 
     def _still_moves(self) -> str | None:
         before = self.read_log()
-        self._hands.wait(0.7)
+        self._input.wait(0.7)
         return None if before == self.read_log() else "lines are still added to the log"
 
     def _opened(self, name: str, click: str | None, seen_at: str) -> None:
@@ -334,7 +335,7 @@ class WindowDesktop:
             if self._view.differs(seen_at, before):
                 return
             if click is None:
-                self._hands.hotkey("ctrl", "l")
+                self._input.hotkey("ctrl", "l")
             else:
                 self._click(click)
 
@@ -355,7 +356,7 @@ class WindowDesktop:
         finding: Callable[[], str | None],
         *,
         timeout_s: float | None = None,
-        tries: int = TRIES,
+        attempts: int = ATTEMPTS,
     ) -> None:
         def alive() -> str | None:
             if not self.is_alive():
@@ -363,8 +364,8 @@ class WindowDesktop:
             return finding()
 
         limit = self._limits.effect_s if timeout_s is None else timeout_s
-        take_step(name, act, alive, timeout_s=limit, recover=self.recover, tries=tries)
+        take_step(name, act, alive, timeout_s=limit, recover=self.recover, attempts=attempts)
 
     def _click(self, place: str) -> None:
-        self._hands.click(*self._view.point(place))
-        self._hands.wait(0.1)
+        self._input.click(*self._view.point(place))
+        self._input.wait(0.1)

@@ -70,8 +70,8 @@ class _WindowsWindows:
     def _window(self, title: str) -> Any:
         import pygetwindow
 
-        found = pygetwindow.getWindowsWithTitle(title)
-        return found[0] if found else None
+        matches = pygetwindow.getWindowsWithTitle(title)
+        return matches[0] if matches else None
 
 
 class _MacWindows:
@@ -154,23 +154,23 @@ class _X11Windows:
     def _window(self, title: str) -> Any:
         """The topmost shown window of this title."""
         waiting = [self._root]
-        found = None
+        match = None
         while waiting:
             window = waiting.pop(0)
             try:
                 children = window.query_tree().children
                 if title.casefold() in self._name(window) and self._is_shown(window):
-                    found = window
+                    match = window
             except self._gone():
                 continue
             waiting += children
-        return found
+        return match
 
     def _name(self, window: Any) -> str:
         for atom in ("_NET_WM_NAME", "WM_NAME"):
-            found = window.get_full_property(self._display.intern_atom(atom), 0)
-            if found is not None and found.value:
-                value = found.value
+            name_property = window.get_full_property(self._display.intern_atom(atom), 0)
+            if name_property is not None and name_property.value:
+                value = name_property.value
                 text = value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
                 return text.casefold()
         return ""

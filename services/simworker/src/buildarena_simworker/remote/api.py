@@ -30,8 +30,8 @@ from buildarena_pipeline.keepalive import socket_options
 from buildarena_simworker.remote.errors import LeaseLostError, RefusedError, UnreachableError
 
 TIMEOUT_S: Final = 15.0
-PATIENCE_S: Final = 15 * 60.0
-"""How long an outcome is kept for an API that does not answer."""
+RETRY_FOR_S: Final = 15 * 60.0
+"""How long the runner retries to send an outcome to an API that does not answer."""
 LONGEST_PAUSE_S: Final = 5.0
 LOOPBACK: Final = ("127.0.0.1", "::1", "localhost")
 BUSY: Final = (429, 500, 502, 503, 504)
@@ -125,22 +125,22 @@ class RunnerApi:
             transport=None if getproxies() else direct,
         )
         self._stopping = stopping
-        self._piece_bytes = 1 << 20
+        self._chunk_bytes = 1 << 20
 
-    def facts(self, *, patience_s: float | None = None) -> dict[str, Any]:
-        """What the API says of key, versions and limits; waits for it until it answers."""
-        found: dict[str, Any] = self._json("GET", "/v1/runner", patience_s=patience_s)
-        self._piece_bytes = int(found["piece_bytes"])
-        return found
+    def facts(self, *, retry_for_s: float | None = None) -> dict[str, Any]:
+        """Key, versions and limits from the API; waits until it answers."""
+        facts: dict[str, Any] = self._json("GET", "/v1/runner", retry_for_s=retry_for_s)
+        self._chunk_bytes = int(facts["piece_bytes"])
+        return facts
 
     def lease(self, about: Mapping[str, Any], wait_s: float) -> dict[str, Any] | None:
-        """The next trial, or None when there is none for so long; waits for an API that is away."""
+        """The next trial, or None if none comes in time; waits for an API that does not answer."""
         answer: dict[str, Any] | None = self._json(
             "POST",
             "/v1/runner/leases",
             json={**about, "wait_s": wait_s},
             timeout=TIMEOUT_S + wait_s,
-            patience_s=None,
+            retry_for_s=None,
         )
         return answer
 
@@ -150,7 +150,7 @@ class RunnerApi:
         """Renews leases; returns those that are lost. Sent once: the next one comes soon."""
         body = {**about, "leases": [lease.document() for lease in leases]}
         answer = self._json(
-            "POST", "/v1/runner/heartbeat", json=body, timeout=within_s, patience_s=0.0
+            "POST", "/v1/runner/heartbeat", json=body, timeout=within_s, retry_for_s=0.0
         )
         return {HeldLease(**lost) for lost in answer["lost"]}
 
@@ -160,10 +160,10 @@ class RunnerApi:
         path = f"{lease.path}/uploads/{sha256}"
         offset, whole = 0, False
         while not whole:
-            piece = data[offset : offset + self._piece_bytes]
+            chunk = data[offset : offset + self._chunk_bytes]
             params: dict[str, Any] = {"size": len(data), "offset": offset}
-            # A piece that was received although its answer was lost may be sent again.
-            received = self._json("PUT", path, params=params, content=piece)
+            # A chunk that was received although its answer was lost may be sent again.
+            received = self._json("PUT", path, params=params, content=chunk)
             offset, whole = int(received["offset"]), bool(received["whole"])
         return {"sha256": sha256, "size": len(data)}
 
@@ -173,7 +173,7 @@ class RunnerApi:
         how: str,
         body: Mapping[str, Any] | None = None,
         *,
-        patience_s: float = PATIENCE_S,
+        retry_for_s: float = RETRY_FOR_S,
         although_stopping: bool = False,
     ) -> None:
         """Ends a lease: ``outcome``, ``fault`` or ``hand-back``.
@@ -186,7 +186,7 @@ class RunnerApi:
             f"{lease.path}/{how}",
             json=None if body is None else dict(body),
             timeout=60.0 if how == "outcome" else TIMEOUT_S,
-            patience_s=patience_s,
+            retry_for_s=retry_for_s,
             although_stopping=although_stopping,
         )
 
@@ -197,7 +197,7 @@ class RunnerApi:
             "/v1/runner/goodbye",
             json=dict(about),
             timeout=2.0,
-            patience_s=0.0,
+            retry_for_s=0.0,
             although_stopping=True,
         )
 
@@ -210,7 +210,7 @@ class RunnerApi:
         method: str,
         path: str,
         *,
-        patience_s: float | None = PATIENCE_S,
+        retry_for_s: float | None = RETRY_FOR_S,
         although_stopping: bool = False,
         timeout: float = TIMEOUT_S,
         **options: Any,
@@ -220,13 +220,13 @@ class RunnerApi:
         Raises:
             LeaseLostError: 409.
             RefusedError: Any other refusal that will not change.
-            UnreachableError: There was none for so long, or the runner is asked to stop.
+            UnreachableError: None came in time, or the runner is asked to stop.
         """
         never = threading.Event()
         stopping = never if although_stopping else self._stopping
         stops: list[stop_base] = [stop_when_event_set(stopping)]
-        if patience_s is not None:
-            stops.append(stop_after_delay(patience_s))
+        if retry_for_s is not None:
+            stops.append(stop_after_delay(retry_for_s))
         sendings = Retrying(
             retry=retry_if_exception_type(_TryAgainError),
             wait=_pause,
@@ -254,11 +254,11 @@ class RunnerApi:
             raise UnreachableError("this runner has stopped") from error
         if answer.status_code in BUSY:
             asked = answer.headers.get("retry-after", "")
-            raise _TryAgainError(_said(answer), float(asked) if asked.isdecimal() else 0.0)
+            raise _TryAgainError(_detail(answer), float(asked) if asked.isdecimal() else 0.0)
         if answer.status_code == GONE:
-            raise LeaseLostError(_said(answer))
+            raise LeaseLostError(_detail(answer))
         if not answer.is_success:
-            raise RefusedError(answer.status_code, _said(answer))
+            raise RefusedError(answer.status_code, _detail(answer))
         if not answer.content:
             return None
         try:
@@ -275,7 +275,7 @@ def _pause(state: RetryCallState) -> float:
     return min(asked, LONGEST_PAUSE_S) + chance
 
 
-def _said(answer: httpx2.Response) -> str:
+def _detail(answer: httpx2.Response) -> str:
     try:
         return str(answer.json()["detail"])
     except (ValueError, KeyError, TypeError):

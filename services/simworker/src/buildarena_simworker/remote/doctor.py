@@ -15,7 +15,7 @@ from buildarena_simworker.remote.api import RunnerApi, check_url, tls_context
 from buildarena_simworker.remote.errors import RefusedError, RemoteError
 from buildarena_simworker.remote.process import KEY_VARIABLE, read_key
 
-PATIENCE_S: Final = 5.0
+RETRY_FOR_S: Final = 5.0
 
 Check = dict[str, Any]
 
@@ -79,7 +79,7 @@ def _service(
         yield _check("settings", str(error), "correct --api, --key-file or --ca-file")
         return
     try:
-        facts = api.facts(patience_s=PATIENCE_S)
+        facts = api.facts(retry_for_s=RETRY_FOR_S)
     except RefusedError as error:
         command = f"buildarena key create NAME --scope runner --simulator {simulator}"
         advice = f"have an admin make one: {command}; set {KEY_VARIABLE} or --key-file"

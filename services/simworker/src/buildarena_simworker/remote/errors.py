@@ -8,7 +8,7 @@ class RemoteError(Exception):
 
 
 class LeaseLostError(RemoteError):
-    """The lease is over: the job is somebody else's, was cancelled, or this runner shuts down."""
+    """The lease is over: another worker has the job, it was cancelled, or the runner shuts down."""
 
 
 class RefusedError(RemoteError):

@@ -171,7 +171,8 @@ class Runner:
     def _end(self, beats: Heartbeats, threads: list[threading.Thread]) -> None:
         held = beats.stop()
         backs = [
-            threading.Thread(target=hand_back, args=(self._api, one), daemon=True) for one in held
+            threading.Thread(target=hand_back, args=(self._api, lease), daemon=True)
+            for lease in held
         ]
         for thread in backs:
             thread.start()

@@ -34,7 +34,7 @@ HAND_BACK_S: Final = 3.0
 WAIT_S: Final = 20.0
 """How long the API may keep a request for a trial."""
 PAUSE_S: Final = 1.0
-"""After what nobody foresaw a slot pauses, so that it does not meet it again and again."""
+"""After an unexpected error a slot pauses, so that it does not meet it again at once."""
 LONGEST_DETAIL: Final = 2000
 REASONS: Final = (
     *("simulator_fault", "game_version", "needs_script"),
@@ -62,7 +62,7 @@ class Heartbeats:
 
     Args:
         api: Where they are.
-        about: What the runner says of itself, at each beat.
+        about: What the runner reports of itself, at each beat.
         lease_s: How long a lease lives without.
     """
 
@@ -86,9 +86,9 @@ class Heartbeats:
         self._thread.stop()
         with self._lock:
             active, self._active = list(self._active.values()), {}
-        for one in active:
-            one.lost.set()
-        return [one.lease for one in active]
+        for active_lease in active:
+            active_lease.lost.set()
+        return [active_lease.lease for active_lease in active]
 
     @contextmanager
     def keeping(self, lease: HeldLease) -> Iterator[_Active]:
@@ -138,17 +138,19 @@ class LeasedOverHttp:
 
     def take(self) -> TrialRequest:
         """What is to be run; see `TrialSource`."""
-        given = self._document
+        document = self._document
         try:
-            controls = given["controls"]
+            controls = document["controls"]
             return TrialRequest(
                 job_id=self._active.lease.job_id,
-                number=int(given["number"]),
+                number=int(document["number"]),
                 token=self._active.lease.token,
-                version=str(given["version"]),
-                task=task_of(TaskDocument.model_validate(given["task"])),
-                machine=Machine.from_document(given["machine"]),
-                controls=None if controls is None else tuple(KeyPress(**one) for one in controls),
+                version=str(document["version"]),
+                task=task_of(TaskDocument.model_validate(document["task"])),
+                machine=Machine.from_document(document["machine"]),
+                controls=None
+                if controls is None
+                else tuple(KeyPress(**press) for press in controls),
                 require_held=self._active.require,
             )
         except Exception as error:
@@ -193,7 +195,7 @@ class Slot:
         api: Where trials come from.
         beats: Keeps its leases alive.
         simulator: What runs trials.
-        about: What the runner says of itself when it asks for one.
+        about: What the runner reports of itself when it requests one.
         stopping: Whether it is to take no more.
         stop_all: Ends the whole runner for a reason that will not change.
     """
@@ -264,7 +266,7 @@ class Slot:
         self, active: _Active, leased: LeasedOverHttp, error: TransientError | PermanentError
     ) -> None:
         if active.lost.is_set():
-            return  # it was broken off, and is nobody's fault
+            return  # it was interrupted, which is not a fault
         log.warning("fault", reason=error.reason, detail=str(error))
         detail = str(error)[:LONGEST_DETAIL] or error.reason
         body = {
@@ -283,6 +285,6 @@ class Slot:
 def hand_back(api: RunnerApi, lease: HeldLease) -> None:
     """Gives a lease back at shutdown, if the API answers soon."""
     try:
-        api.end(lease, "hand-back", patience_s=HAND_BACK_S, although_stopping=True)
+        api.end(lease, "hand-back", retry_for_s=HAND_BACK_S, although_stopping=True)
     except RemoteError as error:
         log.info("not_handed_back", job=lease.job_id, error=str(error))

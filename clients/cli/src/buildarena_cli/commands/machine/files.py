@@ -44,11 +44,11 @@ def check(
         problems = [f"block {block} is attached to nothing" for block in machine.detached]
         if broken is not None and not (problems and broken[0] == "unjoined_parts"):
             problems.append(f"{broken[0]}: {broken[1]}")
-        found = {**_facts(machine), "problems": problems}
+        report = {**_facts(machine), "problems": problems}
         if as_json:
-            print_json(found)
+            print_json(report)
         else:
-            _print_facts(found)
+            _print_facts(report)
         raise typer.Exit(FAILED if problems else DONE)
 
 
@@ -62,17 +62,17 @@ def _facts(machine: Machine) -> dict[str, Any]:
     }
 
 
-def _print_size(found: dict[str, Any]) -> None:
-    size = " x ".join(f"{length:.2f}" for length in found["size"])
-    say(f"{found['parts']} parts, mass {found['mass']:.2f}, cost {found['cost']}")
+def _print_size(facts: dict[str, Any]) -> None:
+    size = " x ".join(f"{length:.2f}" for length in facts["size"])
+    say(f"{facts['parts']} parts, mass {facts['mass']:.2f}, cost {facts['cost']}")
     say(f"{size} units east x north x up")
 
 
-def _print_facts(found: dict[str, Any]) -> None:
-    _print_size(found)
-    for problem in found["problems"]:
+def _print_facts(facts: dict[str, Any]) -> None:
+    _print_size(facts)
+    for problem in facts["problems"]:
         say(problem)
-    if not found["problems"]:
+    if not facts["problems"]:
         say("The machine is sound.")
 
 
@@ -98,8 +98,8 @@ def export(
     with shown_errors():
         if out.suffix not in FORMATS:
             raise CommandError(f"{out}: {out.suffix or 'no'} ending; use {', '.join(FORMATS)}")
-        given = {"--task": task, "--controls": controls}
-        for option, value in given.items():
+        options = {"--task": task, "--controls": controls}
+        for option, value in options.items():
             if value is not None and out.suffix != ".bsg":
                 raise CommandError(f"{option} is for .bsg files, not for {out}")
         machine = read_machine(file, dialect)
@@ -140,23 +140,23 @@ def import_file(
 ) -> None:
     """Read a machine file of the game's, and tell what of it was not understood."""
     with shown_errors():
-        found = read_imported(file)
+        imported = read_imported(file)
         if out is not None:
             from buildarena_geometry.machine_files import machine_bytes
 
-            out.write_bytes(machine_bytes(found.machine))
+            out.write_bytes(machine_bytes(imported.machine))
         facts = {
-            "name": found.name,
-            **_facts(found.machine),
-            "not_understood": list(found.not_understood),
+            "name": imported.name,
+            **_facts(imported.machine),
+            "not_understood": list(imported.not_understood),
         }
         if as_json:
             print_json(facts)
             return
         _print_size(facts)
-        for remark in found.not_understood:
+        for remark in imported.not_understood:
             say(remark)
-        if not found.not_understood:
+        if not imported.not_understood:
             say("Everything was understood.")
         if out is not None:
             say(str(out))

@@ -29,7 +29,7 @@ def show_robustness(
 
     with progress_bar() as bar:
         row = bar.add_task(f"{trials} trials on {engine}", total=1.0)
-        found = robustness(
+        measured = robustness(
             task,
             machine,
             engine,
@@ -37,23 +37,23 @@ def show_robustness(
             on_progress=lambda done: bar.update(row, completed=done),
         )
     if as_json:
-        print_json(_report(task, engine, found))
+        print_json(_report(task, engine, measured))
     else:
-        _print(task, engine, found)
+        _print(task, engine, measured)
 
 
-def _report(task: Task, engine: str, found: Robustness) -> dict[str, Any]:
+def _report(task: Task, engine: str, measured: Robustness) -> dict[str, Any]:
     from buildarena_benchmark.statistics import exact_interval
 
-    trials = len(found.scores)
+    trials = len(measured.scores)
     return {
         "task": task.name,
         "task_version": task.version,
         "engine": engine,
         "trials": trials,
-        "successes": found.successes,
-        "robustness": found.share,
-        "robustness_interval": list(exact_interval(found.successes, trials)),
+        "successes": measured.successes,
+        "robustness": measured.share,
+        "robustness_interval": list(exact_interval(measured.successes, trials)),
         "indicator_name": task.indicator.name,
         "indicator_unit": task.indicator.unit,
         "results": [
@@ -63,20 +63,23 @@ def _report(task: Task, engine: str, found: Robustness) -> dict[str, Any]:
                 "indicator": result.indicator,
                 "flags": list(result.flags),
             }
-            for seed, result in zip(found.seeds, found.scores, strict=True)
+            for seed, result in zip(measured.seeds, measured.scores, strict=True)
         ],
     }
 
 
-def _print(task: Task, engine: str, found: Robustness) -> None:
-    report = _report(task, engine, found)
+def _print(task: Task, engine: str, measured: Robustness) -> None:
+    report = _report(task, engine, measured)
     low, high = report["robustness_interval"]
-    indicators = [result.indicator for result in found.scores]
-    flags = sorted({flag for result in found.scores for flag in result.flags})
+    indicators = [result.indicator for result in measured.scores]
+    flags = sorted({flag for result in measured.scores for flag in result.flags})
     failed = [str(r["seed"]) for r in report["results"] if not r["success"]]
     unit = "" if task.indicator.unit == "1" else f" {task.indicator.unit}"
     rows = [
-        ("robustness", f"{found.successes} of {report['trials']} succeed ({found.share:.0%})"),
+        (
+            "robustness",
+            f"{measured.successes} of {report['trials']} succeed ({measured.share:.0%})",
+        ),
         ("95 % interval", f"{low:.0%} to {high:.0%}"),
         (f"{task.indicator.name}, median", f"{statistics.median(indicators):,.2f}{unit}"),
         ("least and greatest", f"{min(indicators):,.2f} to {max(indicators):,.2f}{unit}"),

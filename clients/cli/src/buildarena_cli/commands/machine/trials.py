@@ -77,8 +77,8 @@ def simulate(  # noqa: PLR0917 - the command line passes options by name
             require_engine(engine)
         except UnknownEngineError as error:
             raise CommandError(f"{error}{did_you_mean(engine, ENGINES)}") from error
-        given = {"--seed": seed, "--video": video, "--trajectory": trajectory}
-        single = [option for option, value in given.items() if value is not None]
+        options = {"--seed": seed, "--video": video, "--trajectory": trajectory}
+        single = [option for option, value in options.items() if value is not None]
         if seeds is not None and single:
             raise CommandError(f"--seeds makes many trials, {single[0]} is for one; give either")
         chosen, machine = chosen_task(task), read_machine(file, dialect)

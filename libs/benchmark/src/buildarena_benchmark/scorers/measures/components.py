@@ -21,7 +21,7 @@ def joined_to_start(machine: "Machine", trajectory: "Trajectory") -> Mask:
     """Which tracked blocks are joined to the starting block at each sample, (T, N).
 
     Joints, axles, braces and ropes join as long as they hold; of several starting blocks the first
-    counts. All blocks do where the trajectory does not tell pieces.
+    counts. Without pieces in the trajectory, all blocks are joined.
 
     Args:
         machine: Gives starting block and ropes.

@@ -49,7 +49,7 @@ def driven_distances(
         path: (T, 2) or (T, 3) of what is transported.
 
     Returns:
-        None where the trajectory does not tell what bears the wheels, or how they move.
+        None where the trajectory has no forces on the wheels, or not how they move.
     """
     bearing = trajectory.bearing
     index = {block: i for i, block in enumerate(trajectory.block_ids)}
@@ -118,8 +118,8 @@ def _rolling(
     credit = np.zeros(len(along))
     speed = 0.0
     for k, step_s in enumerate(steps_s):
-        kept = np.copysign(max(abs(speed) - _COASTING * step_s, 0.0) * step_s, speed)
-        low, high = min(rolled[k], kept, 0.0), max(rolled[k], kept, 0.0)
+        coasted = np.copysign(max(abs(speed) - _COASTING * step_s, 0.0) * step_s, speed)
+        low, high = min(rolled[k], coasted, 0.0), max(rolled[k], coasted, 0.0)
         credit[k] = min(max(along[k], low), high)
         speed = credit[k] / step_s
     length = np.linalg.norm(moved, axis=1)

@@ -28,8 +28,8 @@ def speeds(time_s: Series, positions: Series) -> Series:
 
 def rotations(quaternions: NDArray[np.floating]) -> Series:
     """Rotation matrices, (T, 3, 3), of quaternions (T, 4) as (w, x, y, z)."""
-    given = quaternions.astype(np.float64)
-    w, x, y, z = (given / np.maximum(np.linalg.norm(given, axis=1), 1e-9)[:, None]).T
+    wxyz = quaternions.astype(np.float64)
+    w, x, y, z = (wxyz / np.maximum(np.linalg.norm(wxyz, axis=1), 1e-9)[:, None]).T
     rows = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
         [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],

@@ -29,8 +29,8 @@ MIN_CARRIED: Final = 0.9
 """Smallest share of the force that holds the cargo up that must come from the machine."""
 
 COLLAPSE_S: Final = 1.5
-"""A bridge that gives way may be in pieces for so long before the cargo is lost, seconds: who takes
-up the load from then on says nothing about the bridge. At most half of the time it carried it."""
+"""A bridge that gives way may be in pieces for so long before the cargo is lost, seconds: what
+carries the load from then on does not count. At most half of the time it carried it."""
 
 _EDGE = 1e-6
 
@@ -81,8 +81,8 @@ def deciding_sample(
         fall_height: Units.
     """
     assert trajectory.cargo_position is not None  # noqa: S101 - the caller looked
-    found = np.flatnonzero(is_lost(scenario, trajectory.cargo_position, fall_height=fall_height))
-    return int(found[0]) if len(found) else None
+    lost = np.flatnonzero(is_lost(scenario, trajectory.cargo_position, fall_height=fall_height))
+    return int(lost[0]) if len(lost) else None
 
 
 def is_lost(
@@ -99,15 +99,15 @@ def is_lost(
 def measure_span(
     scenario: "Scenario", trajectory: "Trajectory", decided: int | None
 ) -> Span | None:
-    """Where the load went until it was decided; None where that cannot be asked.
+    """Where the load went until it was decided; None where that is not defined.
 
-    It cannot where the scenario has no gap between terrains, and where the trajectory does not
-    tell contact forces.
+    It is not where the scenario has no gap between terrains, or where the trajectory has no
+    contact forces.
 
     Args:
         scenario: Gives gap and terrains.
         trajectory: The trial, with cargo.
-        decided: As `deciding_sample` says.
+        decided: As from `deciding_sample`.
     """
     bearing, sides = trajectory.bearing, terrain_sides(scenario)
     if bearing is None or sides is None:

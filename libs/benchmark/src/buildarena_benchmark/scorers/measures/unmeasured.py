@@ -1,4 +1,4 @@
-"""Trials that tell no forces: mechanisms and flight cannot be judged by positions alone."""
+"""Trials without forces: mechanisms and flight cannot be judged by positions alone."""
 
 from typing import TYPE_CHECKING
 

@@ -21,12 +21,12 @@ class Addresses:
     Attributes:
         bodies: (C,) body of each cluster.
         body_of_geom: Cluster of each geom, `CARGO` or `WORLD`.
-        block_of_geom: Block of each geom that stands for one only, else -1.
+        block_of_geom: Block of each geom that represents one only, else -1.
         surface_of_geom: Fixed body of each geom as in `ContactForces.surface`.
         joints: The driven joints.
         thrust_actuators: (K,) actuator of each cannon.
         free_dofs: (F, 3) linear velocities of the free bodies, the cargo first.
-        spin_dofs: (P, 3) angular velocities of the pieces.
+        spin_dofs: (P, 3) angular velocities of the components.
         tendons: Tendon of each rope that holds.
     """
 
@@ -70,9 +70,11 @@ def addresses_in(
     for name, surface in [("ground", 0)] * world.ground + fixed:
         geom = model.geom(name).id
         body_of_geom[geom], surface_of_geom[geom] = WORLD, surface
-    pieces = [model.joint(f"free {piece[0]}").dofadr[0] for piece in clusters.pieces]
-    # Only the cargo can stand before the pieces; its free joint comes first.
-    free = pieces if pieces[0] == 0 else [0, *pieces]
+    components = [
+        model.joint(f"free {component[0]}").dofadr[0] for component in clusters.components
+    ]
+    # Only the cargo can come before the components; its free joint is the first.
+    free = components if components[0] == 0 else [0, *components]
     return Addresses(
         bodies=_ids(model.body(f"cluster {c}").id for c in range(len(clusters))),
         body_of_geom=body_of_geom,
@@ -81,7 +83,7 @@ def addresses_in(
         joints=joint_addresses(model, structure, clusters),
         thrust_actuators=_ids(model.actuator(f"cannon {i}").id for i in structure.cannons),
         free_dofs=_ids(free)[:, None] + np.arange(3),
-        spin_dofs=_ids(pieces)[:, None] + np.arange(3, 6),
+        spin_dofs=_ids(components)[:, None] + np.arange(3, 6),
         tendons={int(r): model.tendon(f"rope {r}").id for r in np.flatnonzero(rope_alive)},
     )
 

@@ -16,7 +16,7 @@ from buildarena_simulation.engines.mujoco.model import MjcfSettings, MjcfState, 
 from buildarena_simulation.engines.mujoco.tendons import Tendons, weld_wrenches
 from buildarena_simulation.engines.shared.closest_points import ShapeTable, shape_table
 from buildarena_simulation.engines.shared.impacts import ImpactWatch
-from buildarena_simulation.engines.shared.joint_frames import is_simple_piece
+from buildarena_simulation.engines.shared.joint_frames import is_simple_component
 from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.contacts import ContactForces
 from buildarena_simulation.structure.grips import Hold
@@ -247,17 +247,17 @@ class MujocoEngine:
         self._dof_invweight_times_mass = model.dof_invweight0[:6] * mass
 
     def _set_drag(self, moments: FloatArray) -> None:
-        """Damping of each piece's free joint: Unity's v *= 1 - drag·dt, as a force.
+        """Damping of each component's free joint: Unity's v *= 1 - drag·dt, as a force.
 
-        The clusters of a piece with other joints than wheels' axles have each its own drag.
+        The clusters of a component with other joints than wheels' axles have each its own drag.
         """
         model, clusters = self._model, self._clusters
         self._apart: list[tuple[int, ...]] = []
-        for piece in clusters.pieces:
-            if not is_simple_piece(self._structure, clusters, piece):
-                self._apart.append(piece)
+        for component in clusters.components:
+            if not is_simple_component(self._structure, clusters, component):
+                self._apart.append(component)
                 continue
-            root, inside = piece[0], list(piece)
+            root, inside = component[0], list(component)
             dof = model.joint(f"free {root}").dofadr[0]
             drag = clusters.linear_drag[inside] @ clusters.mass[inside]
             model.dof_damping[dof : dof + 3] = drag
@@ -278,7 +278,7 @@ class MujocoEngine:
                 enter_joint(model, data, bodies, motion, c=c, targets=self._targets)
 
     def _limit_spin(self) -> None:
-        """Slows pieces that spin faster than any part of the game may."""
+        """Slows components that spin faster than any part of the game may."""
         dofs = self._addresses.spin_dofs
         spins = self._data.qvel[dofs]
         if np.abs(spins).max() > MAX_SPIN / 2:
@@ -331,8 +331,8 @@ class MujocoEngine:
                     self._shapes[c] = shape_table(self._structure, self._clusters.blocks[c])
                 among = (cluster == c).nonzero()[0]
                 local = (points[among] - motion.position[c]) @ motion.rotation[c]
-                row, found, weight = self._shapes[c].share(local)
+                row, sharing, weight = self._shapes[c].share(local)
                 rows.append(among[row])
-                blocks.append(found)
+                blocks.append(sharing)
                 weights.append(weight)
         return np.concatenate(rows), np.concatenate(blocks), np.concatenate(weights)

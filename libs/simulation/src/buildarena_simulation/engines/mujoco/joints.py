@@ -1,4 +1,4 @@
-"""Moving joints in a compiled MuJoCo model: where they start, and what their drives are told."""
+"""Moving joints in a compiled MuJoCo model: where they start, and the targets of their drives."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -92,7 +92,7 @@ def enter_joint(
     c: int,
     targets: FloatArray | None,
 ) -> None:
-    """Puts a cluster's joint where the cluster stands, moving as it moves.
+    """Gives a cluster's joint the position and the rate that the cluster's motion implies.
 
     Args:
         model: The model.
@@ -108,16 +108,16 @@ def enter_joint(
         data.qvel[joint.dofadr[0]] = joint_rate(structure, clusters, motion, c)
         return
     seat = seat_of(structure, clusters, c)
-    found = entered_place(structure, clusters, motion, c, targets)
+    entered = entered_place(structure, clusters, motion, c, targets)
     place, dof = int(joint.qposadr[0]), int(joint.dofadr[0])
     if seat == "ball":
-        turn = axes[c].T @ rotation_of(found.place) @ axes[c]
+        turn = axes[c].T @ rotation_of(entered.place) @ axes[c]
         data.qpos[place : place + 4] = quaternion_of(turn)
-        data.qvel[dof : dof + 3] = axes[c].T @ found.rate
+        data.qvel[dof : dof + 3] = axes[c].T @ entered.rate
         return
-    count = len(found.place)
-    data.qpos[place : place + count] = found.place
-    data.qvel[dof : dof + count] = found.rate
+    count = len(entered.place)
+    data.qpos[place : place + count] = entered.place
+    data.qvel[dof : dof + count] = entered.rate
 
 
 def drag_apart(
@@ -125,21 +125,21 @@ def drag_apart(
     data: "mujoco.MjData",
     bodies: tuple[Clusters, IntArray],
     motion: Motion,
-    pieces: Sequence[Sequence[int]],
+    components: Sequence[Sequence[int]],
 ) -> None:
-    """Applies the drag of every cluster of some pieces until it is called again.
+    """Applies the drag of every cluster of some components until it is called again.
 
     Args:
         model: The model.
         data: Its state; the applied generalised forces are written.
         bodies: The clusters, and (C,) the body of each.
         motion: The clusters' motion.
-        pieces: The clusters of each piece.
+        components: The clusters of each component.
     """
     clusters, body_of = bodies
     centers = motion.centers_of_mass(clusters)
     data.qfrc_applied[:] = 0.0
-    for c in (c for piece in pieces for c in piece):
+    for c in (c for component in components for c in component):
         turn = motion.rotation[c]
         force = -clusters.linear_drag[c] * clusters.mass[c] * motion.velocity[c]
         slowed = clusters.inertia[c] @ (turn.T @ motion.spin[c])

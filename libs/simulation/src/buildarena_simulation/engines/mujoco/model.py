@@ -34,7 +34,7 @@ _TERRAIN_PRIORITY, _CARGO_PRIORITY, _BLOCK_PRIORITY, _WHEEL_PRIORITY = 0, 1, 2, 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MjcfSettings:
-    """What the text says about the solver.
+    """The solver's settings in the text.
 
     Attributes:
         time_step_s: Length of a step, seconds.
@@ -57,7 +57,7 @@ class MjcfSettings:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MjcfState:
-    """What the text says about the bodies.
+    """The bodies in the text.
 
     Attributes:
         clusters: The clusters.
@@ -119,7 +119,7 @@ def mjcf_of(world: World, state: MjcfState, settings: MjcfSettings) -> str:
         "<worldbody>",
         *_static(world),
         *_cargo(world, state.cargo_mass),
-        *_pieces(world.structure, state, joints),
+        *_components(world.structure, state, joints),
         "</worldbody>",
         "<contact>",
         *_exclusions(state.clusters),
@@ -180,9 +180,9 @@ def _cargo(world: World, mass: float) -> Iterator[str]:
     yield "</body>"
 
 
-def _pieces(structure: Structure, state: MjcfState, joints: JointText) -> Iterator[str]:
-    for piece in state.clusters.pieces:
-        yield from _body(structure, state, joints, piece[0])
+def _components(structure: Structure, state: MjcfState, joints: JointText) -> Iterator[str]:
+    for component in state.clusters.components:
+        yield from _body(structure, state, joints, component[0])
 
 
 def _body(structure: Structure, state: MjcfState, joints: JointText, c: int) -> Iterator[str]:
@@ -246,10 +246,10 @@ def _rope_sites(structure: Structure, state: MjcfState, c: int) -> Iterator[str]
 
 
 def _exclusions(clusters: Clusters) -> Iterator[str]:
-    """Parts of one articulated piece do not collide with each other."""
-    for piece in clusters.pieces:
-        for i, first in enumerate(piece):
-            for second in piece[i + 1 :]:
+    """Parts of one articulated component do not collide with each other."""
+    for component in clusters.components:
+        for i, first in enumerate(component):
+            for second in component[i + 1 :]:
                 yield tag("exclude", body1=f"cluster {first}", body2=f"cluster {second}")
 
 

@@ -1,8 +1,8 @@
 """MJCF text of moving joints, their drives and their gears.
 
-A simple axle is written at the angle at which it stands, as angle 0. Any other joint is written at
-its place 0, where the machine was built, as its limits, spring and drive count from there; the
-engine then puts it where it stands.
+A simple axle is written at its present angle, as angle 0. Any other joint is written at its
+position 0, where the machine was built, as its limits, spring and drive count from there; the
+engine then moves it to its present position.
 """
 
 from collections.abc import Iterator

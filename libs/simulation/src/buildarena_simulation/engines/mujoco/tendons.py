@@ -66,15 +66,15 @@ def weld_wrenches(
     A weld's six constraint forces act on its first body: a force, and twice a moment in the axes of
     the second body.
     """
-    found = np.zeros((len(holds), 6))
+    wrenches = np.zeros((len(holds), 6))
     if not holds:
-        return found
+        return wrenches
     equalities = data.efc_type[: data.nefc] == mujoco.mjtConstraint.mjCNSTR_EQUALITY
     for row, hold in enumerate(holds):
         weld = model.equality(f"grip {hold.grip}").id
         rows = np.flatnonzero(equalities & (data.efc_id[: data.nefc] == weld))
-        if len(rows) == len(found[row]):
+        if len(rows) == len(wrenches[row]):
             force = data.efc_force[rows]
             turn = data.xmat[model.eq_obj2id[weld]].reshape(3, 3)
-            found[row] = -np.concatenate([force[:3], turn @ force[3:] / 2])
-    return found
+            wrenches[row] = -np.concatenate([force[:3], turn @ force[3:] / 2])
+    return wrenches

@@ -7,7 +7,7 @@ import numpy as np
 
 from buildarena_simulation.constants import FRICTION_TERRAIN, MAX_SPIN
 from buildarena_simulation.engines.base import CargoPose
-from buildarena_simulation.engines.pybullet.hinges import HingedPiece
+from buildarena_simulation.engines.pybullet.hinges import HingedComponent
 from buildarena_simulation.engines.pybullet.quiet_output import quiet_output
 from buildarena_simulation.structure.model import FloatArray, IntArray, Structure
 from buildarena_simulation.structure.motion import Motion
@@ -123,19 +123,21 @@ def friction_of(structure: Structure, blocks: IntArray) -> float:
     return float(deciding.physics.friction)
 
 
-def limit_spin(client: Mapping[str, int], pieces: Sequence[HingedPiece], motion: Motion) -> None:
-    """Slows pieces that spin faster than any part of the game may.
+def limit_spin(
+    client: Mapping[str, int], components: Sequence[HingedComponent], motion: Motion
+) -> None:
+    """Slows components that spin faster than any part of the game may.
 
     Args:
         client: The engine's world.
-        pieces: Its pieces.
+        components: Its components.
         motion: The clusters' motion.
     """
-    for piece in pieces:
-        root = piece.inside[0]
+    for component in components:
+        root = component.inside[0]
         spin = motion.spin[root]
         speed = float(np.linalg.norm(spin))
         if speed > MAX_SPIN:
             slower = (spin * (MAX_SPIN / speed)).tolist()
             velocity = motion.velocity[root].tolist()
-            pybullet.resetBaseVelocity(piece.body, velocity, slower, **client)
+            pybullet.resetBaseVelocity(component.body, velocity, slower, **client)

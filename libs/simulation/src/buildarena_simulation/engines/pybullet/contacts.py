@@ -78,15 +78,15 @@ def _to_blocks(table: FloatArray, c: int, shapes: ShapeTable, motion: Motion) ->
     )
 
 
-def _gathered(found: Sequence[ContactForces]) -> ContactForces:
+def _gathered(parts: Sequence[ContactForces]) -> ContactForces:
     none = np.zeros(0, dtype=np.int64)
     return ContactForces(
-        block=np.concatenate([none, *(f.block for f in found)]),
-        other=np.concatenate([none, *(f.other for f in found)]),
-        surface=np.concatenate([none, *(f.surface for f in found)]),
-        weight=np.concatenate([np.zeros(0), *(f.weight for f in found)]),
-        area=np.concatenate([np.zeros(0), *(f.area for f in found)]),
-        normal=np.concatenate([np.zeros((0, 3)), *(f.normal for f in found)]),
-        point=np.concatenate([np.zeros((0, 3)), *(f.point for f in found)]),
-        force=np.concatenate([np.zeros((0, 3)), *(f.force for f in found)]),
+        block=np.concatenate([none, *(f.block for f in parts)]),
+        other=np.concatenate([none, *(f.other for f in parts)]),
+        surface=np.concatenate([none, *(f.surface for f in parts)]),
+        weight=np.concatenate([np.zeros(0), *(f.weight for f in parts)]),
+        area=np.concatenate([np.zeros(0), *(f.area for f in parts)]),
+        normal=np.concatenate([np.zeros((0, 3)), *(f.normal for f in parts)]),
+        point=np.concatenate([np.zeros((0, 3)), *(f.point for f in parts)]),
+        force=np.concatenate([np.zeros((0, 3)), *(f.force for f in parts)]),
     )

@@ -1,4 +1,4 @@
-"""PyBullet behind the engine seam: one multibody per articulated piece, read from URDF text.
+"""PyBullet behind the engine seam: one multibody per articulated component, read from URDF text.
 
 Why: multibodies keep heavy cargo quiet; `createCollisionShapeArray` drops shapes beyond 16; inertia
 computed by PyBullet is wrong; URDFs are cached by file name; its damping grows with the speed's
@@ -42,7 +42,7 @@ from buildarena_simulation.engines.pybullet.external_forces import (
 )
 from buildarena_simulation.engines.pybullet.friction import follow_friction, mixed_clusters
 from buildarena_simulation.engines.pybullet.grips import BulletGrips
-from buildarena_simulation.engines.pybullet.hinges import HingedPiece, hinge_frames
+from buildarena_simulation.engines.pybullet.hinges import HingedComponent, hinge_frames
 from buildarena_simulation.engines.pybullet.joints import articulated
 from buildarena_simulation.engines.pybullet.quiet_output import quiet_output
 from buildarena_simulation.engines.pybullet.ropes import rope_forces
@@ -51,7 +51,7 @@ from buildarena_simulation.engines.shared.closest_points import shape_table
 from buildarena_simulation.engines.shared.impacts import ImpactWatch
 from buildarena_simulation.engines.shared.joint_frames import (
     has_joints,
-    is_simple_piece,
+    is_simple_component,
     joint_rate,
 )
 from buildarena_simulation.structure.clusters import Clusters
@@ -99,7 +99,7 @@ class PyBulletEngine:
         self._client = {"physicsClientId": pybullet.connect(pybullet.DIRECT)}
         self._folder = Path(tempfile.mkdtemp(prefix="buildarena-"))
         self._serial = itertools.count()
-        self._pieces: list[HingedPiece] = []
+        self._components: list[HingedComponent] = []
         self._solids = Solids(world.structure)
         self._surfaces: dict[int, int] = {}
         self._cargo: int | None = None
@@ -136,17 +136,17 @@ class PyBulletEngine:
         self._compliance = np.asarray(np.linalg.inv(clusters.inertia))
         self._hinges = hinge_frames(self._structure, clusters, motion)
         self._grips.leave()
-        for piece in self._pieces:
-            if piece.articulation is not None:
-                piece.articulation.release()
-            pybullet.removeBody(piece.body, **self._client)
-        self._pieces = [self._add_piece(piece, motion) for piece in clusters.pieces]
+        for component in self._components:
+            if component.articulation is not None:
+                component.articulation.release()
+            pybullet.removeBody(component.body, **self._client)
+        self._components = [self._add_component(inside, motion) for inside in clusters.components]
         self._cluster_of_link = {
-            (piece.body, link): c for piece in self._pieces for c, link in piece.links.items()
+            (tree.body, link): c for tree in self._components for c, link in tree.links.items()
         }
         self._address = {c: key for key, c in self._cluster_of_link.items()}
         self._shapes = [shape_table(self._structure, blocks) for blocks in clusters.blocks]
-        self._free_bodies = [piece.body for piece in self._pieces]
+        self._free_bodies = [component.body for component in self._components]
         if self._cargo is not None:
             self._free_bodies.append(self._cargo)
         mixed = mixed_clusters(self._structure, clusters)
@@ -185,7 +185,7 @@ class PyBulletEngine:
                 impacts.take(self._read_contacts())
         self._targets = targets[-1]
         self._motion = self._read_motion()
-        limit_spin(self._client, self._pieces, self._motion)
+        limit_spin(self._client, self._components, self._motion)
         if self._mixed:
             follow_friction(self._client, self._structure, self._mixed, self._shapes, self._motion)
         self._impacts = impacts
@@ -246,7 +246,7 @@ class PyBulletEngine:
             cargo = world.cargo
             self._cargo = add_box(self._client, cargo.size / 2, cargo.position, mass=cargo.mass)
 
-    def _add_piece(self, inside: tuple[int, ...], motion: Motion) -> HingedPiece:
+    def _add_component(self, inside: tuple[int, ...], motion: Motion) -> HingedComponent:
         clusters, structure, root = self._clusters, self._structure, inside[0]
         body = self._load(inside, motion)
         free_of_damping(self._client, body)
@@ -263,7 +263,7 @@ class PyBulletEngine:
         )
         for c, link in articulation.links.items():
             set_friction(self._client, body, link, friction_of(structure, clusters.blocks[c]))
-        simple = is_simple_piece(structure, clusters, inside)
+        simple = is_simple_component(structure, clusters, inside)
         if simple:
             for link, c in enumerate(inside[1:]):
                 rate = joint_rate(structure, clusters, motion, c)
@@ -273,7 +273,7 @@ class PyBulletEngine:
         articulation.add_gears()
         hinged = list(inside[1:]) if simple else []
         places = [self._place_of_wheel[int(wheel)] for wheel in clusters.seated[hinged]]
-        return HingedPiece(
+        return HingedComponent(
             body=body,
             inside=inside,
             links=articulation.links,
@@ -284,7 +284,7 @@ class PyBulletEngine:
         )
 
     def _load(self, inside: tuple[int, ...], motion: Motion) -> int:
-        """The body of a piece, put where its root is."""
+        """The body of a component, put where its root is."""
         clusters, root = self._clusters, inside[0]
         solids = {c: self._solids.of(clusters.blocks[c]) for c in inside}
         text = urdf_of(self._structure, clusters, solids, axes=self._axes, moments=self._moments)
@@ -305,18 +305,18 @@ class PyBulletEngine:
         return int(body)
 
     def _drive(self, speeds: FloatArray) -> None:
-        for piece in self._pieces:
-            if piece.articulation is not None:
-                piece.articulation.follow(speeds)
+        for component in self._components:
+            if component.articulation is not None:
+                component.articulation.follow(speeds)
                 continue
-            count = len(piece.wheel_signs)
-            if count:
+            signs = component.wheel_signs
+            if count := len(signs):
                 pybullet.setJointMotorControlArray(
-                    piece.body,
+                    component.body,
                     range(count),
                     pybullet.VELOCITY_CONTROL,
-                    targetVelocities=(speeds[piece.wheel_places] * piece.wheel_signs).tolist(),
-                    forces=piece.wheel_torques.tolist(),
+                    targetVelocities=(speeds[component.wheel_places] * signs).tolist(),
+                    forces=component.wheel_torques.tolist(),
                     **self._client,
                 )
 
@@ -362,7 +362,7 @@ class PyBulletEngine:
             )
 
     def _free_velocities(self) -> FloatArray:
-        """Velocity of every piece and of the cargo, (K, 3), units/s."""
+        """Velocity of every component and of the cargo, (K, 3), units/s."""
         client = self._client
         return np.array([pybullet.getBaseVelocity(body, **client)[0] for body in self._free_bodies])
 
@@ -376,16 +376,16 @@ class PyBulletEngine:
             velocity=np.empty((count, 3)),
             spin=np.empty((count, 3)),
         )
-        for piece in self._pieces:
-            root, body = piece.inside[0], piece.body
+        for component in self._components:
+            root, body = component.inside[0], component.body
             center, turn = pybullet.getBasePositionAndOrientation(body, **client)
             motion.velocity[root], motion.spin[root] = pybullet.getBaseVelocity(body, **client)
             rotation = rotation_of(np.array(turn)[[3, 0, 1, 2]]) @ self._axes[root].T
             motion.rotation[root] = rotation
             motion.position[root] = center - rotation @ clusters.center_of_mass[root]
-            hinged = piece.inside[1:]
-            if piece.articulation is not None:
-                piece.articulation.read(motion)
+            hinged = component.inside[1:]
+            if component.articulation is not None:
+                component.articulation.read(motion)
             elif hinged:
                 states = pybullet.getJointStates(body, range(len(hinged)), **client)
                 for c, state in zip(hinged, states, strict=True):

@@ -6,7 +6,7 @@ between; given in a body's own principal frame, they turn with it.
 
 import numpy as np
 
-from buildarena_simulation.engines.shared.joint_frames import is_simple_piece
+from buildarena_simulation.engines.shared.joint_frames import is_simple_component
 from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.model import FloatArray, Structure
 from buildarena_simulation.structure.motion import Motion
@@ -27,15 +27,15 @@ def thrust_forces(
         axes: (C, 3, 3) machine_from_principal.
         thrusts: (C,) recoil of each cannon, mass·unit/s².
     """
-    found = []
+    forces = []
     for cannon in np.flatnonzero(thrusts):
         block = structure.cannons[cannon]
         c = int(clusters.cluster_of[block])
         to_body = axes[c].T
         arm = to_body @ (structure.thrust_points[cannon] - clusters.center_of_mass[c])
         force = -thrusts[cannon] * (to_body @ structure.directions[block])
-        found.append((c, (force.tolist(), arm.tolist())))
-    return found
+        forces.append((c, (force.tolist(), arm.tolist())))
+    return forces
 
 
 def drag_forces(
@@ -43,8 +43,8 @@ def drag_forces(
 ) -> list[tuple[int, Force]]:
     """Cluster, force and torque of drag: Unity's v *= 1 - drag·dt as a force.
 
-    A piece with no joints but wheels' axles moves as its root does, which takes the drag of all; in
-    any other each cluster has its own.
+    A component with no joints but wheels' axles moves as its root does, which takes the drag of
+    all; in any other each cluster has its own.
 
     Args:
         structure: The machine.
@@ -53,18 +53,18 @@ def drag_forces(
         axes: (C, 3, 3) machine_from_principal.
         moments: (C, 3) principal moments of inertia.
     """
-    found = []
-    for piece in clusters.pieces:
-        if not is_simple_piece(structure, clusters, piece):
-            found += [(c, _own_drag(clusters, motion, axes, moments, c=c)) for c in piece]
+    forces = []
+    for component in clusters.components:
+        if not is_simple_component(structure, clusters, component):
+            forces += [(c, _own_drag(clusters, motion, axes, moments, c=c)) for c in component]
             continue
-        root, inside = piece[0], list(piece)
+        root, inside = component[0], list(component)
         to_body = (motion.rotation[root] @ axes[root]).T
         drag = float(clusters.linear_drag[inside] @ clusters.mass[inside])
         force = -drag * (to_body @ motion.velocity[root])
         torque = -clusters.angular_drag[root] * moments[root] * (to_body @ motion.spin[root])
-        found.append((root, (force.tolist(), torque.tolist())))
-    return found
+        forces.append((root, (force.tolist(), torque.tolist())))
+    return forces
 
 
 def body_wrenches(wrenches: FloatArray, axes: FloatArray) -> list[tuple[int, Force]]:

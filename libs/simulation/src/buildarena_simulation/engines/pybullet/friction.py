@@ -17,13 +17,13 @@ with quiet_output():
 
 def mixed_clusters(structure: Structure, clusters: Clusters) -> tuple[int, ...]:
     """Clusters without a wheel whose blocks differ in friction."""
-    found = []
+    mixed = []
     for c, blocks in enumerate(clusters.blocks):
         parts = [structure.parts[i] for i in blocks]
         alike = len({part.physics.friction for part in parts}) == 1
         if not alike and not any(part.is_wheel for part in parts):
-            found.append(c)
-    return tuple(found)
+            mixed.append(c)
+    return tuple(mixed)
 
 
 def follow_friction(

@@ -69,7 +69,7 @@ class BulletGrips:
                 rotation = np.array(pybullet.getMatrixFromQuaternion(turn)).reshape(3, 3)
                 held, place = (int(cargo or 0), -1), (np.array(position), rotation)
             (first, first_turn), (second, second_turn) = (
-                _seen_from(one, point) for one in (frame(c), place)
+                _seen_from(body, point) for body in (frame(c), place)
             )
             self._constraints.append(
                 pybullet.createConstraint(
@@ -90,12 +90,12 @@ class BulletGrips:
 
         World frame, mass·unit/s² and mass·unit²/s².
         """
-        found = np.zeros((len(self.holds), 6))
+        wrenches = np.zeros((len(self.holds), 6))
         for row, constraint in enumerate(self._constraints):
             state = pybullet.getConstraintState(constraint, **self._client)
-            if len(state) == len(found[row]):  # none before its first step
-                found[row] = state
-        return found
+            if len(state) == len(wrenches[row]):  # none before its first step
+                wrenches[row] = state
+        return wrenches
 
 
 def _seen_from(

@@ -13,15 +13,15 @@ from buildarena_simulation.structure.vectors import cross, turn_about
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class HingedPiece:
-    """A multibody of an engine; its links are the piece's clusters in order.
+class HingedComponent:
+    """A multibody of an engine; its links are the component's clusters in order.
 
     Attributes:
         body: The engine's id of it.
         inside: Its clusters, the root first.
         links: The engine's link of each of them; the root's is -1.
-        articulation: Its joints, if one of them is more than a simple axle; else None, and the rest
-            says all.
+        articulation: Its joints, if one of them is more than a simple axle; else None, and the
+            other attributes describe them.
         wheel_signs: Per hinge, -1 where the link turned is not the wheel's but its mount's.
         wheel_places: Per hinge, which wheel of the structure it is.
         wheel_torques: Per hinge, torque limit of its motor, mass·unit²/s².

@@ -49,14 +49,14 @@ class _Drive:
         sign: -1 where the link moved is not the seated block's but its mount's.
         force: The most it exerts, mass·unit/s², times units where it turns.
         holds_place: Whether its target is a place; else it is a speed.
-        told: Its last target; infinite before the first.
+        commanded: Its last target; infinite before the first.
     """
 
     link: int
     sign: float
     force: float
     holds_place: bool
-    told: float = math.inf
+    commanded: float = math.inf
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -91,7 +91,7 @@ class Articulation:
         return self.world.structure
 
     def start(self, motion: Motion, targets: FloatArray | None) -> None:
-        """Puts all joints where the clusters stand, and sets up springs and friction.
+        """Puts all joints at their clusters' positions, and sets up springs and friction.
 
         Args:
             motion: The clusters' motion.
@@ -100,20 +100,22 @@ class Articulation:
         self._find_drives()
         for c, link in self._joints():
             seat = seat_of(self.structure, self.clusters, c)
-            found = entered_place(self.structure, self.clusters, motion, c, targets)
+            entered = entered_place(self.structure, self.clusters, motion, c, targets)
             if seat == "ball":
-                self._start_ball(c, link, found.place, found.rate)
+                self._start_ball(c, link, entered.place, entered.rate)
             elif seat == "constant_velocity":
-                for at, place, rate in zip(self.chains[c], found.place, found.rate, strict=True):
+                for at, place, rate in zip(
+                    self.chains[c], entered.place, entered.rate, strict=True
+                ):
                     self._reset(at, place, rate)
                     self._motor(at, pybullet.VELOCITY_CONTROL, force=0.0)
                 self._tie(self.chains[c][0], link, 1.0)
             else:
-                self._reset(link, found.place[0], found.rate[0])
+                self._reset(link, entered.place[0], entered.rate[0])
                 self._rest(c, link)
 
     def follow(self, targets: FloatArray) -> None:
-        """Gives the drives their targets; one that stays is not told again.
+        """Gives the drives their targets; unchanged ones are left alone.
 
         Args:
             targets: (D,) as in `Schedule.targets`.
@@ -121,9 +123,9 @@ class Articulation:
         wanted = targets.tolist()
         for d, drive in self._drives.items():
             target = wanted[d]
-            if target == drive.told:
+            if target == drive.commanded:
                 continue
-            drive.told = target
+            drive.commanded = target
             if drive.holds_place:
                 self._motor(
                     drive.link,
@@ -231,8 +233,8 @@ class Articulation:
     def _reset(self, link: int, place: float, rate: float) -> None:
         pybullet.resetJointState(self.body, link, float(place), float(rate), **self.client)
 
-    def _motor(self, link: int, mode: int, **figures: Any) -> None:
-        pybullet.setJointMotorControl2(self.body, link, mode, **figures, **self.client)
+    def _motor(self, link: int, mode: int, **parameters: Any) -> None:
+        pybullet.setJointMotorControl2(self.body, link, mode, **parameters, **self.client)
 
     def add_gears(self) -> None:
         """Lets the cogs that engage turn each other."""

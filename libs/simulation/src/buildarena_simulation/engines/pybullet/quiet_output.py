@@ -14,7 +14,7 @@ def quiet_output() -> Iterator[None]:
     """While it lasts, nothing that Python or C prints reaches stdout or stderr."""
     sys.stdout.flush()
     sys.stderr.flush()
-    kept = [os.dup(stream) for stream in _STREAMS]
+    copies = [os.dup(stream) for stream in _STREAMS]
     nowhere = os.open(os.devnull, os.O_WRONLY)
     try:
         for stream in _STREAMS:
@@ -23,7 +23,7 @@ def quiet_output() -> Iterator[None]:
         # What C has buffered must leave before the streams are put back.
         ctypes.CDLL(None).fflush(None)
     finally:
-        for stream, copy in zip(_STREAMS, kept, strict=True):
+        for stream, copy in zip(_STREAMS, copies, strict=True):
             os.dup2(copy, stream)
             os.close(copy)
         os.close(nowhere)

@@ -1,4 +1,4 @@
-"""URDF text of one articulated piece.
+"""URDF text of one articulated component.
 
 Each link's inertial frame is the principal frame of its cluster. A newline follows every tag: long
 URDF lines fail to parse.
@@ -22,18 +22,18 @@ def urdf_of(
     axes: FloatArray,
     moments: FloatArray,
 ) -> str:
-    """The URDF of a piece whose joints all stand at 0 in the machine frame.
+    """The URDF of a component whose joints are all at 0 in the machine frame.
 
     Args:
         structure: The machine.
         clusters: Its clusters.
-        solids: The collision shapes of the piece's clusters, its root first.
+        solids: The collision shapes of the component's clusters, its root first.
         axes: (C, 3, 3) machine_from_principal.
         moments: (C, 3) principal moments of inertia.
     """
     inside = list(solids)
     root = inside[0]
-    # A link's frame stands where its hinge is; the root's, at its centre of mass.
+    # A link's frame is at its hinge; the root's, at its centre of mass.
     origins = {root: clusters.center_of_mass[root]}
     lines = ['<robot name="piece">']
     for link, c in enumerate(inside):

@@ -1,8 +1,7 @@
 """Contact forces averaged over an interval at little cost.
 
-Contacts at rest change slowly, so the interval's last step stands for all quiet ones. A step in
-which something is struck is read as well: otherwise its impulse would be missed, or counted for
-the whole interval.
+Contacts at rest change slowly, so the interval's last step represents all quiet ones. A step with
+an impact is read as well: otherwise its impulse would be missed, or counted for the whole interval.
 """
 
 from collections.abc import Callable

@@ -1,7 +1,7 @@
-"""Where clusters stand on their joints, and how fast they move there.
+"""Positions and rates of joints.
 
-All of it is of a cluster against its parent, whichever of them the seated block belongs to. In the
-machine frame every joint stands at 0.
+All of them are of a cluster relative to its parent, whichever of them the seated block belongs to.
+In the machine frame every joint is at 0.
 """
 
 import math
@@ -50,9 +50,9 @@ def has_joints(structure: Structure) -> bool:
     return bool((moving & ~structure.joints.simple).any())
 
 
-def is_simple_piece(structure: Structure, clusters: Clusters, piece: Sequence[int]) -> bool:
-    """Whether all joints of a piece, given root first, are axles whose angles do not matter."""
-    return all(is_simple(structure, clusters, c) for c in piece[1:])
+def is_simple_component(structure: Structure, clusters: Clusters, component: Sequence[int]) -> bool:
+    """Whether all joints of a component, given root first, are axles whose angles do not matter."""
+    return all(is_simple(structure, clusters, c) for c in component[1:])
 
 
 def sign_of(clusters: Clusters, c: int) -> float:
@@ -118,8 +118,8 @@ def entered_place(
 ) -> JointPlace:
     """The place of a cluster on its joint as an engine starts from it.
 
-    Poses do not tell how often a joint has turned; where its drive holds a place without limits, it
-    is taken to be at the turn nearest to that.
+    Poses do not show how often a joint has turned; where its drive holds a position without limits,
+    the turn nearest to that position is assumed.
 
     Args:
         structure: The machine.
@@ -128,26 +128,26 @@ def entered_place(
         c: A cluster that hangs on another.
         targets: (D,) what the driven joints aimed at last; None at the start.
     """
-    found = joint_place(structure, clusters, motion, c)
+    current = joint_place(structure, clusters, motion, c)
     block = clusters.seated[c]
     joint = structure.parts[block].module.joint
     if targets is None or joint is None or joint.drive is None or joint.limits is not None:
-        return found
+        return current
     if joint.drive.kind == "position" and seat_of(structure, clusters, c) != "slider":
         target = targets[structure.joints.driven == block][0] * sign_of(clusters, c)
-        turns = np.round((target - found.place) / (2.0 * np.pi))
-        return JointPlace(place=found.place + 2.0 * np.pi * turns, rate=found.rate)
-    return found
+        turns = np.round((target - current.place) / (2.0 * np.pi))
+        return JointPlace(place=current.place + 2.0 * np.pi * turns, rate=current.rate)
+    return current
 
 
 def driven_clusters(structure: Structure, clusters: Clusters) -> list[int]:
     """Clusters that hang on their parents by a joint that follows a target."""
-    found = []
+    driven = []
     for c in np.flatnonzero(clusters.parent >= 0).tolist():
         module = structure.parts[clusters.seated[c]].module
         if module.motor is not None or (module.joint is not None and module.joint.drive):
-            found.append(c)
-    return found
+            driven.append(c)
+    return driven
 
 
 def engaged(structure: Structure, clusters: Clusters) -> list[tuple[int, int, float]]:
@@ -158,13 +158,13 @@ def engaged(structure: Structure, clusters: Clusters) -> list[tuple[int, int, fl
     """
     place = {int(block): c for c, block in enumerate(clusters.seated) if block >= 0}
     base = clusters.cluster_of[structure.members.first]
-    found = []
+    meshing = []
     for mesh in structure.joints.meshes:
         c, d = place.get(mesh.first), place.get(mesh.second)
         if c is None or d is None or base[clusters.joint[c]] != base[clusters.joint[d]]:
             continue
-        found.append((c, d, mesh.ratio * sign_of(clusters, c) * sign_of(clusters, d)))
-    return found
+        meshing.append((c, d, mesh.ratio * sign_of(clusters, c) * sign_of(clusters, d)))
+    return meshing
 
 
 def _slide(clusters: Clusters, motion: Motion, c: int, axis: FloatArray) -> JointPlace:

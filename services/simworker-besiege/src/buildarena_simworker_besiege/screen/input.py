@@ -1,4 +1,4 @@
-"""Mouse, keyboard, clipboard and eyes on a screen; the only module that uses PyAutoGUI."""
+"""Mouse, keyboard and clipboard of a screen; the only module that uses PyAutoGUI."""
 
 from __future__ import annotations
 
@@ -8,28 +8,23 @@ import os
 import sys
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from buildarena_simworker_besiege.errors import DesktopError, NotSetUpError
 from buildarena_simworker_besiege.screen.clipboard import open_clipboard
-
-if TYPE_CHECKING:
-    from PIL.Image import Image
-
-    from buildarena_simworker_besiege.screen.windows import Area
 
 MODIFIERS: Final = ("ctrl", "shift", "alt", "command", "win")
 SELECT: Final = "command" if sys.platform == "darwin" else "ctrl"
 """The modifier of "select all" and "copy"."""
 SENTINEL: Final = "nothing was copied"
-"""Put into the clipboard before copying: found there again, nothing was."""
+"""Put into the clipboard before copying: when it is still there, nothing was copied."""
 
 
-class Hands:
-    """Acts on the screen as a person does.
+class ScreenInput:
+    """Moves the mouse, types and copies, as a person does.
 
     Args:
-        pace: How much shorter than usual all waits are.
+        pace: Factor by which all waits are shorter than usual.
 
     Raises:
         NotSetUpError: There is no screen, or the extra `besiege` is not installed.
@@ -74,16 +69,16 @@ class Hands:
 
     def screen_size(self) -> tuple[int, int]:
         """Width and height of the screen, pixels."""
-        found = self._gui.size()
-        return (int(found.width), int(found.height))
+        size = self._gui.size()
+        return (int(size.width), int(size.height))
 
     def position(self) -> tuple[int, int]:
         """Where the mouse is."""
-        found = self._gui.position()
-        return (int(found.x), int(found.y))
+        point = self._gui.position()
+        return (int(point.x), int(point.y))
 
     def press(self, key: str) -> None:
-        """Presses one key and lets it go."""
+        """Presses and releases one key."""
         with _stopped_by_hand(self._gui):
             self._gui.press(key)
 
@@ -102,18 +97,18 @@ class Hands:
             self._gui.write(text)
 
     def release_all(self) -> None:
-        """Lets go whatever a runner that died may have held."""
+        """Releases all keys and buttons that a runner that died may have held."""
         for key in MODIFIERS:
             self._gui.keyUp(key)
         self._gui.mouseUp()
 
     def close(self) -> None:
-        """Lets go of keys and clipboard."""
+        """Releases keys and clipboard."""
         self.release_all()
         self._clipboard.close()
 
     def clear_clipboard(self) -> None:
-        """Makes the clipboard tell whether something is copied from here on."""
+        """Marks the clipboard, so that a later copy can be recognised."""
         self._clipboard.put(SENTINEL)
 
     def copy_all(self) -> str | None:
@@ -126,20 +121,6 @@ class Hands:
         text = self._clipboard.get()
         return None if text is None or text == SENTINEL else text
 
-    def picture(self, area: Area) -> Image:
-        """What the screen shows there."""
-        from PIL import ImageGrab
-
-        return ImageGrab.grab(bbox=area.box).convert("L")
-
-    def screenshot(self) -> bytes:
-        """The whole screen as PNG."""
-        from PIL import ImageGrab
-
-        data = io.BytesIO()
-        ImageGrab.grab().save(data, "PNG")
-        return data.getvalue()
-
 
 def _need_no_authority() -> None:
     """Python's Xlib insists on a file of authorities, also on a screen that asks for none."""
@@ -147,22 +128,6 @@ def _need_no_authority() -> None:
         return
     if not Path("~/.Xauthority").expanduser().exists():
         os.environ["XAUTHORITY"] = os.devnull
-
-
-def difference(one: Image, other: Image) -> float:
-    """Share of two pictures that looks different, 0 to 1."""
-    from PIL import ImageChops
-
-    if one.size != other.size:
-        return 1.0
-    small = (256, 256)
-    changed = ImageChops.difference(one.resize(small), other.resize(small))
-    counts = changed.histogram()
-    return sum(counts[_VISIBLE:]) / (small[0] * small[1])
-
-
-_VISIBLE: Final = 16
-"""Shades of grey, of 256, by which a pixel must change to count."""
 
 
 class _stopped_by_hand:  # noqa: N801 - reads as a statement
