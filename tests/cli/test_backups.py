@@ -160,6 +160,74 @@ def test_a_damaged_backup_is_refused_and_the_database_stays_empty(
     assert command(other, "restore", str(place)).returncode == 0
 
 
+@pytest.fixture
+def place(context, submissions, tmp_path) -> Path:
+    """A place with the backup of a service whose one job has ended."""
+    submit(submissions, {**SWEEP, "models": ["builtin/expert"]})
+    work(context)
+    assert command(context, "backup", str(tmp_path / "b"), "--name", "one").returncode == 0
+    return tmp_path / "b"
+
+
+def trajectory_in(place: Path, context: Context) -> tuple[Path, str]:
+    """The file of the job's trajectory in a place of backups, and what it is to the job."""
+    (job,) = context.store.jobs.page(limit=10)
+    digest = context.store.jobs.artifacts(job.id)["trajectory-0"]
+    return place / "artifacts" / digest[:2] / digest, f"{job.id}/trajectory-0"
+
+
+@pytest.mark.parametrize("damage", [lambda data: data[:-1] + b"?", lambda data: data + b"?", None])
+def test_a_damaged_artifact_is_found_and_copied_again(context, place, damage) -> None:
+    file, _ = trajectory_in(place, context)
+    whole = file.read_bytes()
+    assert command(context, "backup", str(place), "--check").returncode == 0
+    file.unlink() if damage is None else file.write_bytes(damage(whole))
+    found = command(context, "backup", str(place), "--check", "--json")
+    assert found.returncode == 3
+    assert list(json.loads(found.stdout)["problems"]) == [file.name]
+    assert command(context, "backup", str(place), "--name", "two").returncode == 0
+    assert file.read_bytes() == whole
+    for name in ("one", "two"):
+        assert command(context, "backup", str(place), "--check", "--name", name).returncode == 0
+
+
+def test_an_artifact_of_another_size_is_copied_again_unasked(context, place) -> None:
+    file, _ = trajectory_in(place, context)
+    whole = file.read_bytes()
+    file.write_bytes(whole[:100])
+    made = command(context, "backup", str(place), "--json")
+    assert (made.returncode, json.loads(made.stdout)["copied"]) == (0, 1)
+    assert file.read_bytes() == whole
+
+
+def test_what_is_left_is_restored_and_what_is_lost_named(context, place, elsewhere) -> None:
+    file, use = trajectory_in(place, context)
+    file.unlink()
+    other = elsewhere()
+    refused = command(other, "restore", str(place))
+    assert refused.returncode == 1
+    assert "--despite-missing" in refused.stderr
+    assert other.store.database.schema() is None
+    restored = command(other, "restore", str(place), "--despite-missing")
+    assert restored.returncode == 3, restored.stderr
+    assert f"lost: artifact {file.name}, {use}" in restored.stdout
+    assert rows(other) == rows(context)
+    assert set(stored(other)) == set(stored(context)) - {file.name}
+
+
+def test_a_restore_names_what_was_missing_when_it_was_backed_up(
+    context, submissions, elsewhere, tmp_path
+) -> None:
+    submit(submissions, {**SWEEP, "models": ["builtin/expert"]})
+    work(context)
+    file, use = trajectory_in(context.settings.data, context)
+    file.unlink()
+    assert command(context, "backup", str(tmp_path / "b")).returncode == 3
+    restored = command(elsewhere(), "restore", str(tmp_path / "b"), "--json")
+    assert restored.returncode == 3, restored.stderr
+    assert json.loads(restored.stdout)["lost"] == {file.name: [use]}
+
+
 def test_refusals_name_the_offender_and_the_choices(context, elsewhere, tmp_path) -> None:
     place = str(tmp_path / "b")
     assert command(context, "backup", place, "--name", "one").returncode == 0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Final
@@ -19,7 +19,7 @@ class Copied:
     Attributes:
         sizes: Lengths of the artifacts that the target now has, by their hashes.
         missing: What is wrong with those that the source could not give, by their hashes.
-        new: How many the target had not.
+        new: How many the target had not, or not whole.
     """
 
     sizes: dict[str, int]
@@ -27,16 +27,28 @@ class Copied:
     new: int
 
 
-def copy_artifacts(source: ArtifactStore, target: ArtifactStore, hashes: Sequence[str]) -> Copied:
-    """Copies what the target lacks; every byte that is copied is checked.
+def copy_artifacts(
+    source: ArtifactStore, target: ArtifactStore, sizes: Mapping[str, int | None]
+) -> Copied:
+    """Copies what the target lacks or has in another size; every byte that is copied is checked.
+
+    Args:
+        source: Where the artifacts are.
+        target: Where they go.
+        sizes: Their lengths by their hashes; None where nobody noted one.
 
     Raises:
         ArtifactStoreError: A store can't be read or written now.
     """
     there = {item.hash: item.size for item in target.all()}
+    whole = {
+        digest
+        for digest, size in sizes.items()
+        if digest in there and size in {None, there[digest]}
+    }
 
     def size_of(digest: str) -> int | str:
-        if digest in there:
+        if digest in whole:
             return there[digest]
         try:
             data = source.get(digest)
@@ -45,12 +57,12 @@ def copy_artifacts(source: ArtifactStore, target: ArtifactStore, hashes: Sequenc
         return target.put(data, "").size
 
     with ThreadPoolExecutor(AT_ONCE) as pool:
-        outcomes = dict(zip(hashes, pool.map(size_of, hashes), strict=True))
-    sizes = {digest: size for digest, size in outcomes.items() if isinstance(size, int)}
+        outcomes = dict(zip(sizes, pool.map(size_of, sizes), strict=True))
+    copied = {digest: size for digest, size in outcomes.items() if isinstance(size, int)}
     return Copied(
-        sizes=sizes,
+        sizes=copied,
         missing={
             digest: problem for digest, problem in outcomes.items() if isinstance(problem, str)
         },
-        new=sum(digest not in there for digest in sizes),
+        new=sum(digest not in whole for digest in copied),
     )

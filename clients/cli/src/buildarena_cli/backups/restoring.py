@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from obstore.exceptions import BaseError
-from sqlalchemy import inspect
+from sqlalchemy import inspect, select
 
 from buildarena_cli.backups.copying import copy_artifacts
 from buildarena_cli.backups.place import DUMP, LIST, BackupPlace, Manifest
@@ -16,6 +17,20 @@ from buildarena_cli.backups.programs import run_program
 from buildarena_cli.errors import CommandError
 from buildarena_store import ArtifactStore, Database
 from buildarena_store.database import known_schemas
+from buildarena_store.tables import job_artifacts
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Restored:
+    """A backup that was restored.
+
+    Attributes:
+        manifest: What it is.
+        lost: What artifacts that could not be restored are to jobs, by their hashes.
+    """
+
+    manifest: Manifest
+    lost: Mapping[str, Sequence[str]]
 
 
 def restore_backup(
@@ -25,8 +40,9 @@ def restore_backup(
     place: BackupPlace,
     name: str,
     *,
+    despite_missing: bool = False,
     tell: Callable[[str], None],
-) -> Manifest:
+) -> Restored:
     """Restores a backup. Broken off, it leaves the database empty and can be done again.
 
     Args:
@@ -35,6 +51,7 @@ def restore_backup(
         artifacts: Where artifacts go; what is there stays.
         place: Where the backup lies.
         name: Its name.
+        despite_missing: Restore what is left of a backup whose artifacts are lost or damaged.
         tell: Gets a line for each step.
 
     Raises:
@@ -50,27 +67,15 @@ def restore_backup(
         raise CommandError("the database is not empty: restore into an empty one")
     with tempfile.TemporaryDirectory(prefix="buildarena-restore-") as folder:
         dump = Path(folder) / DUMP
-        try:
-            tell("checking the backup")
-            sha256, listed = place.fetch(f"{name}/{DUMP}", dump), place.read(f"{name}/{LIST}")
-        except (BaseError, OSError) as error:
-            raise CommandError(f"backup {name} can't be read: {error}") from error
-        for what, actual, expected in (
-            (DUMP, sha256, manifest.dump_sha256),
-            (LIST, hashlib.sha256(listed).hexdigest(), manifest.list_sha256),
-        ):
-            if actual != expected:
-                raise CommandError(
-                    f"{name}/{what} is damaged: its SHA-256 is {actual}, "
-                    f"the manifest says {expected}"
-                )
-        hashes = [line.split()[0] for line in listed.decode().splitlines()]
-        tell(f"copying {len(hashes):,} artifacts")
-        missing = copy_artifacts(place.artifacts, artifacts, hashes).missing
-        if missing:
+        tell("checking the backup")
+        sizes = read_list(place, name, manifest, dump)
+        tell(f"copying {len(sizes):,} artifacts")
+        lost = copy_artifacts(place.artifacts, artifacts, sizes).missing
+        if lost and not despite_missing:
             raise CommandError(
-                f"{len(missing):,} of backup {name}'s {len(hashes):,} artifacts are lost or "
-                f"damaged, the first: {next(iter(missing.values()))}. The database was not touched"
+                f"{len(lost):,} of backup {name}'s {len(sizes):,} artifacts are lost or "
+                f"damaged, the first: {next(iter(lost.values()))}. The database was not touched; "
+                "--despite-missing restores the rest"
             )
         tell("restoring the database")
         words = ["--no-owner", "--no-privileges", "--exit-on-error", "--single-transaction"]
@@ -78,4 +83,35 @@ def restore_backup(
             "pg_restore", url, *words, "--dbname", str(database.engine.url.database), str(dump)
         )
     database.migrate()
-    return manifest
+    return Restored(manifest=manifest, lost=_names(database, [*manifest.missing, *lost]))
+
+
+def read_list(place: BackupPlace, name: str, manifest: Manifest, dump: Path) -> dict[str, int]:
+    """The lengths of a backup's artifacts by their hashes, with its dump in a file.
+
+    Raises:
+        CommandError: The dump or the list can't be read, or is damaged.
+    """
+    try:
+        sha256, listed = place.fetch(f"{name}/{DUMP}", dump), place.read(f"{name}/{LIST}")
+    except (BaseError, OSError) as error:
+        raise CommandError(f"backup {name} can't be read: {error}") from error
+    for what, actual, expected in (
+        (DUMP, sha256, manifest.dump_sha256),
+        (LIST, hashlib.sha256(listed).hexdigest(), manifest.list_sha256),
+    ):
+        if actual != expected:
+            raise CommandError(
+                f"{name}/{what} is damaged: its SHA-256 is {actual}, the manifest says {expected}"
+            )
+    return {digest: int(size) for digest, size in map(str.split, listed.decode().splitlines())}
+
+
+def _names(database: Database, lost: Sequence[str]) -> dict[str, list[str]]:
+    """What the artifacts are to jobs, as ``JOB/NAME``, by their hashes."""
+    names: dict[str, list[str]] = {digest: [] for digest in lost}
+    query = select(job_artifacts).where(job_artifacts.c.hash.in_(list(names)))
+    with database.transaction() as connection:
+        for row in connection.execute(query.order_by(job_artifacts.c.job_id)):
+            names[row.hash].append(f"{row.job_id}/{row.name}")
+    return names

@@ -10,7 +10,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final
 
-from sqlalchemy import text
+from sqlalchemy import Connection, select, text
 
 from buildarena_cli.backups.copying import copy_artifacts
 from buildarena_cli.backups.place import DUMP, FORMAT, LIST, NAME, BackupPlace, Manifest
@@ -19,6 +19,7 @@ from buildarena_cli.errors import CommandError
 from buildarena_pipeline import __version__
 from buildarena_store import ArtifactStore, Database
 from buildarena_store.artifacts.collecting import LOCK, referenced
+from buildarena_store.tables import artifacts as artifacts_table
 
 CHUNK_BYTES: Final = 1024 * 1024
 
@@ -86,11 +87,11 @@ def write_backup(
                 tell("dumping the database")
                 words = ["--format=custom", "--no-owner", "--no-privileges"]
                 run_program("pg_dump", url, *words, f"--snapshot={snapshot}", f"--file={dump}")
-                hashes = list(referenced(connection))
+                sizes = _sizes(connection)
                 connection.rollback()
                 place.send(f"{name}/{DUMP}", dump)
-                tell(f"copying what is new of {len(hashes):,} artifacts")
-                copied = copy_artifacts(artifacts, place.artifacts, hashes)
+                tell(f"copying what is new of {len(sizes):,} artifacts")
+                copied = copy_artifacts(artifacts, place.artifacts, sizes)
             finally:
                 connection.rollback()
                 connection.execute(text("SELECT pg_advisory_unlock_shared(:key)"), {"key": LOCK})
@@ -110,6 +111,13 @@ def write_backup(
         )
     place.finish(name, manifest)
     return Written(name=name, manifest=manifest, copied=copied.new)
+
+
+def _sizes(connection: Connection) -> dict[str, int | None]:
+    """The lengths of all artifacts that the database refers to, as it says, by their hashes."""
+    query = select(artifacts_table.c.hash, artifacts_table.c.size)
+    noted = {row.hash: row.size for row in connection.execute(query)}
+    return {digest: noted.get(digest) for digest in referenced(connection)}
 
 
 def _hash_of(file: Path) -> str:

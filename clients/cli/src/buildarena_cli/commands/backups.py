@@ -30,6 +30,10 @@ def backup(
     listed: Annotated[
         bool, typer.Option("--list", help="Only show the backups there are.")
     ] = False,
+    check: Annotated[
+        bool,
+        typer.Option("--check", help="Only read a whole backup, the newest or --name, and check."),
+    ] = False,
     data: DataOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -37,7 +41,8 @@ def backup(
 
     The service may run meanwhile: a backup is one moment of it. Several backups in one place share
     their artifacts. Without BUILDARENA_DATABASE_URL, it is the service of the data folder.
-    The exit code is 3 when artifacts were missing already.
+    The exit code is 3 when artifacts were missing already, or --check finds a damaged one; the next
+    backup copies that again.
     """
     from buildarena_cli.backups.writing import write_backup
     from buildarena_cli.local.stores import opened_stores
@@ -46,6 +51,9 @@ def backup(
         where = _place(place)
         if listed:
             _list(where, as_json=as_json)
+            return
+        if check:
+            _check(where, name, as_json=as_json)
             return
         with opened_stores(data) as stores:
             made = write_backup(
@@ -71,6 +79,12 @@ def restore(
     name: Annotated[
         str | None, typer.Option("--name", help="Which backup; the newest by default.")
     ] = None,
+    despite_missing: Annotated[
+        bool,
+        typer.Option(
+            "--despite-missing", help="Restore what is left where artifacts are lost or damaged."
+        ),
+    ] = False,
     data: DataOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -78,26 +92,59 @@ def restore(
 
     The database is that of BUILDARENA_DATABASE_URL, or a new one in the data folder. Broken off,
     the command can be given again. Jobs that were running at the backup's moment continue from
-    their journals.
+    their journals. The exit code is 3 when something of the backup is lost, which is named.
     """
     from buildarena_cli.backups.restoring import restore_backup
     from buildarena_cli.local.stores import opened_stores
 
     with _sayable():
         where = _place(place)
-        known = where.names()
-        if not known:
-            raise CommandError(f"there is no whole backup in {place}")
-        chosen = name or known[-1]
-        where.manifest(chosen)
+        chosen = _chosen(where, name)
         with opened_stores(data, new=True) as stores:
-            manifest = restore_backup(
-                stores.database, stores.url, stores.artifacts, where, chosen, tell=_tell(as_json)
+            restored = restore_backup(
+                stores.database,
+                stores.url,
+                stores.artifacts,
+                where,
+                chosen,
+                despite_missing=despite_missing,
+                tell=_tell(as_json),
             )
+    manifest, lost = restored.manifest, restored.lost
     if as_json:
-        print_json({"name": chosen, **asdict(manifest)})
+        print_json({"name": chosen, **asdict(manifest), "lost": lost})
     else:
         say(f"restored {chosen} of {manifest.made_at}: {manifest.artifacts:,} artifacts")
+        for digest, uses in lost.items():
+            say(f"lost: artifact {digest}, {', '.join(uses) or 'of a journal or a machine'}")
+    if lost:
+        raise typer.Exit(PARTIAL)
+
+
+def _chosen(place: BackupPlace, name: str | None) -> str:
+    """The backup of a name, or the newest."""
+    known = place.names()
+    if not known:
+        raise CommandError(f"there is no whole backup in {place.location}")
+    chosen = name or known[-1]
+    place.manifest(chosen)
+    return chosen
+
+
+def _check(place: BackupPlace, name: str | None, *, as_json: bool) -> None:
+    from buildarena_cli.backups.checking import check_backup
+
+    chosen = _chosen(place, name)
+    problems, manifest = check_backup(place, chosen), place.manifest(chosen)
+    if as_json:
+        print_json({"name": chosen, **asdict(manifest), "problems": problems})
+    else:
+        for problem in problems.values():
+            say(problem)
+        verdict = f"{len(problems):,} artifacts are not" if problems else "every byte is"
+        say(f"backup {chosen} of {manifest.made_at}: {verdict} as it was written")
+    if problems:
+        raise typer.Exit(PARTIAL)
 
 
 def _tell(quiet: bool) -> Callable[[str], None]:
