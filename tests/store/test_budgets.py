@@ -4,6 +4,7 @@ from dataclasses import replace
 from decimal import Decimal
 
 import pytest
+from sqlalchemy import text
 from support.jobs import cancel, claim, journal_entry, set_budget
 
 from buildarena_pipeline.runtime.context import Context
@@ -113,6 +114,40 @@ def test_a_reply_that_came_too_late_was_paid_for(context, sweep) -> None:
     budget = context.store.budgets.get(name)
     assert budget is not None
     assert budget.spent_requests == 1
+    assert (budget.lost_requests, budget.lost_cost_usd) == (1, budget.spent_cost_usd)
+    assert context.store.sweeps.progress(name).lost_requests == 1
+
+
+def lose(context, *, jobs: int) -> None:
+    """Lets the leases of jobs run out, as if their workers had been killed."""
+    with context.store.database.transaction() as connection:
+        connection.execute(text("UPDATE jobs SET lease_expires_at = now() - interval '1 s'"))
+    assert len(context.store.leases.recover()) == jobs
+
+
+def test_a_reply_that_was_lost_in_a_kill_is_a_figure_of_its_own(context, sweep) -> None:
+    name = sweep(0, 1, max_requests=9)
+    asking = claim(context)
+    claim(context)
+    assert context.store.budgets.reserve(asking, NEED) is None
+    lose(context, jobs=2)
+    budget = context.store.budgets.get(name)
+    assert budget is not None
+    assert (budget.lost_requests, budget.lost_cost_usd) == (1, NEED.cost_usd)
+    assert (budget.spent_requests, budget.spent_cost_usd) == (0, 0)
+    # Of a job without a request under way nobody can tell: its figure is at most.
+    assert context.store.sweeps.progress(name).lost_requests == 2
+
+
+@pytest.mark.parametrize("end", ["hand_back", "cancel"])
+def test_what_ends_in_good_order_loses_nothing(context, sweep, end) -> None:
+    name = sweep(0, max_requests=9)
+    lease = claim(context)
+    assert context.store.budgets.reserve(lease, NEED) is None
+    context.store.leases.hand_back(lease) if end == "hand_back" else cancel(context, lease.job.id)
+    budget = context.store.budgets.get(name)
+    assert budget is not None
+    assert (budget.lost_requests, context.store.sweeps.progress(name).lost_requests) == (0, 0)
 
 
 def test_a_stopped_sweep_passes_on_what_another_wants_and_holds_the_rest(context, sweep) -> None:

@@ -6,7 +6,7 @@ from sqlalchemy.exc import IntegrityError
 from support.jobs import claim, execute, journal_entry, set_budget
 
 from buildarena_store import JournalEntry, Usage
-from buildarena_store.jobs.journal import MAX_USD
+from buildarena_store.account_tables import MAX_USD
 
 USAGE = Usage(
     requests=1, input_tokens=100, output_tokens=10, cached_tokens=40, cost_usd=Decimal("0.25")

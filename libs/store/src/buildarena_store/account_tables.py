@@ -7,6 +7,8 @@ from sqlalchemy.dialects.postgresql import JSONB
 
 from buildarena_store.tables import count_column, metadata, time_column
 
+MAX_USD = 99_999_999
+"""Sums stop here: what a provider claims to have used must not make a column overflow."""
 FOLD = (
     "replace(replace(translate(lower(regexp_replace({}, '[._-]', '', 'g')), '01i5', 'olls'),"
     " 'rn', 'm'), 'vv', 'w')"
@@ -53,6 +55,8 @@ budgets = Table(
     Column("spent_cost_usd", Numeric(14, 6), nullable=False, server_default=text("0")),
     count_column("spent_tokens"),
     count_column("spent_requests"),
+    Column("lost_cost_usd", Numeric(14, 6), nullable=False, server_default=text("0")),
+    count_column("lost_requests"),
 )
 
 # What one open model request may cost: a job has one at a time.

@@ -87,6 +87,7 @@ jobs = Table(
     Column("manifest", JSONB),
     # What it cost.
     count_column("requests"),
+    count_column("lost_requests"),
     count_column("input_tokens"),
     count_column("output_tokens"),
     count_column("cached_tokens"),

@@ -139,6 +139,12 @@ class JobPage(_Answer):
     next_cursor: str | None = Field(description="Give it as `cursor` to get the next page")
 
 
+LOST: Final = (
+    "Requests whose replies may have been paid for and are in no journal: the process that sent "
+    "them was killed, or their lease had ended"
+)
+
+
 class ProgressView(_Answer):
     """Progress of a sweep."""
 
@@ -150,6 +156,7 @@ class ProgressView(_Answer):
     )
     outcomes: dict[str, int] = Field(description="Ended jobs by outcome", examples=[{"success": 4}])
     requests: int
+    lost_requests: int = Field(default=0, description=LOST)
     input_tokens: int
     output_tokens: int
     cost_usd: float
@@ -169,6 +176,10 @@ class BudgetView(_Answer):
     spent_cost_usd: float
     spent_tokens: int
     spent_requests: int
+    lost_cost_usd: float = Field(
+        default=0.0, description="What the lost requests cost at most, beyond what was spent"
+    )
+    lost_requests: int = Field(default=0, description=LOST)
 
     @staticmethod
     def of(budget: Budget | None) -> BudgetView | None:
@@ -183,6 +194,8 @@ class BudgetView(_Answer):
             spent_cost_usd=float(budget.spent_cost_usd),
             spent_tokens=budget.spent_tokens,
             spent_requests=budget.spent_requests,
+            lost_cost_usd=float(budget.lost_cost_usd),
+            lost_requests=budget.lost_requests,
         )
 
 

@@ -273,6 +273,8 @@ def _show(sweep: SweepView, *, as_json: bool) -> None:
     for name, count in {**progress["stages"], **progress["outcomes"]}.items():
         say(f"  {count:>6}  {name}")
     say(f"{progress['requests']:,} model requests, ${progress['cost_usd']:.2f}")
+    if progress.get("lost_requests"):
+        say(f"{progress['lost_requests']:,} more may have been paid for: their replies were lost")
     if sweep["budget"] is not None:
         say(f"budget: {spent(sweep['budget'])}")
     _show_limit(sweep)

@@ -16,9 +16,9 @@ from typing import Any
 from sqlalchemy import Connection, and_, func, literal, or_, select, update
 from sqlalchemy.dialects.postgresql import insert
 
-from buildarena_store.account_tables import budgets, reservations
+from buildarena_store.account_tables import MAX_USD, budgets, reservations
 from buildarena_store.database import Database
-from buildarena_store.jobs.journal import MAX_USD, Usage
+from buildarena_store.jobs.journal import Usage
 from buildarena_store.jobs.leases import Lease
 from buildarena_store.tables import jobs, journal, sweep_jobs
 
@@ -48,6 +48,10 @@ class Budget:
         spent_cost_usd: US dollars spent.
         spent_tokens: Input and output tokens used.
         spent_requests: Model requests answered.
+        lost_cost_usd: What the lost requests cost at most; only what is known to have been paid is
+            part of what was spent.
+        lost_requests: Requests whose replies no journal has: sent by a process that was killed, or
+            answered after their lease had ended. Each may have been paid for.
     """
 
     id: str
@@ -55,6 +59,8 @@ class Budget:
     spent_cost_usd: Decimal
     spent_tokens: int
     spent_requests: int
+    lost_cost_usd: Decimal
+    lost_requests: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -176,7 +182,14 @@ class Budgets:
                     spent_cost_usd=func.least(budgets.c.spent_cost_usd + usage.cost_usd, MAX_USD),
                     spent_tokens=budgets.c.spent_tokens + usage.input_tokens + usage.output_tokens,
                     spent_requests=budgets.c.spent_requests + usage.requests,
+                    lost_cost_usd=func.least(budgets.c.lost_cost_usd + usage.cost_usd, MAX_USD),
+                    lost_requests=budgets.c.lost_requests + usage.requests,
                 )
+            )
+            connection.execute(
+                update(jobs)
+                .where(jobs.c.id == lease.job.id)
+                .values(lost_requests=jobs.c.lost_requests + usage.requests)
             )
 
 
@@ -193,6 +206,8 @@ def _budget(row: Any) -> Budget:
         spent_cost_usd=row.spent_cost_usd,
         spent_tokens=row.spent_tokens,
         spent_requests=row.spent_requests,
+        lost_cost_usd=row.lost_cost_usd,
+        lost_requests=row.lost_requests,
     )
 
 

@@ -12,6 +12,7 @@ from typing import Any
 from sqlalchemy import ClauseElement, Connection, TextClause, bindparam, text
 from sqlalchemy.dialects import postgresql
 
+from buildarena_store.account_tables import MAX_USD
 from buildarena_store.errors import StaleLeaseError
 from buildarena_store.states import AttemptResult, JobState
 from buildarena_store.tables import jobs
@@ -57,6 +58,15 @@ _END = text(
         ) AS ending (job_id, token, state, data)
     ), released AS (
         DELETE FROM reservations USING ending WHERE reservations.job_id = ending.job_id
+        RETURNING reservations.budget_id, reservations.cost_usd
+    ), lost AS (
+        UPDATE budgets SET lost_requests = lost_requests + released.requests,
+            lost_cost_usd = LEAST(lost_cost_usd + released.cost_usd, :max_usd)
+        FROM (
+            SELECT budget_id, count(*) AS requests, sum(cost_usd) AS cost_usd FROM released
+            GROUP BY budget_id
+        ) AS released
+        WHERE :is_lost AND budgets.id = released.budget_id
     ), ended AS (
         UPDATE attempts SET ended_at = clock_timestamp(), result = :result, detail = :detail
         FROM ending
@@ -78,6 +88,8 @@ def end_attempts(
 ) -> None:
     """Ends attempts: releases what was reserved for their requests and records the jobs' states.
 
+    What was reserved under a lease that was lost may have been paid for: the budgets count it.
+
     Args:
         endings: The attempts; a job that nobody was working on just gets its event.
         result: How they ended.
@@ -93,6 +105,8 @@ def end_attempts(
         "data": [json.dumps(dict(ending.data)) for ending in endings],
         "result": str(result),
         "detail": detail,
+        "is_lost": result == AttemptResult.LOST,
+        "max_usd": MAX_USD,
     }
     connection.execute(_END, given)
 

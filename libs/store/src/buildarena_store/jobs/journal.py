@@ -11,6 +11,7 @@ from typing import Any
 
 from sqlalchemy import bindparam, select, text
 
+from buildarena_store.account_tables import MAX_USD
 from buildarena_store.database import Database
 from buildarena_store.errors import StaleLeaseError
 from buildarena_store.jobs.leases import Lease
@@ -88,9 +89,6 @@ class JournalEntry:
         """Whether a session goes on with its reply; otherwise it only counts and was paid for."""
         return self.reply.get("finish") not in {GARBAGE, OUT_OF_TIME}
 
-
-MAX_USD = 99_999_999
-"""Sums stop here: what a provider claims to have used must not make a column overflow."""
 
 # One statement, because it is the one that every turn of every session waits for.
 _APPEND = text(

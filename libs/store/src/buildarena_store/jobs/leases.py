@@ -308,6 +308,8 @@ class Leases:
         faults = jobs.c.faults + case((missed_before, 0), else_=1)
         limit = case((is_runners, max(self.max_faults, MIN_KEYS)), else_=self.max_faults)
         last = faults >= limit
+        # A session has one request open at most, whose reply is lost with its process.
+        in_session = jobs.c.stage == Stage.CONSTRUCT
         with self._database.transaction() as connection:
             lost = (
                 select(jobs.c.id)
@@ -324,6 +326,7 @@ class Leases:
                     detail=case((last, literal("it lost its workers again and again")), else_=None),
                     finished_at=case((last, events.now), else_=None),
                     faults=faults,
+                    lost_requests=jobs.c.lost_requests + case((in_session, 1), else_=0),
                     lease_owner=None,
                     lease_expires_at=None,
                     notified_at=None,

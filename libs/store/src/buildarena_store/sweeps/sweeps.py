@@ -66,6 +66,8 @@ class SweepProgress:
         outcomes: Ended jobs by outcome.
         cost_usd: What its jobs cost so far.
         requests: Model requests so far.
+        lost_requests: Requests whose replies may have been paid for and are in no journal: at most
+            one for each process that was killed in a session.
         input_tokens: Tokens sent so far.
         output_tokens: Tokens received so far.
     """
@@ -75,6 +77,7 @@ class SweepProgress:
     outcomes: Mapping[str, int]
     cost_usd: Decimal
     requests: int
+    lost_requests: int
     input_tokens: int
     output_tokens: int
 
@@ -200,6 +203,7 @@ class Sweeps:
                 func.count().label("jobs"),
                 func.sum(jobs.c.cost_usd).label("cost_usd"),
                 func.sum(jobs.c.requests).label("requests"),
+                func.sum(jobs.c.lost_requests).label("lost_requests"),
                 func.sum(jobs.c.input_tokens).label("input_tokens"),
                 func.sum(jobs.c.output_tokens).label("output_tokens"),
             )
@@ -223,6 +227,7 @@ class Sweeps:
             outcomes=outcomes,
             cost_usd=sum((row.cost_usd for row in rows), Decimal()),
             requests=int(sum(row.requests for row in rows)),
+            lost_requests=int(sum(row.lost_requests for row in rows)),
             input_tokens=int(sum(row.input_tokens for row in rows)),
             output_tokens=int(sum(row.output_tokens for row in rows)),
         )
