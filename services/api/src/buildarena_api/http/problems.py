@@ -38,6 +38,7 @@ PROBLEM_JSON = "application/problem+json"
 QUOTED = re.compile(r"'([^']*)'")
 """How pydantic spells the values that it expects."""
 RETRY_FILES_S = 5
+"""When a caller may come back whose trials of files found no room."""
 MAX_SHOWN = 100
 """Characters of a wrong value that are repeated."""
 

@@ -25,7 +25,6 @@ router = APIRouter(prefix="/v1/machines", tags=["machines"])
 
 CHECK_PATH: Final = "/v1/machines/check"
 TRIAL_PATH: Final = "/v1/machines/trials"
-"""When a caller may come back whose trials found no room."""
 FILE: Final[dict[str, Any]] = {
     "requestBody": {
         "required": True,
