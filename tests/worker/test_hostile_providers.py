@@ -215,7 +215,7 @@ def test_garbage_is_counted_charged_and_bounded(context, tmp_path, name) -> None
 def test_garbage_forever_ends_as_errored(context, tmp_path, monkeypatch) -> None:
     monkeypatch.setattr("buildarena_worker.session.host.OUTAGE_DELAY_S", 0.0)
     monkeypatch.setattr("buildarena_worker.session.host.FIRST_WAIT_S", 0.001)
-    context.store.leases._max_faults = 3
+    context.store.leases.max_faults = 3
     with stuck("garbage") as bad, crew(context, tmp_path, bad=bad) as workers:
         job = workers.ended(workers.submit("bad"))
         assert bad.counts.requests == 18

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from urllib.parse import urlsplit
 
 PIECE = 65_536
+QUIET_ROUNDS = 20
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,12 +52,15 @@ def reverse_proxy(upstream: str, rules: ProxyRules) -> Iterator[str]:
 
 async def _stop(server: asyncio.Server) -> None:
     server.close()
-    # A connection that was accepted just now has its task in the loop's next round.
-    await asyncio.sleep(0.05)
-    while others := asyncio.all_tasks() - {asyncio.current_task()}:
+    # A connection that was accepted just now has its task some rounds of the loop later.
+    quiet_rounds = 0
+    while quiet_rounds < QUIET_ROUNDS:
+        others = asyncio.all_tasks() - {asyncio.current_task()}
         for task in others:
             task.cancel()
         await asyncio.gather(*others, return_exceptions=True)
+        await asyncio.sleep(0)
+        quiet_rounds = 0 if others else quiet_rounds + 1
     await asyncio.sleep(0.05)
 
 
