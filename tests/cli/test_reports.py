@@ -2,6 +2,8 @@
 
 import html.parser
 import re
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 
 import pytest
@@ -86,7 +88,9 @@ class Seen(html.parser.HTMLParser):
 @pytest.mark.parametrize(("rows", "columns"), [(3, 4), (150, 14), (5, 40)])
 def test_a_pdf_holds_every_figure_however_long_and_wide(tmp_path, rows, columns) -> None:
     report = wide_report(rows, columns)
-    write_report(report, tmp_path / "r.pdf")
+    # The typesetter keeps hundreds of megabytes of a long report: they go with a process.
+    with ProcessPoolExecutor(1, get_context("spawn")) as apart:
+        apart.submit(write_report, report, tmp_path / "r.pdf").result()
     pages = PdfReader(tmp_path / "r.pdf").pages
     text = pdf_text(tmp_path / "r.pdf")
     (grid,) = (block for block in report if isinstance(block, Grid))
