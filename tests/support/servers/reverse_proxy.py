@@ -9,6 +9,8 @@ from urllib.parse import urlsplit
 
 PIECE = 65_536
 QUIET_ROUNDS = 20
+SERVING: set[asyncio.Task[None] | None] = set()
+"""Connections under way: of one whose client has left, the loop holds no reference."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,6 +74,8 @@ async def _serve(
 ) -> None:
     """One connection carries one request, so that only heads need to be read."""
     inner: asyncio.StreamWriter | None = None
+    task = asyncio.current_task()
+    SERVING.add(task)
     try:
         head = await reader.readuntil(b"\r\n\r\n")
         passed = _passed_on(head.decode("latin-1"), rules)
@@ -93,6 +97,7 @@ async def _serve(
         for end in (inner, writer):
             if end is not None:
                 end.close()
+        SERVING.discard(task)
 
 
 def _passed_on(head: str, rules: ProxyRules) -> str | None:

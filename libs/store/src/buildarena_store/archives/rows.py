@@ -136,6 +136,7 @@ class JobRow(_Row):
     flags: list[Word] | None
     manifest: JsonObject | None
     requests: Count
+    lost_requests: Count = 0
     input_tokens: Count
     output_tokens: Count
     cached_tokens: Count
