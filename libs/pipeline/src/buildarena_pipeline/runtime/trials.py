@@ -4,13 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 from buildarena_benchmark import Task
 from buildarena_geometry import KeyPress, Machine
 from buildarena_simulation import Trajectory
 
 PARQUET: Final = "application/vnd.apache.parquet"
+FaultReason = Literal[
+    "simulator_fault",
+    "game_version",
+    "needs_script",
+    "unreadable_trial",
+    "outcome_refused",
+    "internal_error",
+]
+"""Why a runner did not do a trial."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -107,8 +107,7 @@ class Leases:
             last: The owner whose job was taken last.
             only: Owners whose jobs may be taken; None for everybody's.
             version: The simulator's version that jobs must have been submitted for, if given.
-            prefix: Of a key's runners, what their ids begin with: jobs that they missed lately are
-                passed over.
+            prefix: Of a key's runners, what their ids begin with; jobs they missed are passed over.
             most: Leases that these may have at once.
 
         Returns:
@@ -308,8 +307,6 @@ class Leases:
         faults = jobs.c.faults + case((missed_before, 0), else_=1)
         limit = case((is_runners, max(self.max_faults, MIN_KEYS)), else_=self.max_faults)
         last = faults >= limit
-        # A session has one request open at most, whose reply is lost with its process.
-        in_session = jobs.c.stage == Stage.CONSTRUCT
         with self._database.transaction() as connection:
             lost = (
                 select(jobs.c.id)
@@ -326,7 +323,7 @@ class Leases:
                     detail=case((last, literal("it lost its workers again and again")), else_=None),
                     finished_at=case((last, events.now), else_=None),
                     faults=faults,
-                    lost_requests=jobs.c.lost_requests + case((in_session, 1), else_=0),
+                    lost_requests=jobs.c.lost_requests + case((_IN_SESSION, 1), else_=0),
                     lease_owner=None,
                     lease_expires_at=None,
                     notified_at=None,
@@ -394,6 +391,10 @@ class Leases:
 _BUDGETED = (
     select(budgets).where(budgets.c.id.in_([jobs.c.payer, jobs.c.owner])).exists().label("budgeted")
 )
+
+
+# A session has one request open at most, whose reply is lost with its process.
+_IN_SESSION = jobs.c.stage == Stage.CONSTRUCT
 
 
 def _among(leases: Sequence[Lease]) -> ColumnElement[bool]:

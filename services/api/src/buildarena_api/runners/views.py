@@ -9,6 +9,7 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from buildarena_pipeline.runtime.settings import SimulatorName
+from buildarena_pipeline.runtime.trials import FaultReason
 from buildarena_simulation import ENGINES
 from buildarena_store.artifacts.kinds import EVIDENCE_NAME
 from buildarena_store.uploads import MAX_FILE_BYTES, MAX_LEASE_FILES
@@ -194,16 +195,6 @@ class Outcome(_Document):
     wall_s: Seconds = Field(description="How long the trial took")
     files: Files = []
     annotations: Annotated[dict[EngineName, Annotation], Field(max_length=8)] | None = None
-
-
-FaultReason = Literal[
-    "simulator_fault",
-    "game_version",
-    "needs_script",
-    "unreadable_trial",
-    "outcome_refused",
-    "internal_error",
-]
 
 
 class Fault(_Document):

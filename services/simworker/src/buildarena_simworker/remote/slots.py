@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
-from typing import Any, Final
+from typing import Any, Final, get_args
 
 import structlog
 
@@ -17,7 +17,7 @@ from buildarena_geometry import KeyPress, Machine
 from buildarena_pipeline.errors import PermanentError, TransientError
 from buildarena_pipeline.periodic import Periodic
 from buildarena_pipeline.runtime.simulators.simulator import Simulator, TrialRequest
-from buildarena_pipeline.runtime.trials import File, TrialResult
+from buildarena_pipeline.runtime.trials import FaultReason, File, TrialResult
 from buildarena_simulation import write_trajectory
 from buildarena_simworker.remote.api import HeldLease, RunnerApi
 from buildarena_simworker.remote.errors import (
@@ -36,10 +36,7 @@ WAIT_S: Final = 20.0
 PAUSE_S: Final = 1.0
 """After an unexpected error a slot pauses, so that it does not meet it again at once."""
 LONGEST_DETAIL: Final = 2000
-REASONS: Final = (
-    *("simulator_fault", "game_version", "needs_script"),
-    *("unreadable_trial", "outcome_refused", "internal_error"),
-)
+REASONS: Final = get_args(FaultReason)
 """Reasons that the API knows; a simulator of one's own may have others."""
 
 log = structlog.get_logger(__name__)
