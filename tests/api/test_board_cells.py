@@ -23,7 +23,15 @@ from buildarena_store.tables import board_changes, jobs, sweep_jobs, sweeps
 
 TRACKS = ("first/track-1", "second/track-1")
 START = datetime(2026, 1, 1, tzinfo=UTC)
-FLAGS = (None, [], ["unstable"], ["never_fell"], ["no_wheels", "never_fell"], ["of tomorrow"])
+FLAGS = (
+    None,
+    [],
+    ["unstable"],
+    ["never_fell"],
+    ["no_wheels", "never_fell"],
+    ["of tomorrow"],
+    ["refuted"],
+)
 TASKS = ("lift-1", "support-1", "somebodys-own")
 BOARD = {"track": TRACKS[0], "policy": ScoringPolicy.OURS}
 
@@ -66,7 +74,8 @@ def random_job(rng: random.Random, number: int) -> dict[str, object]:
         "refused_actions": rng.randrange(3),
         "finished_at": START + timedelta(hours=rng.randrange(1000)),
         "imported_from": "elsewhere" if imported else None,
-        "verified_at": START if imported and rng.random() < 0.5 else None,
+        "by_runner": rng.random() < 0.3,
+        "audit": rng.choice(("required", "verified", "refuted", None)) if imported else None,
     }
 
 
@@ -87,8 +96,9 @@ def disturb(context, rng: random.Random, number: int) -> None:
         elif kind == "leave":
             connection.execute(update(jobs).where(here).values(state="queued", outcome=None))
         elif kind == "verify":
-            imported = jobs.c.imported_from.is_not(None)
-            connection.execute(update(jobs).where(imported).values(verified_at=START))
+            waiting = jobs.c.audit == "required"
+            audit = rng.choice(("verified", "refuted"))
+            connection.execute(update(jobs).where(waiting).values(audit=audit))
         elif kind == "refusals":
             connection.execute(update(jobs).where(here).values(refusals={"overlap": number}))
         elif kind == "delete":

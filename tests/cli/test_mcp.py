@@ -59,7 +59,7 @@ def test_an_agent_builds_a_bridge_and_gets_its_score(context, stdio) -> None:
     assert result["outcome"] == "success"
     assert result["indicator"] > 100
     (job,) = context.store.jobs.page(limit=2)
-    report = verifier(context).verify(job.id)
+    report = verifier(context).verify(job.id).as_document()
     assert report["ok"], [check for check in report["checks"] if not check["ok"]]
 
 

@@ -116,5 +116,5 @@ def test_who_knows_only_what_the_server_sends_builds_bridge_car_and_rocket(conte
     )
     jobs = context.store.jobs.page(limit=4)
     assert [job.refused_actions for job in jobs] == [0, 0, 0]
-    report = verifier(context).verify(jobs[0].id)
+    report = verifier(context).verify(jobs[0].id).as_document()
     assert report["ok"], [check for check in report["checks"] if not check["ok"]]

@@ -91,7 +91,7 @@ def test_every_lost_byte_is_noticed(context, submissions, folder, name, damage) 
     job, _ = submissions.submit_job(SPEC)
     work(context)
     digest = context.store.jobs.artifacts(job.id)[name]
-    assert verifier(context).verify(job.id)["ok"]
+    assert verifier(context).verify(job.id).as_document()["ok"]
     file = folder / digest[:2] / digest
     if damage == "missing":
         file.unlink()
@@ -99,7 +99,7 @@ def test_every_lost_byte_is_noticed(context, submissions, folder, name, damage) 
         data = bytearray(file.read_bytes())
         data[len(data) // 2] ^= 1
         file.write_bytes(data)
-    report = verifier(context).verify(job.id)
+    report = verifier(context).verify(job.id).as_document()
     wrong = {check["name"]: check["found"] for check in report["checks"] if not check["ok"]}
     assert not report["ok"]
     assert wrong[f"artifact {name}"] == damage
@@ -139,6 +139,6 @@ def test_a_trajectory_of_an_older_schema_is_verified_as_it_is(
     work(context)
     kept = context.artifacts.get(context.store.jobs.artifacts(job.id)["trajectory-0"])
     assert schema_of(kept) == 2
-    checks = verifier(context).verify(job.id)["checks"]
+    checks = verifier(context).verify(job.id).as_document()["checks"]
     assert [check["name"] for check in checks if not check["ok"]] == []
     assert "rollout 0: trajectory" in {check["name"] for check in checks}

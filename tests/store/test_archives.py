@@ -98,11 +98,12 @@ def test_a_sweep_arrives_whole_and_can_be_verified_there(context, played, elsewh
     assert origin is not None
     assert sweep_id in origin
     assert after == [
-        replace(job, owner="key_k", payer=sweep_id, imported_from=origin) for job in before
+        replace(job, owner="key_k", payer=sweep_id, imported_from=origin, audit="required")
+        for job in before
     ]
     assert {job.id: other.store.journal.read(job.id) for job in after} == journals
     assert other.store.sweeps.progress(sweep_id).outcomes == {"success": 2}
-    report = verifier(other).verify(after[0].id)
+    report = verifier(other).verify(after[0].id).as_document()
     assert report["ok"], report
 
 

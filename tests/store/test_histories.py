@@ -72,7 +72,7 @@ def test_a_packed_job_is_still_verified_and_read(context, histories) -> None:
     list(histories.pack_all(NOW))
     assert boards.changes(track) == before
     for job_id in ids(context):
-        report = verifier(context).verify(job_id)
+        report = verifier(context).verify(job_id).as_document()
         assert report["ok"], report
     assert rows(context)["journal"]
 
@@ -111,7 +111,7 @@ def test_a_history_that_is_lost_is_named_and_leaves_its_job_alone(context, histo
     with pytest.raises(ArtifactMissingError, match=digest):
         histories.unpack([job_id])
     assert context.store.jobs.artifacts(job_id)["history"] == digest
-    assert not verifier(context).verify(job_id)["ok"]
+    assert not verifier(context).verify(job_id).as_document()["ok"]
 
 
 def test_an_archive_of_packed_jobs_is_whole(context, histories, tmp_path) -> None:

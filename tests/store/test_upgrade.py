@@ -108,7 +108,7 @@ def test_ended_jobs_of_older_task_versions_say_what_they_would_need(upgraded) ->
     ended = [job for job in upgraded.store.jobs.page(limit=100) if job.success is not None]
     assert ended
     for job in ended:
-        report = verifier(upgraded).verify(job.id)
+        report = verifier(upgraded).verify(job.id).as_document()
         (failed,) = (check for check in report["checks"] if not check["ok"])
         assert f"{job.task} is no longer at version {job.task_version}" in failed["found"]
 

@@ -31,7 +31,7 @@ def test_a_machine_that_was_let_through_fails_verification(context, monkeypatch)
     monkeypatch.setattr(submission, "broken_constraint", lambda *_: None)
     job = _submitted(context)
     assert context.store.jobs.get(job).outcome == "unsuccessful"
-    report = verifier(context).verify(job)
+    report = verifier(context).verify(job).as_document()
     assert not report["ok"]
     wrong = [check for check in report["checks"] if not check["ok"]]
     assert [(check["name"], check["found"]) for check in wrong] == [("reason", "unjoined_parts")]
@@ -40,5 +40,5 @@ def test_a_machine_that_was_let_through_fails_verification(context, monkeypatch)
 def test_a_machine_that_was_refused_is_verified_as_refused(context) -> None:
     job = _submitted(context)
     assert context.store.jobs.get(job).reason == "unjoined_parts"
-    report = verifier(context).verify(job)
+    report = verifier(context).verify(job).as_document()
     assert report["ok"], [check for check in report["checks"] if not check["ok"]]

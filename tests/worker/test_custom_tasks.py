@@ -76,7 +76,7 @@ def own(name: str, builtin: str, **changes: object) -> str:
 
 
 def assert_verified(context, job: Job) -> None:
-    report = verifier(context).verify(job.id)
+    report = verifier(context).verify(job.id).as_document()
     assert report["ok"], [check for check in report["checks"] if not check["ok"]]
 
 

@@ -35,7 +35,7 @@ def test_a_bridge_is_built_simulated_scored_and_verified(context, run) -> None:
     assert (job.outcome, job.success) == ("success", True)
     assert job.manifest["machine"] == context.store.jobs.artifacts(job.id)["machine"]
     assert job.requests == len(context.store.journal.read(job.id))
-    report = verifier(context).verify(job.id)
+    report = verifier(context).verify(job.id).as_document()
     assert report["ok"], [check for check in report["checks"] if not check["ok"]]
     names = {check["name"] for check in report["checks"]}
     assert {"transcript", "rollout 0: trajectory", "score: indicator", "usage: cost_usd"} <= names
@@ -58,7 +58,7 @@ def test_any_changed_figure_is_found(context, run, statement, check) -> None:
     job = run()
     with context.store.database.transaction() as connection:
         connection.exec_driver_sql(statement)
-    report = verifier(context).verify(job.id)
+    report = verifier(context).verify(job.id).as_document()
     assert not report["ok"]
     assert check in {entry["name"] for entry in report["checks"] if not entry["ok"]}
 
@@ -68,7 +68,7 @@ def test_failures_are_scored_and_verified_too(context, run, model) -> None:
     job = run(model=model)
     assert job.success is False
     assert job.indicator == 0.0 or job.outcome == "unsuccessful"
-    report = verifier(context).verify(job.id)
+    report = verifier(context).verify(job.id).as_document()
     assert report["ok"], [check for check in report["checks"] if not check["ok"]]
 
 
@@ -77,14 +77,14 @@ def test_a_limit_keeps_what_was_built(context, run) -> None:
     assert (job.outcome, job.reason, job.requests) == ("limit", "max_requests", 20)
     assert job.metrics["parts"] > 5
     assert "machine" in context.store.jobs.artifacts(job.id)
-    assert verifier(context).verify(job.id)["ok"]
+    assert verifier(context).verify(job.id).as_document()["ok"]
 
 
 def test_a_job_that_was_never_scored_is_not_verified(context) -> None:
     job, _ = Submissions(context, load_registry()).submit_job(
         JobSpec(task="support-1", model="builtin/idle")
     )
-    assert not verifier(context).verify(job.id)["ok"]
+    assert not verifier(context).verify(job.id).as_document()["ok"]
 
 
 def test_a_missing_key_ends_the_job_as_errored(run, monkeypatch) -> None:
@@ -108,10 +108,10 @@ def test_a_driven_car_is_tried_three_times_and_the_best_counts(context, run) -> 
     assert records[0].wall_s > 0
     assert [record.wall_s for record in records[1:]] == [0.0, 0.0]
     assert job.indicator == max(record.indicator for record in records)
-    assert verifier(context).verify(job.id)["ok"]
+    assert verifier(context).verify(job.id).as_document()["ok"]
 
 
 def test_an_assembled_rocket_flies(context, run) -> None:
     job = run(task="lift-3")
     assert job.outcome == "success"
-    assert verifier(context).verify(job.id)["ok"]
+    assert verifier(context).verify(job.id).as_document()["ok"]

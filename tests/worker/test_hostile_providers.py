@@ -83,7 +83,7 @@ def test_a_job_s_seconds_end_its_request_and_are_verified(context, tmp_path, how
     # What was sent and broken off costs what was sent.
     assert (job.input_tokens > 100) == (how in {"hang", "drip"})
     assert (job.cost_usd > 0) == (how in {"hang", "drip"})
-    report = verifier(context).verify(job.id)
+    report = verifier(context).verify(job.id).as_document()
     assert report["ok"], [check for check in report["checks"] if not check["ok"]]
 
 
@@ -208,7 +208,7 @@ def test_garbage_is_counted_charged_and_bounded(context, tmp_path, name) -> None
     assert job.input_tokens == (200 if name in CHARGED else 0)
     assert job.cost_usd == (Decimal("0.0012") if name in CHARGED else 0)
     assert [entry["finish"] for entry in workers.requests(job.id)] == ["garbage"] * 2
-    report = verifier(context).verify(job.id)
+    report = verifier(context).verify(job.id).as_document()
     assert report["ok"], [check for check in report["checks"] if not check["ok"]]
 
 
@@ -236,7 +236,7 @@ def test_after_garbage_the_session_goes_on_and_is_verified(context, tmp_path) ->
     assert job.requests == bad.counts.requests
     finishes = [entry["finish"] for entry in workers.requests(job_id)]
     assert [n for n, finish in enumerate(finishes) if finish == "garbage"] == sorted(bad_ones)
-    report = verifier(context).verify(job_id)
+    report = verifier(context).verify(job_id).as_document()
     assert report["ok"], [check for check in report["checks"] if not check["ok"]]
 
 

@@ -10,6 +10,7 @@ from support.servers.stacks import wait_until
 
 from buildarena_pipeline.catalog.specs import SweepSpec
 from buildarena_worker.verification_runner import AT_ONCE, VerificationRunner
+from buildarena_worker.verify import Report
 
 
 class Slow:
@@ -20,7 +21,7 @@ class Slow:
         self._fails = fails
         self.now = self.most = self.done = 0
 
-    def verify(self, _: str) -> dict[str, object]:
+    def verify(self, _: str) -> Report:
         with self._lock:
             self.now += 1
             self.most = max(self.most, self.now)
@@ -30,7 +31,7 @@ class Slow:
             self.done += 1
         if self._fails:
             raise RuntimeError("broken")
-        return {"ok": True, "checks": []}
+        return Report([])
 
 
 @pytest.fixture

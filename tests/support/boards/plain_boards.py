@@ -68,6 +68,8 @@ def plain_summary(
 ) -> Cell:
     """The summary of one cell's trials."""
     first, imported = trials[0], sum(trial.imported for trial in trials)
+    by_runner = sum(trial.by_runner for trial in trials)
+    refuted = sum("refuted" in trial.flags for trial in trials)
     given, trials = len(trials), [trial for trial in trials if not trial.unverified]
     counted = counted_trials(trials, policy=policy)
     number = len(counted)
@@ -92,7 +94,9 @@ def plain_summary(
         flagged=sum(_is_flagged(trial, policy) for trial in scored),
         flags=dict(sorted(Counter(flag for t in scored for flag in set(t.flags)).items())),
         imported=imported,
+        by_runner=by_runner,
         unverified=given - len(trials),
+        refuted=refuted,
         simulated=sum(trial.outcome in SIMULATED for trial in counted),
         successes=successes,
         success_rate=successes / number if number else None,

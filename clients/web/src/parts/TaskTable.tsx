@@ -43,6 +43,18 @@ export function TaskTable({ task, search = {} }: { task: TaskBoard; search?: Boa
   );
 }
 
+/** Who ran a row's trials besides the service, and what of them counts nowhere. */
+function Proof({ row }: { row: Row }) {
+  const waiting = row.unverified - row.refuted;
+  const parts = [
+    row.imported > 0 && `${row.imported} imported`,
+    row.by_runner > 0 && `${row.by_runner} by a runner`,
+    waiting > 0 && `${waiting} to be verified`,
+    row.refuted > 0 && `${row.refuted} refuted`,
+  ].filter((part) => part !== false);
+  return parts.length > 0 && <small className="dimmed">{parts.join(", ")}</small>;
+}
+
 function TaskRow({ row, search, tied, several }: { row: Row; search: BoardSearch; tied: boolean; several: boolean }) {
   const success = `${row.successes} of ${row.trials}`;
   return (
@@ -58,6 +70,7 @@ function TaskRow({ row, search, tied, several }: { row: Row; search: BoardSearch
               {row.flagged} flagged
             </Badge>
           )}
+          <Proof row={row} />
         </Group>
       </Table.Td>
       <Table.Td className="figures">

@@ -42,6 +42,9 @@ api_keys = Table(
     time_column("expires_at"),
     time_column("revoked_at"),
     time_column("used_at"),
+    # Of a runner key: since when its runners may do nothing, and the verification that refuted one.
+    time_column("suspended_at"),
+    Column("suspended_for", Text),
 )
 
 # A row's id is that of the sweep or key whose budget it is.

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Any, Final
 
 from sqlalchemy import Connection, func, select, text
 
 from buildarena_store import events
 from buildarena_store.database import Database
-from buildarena_store.states import JobState
+from buildarena_store.states import Audit, JobState, Verdict
 from buildarena_store.tables import jobs, sweeps
 
 GATHER_LOCK: Final = 0x636F756E74  # "count": one process at a time adds changes to the counts
@@ -74,7 +75,18 @@ class StageTimes:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MetricValues:
-    """All of them, from one moment."""
+    """All of them, from one moment.
+
+    Attributes:
+        jobs: Jobs by where they are.
+        queues: What waits.
+        models: What sessions used.
+        stages: How long attempts took.
+        sweeps: Sweeps by state.
+        running: Jobs that are worked on, by queue.
+        verifications: Ended verifications by verdict.
+        audits: Jobs by where their audit stands; those that need none are left out.
+    """
 
     jobs: Sequence[JobCount]
     queues: Sequence[QueueDepth]
@@ -82,6 +94,8 @@ class MetricValues:
     stages: Sequence[StageTimes]
     sweeps: dict[str, int]
     running: dict[str, int]
+    verifications: dict[str, int]
+    audits: dict[str, int]
 
 
 class Metrics:
@@ -103,6 +117,8 @@ class Metrics:
                 stages=_stages(kept),
                 sweeps=_sweeps(connection),
                 running=_running(connection),
+                verifications=_by_state(kept, "verifications", Verdict),
+                audits=_by_state(kept, "audits", Audit),
             )
 
     def gather(self) -> None:
@@ -201,6 +217,12 @@ def _stages(kept: _Stored) -> list[StageTimes]:
         StageTimes(stage=stage, result=result, counts=counts, total_s=total)
         for (stage, result), (counts, total) in sorted(found.items())
     ]
+
+
+def _by_state(kept: _Stored, kind: str, states: type[StrEnum]) -> dict[str, int]:
+    """Counts by state, also of states that nothing is in."""
+    counts = {str(state): 0 for state in states}
+    return counts | {state: int(amounts[0]) for (state,), amounts in kept.of(kind)}
 
 
 def _sweeps(connection: Connection) -> dict[str, int]:

@@ -22,10 +22,12 @@ __all__ = [
     "TURN",
     "VERIFY_QUEUE",
     "AttemptResult",
+    "Audit",
     "JobState",
     "Outcome",
     "Stage",
     "SweepState",
+    "Verdict",
     "VerificationState",
     "require_legal",
     "simulate_queue",
@@ -111,6 +113,34 @@ class VerificationState(StrEnum):
     QUEUED = "queued"
     RUNNING = "running"
     DONE = "done"
+
+
+class Verdict(StrEnum):
+    """What a verification found out.
+
+    Attributes:
+        VERIFIED: Every figure came out equal.
+        REFUTED: A figure came out different, from the same versions of everything.
+        INCONCLUSIVE: It can't be said here: other versions, or something is missing or damaged.
+    """
+
+    VERIFIED = "verified"
+    REFUTED = "refuted"
+    INCONCLUSIVE = "inconclusive"
+
+
+class Audit(StrEnum):
+    """Where a score stands that had to be verified, or was refuted; others have none.
+
+    Attributes:
+        REQUIRED: It counts once it was verified.
+        VERIFIED: It counts.
+        REFUTED: It counts nowhere.
+    """
+
+    REQUIRED = "required"
+    VERIFIED = "verified"
+    REFUTED = "refuted"
 
 
 JOB_TRANSITIONS: Final[Mapping[JobState, frozenset[JobState]]] = MappingProxyType(

@@ -96,8 +96,11 @@ jobs = Table(
     count_column("actions"),
     count_column("refused_actions"),
     Column("refusals", JSONB),
-    # What it was imported from, if it was, and when its figures were found again here.
+    # What it was imported from, if it was; whether a runner ran one of its trials; whether its
+    # score waits for a verification, and what the last one that could tell said, and when.
     Column("imported_from", Text),
+    Column("by_runner", Boolean, nullable=False, server_default=text("false")),
+    Column("audit", Text),
     time_column("verified_at"),
     time_column("created_at", now=True),
     time_column("started_at"),
@@ -273,9 +276,13 @@ rollouts = Table(
     Column("versions", JSONB),
     Column("annotations", JSONB(none_as_null=True)),
     Column("wall_s", Double),
+    # The key whose runner ran it, if one did, and whether its job is verified before it counts.
+    Column("runner", Text),
+    Column("audited", Boolean, nullable=False, server_default=text("false")),
     time_column("created_at", now=True),
     time_column("finished_at"),
 )
+Index("ix_rollouts_runner", rollouts.c.runner, postgresql_where=rollouts.c.runner.is_not(None))
 
 artifacts = Table(
     "artifacts",
@@ -301,6 +308,7 @@ verifications = Table(
     Column("job_id", Text, ForeignKey("jobs.id"), nullable=False),
     Column("state", Text, nullable=False),
     Column("report", JSONB),
+    Column("verdict", Text),
     Column("owner", Text),
     time_column("created_at", now=True),
     time_column("claimed_at"),

@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from buildarena_benchmark.flags import is_censored
 from buildarena_store import Budget, Job, JobState, Outcome, Stage, SweepProgress, SweepState
-from buildarena_store.states import AttemptResult
+from buildarena_store.states import AttemptResult, Audit
 
 # Spelled out, because the contract lists the values in place.
 AnyOutcome = Literal[
@@ -94,10 +94,12 @@ class JobView(_Answer):
     refusals: dict[str, int] | None = Field(description="Refused actions by class")
     faults: int = Field(description="Infrastructure faults at the current stage")
     imported_from: str | None = Field(description="The archive it was imported from, if it was")
-    verified_at: datetime | None = Field(
-        description="When an imported job's figures were found again here; until then they are in "
-        "no ranking"
+    by_runner: bool = Field(description="Whether a runner ran one of its trials")
+    audit: Literal[Audit.REQUIRED, Audit.VERIFIED, Audit.REFUTED] | None = Field(
+        description="Of a score that was imported, brought by a runner, or refuted: it counts once "
+        "it is verified, and nowhere while a verification is required or refuted it"
     )
+    verified_at: datetime | None = Field(description="When such a score was verified")
     created_at: datetime
     started_at: datetime | None
     finished_at: datetime | None

@@ -10,7 +10,8 @@ import structlog
 from sqlalchemy.exc import OperationalError
 
 from buildarena_store import ArtifactStoreError, Verifications
-from buildarena_worker.verify import Check, Verifier, report_of
+from buildarena_store.states import Verdict
+from buildarena_worker.verify import Report, Verifier, broken_off
 
 AT_ONCE = 2
 """Verifications of one process at once, however many wait."""
@@ -60,9 +61,15 @@ class VerificationRunner:
             return False
         except Exception as error:
             log.exception("verification_failed", job=claimed.job_id)
-            found = f"it broke off: {error}"
-            report = report_of([Check(name="verification", ok=False, kept=None, found=found)])
-        self._verifications.finish(claimed.id, report)
+            report = Report([broken_off(f"it broke off: {error}")])
+        if report.verdict == Verdict.REFUTED:
+            log.error("refuted", job=claimed.job_id, verification=claimed.id)
+        self._verifications.finish(
+            claimed.id,
+            report.as_document(),
+            verdict=report.verdict,
+            refuted_trials=report.refuted_trials,
+        )
         return True
 
     def _do_next(self) -> None:

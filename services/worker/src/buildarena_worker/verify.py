@@ -1,8 +1,12 @@
 """Verification: a finished job is replayed without a model, re-simulated, and compared.
 
 Everything that a score rests on is made again: the session from its journal, the machine it
-built, the trajectory of each rollout, and the score; figures are compared exactly. The kept bytes
+built, the trajectory of each rollout, and the score; figures are compared exactly. The stored bytes
 of every artifact are read and hashed.
+
+A figure that comes out different refutes the job, if it came of the same versions of everything.
+What can't be made again here, because a version differs or something is missing or damaged, makes
+the verification inconclusive: nothing follows from it.
 """
 
 from __future__ import annotations
@@ -10,11 +14,12 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from hashlib import sha256
 from typing import Any
 
 from buildarena_benchmark import Score, Task, broken_constraint, failed_score, score
+from buildarena_benchmark.scorers.scorer import REFUTED
 from buildarena_besiege import LogIncompleteError, MachineNotPlayableError, prepare_run
 from buildarena_geometry import KeyPress, Machine
 from buildarena_geometry.machine_files import machine_bytes
@@ -31,6 +36,7 @@ from buildarena_simulation import (
     Trajectory,
     TrajectoryFormatError,
     UnknownEngineError,
+    engine_version,
     read_trajectory,
     schema_of,
     simulate,
@@ -50,6 +56,7 @@ from buildarena_store import (
     Usage,
 )
 from buildarena_store.jobs.histories import Histories
+from buildarena_store.states import Verdict
 from buildarena_worker.game_trials import annotations_again, logged_trajectory
 from buildarena_worker.jobs import loop_of, pack_of
 from buildarena_worker.session.host import ReplayHost
@@ -67,12 +74,57 @@ from buildarena_worker.workflow.rounds import run_session
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Check:
-    """One comparison: what is kept, and what came out now."""
+    """One comparison: what is stored, and what came out now.
+
+    Attributes:
+        name: What is compared.
+        ok: Whether both are equal.
+        kept: What is stored.
+        found: What came out now.
+        able: Whether, when they differ, a figure is wrong; otherwise it can't be said here.
+        trial: Number of the rollout whose trajectory is wrong when they differ, if it is that.
+    """
 
     name: str
     ok: bool
     kept: Any
     found: Any
+    able: bool = True
+    trial: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """What a verification found out.
+
+    Attributes:
+        checks: Its comparisons.
+    """
+
+    checks: Sequence[Check]
+
+    @property
+    def verdict(self) -> Verdict:
+        """Whether all is equal, and if not, whether that refutes the job."""
+        differing = [check for check in self.checks if not check.ok]
+        if not differing:
+            return Verdict.VERIFIED
+        able = all(check.able for check in differing)
+        return Verdict.REFUTED if able else Verdict.INCONCLUSIVE
+
+    @property
+    def refuted_trials(self) -> list[int]:
+        """Numbers of the rollouts whose trajectories are not what they must be."""
+        if self.verdict != Verdict.REFUTED:
+            return []
+        return sorted({c.trial for c in self.checks if not c.ok and c.trial is not None})
+
+    def as_document(self) -> dict[str, Any]:
+        """``{"ok", "verdict", "checks": [{"name", "ok", "kept", "found"}]}``."""
+        verdict = self.verdict
+        names = ("name", "ok", "kept", "found")
+        checks = [{name: getattr(check, name) for name in names} for check in self.checks]
+        return {"ok": verdict == Verdict.VERIFIED, "verdict": verdict, "checks": checks}
 
 
 SCORED = ("success", "indicator", "metrics", "flags")
@@ -105,19 +157,15 @@ class Verifier:
         self._packs = packs
         self._workflows = workflows
 
-    def verify(self, job_id: str) -> dict[str, Any]:
-        """Verifies a job that was scored.
-
-        Returns:
-            ``{"ok", "checks": [{"name", "ok", "kept", "found"}]}``.
-        """
+    def verify(self, job_id: str) -> Report:
+        """Verifies a job that was scored."""
         job = self._store.jobs.get(job_id)
         try:
             Histories(self._store.database, self._artifacts).unpack([job_id])
             repeated = self._checks(job)
         except (ArtifactMissingError, ArtifactDamagedError) as error:
-            repeated = [_broken_off(str(error))]
-        return report_of([*self._artifact_checks(job), *repeated])
+            repeated = [broken_off(str(error))]
+        return Report([*self._artifact_checks(job), *repeated])
 
     def _artifact_checks(self, job: Job) -> list[Check]:
         """Whether the bytes of every artifact are those that were stored."""
@@ -128,7 +176,7 @@ class Verifier:
                 named[f"trajectory-{record.number}"] = record.trajectory_hash
         states = {digest: self._state_of(digest) for digest in set(named.values())}
         return [
-            _compare(f"artifact {name}", digest, states[digest])
+            _compare(f"artifact {name}", digest, states[digest], able=False)
             for name, digest in sorted(named.items())
         ]
 
@@ -149,16 +197,16 @@ class Verifier:
         try:
             session, host, result = self._replay(job)
         except PermanentError as error:
-            return [_broken_off(str(error))]
+            return [broken_off(str(error))]
         match result:
             case Finished():
                 reasons = []
             case Failed(reason=reason) | LimitReached(limit=reason):
                 reasons = [_compare("reason", job.reason, reason)]
             case Suspended(number=number):
-                return [_broken_off(f"waits for rollout {number}")]
+                return [broken_off(f"waits for rollout {number}")]
             case _:
-                return [_broken_off(getattr(result, "detail", str(result)))]
+                return [broken_off(getattr(result, "detail", str(result)))]
         records = self._store.rollouts.read(job.id)
         checks = [
             _compare(
@@ -224,8 +272,10 @@ class Verifier:
         machine: Machine,
         controls: Sequence[KeyPress] | None,
     ) -> list[Check]:
-        name = f"rollout {record.number}"
-        checks = [_compare(f"{name}: machine", record.machine_hash, _hash(machine_bytes(machine)))]
+        name, built = f"rollout {record.number}", _hash(machine_bytes(machine))
+        checks = [_compare(f"{name}: machine", record.machine_hash, built)]
+        # Another machine moves otherwise, whoever simulates it.
+        trial = record.number if built == record.machine_hash else None
         task = task_of(job, self._tasks)
         try:
             if record.engine == BESIEGE:
@@ -235,9 +285,7 @@ class Verifier:
                     for engine, kept, found in annotations_again(record, task, machine, controls)
                 ]
             else:
-                simulated_by = (record.versions or {}).get("simulation")
-                version = f"{name}: simulation version"
-                checks.append(_compare(version, simulated_by, SIMULATION_VERSION))
+                checks += self._version_checks(name, record)
                 trajectory = simulate(
                     machine,
                     task.scenario,
@@ -247,18 +295,26 @@ class Verifier:
         except (MachineNotSimulable, MachineNotPlayableError):
             repeated, digest = failed_score(task, machine), None
         except LogIncompleteError as error:
-            return [*checks, Check(name=f"{name}: log", ok=False, kept="", found=str(error))]
+            return [*checks, _compare(f"{name}: log", "", str(error), able=False)]
         except UnknownEngineError as error:
-            kept = record.engine
-            return [*checks, Check(name=f"{name}: engine", ok=False, kept=kept, found=str(error))]
+            return [*checks, _compare(f"{name}: engine", record.engine, str(error), able=False)]
         else:
             repeated = score(task, machine, trajectory)
             digest = _hash(self._written_as(record.trajectory_hash, trajectory))
-        checks.append(_compare(f"{name}: trajectory", record.trajectory_hash, digest))
+        checks.append(_compare(f"{name}: trajectory", record.trajectory_hash, digest, trial=trial))
         for field in SCORED:
             kept = _plain(getattr(record, field))
             checks.append(_compare(f"{name}: {field}", kept, _plain(getattr(repeated, field))))
         return checks
+
+    def _version_checks(self, name: str, record: RolloutRecord) -> list[Check]:
+        """Whether a trajectory came of the versions that simulate here."""
+        said = record.versions or {}
+        here = {"simulation": SIMULATION_VERSION, "engine_version": engine_version(record.engine)}
+        return [
+            _compare(f"{name}: {what.replace('_', ' ')}", said.get(what), version, able=False)
+            for what, version in here.items()
+        ]
 
     def _written_as(self, kept: str | None, trajectory: Trajectory) -> bytes:
         """A trajectory's file in the schema of the kept one, which an older version may have."""
@@ -291,17 +347,17 @@ class Verifier:
             else failed_score(task_of(job, self._tasks), machine)
         )
         return [
-            _compare(f"score: {n}", _plain(getattr(job, n)), _plain(getattr(counted, n)))
-            for n in SCORED
+            _compare(f"score: {n}", _scored(job, n), _plain(getattr(counted, n))) for n in SCORED
         ]
 
     def _artifact(self, job: Job, name: str) -> str | None:
         return self._store.jobs.artifacts(job.id).get(name)
 
 
-def report_of(checks: Sequence[Check]) -> dict[str, Any]:
-    """The checks as the report that is stored."""
-    return {"ok": all(check.ok for check in checks), "checks": [asdict(c) for c in checks]}
+def _scored(job: Job, name: str) -> Any:
+    """A figure of a job's score, without what an earlier verification added to it."""
+    value = _plain(getattr(job, name))
+    return [flag for flag in value if flag != REFUTED.name] if name == "flags" else value
 
 
 def _feedback_of(calls: Sequence[ExternalCall]) -> list[list[Any]]:
@@ -314,12 +370,15 @@ def _usage_checks(job: Job, usage: Usage) -> list[Check]:
     return checks
 
 
-def _broken_off(detail: str) -> Check:
-    return Check(name="replay", ok=False, kept="the journal", found=detail)
+def broken_off(detail: str) -> Check:
+    """What a verification says that can't be done."""
+    return _compare("replay", "the journal", detail, able=False)
 
 
-def _compare(name: str, kept: Any, found: Any) -> Check:
-    return Check(name=name, ok=kept == found, kept=kept, found=found)
+def _compare(
+    name: str, kept: Any, found: Any, *, able: bool = True, trial: int | None = None
+) -> Check:
+    return Check(name=name, ok=kept == found, kept=kept, found=found, able=able, trial=trial)
 
 
 def _hash(data: bytes) -> str:

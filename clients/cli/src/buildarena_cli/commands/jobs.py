@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Final
 
 import typer
 
@@ -74,8 +74,19 @@ def cancel_job(job_id: JobId, *, url: UrlOption = DEFAULT_URL, as_json: JsonOpti
 
 @app.command("retry")
 def retry_job(job_id: JobId, *, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) -> None:
-    """Queue an errored job again where it failed; a scored job is never run again."""
+    """Queue an errored job where it failed, or a refuted one for its trial by a runner.
+
+    A job whose score stands is never run again.
+    """
     _change(url, job_id, "retry", as_json=as_json)
+
+
+VERDICTS: Final = {
+    "verified": "Every figure is the same.",
+    "refuted": "Some figures differ: the score counts nowhere.",
+    "inconclusive": "It can't be said here: something is missing, damaged or of another version.",
+}
+"""What a verification comes to, for people."""
 
 
 @app.command("verify")
@@ -93,7 +104,7 @@ def verify_job(job_id: JobId, *, url: UrlOption = DEFAULT_URL, as_json: JsonOpti
             stored, computed = entry["kept"], entry["found"]
             shown = stored if entry["ok"] else f"kept {stored}, found {computed}"
             say(f"{mark}  {entry['name']:<32} {shown}")
-        say("Every figure is the same." if report["ok"] else "Some figures differ.")
+        say(VERDICTS[report.get("verdict") or ("verified" if report["ok"] else "refuted")])
     raise typer.Exit(DONE if report["ok"] else FAILED)
 
 
@@ -104,6 +115,13 @@ def _change(url: str, job_id: str, verb: str, *, as_json: bool) -> None:
     client = Client(url)
     path = at("jobs", whole_id(client, "job", job_id), verb)
     _show(client.post(path, {}), as_json=as_json)
+
+
+def _audit(job: dict[str, Any]) -> str:
+    if job["audit"] == "verified":
+        return f"verified at {minute_of(job['verified_at'])}"
+    waits = "waits for its verification" if job["audit"] == "required" else "refuted"
+    return f"{waits}: it counts nowhere"
 
 
 def _show(job: dict[str, Any], *, as_json: bool) -> None:
@@ -122,9 +140,11 @@ def _show(job: dict[str, Any], *, as_json: bool) -> None:
         say(f"flag      {flag}: {meaning(flag)}" if meaning(flag) else f"flag      {flag}")
     say(f"indicator {number(job['indicator'], 3, at_least=job['censored'])}")
     if job["imported_from"]:
-        verified = job["verified_at"]
-        state = f"verified here at {minute_of(verified)}" if verified else "not verified here"
-        say(f"imported  from {job['imported_from']}; {state}")
+        say(f"imported  from {job['imported_from']}")
+    if job.get("by_runner"):
+        say("trials    by a runner")
+    if job.get("audit"):
+        say(f"audit     {_audit(job)}")
     usage = job["usage"]
     say(
         f"usage     {number(usage['requests'], 0)} requests, "

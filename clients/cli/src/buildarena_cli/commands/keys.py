@@ -25,7 +25,8 @@ from buildarena_cli.options import (
 from buildarena_cli.terminal.output import columns, minute_of, number, print_json, print_table, say
 
 app = new_group(
-    "Make, list, rotate and revoke API keys. Needs a key with the scope admin in BUILDARENA_KEY."
+    "Make, list, rotate, revoke and reinstate API keys. Needs a key with the scope admin in "
+    "BUILDARENA_KEY."
 )
 COLUMNS = columns(
     *("key", "name", "scopes", "used", "state", "spent"),
@@ -117,6 +118,19 @@ def revoke_key(key_id: KeyId, *, url: UrlOption = DEFAULT_URL, as_json: JsonOpti
         say(f"{key['id']} ({key['name']}) is revoked")
 
 
+@app.command("reinstate")
+def reinstate_key(
+    key_id: KeyId, *, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False
+) -> None:
+    """Let a runner key work again that was suspended because a trial of its was refuted."""
+    client = Client(url)
+    key = client.post(at("keys", whole_id(client, "key", key_id), "reinstate"), {})
+    if as_json:
+        print_json(key)
+    else:
+        say(f"{key['id']} ({key['name']}) may lease trials")
+
+
 @app.command("budget")
 def set_budget(
     key_id: KeyId,
@@ -162,9 +176,11 @@ def spent(budget: Mapping[str, Any] | None) -> str:
 
 def _row(key: dict[str, Any]) -> list[str]:
     used = key["used_at"]
-    state = "revoked" if key["revoked_at"] else "good"
-    if key["expires_at"] and not key["revoked_at"]:
-        state = f"until {key['expires_at'][:10]}"
+    state = f"until {key['expires_at'][:10]}" if key["expires_at"] else "good"
+    if key.get("suspended_at"):
+        state = "suspended"
+    if key["revoked_at"]:
+        state = "revoked"
     return [
         key["id"],
         key["name"],

@@ -96,7 +96,9 @@ JOBS: Final[Sequence[Column]] = (
     Column("reasoning_tokens", _WHOLE, "Part of the output that was hidden reasoning."),
     Column("cost_usd", _REAL, "Price of the requests, US dollars."),
     Column("imported", _YES, "Whether another service ran it."),
-    Column("verified", _YES, "Of imported jobs: whether their figures were found again here."),
+    Column("by_runner", _YES, "Whether a runner ran one of its trials."),
+    Column("audit", _TEXT, "required, verified or refuted: only null and verified ones count."),
+    Column("verified", _YES, "Of imported jobs and such by runners: whether they were verified."),
     Column("finished_at", pa.timestamp("us", tz="UTC"), "When it ended."),
     Column("license", _TEXT, "Licence of the row."),
 )

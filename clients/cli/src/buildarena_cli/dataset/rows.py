@@ -93,11 +93,18 @@ def _rows_of(fetched: Fetched, *, tools: str, licence: str) -> Rows:
         "versions": compact({k: v for k, v in manifest.items() if k not in NO_VERSION}),
         "refusals": compact(job["refusals"] or {}),
         "imported": job["imported_from"] is not None,
-        "verified": None if job["imported_from"] is None else job["verified_at"] is not None,
+        "by_runner": job.get("by_runner", False),
+        "audit": job.get("audit"),
+        "verified": job["verified_at"] is not None if _is_unproved(job) else None,
         "finished_at": job["finished_at"] and datetime.fromisoformat(job["finished_at"]),
         "license": OURS if job["model"].startswith(BASELINE) else licence,
     }
     return Rows(job=row, actions=action_rows(job["id"], turns, document))
+
+
+def _is_unproved(job: Mapping[str, Any]) -> bool:
+    """Whether a job counts only once it was verified."""
+    return job["imported_from"] is not None or job.get("audit") is not None
 
 
 def _turns(transcript: bytes) -> list[dict[str, Any]]:

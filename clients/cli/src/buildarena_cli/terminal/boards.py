@@ -289,6 +289,7 @@ def _marked(rows: Sequence[Mapping[str, Any]]) -> str:
     spelled = ", ".join(f"{name} {value}" for name, value in limits.items())
     marks = "*" if first.get("baseline") else ""
     marks += "†" if any(row.get("imported") for row in rows) else ""
+    marks += "‡" if any(row.get("by_runner") for row in rows) else ""
     return f"{first['model']}{marks}" + (f" ({spelled})" if spelled else "")
 
 
@@ -322,9 +323,20 @@ def _policy(board: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> list
 
 
 def _imports(rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """What the mark of imported results means, if there are any."""
-    imported, waiting = (sum(row[name] for row in rows) for name in ("imported", "unverified"))
-    if not imported:
-        return []
-    text = f"{imported} were imported, {waiting} of them are not verified and count nowhere"
-    return [f"† with results of other services: {text}"]
+    """What the marks of results mean that others brought, if there are any."""
+    names = ("imported", "by_runner", "unverified", "refuted")
+    # Services of before have no runners in their rows.
+    imported, by_runner, unverified, refuted = (
+        sum(row.get(name, 0) for row in rows) for name in names
+    )
+    remarks = []
+    if imported:
+        remarks.append(f"† with results of other services: {imported} were imported")
+    if by_runner:
+        remarks.append(f"‡ with trials by a runner: {by_runner} jobs")
+    if unverified:
+        remarks.append(
+            f"{unverified - refuted} wait for their verification, {refuted} were refuted: "
+            "they count nowhere"
+        )
+    return remarks

@@ -16,6 +16,7 @@ from buildarena_benchmark.flags import ScoringPolicy, is_censored, is_disqualifi
 from buildarena_benchmark.leaderboard.ended_jobs import EndedJob
 from buildarena_benchmark.leaderboard.tallies import UNKNOWN_TOKENS, Tally, Total, tallied
 from buildarena_benchmark.outcomes import SIMULATED, Outcome
+from buildarena_benchmark.scorers.scorer import REFUTED
 from buildarena_benchmark.statistics import (
     cost_per_success,
     exact_interval,
@@ -43,7 +44,10 @@ class Cell:
         flagged: Scored trials that a flag makes failures or, under the published policy, omits.
         flags: Scored trials by flag; one may have several.
         imported: Jobs that came from another service's archive, unverified ones included.
-        unverified: Those of them that were not found again here: they count in nothing else.
+        by_runner: Jobs with a trial that a runner ran, unverified ones included.
+        unverified: Jobs that wait for their verification, or were refuted: they count in nothing
+            else.
+        refuted: Those of them that were refuted.
         simulated: Counted trials whose machine was finished and tried.
         success_rate: Successes of counted trials, with its exact interval.
         success_rate_of_ended: Successes of all ended jobs.
@@ -75,7 +79,9 @@ class Cell:
     flagged: int
     flags: Mapping[str, int]
     imported: int
+    by_runner: int
     unverified: int
+    refuted: int
     simulated: int
     successes: int
     success_rate: float | None
@@ -173,7 +179,9 @@ def summarise_tallies(
         flagged=_number(tally for tally in scored if _is_flagged(tally, policy)),
         flags=_counts((flag, tally.number) for tally in scored for flag in set(tally.flags)),
         imported=_number(tally for tally in all_tallies if tally.imported),
+        by_runner=_number(tally for tally in all_tallies if tally.by_runner),
         unverified=_number(all_tallies) - ended,
+        refuted=_number(tally for tally in all_tallies if REFUTED.name in tally.flags),
         simulated=_number(tally for tally in counted if tally.outcome in SIMULATED),
         successes=successes,
         success_rate=successes / number if number else None,

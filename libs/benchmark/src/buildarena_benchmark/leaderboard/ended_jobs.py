@@ -41,7 +41,8 @@ class EndedJob:
         refused_actions: Refused actions.
         finished_at: When it ended.
         imported: Whether it came from another service's archive.
-        unverified: Whether its figures were not found again here since: it counts nowhere.
+        by_runner: Whether a runner ran one of its trials.
+        unverified: Whether it waits for its verification, or was refuted: it counts nowhere.
     """
 
     job_id: str
@@ -67,6 +68,7 @@ class EndedJob:
     refused_actions: int = 0
     finished_at: datetime | None = None
     imported: bool = False
+    by_runner: bool = False
     unverified: bool = False
 
     @property

@@ -44,7 +44,8 @@ class Tally:
         success: Whether they met the task's criterion.
         flags: Remarks on their scores.
         imported: Whether they came from another service's archive.
-        unverified: Whether their figures were not found again here since.
+        by_runner: Whether runners ran trials of theirs.
+        unverified: Whether they wait for their verification, or were refuted.
         indicators: (N,) float64, of each trial.
         costs_usd: (N,) float64, of each trial; not a number where unknown.
         output_tokens: (N,) int64, of each trial; -1 where unknown.
@@ -62,6 +63,7 @@ class Tally:
     success: bool
     flags: tuple[str, ...]
     imported: bool
+    by_runner: bool
     unverified: bool
     indicators: Floats
     costs_usd: Floats
@@ -85,8 +87,8 @@ class Tally:
         return self.outcome in SCORED and not self.unverified
 
 
-Kind = tuple[str, str | None, bool, tuple[str, ...], bool, bool]
-"""Outcome, reason, success, flags, imported, unverified: what trials of one tally share."""
+Kind = tuple[str, str | None, bool, tuple[str, ...], bool, bool, bool]
+"""What trials of one tally share: outcome, reason, success, flags, imported, by_runner, unverified."""
 
 
 def tallied(trials: Iterable[EndedJob]) -> list[Tally]:
@@ -104,12 +106,13 @@ def _kind(trial: EndedJob) -> Kind:
         trial.success,
         trial.flags,
         trial.imported,
+        trial.by_runner,
         trial.unverified,
     )
 
 
 def _tally(kind: Kind, trials: list[EndedJob]) -> Tally:
-    outcome, reason, success, flags, imported, unverified = kind
+    outcome, reason, success, flags, imported, by_runner, unverified = kind
     refusals: Counter[str] = Counter()
     for trial in trials:
         refusals.update(trial.refusals)
@@ -119,6 +122,7 @@ def _tally(kind: Kind, trials: list[EndedJob]) -> Tally:
         success=success,
         flags=flags,
         imported=imported,
+        by_runner=by_runner,
         unverified=unverified,
         indicators=np.array([trial.indicator for trial in trials], np.float64),
         costs_usd=np.array(

@@ -14,7 +14,7 @@ from typing import Annotated, Any, Final
 from pydantic import Field
 
 from buildarena_benchmark import scorers
-from buildarena_benchmark.scorers.scorer import UNSTABLE, Flag, Scorer
+from buildarena_benchmark.scorers.scorer import REFUTED, UNSTABLE, Flag, Scorer
 
 GROUP: Final = "buildarena.scorers"
 
@@ -46,7 +46,7 @@ def known_flags() -> Mapping[str, Flag]:
     """
     flags: dict[str, Flag] = {}
     raised = [flag for scorer in known_scorers().values() for flag in scorer.flags]
-    for flag in sorted([*raised, UNSTABLE], key=lambda flag: not flag.disqualifying):
+    for flag in sorted([*raised, UNSTABLE, REFUTED], key=lambda flag: not flag.disqualifying):
         if flags.setdefault(flag.name, flag) != flag:
             raise ValueError(f"two flags are called {flag.name!r}")
     return MappingProxyType(flags)

@@ -64,6 +64,11 @@ UNSTABLE: Final = Flag(
     name="unstable", meaning="The simulation blew up: its figures are not those of a machine."
 )
 """Any trial may get it, whichever scorer judges."""
+REFUTED: Final = Flag(
+    name="refuted",
+    meaning="Verification came to other figures than the score has: it counts nowhere.",
+)
+"""A job gets it when it is refuted; no scorer gives it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -185,6 +185,15 @@ class Settings(BaseSettings):
             'keys of runners may name before a worker has announced them; JSON: {"drake": "1"}'
         ),
     ] = {}
+    audited_share: Annotated[
+        float,
+        Field(
+            description="Share of the trials by runners that a worker beside the database runs "
+            "again before their jobs count, on engines that repeat exactly; 0 to 1",
+            ge=0,
+            le=1,
+        ),
+    ] = 1.0
     alive_file: Annotated[
         Path | None,
         Field(

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from random import SystemRandom
 from typing import Any
 
 from buildarena_benchmark import Score, Task, failed_score, score
@@ -18,13 +19,15 @@ from buildarena_pipeline.errors import PermanentError
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.notify import Notifier
 from buildarena_pipeline.runtime.scoring import best_rollout, rollout_score, task_of
+from buildarena_pipeline.runtime.simulators.known import configured_simulators
 from buildarena_pipeline.runtime.trials import PARQUET, File, TrialResult
 from buildarena_simulation import Trajectory, write_trajectory
 from buildarena_store import ArtifactInfo, ArtifactStore, Job, Lease, RolloutRecord, Stage, Store
+from buildarena_store.jobs.audits import is_unproved, runner_key
 from buildarena_store.states import CONSTRUCT_QUEUE
 
 SCORED = ("success", "indicator", "metrics", "flags")
-MADE = (*SCORED, "trajectory_hash", "trace", "versions", "annotations")
+MADE = (*SCORED, "trajectory_hash", "trace", "versions", "annotations", "runner", "audited")
 """What a simulation adds to a rollout's row."""
 
 
@@ -66,15 +69,24 @@ class TrialRepository:
         artifacts: Where machines and trajectories are.
         queues: Where construct workers are notified.
         tasks: The tasks.
+        audited_shares: Of simulators whose trials a verification can repeat, the share of the
+            trials by runners that is verified before it counts, 0 to 1.
     """
 
     def __init__(
-        self, *, store: Store, artifacts: ArtifactStore, queues: Notifier, tasks: TaskCatalog
+        self,
+        *,
+        store: Store,
+        artifacts: ArtifactStore,
+        queues: Notifier,
+        tasks: TaskCatalog,
+        audited_shares: Mapping[str, float],
     ) -> None:
         self._store = store
         self._artifacts = artifacts
         self._queues = queues
         self._tasks = tasks
+        self._audited_shares = audited_shares
 
     @staticmethod
     def of(context: Context) -> TrialRepository:
@@ -84,6 +96,11 @@ class TrialRepository:
             artifacts=context.artifacts,
             queues=context.queues,
             tasks=context.tasks,
+            audited_shares={
+                name: context.settings.audited_share
+                for name, simulator in configured_simulators(context.settings).items()
+                if simulator.repeatable
+            },
         )
 
     def due(self, job: Job) -> DueTrial:
@@ -132,13 +149,15 @@ class TrialRepository:
             StaleLeaseError: The lease is over; nothing was written.
             ArtifactStoreError: The trajectory can't be kept now.
         """
-        trajectory = outcome.trajectory
+        trajectory, runner = outcome.trajectory, runner_key(lease.owner)
         kept: dict[str, ArtifactInfo] = {}
         values: dict[str, Any] = {
             "versions": dict(outcome.versions),
             "wall_s": outcome.wall_s,
             "trajectory_hash": None,
             "trace": [],
+            "runner": runner,
+            "audited": runner is not None and self._is_audited(runner, due.request.engine),
         }
         if trajectory is None:
             values |= _scored(failed_score(due.task, due.machine))
@@ -150,6 +169,16 @@ class TrialRepository:
         if outcome.annotations is not None:
             values["annotations"] = dict(outcome.annotations)
         self._write(lease, due, values, kept | self._put(outcome.files))
+
+    def _is_audited(self, runner: str, engine: str) -> bool:
+        """Whether a runner's trial is verified before it counts; no runner can tell which are."""
+        share = self._audited_shares.get(engine)
+        if share is None:
+            return False
+        if SystemRandom().random() < share:
+            return True
+        with self._store.database.statement() as connection:
+            return is_unproved(runner, connection=connection)
 
     def keep_evidence(self, job: Job, files: Mapping[str, File]) -> None:
         """Stores what shows a fault with the job, in place of what showed the fault before.

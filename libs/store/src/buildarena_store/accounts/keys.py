@@ -37,6 +37,9 @@ class ApiKey:
         expires_at: When it ends, if ever.
         revoked_at: When it was revoked, if it was.
         used_at: When it was last used, to the minute.
+        suspended_at: Of a runner key, since when its runners may do nothing: a trial of theirs was
+            refuted.
+        suspended_for: The verification that refuted it.
         previous_until: Until when the secret before the present one is good; None when there was
             none.
     """
@@ -50,6 +53,8 @@ class ApiKey:
     expires_at: datetime | None
     revoked_at: datetime | None
     used_at: datetime | None
+    suspended_at: datetime | None
+    suspended_for: str | None
     previous_until: datetime | None
 
 
@@ -59,8 +64,8 @@ class KeyCheck:
 
     Attributes:
         key: The key that has it.
-        refusal: ``revoked`` or ``expired``, or ``replaced`` of a secret that a newer one has
-            followed; None when the key is good.
+        refusal: ``revoked``, ``suspended`` or ``expired``, or ``replaced`` of a secret that a newer
+            one has followed; None when the key is good.
     """
 
     key: ApiKey
@@ -142,10 +147,14 @@ class ApiKeys:
         return checks
 
     def ended(self, key_ids: Sequence[str]) -> set[str]:
-        """Those of the keys that were revoked or have expired."""
+        """Those of the keys that were revoked or suspended, or have expired."""
         query = select(api_keys.c.id).where(
             api_keys.c.id == any_(bound_texts(key_ids)),
-            or_(api_keys.c.revoked_at.is_not(None), api_keys.c.expires_at <= events.now),
+            or_(
+                api_keys.c.revoked_at.is_not(None),
+                api_keys.c.suspended_at.is_not(None),
+                api_keys.c.expires_at <= events.now,
+            ),
         )
         with self._database.transaction() as connection:
             return set(connection.execute(query).scalars())
@@ -223,10 +232,30 @@ class ApiKeys:
             raise UnknownIdError("key", key_id)
         return value_of(ApiKey, row)
 
+    def reinstate(self, key_id: str) -> ApiKey:
+        """Lets a suspended key work again; what its runners bring is verified as before.
+
+        Raises:
+            UnknownIdError: There is no such key.
+        """
+        statement = (
+            update(api_keys)
+            .where(api_keys.c.id == key_id)
+            .values(suspended_at=None, suspended_for=None)
+            .returning(*_COLUMNS)
+        )
+        with self._database.transaction() as connection:
+            row = connection.execute(statement).first()
+        if row is None:
+            raise UnknownIdError("key", key_id)
+        return value_of(ApiKey, row)
+
 
 def _refusal(key: ApiKey, *, expired: bool | None, replaced: bool | None) -> str | None:
     if key.revoked_at is not None:
         return "revoked"
+    if key.suspended_at is not None:
+        return "suspended"
     if expired:
         return "expired"
     return "replaced" if replaced else None

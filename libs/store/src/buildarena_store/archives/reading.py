@@ -15,6 +15,7 @@ from sqlalchemy import Column, Connection, Table, func, select, text
 from sqlalchemy.dialects.postgresql import insert
 from sqlalchemy.exc import OperationalError, StatementError
 
+from buildarena_benchmark.scorers.scorer import REFUTED
 from buildarena_store import events
 from buildarena_store.accounts.names import NameKind, claim_name
 from buildarena_store.archives.members import ArchiveError, Members
@@ -34,8 +35,9 @@ from buildarena_store.archives.writing import CHUNK, FORMAT
 from buildarena_store.artifacts import ArtifactStore
 from buildarena_store.database import Database, expected_schema
 from buildarena_store.errors import NameTakenError
-from buildarena_store.ids import content_hash, new_id
-from buildarena_store.states import EXTERNAL_QUEUE, JobState, Outcome, SweepState, VerificationState
+from buildarena_store.ids import content_hash
+from buildarena_store.jobs.audits import require_audits
+from buildarena_store.states import EXTERNAL_QUEUE, Audit, JobState, Outcome, SweepState
 from buildarena_store.tables import (
     artifacts,
     attempts,
@@ -47,7 +49,6 @@ from buildarena_store.tables import (
     sweep_jobs,
     sweeps,
     tasks,
-    verifications,
 )
 
 COUNTED: Final = (
@@ -226,7 +227,7 @@ class _Archive:
             _insert(connection, table, (row for row in rows if row["job_id"] in added))
         self._take_in_sweep(connection)
         scored = [id_ for id_ in sorted(added) if self._jobs[id_].success is not None]
-        self._ask_for_verification(connection, scored)
+        require_audits(scored, connection=connection)
         return Imported(
             sweep_id=self._sweep_id,
             jobs=len(self._jobs),
@@ -278,7 +279,11 @@ class _Archive:
             "lease_expires_at": None,
             "notified_at": None,
             "imported_from": self.origin,
+            "audit": None if row.success is None else Audit.REQUIRED,
             "verified_at": None,
+            "flags": None
+            if row.flags is None
+            else [flag for flag in row.flags if flag != REFUTED.name],
         }
         if row.state != JobState.DONE and row.queue == EXTERNAL_QUEUE:
             # Its agent is not here.
@@ -305,18 +310,6 @@ class _Archive:
             members = [{"sweep_id": self._sweep_id, "job_id": id_} for id_ in ids]
             _insert(connection, sweep_jobs, members)
             events.record_sweep(connection, self._sweep_id, "imported", {"jobs": len(ids)})
-
-    def _ask_for_verification(self, connection: Connection, job_ids: list[str]) -> None:
-        rows = (
-            {
-                "id": new_id("check"),
-                "job_id": id_,
-                "state": VerificationState.QUEUED,
-                "owner": self._owner,
-            }
-            for id_ in job_ids
-        )
-        _insert(connection, verifications, rows)
 
     def _sweep(self) -> SweepRow:
         rows = list(self._members.rows("sweeps", SweepRow))

@@ -19,7 +19,7 @@ from buildarena_benchmark.tasks.sources import MAX_BYTES
 from buildarena_geometry.json_values import levels
 from buildarena_store.artifacts.kinds import MEDIA_TYPES, NAME
 from buildarena_store.jobs.job import JobKey, configuration_hash
-from buildarena_store.states import JobState, Outcome, Stage, SweepState
+from buildarena_store.states import Audit, JobState, Outcome, Stage, SweepState
 
 DEEPEST: Final = 64
 LARGEST_COUNT: Final = 2**53 - 1
@@ -146,6 +146,8 @@ class JobRow(_Row):
     refused_actions: Count
     refusals: Words | None
     imported_from: Prose | None
+    by_runner: bool = False
+    audit: Annotated[Audit | None, Field(strict=False)] = None
     verified_at: AwareDatetime | None
     created_at: Time
     started_at: Time | None
@@ -251,7 +253,7 @@ class ExternalCallRow(_Row):
 
 
 class RolloutRow(_Row):
-    """A simulation."""
+    """A simulation; what came of it here is nobody's word yet."""
 
     job_id: JobId
     number: Annotated[int, Field(ge=0, le=10_000)]
@@ -268,6 +270,8 @@ class RolloutRow(_Row):
     versions: JsonObject | None
     annotations: JsonObject | None = None
     wall_s: Annotated[Figure | None, Field(ge=0)]
+    runner: Annotated[str | None, AfterValidator(lambda _: None)] = None
+    audited: Annotated[bool, AfterValidator(lambda _: True)] = True
     created_at: Time
     finished_at: Time | None
 

@@ -7,12 +7,18 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import Row, func, or_, select, text
+from sqlalchemy import Row, func, select, text
 
 from buildarena_benchmark.flags import is_disqualified
 from buildarena_benchmark.leaderboard import SCORED, EndedJob
 from buildarena_store.boards.cells import BoardCells
-from buildarena_store.boards.trials import RANKED, TRIAL_COLUMNS, TrialFilter, read_trials
+from buildarena_store.boards.trials import (
+    COUNTS,
+    RANKED,
+    TRIAL_COLUMNS,
+    TrialFilter,
+    read_trials,
+)
 from buildarena_store.database import Database
 from buildarena_store.rows import columns_of, value_of
 from buildarena_store.states import JobState
@@ -95,7 +101,7 @@ class Boards:
             return list(read_trials(connection, query))
 
     def scored_ids(self, wanted: TrialFilter) -> list[str]:
-        """Ids of scored jobs, in their order; imported ones that wait to be verified too."""
+        """Ids of scored jobs, in their order, those that do not count included."""
         query = (
             select(jobs.c.id)
             .where(*wanted.conditions(), jobs.c.outcome.in_(sorted(SCORED)))
@@ -159,7 +165,7 @@ class Boards:
             return [value_of(BoardChange, row) for row in connection.execute(query)]
 
     def annotated(self, track: str) -> list[Annotated]:
-        """Every trial of a track that our engines annotated; imported ones once verified."""
+        """Every trial of a track that our engines annotated, whose scores count."""
         said = func.jsonb_each(rollouts.c.annotations).table_valued("key", "value")
         query = (
             select(jobs.c.task, rollouts.c.success, rollouts.c.indicator, said.c.key, said.c.value)
@@ -169,7 +175,7 @@ class Boards:
             .where(
                 jobs.c.track == track,
                 rollouts.c.finished_at.is_not(None),
-                or_(jobs.c.imported_from.is_(None), jobs.c.verified_at.is_not(None)),
+                COUNTS,
             )
             .order_by(jobs.c.task, said.c.key, jobs.c.id, rollouts.c.number)
         )

@@ -17,7 +17,6 @@ from sqlalchemy import (
     LargeBinary,
     Row,
     Text,
-    and_,
     case,
     cast,
     column,
@@ -28,7 +27,7 @@ from sqlalchemy import (
 )
 
 from buildarena_benchmark.leaderboard import UNKNOWN_TOKENS, Tally, Total
-from buildarena_store.boards.trials import CellId, TrialFilter, decoding_of
+from buildarena_store.boards.trials import COUNTS, CellId, TrialFilter, decoding_of
 from buildarena_store.rows import bound_texts
 from buildarena_store.states import EXTERNAL_PROVIDER
 from buildarena_store.tables import jobs
@@ -90,6 +89,7 @@ def stored_tallies(tallies: Sequence[Tally]) -> tuple[list[dict[str, Any]], byte
             "success": tally.success,
             "flags": list(tally.flags),
             "imported": tally.imported,
+            "by_runner": tally.by_runner,
             "unverified": tally.unverified,
             "requests": asdict(tally.requests),
             "input_tokens": asdict(tally.input_tokens),
@@ -127,6 +127,7 @@ def tallies_of(said: Sequence[Mapping[str, Any]], figures: bytes) -> list[Tally]
                 success=one["success"],
                 flags=tuple(one["flags"]),
                 imported=one["imported"],
+                by_runner=one["by_runner"],
                 unverified=one["unverified"],
                 indicators=_floats(parts[0]),
                 costs_usd=_floats(parts[1]),
@@ -163,7 +164,8 @@ _GROUPS: Final = [
         func.nullif(jobs.c.flags, literal_column("'null'::jsonb")), literal_column("'[]'::jsonb")
     ).label("flags"),
     _IMPORTED.label("imported"),
-    and_(_IMPORTED, jobs.c.verified_at.is_(None)).label("unverified"),
+    jobs.c.by_runner,
+    (~COUNTS).label("unverified"),
     _EXTERNAL.label("external"),
 ]
 
@@ -208,7 +210,7 @@ def _refusals(connection: Connection, conditions: Sequence[Any]) -> dict[Any, di
 def _group_of(row: Any) -> tuple[Any, ...]:
     return (
         *_id_of(row), row.outcome, row.reason, row.success, tuple(row.flags),
-        row.imported, row.unverified, row.external,
+        row.imported, row.by_runner, row.unverified, row.external,
     )  # fmt: skip
 
 
@@ -236,6 +238,7 @@ def _tally_of(row: Row[Any], refusals: Mapping[str, int]) -> Tally:
         success=row.success,
         flags=tuple(row.flags),
         imported=row.imported,
+        by_runner=row.by_runner,
         unverified=row.unverified,
         indicators=_floats(row.indicators),
         costs_usd=_floats(row.costs) if known else np.full(number, np.nan),

@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import Any, Final, NamedTuple
 
-from sqlalchemy import ColumnElement, Connection, Integer, and_, cast, exists, func
+from sqlalchemy import ColumnElement, Connection, Integer, cast, exists, func
 
 from buildarena_benchmark.leaderboard import EndedJob
 from buildarena_store.rows import bound_texts
-from buildarena_store.states import EXTERNAL_PROVIDER, FILE_PROVIDER, JobState
+from buildarena_store.states import EXTERNAL_PROVIDER, FILE_PROVIDER, Audit, JobState
 from buildarena_store.tables import jobs, sweep_jobs
 
 CHUNK: Final = 5000
@@ -91,6 +91,8 @@ def in_cells(cells: Collection[CellId]) -> ColumnElement[bool]:
     )
 
 
+COUNTS: Final = func.coalesce(jobs.c.audit, Audit.VERIFIED.value) == Audit.VERIFIED
+"""Whether a scored job counts, as far as its audit goes."""
 RANKED: Final = func.coalesce(jobs.c.model_config["provider"].as_string(), "") != FILE_PROVIDER
 TRIAL_COLUMNS: Final = [
     jobs.c.track,
@@ -112,7 +114,8 @@ TRIAL_COLUMNS: Final = [
     jobs.c.refused_actions,
     jobs.c.finished_at,
     jobs.c.imported_from.is_not(None).label("imported"),
-    and_(jobs.c.imported_from.is_not(None), jobs.c.verified_at.is_(None)).label("unverified"),
+    jobs.c.by_runner,
+    (~COUNTS).label("unverified"),
     jobs.c.id.label("job_id"),
     jobs.c.model_hash.label("configuration"),
     jobs.c.model_config["decoding"].label("decoding"),
@@ -154,6 +157,7 @@ def read_trials(connection: Connection, query: Any) -> Iterator[EndedJob]:
             refused_actions=row.refused_actions,
             finished_at=row.finished_at,
             imported=row.imported,
+            by_runner=row.by_runner,
             unverified=row.unverified,
         )
 

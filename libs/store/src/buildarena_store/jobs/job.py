@@ -111,6 +111,8 @@ class Job:
     refused_actions: int
     refusals: Mapping[str, int] | None
     imported_from: str | None
+    by_runner: bool
+    audit: str | None
     verified_at: datetime | None
     created_at: datetime
     started_at: datetime | None

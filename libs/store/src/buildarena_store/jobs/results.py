@@ -12,6 +12,7 @@ from buildarena_store import events
 from buildarena_store.artifacts import ArtifactInfo
 from buildarena_store.boards import Boards
 from buildarena_store.database import Database
+from buildarena_store.jobs.audits import origin_of, require_audits
 from buildarena_store.jobs.leases import Lease, Leases
 from buildarena_store.states import JobState, Outcome
 from buildarena_store.tables import job_artifacts
@@ -58,6 +59,9 @@ class Results:
     ) -> None:
         """Ends a job with its score; nobody can score it again.
 
+        One with a trial of a runner's that is audited waits for its verification, which is asked
+        for, before it counts.
+
         Args:
             lease: The lease under which it was scored; it ends.
             score: The score.
@@ -80,8 +84,9 @@ class Results:
             flags=list(score.flags),
             manifest=dict(score.manifest),
             finished_at=events.now,
-            **values,
+            **{**origin_of(lease.job.id), **values},
         )
+        require_audits([lease.job.id], connection=connection)
 
     def attach(
         self, job_id: str, made: Mapping[str, ArtifactInfo], *, connection: Connection

@@ -39,6 +39,8 @@ class RolloutRecord:
     """A rollout as the database has it; the score is None until it was simulated.
 
     Attributes:
+        runner: The key whose runner ran it; None for a worker of the house.
+        audited: Whether its job is to be verified before it counts.
         annotations: What our engines say of the machine, by engine; only of trials in the game.
         trace: The tracked body at 1 Hz, rows of time, x, y, z (seconds, units, world frame).
         wall_s: How long the simulation took; the other names are those of the columns.
@@ -58,6 +60,8 @@ class RolloutRecord:
     versions: Mapping[str, Any] | None
     annotations: Mapping[str, Any] | None = None
     wall_s: float | None
+    runner: str | None = None
+    audited: bool = False
     created_at: datetime
     finished_at: datetime | None
 

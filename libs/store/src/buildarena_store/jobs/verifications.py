@@ -14,9 +14,10 @@ from buildarena_store import events
 from buildarena_store.database import Database
 from buildarena_store.errors import UnknownIdError
 from buildarena_store.ids import new_id
+from buildarena_store.jobs.audits import note_verdict
 from buildarena_store.rows import bound_texts, columns_of, value_of
-from buildarena_store.states import VerificationState
-from buildarena_store.tables import jobs, verifications
+from buildarena_store.states import Verdict, VerificationState
+from buildarena_store.tables import verifications
 
 ABANDONED_AFTER = timedelta(minutes=10)
 """After so long without an end, a verification is done by another worker: it writes no score."""
@@ -33,12 +34,14 @@ class Verification:
 
     Attributes:
         state: A `VerificationState`.
+        verdict: A `Verdict`, once it is done.
         report: What was compared, once it is done.
     """
 
     id: str
     job_id: str
     state: str
+    verdict: str | None
     report: Mapping[str, Any] | None
     created_at: datetime
     finished_at: datetime | None
@@ -118,24 +121,39 @@ class Verifications:
             ).first()
         return None if row is None else value_of(Verification, row)
 
-    def finish(self, verification_id: str, report: Mapping[str, Any]) -> None:
-        """Writes what was found; an imported job whose every figure was found again counts."""
+    def finish(
+        self,
+        verification_id: str,
+        report: Mapping[str, Any],
+        *,
+        verdict: Verdict,
+        refuted_trials: Sequence[int] = (),
+    ) -> None:
+        """Writes what came of a verification, and what follows from it; see `audits`.
+
+        Nothing follows from one that another worker has ended, after this one was thought dead.
+
+        Args:
+            verification_id: The verification.
+            report: What was compared.
+            verdict: What it found out.
+            refuted_trials: Numbers of the rollouts whose trajectories are not what they must be.
+        """
         with self._database.transaction() as connection:
-            checked = connection.execute(
+            job_id = connection.execute(
                 update(verifications)
-                .where(verifications.c.id == verification_id)
-                .values(state=VerificationState.DONE, report=dict(report), finished_at=events.now)
+                .where(verifications.c.id == verification_id, _OPEN)
+                .values(
+                    state=VerificationState.DONE,
+                    verdict=verdict,
+                    report=dict(report),
+                    finished_at=events.now,
+                )
                 .returning(verifications.c.job_id)
             ).scalar()
-            if report["ok"]:
-                connection.execute(
-                    update(jobs)
-                    .where(
-                        jobs.c.id == checked,
-                        jobs.c.imported_from.is_not(None),
-                        jobs.c.verified_at.is_(None),
-                    )
-                    .values(verified_at=events.now)
+            if job_id is not None:
+                note_verdict(
+                    job_id, verdict, verification_id, refuted_trials, connection=connection
                 )
 
     def get(self, verification_id: str) -> Verification:

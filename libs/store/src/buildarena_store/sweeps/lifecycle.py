@@ -18,6 +18,7 @@ from buildarena_store import events
 from buildarena_store.accounts.budgets import BudgetLimits, Budgets
 from buildarena_store.database import Database
 from buildarena_store.errors import NotOwnedError, TransitionError, UnknownIdError
+from buildarena_store.jobs.audits import retry_refuted
 from buildarena_store.jobs.files import require_room
 from buildarena_store.jobs.jobs import Jobs
 from buildarena_store.jobs.transitions import transition
@@ -164,13 +165,15 @@ class SweepLifecycle:
     def retry_job(self, job_id: str, *, owner: str | None, force: bool = False) -> bool:
         """Queues an errored job again, paid for by an active sweep of its key or by the key.
 
+        A refuted one whose trials runners ran is simulated again, see `audits.retry_refuted`.
+
         Args:
             job_id: The job.
             owner: The key that asks.
             force: Retry also another key's job.
 
         Returns:
-            False when the job has not errored.
+            False when the job has neither errored nor been refuted so.
 
         Raises:
             UnknownIdError: There is no such job.
@@ -192,7 +195,9 @@ class SweepLifecycle:
                 .order_by((sweeps.c.id == (job.payer or "")).desc(), sweeps.c.created_at)
             )
             payer = connection.execute(payers.limit(1)).scalar()
-            retried = self._jobs.retry(jobs.c.id == job_id, connection=connection, payer=payer)
+            retried = self._jobs.retry(
+                jobs.c.id == job_id, connection=connection, payer=payer
+            ) or retry_refuted(job_id, connection=connection, payer=payer)
             if retried and payer is None:
                 claims.add_claim(job_id, job.owner, connection=connection)
             if retried and job.provider == FILE_PROVIDER:

@@ -239,7 +239,9 @@ async def _identify(
     if found is None:
         raise _unauthorized("unknown API key")
     if found.refusal is not None:
-        raise _unauthorized(f"API key {found.key.id} is {found.refusal}")
+        cause = found.key.suspended_for if found.refusal == "suspended" else None
+        refuted = f": {cause} refuted a trial of its runners" if cause else ""
+        raise _unauthorized(f"API key {found.key.id} is {found.refusal}{refuted}")
     key = found.key
     if RUNNER in key.scopes:
         rights = RunnerRights(simulators=key.simulators or (), job_owners=key.job_owners)

@@ -59,6 +59,7 @@ class ServiceMetrics(Collector):
         yield from _queue_metrics(figures)
         yield from _model_metrics(figures)
         yield _stage_metric(figures)
+        yield from _audit_metrics(figures)
         workers = GaugeMetricFamily(
             "buildarena_workers", "Worker processes alive, by kind.", labels=["kind"]
         )
@@ -138,6 +139,22 @@ def _model_metrics(figures: MetricValues) -> Iterable[Metric]:
         tokens.add_metric([use.model, "output"], use.output_tokens)
         cost.add_metric([use.model], use.cost_usd)
     return requests, tokens, cost
+
+
+def _audit_metrics(figures: MetricValues) -> Iterable[Metric]:
+    verifications = CounterMetricFamily(
+        "buildarena_verifications", "Verifications that ended, by verdict.", labels=["verdict"]
+    )
+    for verdict, number in sorted(figures.verifications.items()):
+        verifications.add_metric([verdict], number)
+    audits = GaugeMetricFamily(
+        "buildarena_audited_jobs",
+        "Scored jobs that count once they are verified, or were refuted, by audit.",
+        labels=["audit"],
+    )
+    for audit, number in sorted(figures.audits.items()):
+        audits.add_metric([audit], number)
+    return verifications, audits
 
 
 def _stage_metric(figures: MetricValues) -> Metric:

@@ -48,9 +48,11 @@ class Row(_View):
     )
     flags: dict[str, int] = Field(description="Scored jobs by flag")
     imported: int = Field(description="Jobs that came from another service's archive")
+    by_runner: int = Field(description="Jobs with a trial that a runner ran")
     unverified: int = Field(
-        description="Imported jobs whose figures were not found again here: they count nowhere"
+        description="Jobs that wait for their verification, or were refuted: they count nowhere"
     )
+    refuted: int = Field(description="Jobs whose verification came to other figures")
     simulated: int = Field(description="Counted jobs whose machine was finished and simulated")
     successes: int
     success_rate: float | None = Field(description="null when nothing was scored")

@@ -79,7 +79,10 @@ class Result(BaseModel):
     actions: int
     refused_actions: int
     imported: bool
-    unverified: bool = Field(description="Imported and not found again here: it counts nowhere")
+    by_runner: bool = Field(description="A runner ran one of its trials")
+    unverified: bool = Field(
+        description="It waits for its verification, or was refuted: it counts nowhere"
+    )
     rounds: list[RoundView] = Field(description="In order; more than one in a closed loop")
 
 

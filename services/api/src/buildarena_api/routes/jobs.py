@@ -201,11 +201,17 @@ def cancel_job(job_id: str, context: ContextDep, caller: CallerDep) -> JobView:
 
 @router.post("/{job_id}/retry", status_code=202, responses=problem_responses(404, 409, 503))
 def retry_job(job_id: str, context: ContextDep, caller: CallerDep) -> JobView:
-    """Queues an errored job again where it failed. A scored job is never run again."""
+    """Queues an errored job where it failed, or a refuted one for its trial by a runner.
+
+    A job whose score stands is never run again.
+    """
     if not context.store.lifecycle.retry_job(job_id, owner=caller.key_id, force=caller.is_admin):
         job = context.store.jobs.get(job_id)
         state = job.outcome or job.state
-        raise ProblemError(409, f"only errored jobs are retried; job {job_id} is {state}")
+        raise ProblemError(
+            409,
+            f"only errored jobs and refuted trials of runners are retried; job {job_id} is {state}",
+        )
     job = context.store.jobs.get(job_id)
     notify_waiting(context, job.queue)
     return JobView.of(job)

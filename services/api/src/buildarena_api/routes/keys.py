@@ -105,6 +105,12 @@ class KeyView(BaseModel):
     expires_at: datetime | None
     revoked_at: datetime | None
     used_at: datetime | None = Field(description="When it was last used, to the minute")
+    suspended_at: datetime | None = Field(
+        description="Of a runner key: since when its runners may do nothing"
+    )
+    suspended_for: str | None = Field(
+        description="The verification that refuted a trial of its runners"
+    )
     previous_until: datetime | None = Field(
         description="Until when the secret before the present one is good; null without one"
     )
@@ -167,6 +173,15 @@ def revoke_key(key_id: str, context: ContextDep, request: Request) -> KeyView:
     checks: KeyChecks = request.app.state.key_checks
     checks.forget()
     return revoked
+
+
+@router.post("/{key_id}/reinstate", responses=problem_responses(404, 503))
+def reinstate_key(key_id: str, context: ContextDep, request: Request) -> KeyView:
+    """Lets a key work again that was suspended because a trial of its runners was refuted."""
+    reinstated = _view(context, context.store.keys.reinstate(key_id))
+    checks: KeyChecks = request.app.state.key_checks
+    checks.forget()
+    return reinstated
 
 
 @router.put("/{key_id}/budget", responses=problem_responses(404, 422, 503))

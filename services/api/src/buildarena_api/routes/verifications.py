@@ -14,7 +14,7 @@ from buildarena_api.http.access import Caller, CallerDep
 from buildarena_api.http.problems import ProblemError, problem_responses
 from buildarena_pipeline.runtime.context import Context
 from buildarena_store.jobs.verifications import MAX_OPEN, Requested
-from buildarena_store.states import VERIFY_QUEUE, VerificationState
+from buildarena_store.states import VERIFY_QUEUE, Verdict, VerificationState
 
 router = APIRouter(prefix="/v1", tags=["verification"])
 
@@ -30,8 +30,12 @@ class VerificationView(BaseModel):
     id: str
     job_id: str
     state: Literal[VerificationState.QUEUED, VerificationState.RUNNING, VerificationState.DONE]
+    verdict: Literal[Verdict.VERIFIED, Verdict.REFUTED, Verdict.INCONCLUSIVE] | None = Field(
+        description="null until it is done; a refuted job counts nowhere, and nothing follows from "
+        "an inconclusive verification"
+    )
     report: dict[str, Any] | None = Field(
-        description="ok, and checks with name, ok, kept and found; null until it is done"
+        description="ok, verdict, and checks with name, ok, kept and found; null until it is done"
     )
     created_at: datetime
     finished_at: datetime | None
