@@ -27,6 +27,8 @@ FULL: Mapping[str, float] = {
     "verifications": 1500,
     "flood_s": 10,
     "bomb_mib": 2048,
+    "lies": 100,
+    "strangers": 200,
     "broker_s": 60,
 }
 P99_BOUND_S = 0.25

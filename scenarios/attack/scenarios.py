@@ -12,6 +12,13 @@ from typing import Any
 from scenarios.attack import floods
 from scenarios.attack.arena import HOSTILE, Arena, Tried
 from scenarios.attack.outages import full_disk, killed_supervisor, stopped_broker
+from scenarios.attack.runners import (
+    forged_trials,
+    harmful_runner,
+    look_alikes,
+    noisy_runner,
+    strangers,
+)
 from support.clients.tenants import everything
 from support.servers.api_process import Service
 from support.servers.stacks import wait_until
@@ -278,6 +285,11 @@ SCENARIOS: dict[str, Callable[[Arena], Tried]] = {
     "lying provider": lying_provider,
     "truncated bodies": truncated_bodies,
     "forged archives": forged_archives,
+    "forged trials": forged_trials,
+    "noisy runner": noisy_runner,
+    "harmful runner": harmful_runner,
+    "strangers": strangers,
+    "look-alikes": look_alikes,
     **{kind: flood(kind) for kind in ("streams", "archives", "exports", "boards", "verifications")},
     "full disk": full_disk,
     "stopped broker": stopped_broker,

@@ -19,6 +19,8 @@ SMALL = {
     "verifications": 60,
     "flood_s": 1.0,
     "bomb_mib": 64,
+    "lies": 3,
+    "strangers": 60,
     "broker_s": 3,
 }
 

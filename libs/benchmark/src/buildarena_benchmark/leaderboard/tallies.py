@@ -88,7 +88,7 @@ class Tally:
 
 
 Kind = tuple[str, str | None, bool, tuple[str, ...], bool, bool, bool]
-"""What trials of one tally share: outcome, reason, success, flags, imported, by_runner, unverified."""
+"""What trials of one tally share: outcome to flags, imported, by_runner, unverified."""
 
 
 def tallied(trials: Iterable[EndedJob]) -> list[Tally]:

@@ -1,0 +1,265 @@
+"""What runners try, and strangers without a key: lies, noise, harm, stalled bodies."""
+
+import json
+import secrets
+import socket
+import statistics
+import time
+from collections import Counter
+from contextlib import ExitStack
+from typing import Any
+from urllib.parse import urlsplit
+
+import httpx
+from cachetools import cached
+from scenarios.attack.arena import MEBI, Arena, Tried
+from support.servers.lies import LIES
+from support.servers.runner_rig import Caller
+from support.servers.stacks import wait_until
+
+from buildarena_benchmark import builtin_tasks
+from buildarena_geometry import KeyPress, Machine
+from buildarena_simulation import (
+    SIMULATION_VERSION,
+    Trajectory,
+    engine_version,
+    simulate,
+    write_trajectory,
+)
+
+ENGINE = "pybullet"
+"""The stack has no worker of this simulator: its trials are the runners'."""
+TASK = "support-1"
+RUNNER = {"name": "runner", "scopes": ["runner"], "simulators": [ENGINE]}
+HEALTH = "/v1/health"
+HEALTH_S = 0.5
+GROWTH_MIB = 150
+"""What 200 strangers may cost the API; they held 1,700 MiB."""
+
+
+def forged_trials(arena: Arena) -> Tried:
+    """Lies in trajectories, each by a key of its own, and the truth by another."""
+    lies = dict(list(LIES.items())[: int(arena.sizes["lies"])])
+    found = Tried(f"{len(lies)} lies in trajectories, and the truth")
+    brought: dict[str, str] = {}
+    known = 0
+    for seed, name in enumerate([*lies, "the truth"]):
+        job = _submitted(arena, seed)
+        runner = _runner(arena)
+        lease, true = _trial(runner, job)
+        told = lies[name](true) if name in lies else true
+        versions = {"engine": ENGINE, "simulation": SIMULATION_VERSION}
+        versions["engine_version"] = told.engine_version
+        answer = runner.outcome(lease, write_trajectory(told), versions=versions)
+        if answer.status_code == 200:
+            brought[job] = name
+        else:
+            known += 1
+            found.require(answer.status_code == 422, f"{name}: {answer.status_code}")
+            arena.operator.post(f"/v1/jobs/{job}/cancel")
+    jobs = {}
+    for job in brought:
+        wait_until(lambda: _verified(arena, job), 300, f"{job} is verified")  # noqa: B023
+        jobs[job] = arena.operator.get(f"/v1/jobs/{job}")
+    audits = Counter(str(job["audit"]) for job in jobs.values())
+    for id_, job in jobs.items():
+        honest = brought[id_] == "the truth"
+        found.require((job["audit"] == "verified") == honest, f"{brought[id_]}: {job['audit']}")
+    rows = [
+        row
+        for task in arena.operator.get(f"/v1/leaderboard?track={job['track']}")["tasks"]
+        for row in task["rows"]
+    ]
+    found.require(sum(row["trials"] for row in rows) == 1, f"the board counts {rows}")
+    keys = arena.operator.get("/v1/keys")
+    suspended = sum(key["suspended_at"] is not None for key in keys)
+    found.require(suspended == audits["refuted"], f"{suspended} keys are suspended")
+    found.refused = f"{known} refused at once, of the others {dict(audits)}; {suspended} suspended"
+    return found
+
+
+def noisy_runner(arena: Arena) -> Tried:
+    """Heartbeats of megabytes, and more names than a key may have."""
+    runner = _runner(arena)
+    found = Tried("100 heartbeats of 2 MB, as many of 60 kB, 400 names")
+    before = _health(arena)
+    answers: Counter[int] = Counter()
+    large_taken = 0
+    large = json.dumps({**_beat("noisy"), "versions": {"engine": "x" * 2_000_000}}).encode()
+    wordy = {**_beat("noisy"), "versions": {"engine": "x" * 60_000}}
+    for number in range(100):
+        answer = _ask(runner, content=large)
+        answers[answer] += 1
+        large_taken += answer == 200
+        answers[_ask(runner, json=wordy)] += 1
+        for part in range(4):
+            answers[_ask(runner, json=_beat(f"name-{number}-{part}"))] += 1
+    after = _health(arena)
+    found.require(set(answers) <= {200, 413, 422, 429}, f"answers {answers}")
+    found.require(not large_taken, f"{large_taken} of 2 MB were taken")
+    found.require(after < HEALTH_S, f"health takes {after:.1f} s")
+    workers = arena.operator.get("/v1/workers?limit=200")["workers"]
+    names = sum(worker["id"].startswith("runner@") for worker in workers)
+    found.require(names <= 128 + 10, f"{names} names are in the register")
+    found.refused = (
+        f"answers {dict(answers)}; {names} names; health {before * 1000:.0f} -> "
+        f"{after * 1000:.0f} ms"
+    )
+    return found
+
+
+def harmful_runner(arena: Arena) -> Tried:
+    """One key says that trials can never be done, fails them, gives them back."""
+    jobs = [_submitted(arena, 3000 + number) for number in range(3)]
+    runner = _runner(arena)
+    found = Tried("every job of a queue said to be impossible, failed and given back by one key")
+    ways = {
+        "/fault": {"json": {"reason": "simulator_fault", "detail": "no", "permanent": True}},
+        "/hand-back": {},
+    }
+    for job in jobs:
+        lease = wait_until(lambda: _leased(runner, job), 60, f"{job} waits")  # noqa: B023
+        path, more = list(ways.items())[jobs.index(job) % 2]
+        runner.ask("POST", runner.at(lease, path), **more)
+    for _ in range(20):
+        again = runner.ask("POST", "/leases", json=_about("by-hand"))
+        if again.status_code == 200:
+            runner.ask("POST", runner.at(again.json(), "/hand-back"))
+    states = Counter(arena.operator.get(f"/v1/jobs/{job}")["state"] for job in jobs)
+    found.require(states["done"] == 0, f"jobs are {dict(states)}")
+    honest = _runner(arena)
+    for job in jobs:
+        lease, true = _trial(honest, job)
+        answer = honest.outcome(lease, write_trajectory(true), versions=_versions())
+        found.require(answer.status_code == 200, answer.text)
+    found.refused = f"jobs {dict(states)}; another key did all"
+    return found
+
+
+def strangers(arena: Arena) -> Tried:
+    """Connections with invented keys that promise 4 MiB and stall."""
+    count = int(arena.sizes["strangers"])
+    found = Tried(f"{count} invented keys, each with a body of 4 MiB that stalls")
+    api = arena.process("api")
+    before, quick = api.memory_info().rss, _health(arena)
+    parts = urlsplit(arena.stack.url)
+    with ExitStack() as connections:
+        opened = []
+        for _ in range(count):
+            connection = socket.create_connection((parts.hostname or "", parts.port or 80), 10)
+            opened.append(connections.enter_context(connection))
+            connection.sendall(
+                f"POST /v1/jobs HTTP/1.1\r\nHost: {parts.netloc}\r\nAuthorization: Bearer ba_"
+                f"{secrets.token_urlsafe(32)}\r\nContent-Type: application/json\r\n"
+                f"Content-Length: {4 * MEBI}\r\n\r\n{{".encode()
+            )
+        answers = Counter(int(c.recv(4096).split()[1]) for c in opened)
+        slow = _health(arena)
+        grown = (api.memory_info().rss - before) / MEBI
+    found.require(set(answers) <= {401, 429, 503}, f"answers {answers}")
+    found.require(grown < GROWTH_MIB, f"the API grew by {grown:.0f} MiB")
+    found.require(slow < HEALTH_S, f"health takes {slow:.1f} s")
+    found.refused = (
+        f"answers {dict(answers)} before any body; API {grown:+.0f} MiB; health "
+        f"{quick * 1000:.0f} -> {slow * 1000:.0f} ms"
+    )
+    return found
+
+
+def look_alikes(arena: Arena) -> Tried:
+    """Names of agents that look like another key's."""
+    arena.innocent.post("/v1/sessions", {"task": TASK, "agent": "mortar-2", "seed": 70})
+    names = ("Mortar-2", "mortar.2", "rnortar-2", "m0rtar-2", "mortar_2", "MORTAR2")
+    answers = Counter(
+        arena.attacker.ask(
+            "POST", "/v1/sessions", json={"task": TASK, "agent": name, "seed": 70}
+        ).status_code
+        for name in names
+    )
+    found = Tried(f"{len(names)} names that look like another key's agent")
+    found.require(200 not in answers and 201 not in answers, f"answers {answers}")
+    found.refused = f"answers {dict(answers)}"
+    return found
+
+
+def _submitted(arena: Arena, seed: int) -> str:
+    job = {"task": TASK, "model": "builtin/expert", "simulator": ENGINE, "seed": 500 + seed}
+    return str(arena.innocent.post("/v1/jobs", job)["id"])
+
+
+def _runner(arena: Arena) -> Caller:
+    key = arena.operator.post("/v1/keys", RUNNER)
+    return Caller(arena.stack.url, key["secret"], name=f"attack-{key['id']}")
+
+
+def _about(name: str, **more: Any) -> dict[str, Any]:
+    return {"name": name, "simulators": {ENGINE: SIMULATION_VERSION}, **more}
+
+
+def _beat(name: str) -> dict[str, Any]:
+    return _about(name, leases=[], versions={}, pid=1)
+
+
+def _versions() -> dict[str, str]:
+    return {
+        "engine": ENGINE,
+        "simulation": SIMULATION_VERSION,
+        "engine_version": engine_version(ENGINE),
+    }
+
+
+def _ask(runner: Caller, **options: Any) -> int:
+    headers = {"Content-Type": "application/json"}
+    try:
+        return runner.ask("POST", "/heartbeat", headers=headers, **options).status_code
+    except httpx.TransportError:
+        return 413  # it answered and hung up while the body was on its way
+
+
+def _leased(runner: Caller, job: str) -> dict[str, Any] | None:
+    """A lease of this job; others are given back."""
+    answer = runner.ask("POST", "/leases", json=_about(runner.name, wait_s=2))
+    if answer.status_code != 200:
+        return None
+    lease: dict[str, Any] = answer.json()
+    if lease["job_id"] == job:
+        return lease
+    runner.ask("POST", runner.at(lease, "/hand-back"))
+    return None
+
+
+def _trial(runner: Caller, job: str) -> tuple[dict[str, Any], Trajectory]:
+    """A lease of a job, and what its trial comes to."""
+    while True:
+        lease = wait_until(lambda: _leased(runner, job), 60, f"{job} waits for its trial")
+        true = _simulated(json.dumps([lease["machine"], lease["controls"]]))
+        # A trial that nobody has simulated yet takes longer than the lease lasts.
+        if runner.ask("GET", runner.at(lease)).status_code == 200:
+            return lease, true
+
+
+@cached(cache={})
+def _simulated(spoken: str) -> Trajectory:
+    document, presses = json.loads(spoken)
+    machine = Machine.from_document(document)
+    controls = presses and tuple(KeyPress(**press) for press in presses)
+    return simulate(machine, builtin_tasks()[TASK].scenario, ENGINE, controls=controls)
+
+
+def _verified(arena: Arena, job: str) -> bool:
+    """Whether nothing of a job waits for a verification any more."""
+    with arena.database.transaction() as connection:
+        open_ones = connection.exec_driver_sql(
+            "SELECT count(*) FROM verifications WHERE job_id = %s AND state <> 'done'", (job,)
+        ).scalar_one()
+    return open_ones == 0 and bool(arena.operator.get(f"/v1/jobs/{job}")["audit"])
+
+
+def _health(arena: Arena) -> float:
+    """Median seconds of a health check."""
+    times = []
+    for _ in range(9):
+        started = time.monotonic()
+        arena.operator.ask("GET", HEALTH)
+        times.append(time.monotonic() - started)
+    return statistics.median(times)
