@@ -4,16 +4,18 @@ import json
 import secrets
 import socket
 import statistics
+import threading
 import time
 from collections import Counter
-from contextlib import ExitStack
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from typing import Any
 from urllib.parse import urlsplit
 
 import httpx
 from cachetools import cached
 from scenarios.attack.arena import MEBI, Arena, Tried
-from support.servers.lies import LIES
+from support.servers.lies import LIES, Lie
 from support.servers.runner_rig import Caller
 from support.servers.stacks import wait_until
 
@@ -41,16 +43,13 @@ def forged_trials(arena: Arena) -> Tried:
     """Lies in trajectories, each by a key of its own, and the truth by another."""
     lies = dict(list(LIES.items())[: int(arena.sizes["lies"])])
     found = Tried(f"{len(lies)} lies in trajectories, and the truth")
+    before = _counted(arena)
     brought: dict[str, str] = {}
     known = 0
     for seed, name in enumerate([*lies, "the truth"]):
         job = _submitted(arena, seed)
         runner = _runner(arena)
-        lease, true = _trial(runner, job)
-        told = lies[name](true) if name in lies else true
-        versions = {"engine": ENGINE, "simulation": SIMULATION_VERSION}
-        versions["engine_version"] = told.engine_version
-        answer = runner.outcome(lease, write_trajectory(told), versions=versions)
+        answer = _bring(runner, job, lies.get(name, lambda true: true))
         if answer.status_code == 200:
             brought[job] = name
         else:
@@ -65,12 +64,8 @@ def forged_trials(arena: Arena) -> Tried:
     for id_, job in jobs.items():
         honest = brought[id_] == "the truth"
         found.require((job["audit"] == "verified") == honest, f"{brought[id_]}: {job['audit']}")
-    rows = [
-        row
-        for task in arena.operator.get(f"/v1/leaderboard?track={job['track']}")["tasks"]
-        for row in task["rows"]
-    ]
-    found.require(sum(row["trials"] for row in rows) == 1, f"the board counts {rows}")
+    counted = _counted(arena) - before
+    found.require(counted == audits["verified"], f"the board counts {counted} more")
     keys = arena.operator.get("/v1/keys")
     suspended = sum(key["suspended_at"] is not None for key in keys)
     found.require(suspended == audits["refuted"], f"{suspended} keys are suspended")
@@ -129,8 +124,7 @@ def harmful_runner(arena: Arena) -> Tried:
     found.require(states["done"] == 0, f"jobs are {dict(states)}")
     honest = _runner(arena)
     for job in jobs:
-        lease, true = _trial(honest, job)
-        answer = honest.outcome(lease, write_trajectory(true), versions=_versions())
+        answer = _bring(honest, job)
         found.require(answer.status_code == 200, answer.text)
     found.refused = f"jobs {dict(states)}; another key did all"
     return found
@@ -182,6 +176,17 @@ def look_alikes(arena: Arena) -> Tried:
     return found
 
 
+def _counted(arena: Arena) -> int:
+    """Trials of the expert that the boards of the runners' simulator count."""
+    boards = [
+        arena.operator.get(f"/v1/leaderboard?track={track}")
+        for track in arena.operator.get("/v1/leaderboard")["tracks"]
+        if f"/{ENGINE}-" in track
+    ]
+    rows = [row for board in boards for task in board["tasks"] for row in task["rows"]]
+    return sum(row["trials"] for row in rows if row["model"] == "builtin/expert")
+
+
 def _submitted(arena: Arena, seed: int) -> str:
     job = {"task": TASK, "model": "builtin/expert", "simulator": ENGINE, "seed": 500 + seed}
     return str(arena.innocent.post("/v1/jobs", job)["id"])
@@ -228,14 +233,32 @@ def _leased(runner: Caller, job: str) -> dict[str, Any] | None:
     return None
 
 
-def _trial(runner: Caller, job: str) -> tuple[dict[str, Any], Trajectory]:
-    """A lease of a job, and what its trial comes to."""
-    while True:
-        lease = wait_until(lambda: _leased(runner, job), 60, f"{job} waits for its trial")
-        true = _simulated(json.dumps([lease["machine"], lease["controls"]]))
-        # A trial that nobody has simulated yet takes longer than the lease lasts.
-        if runner.ask("GET", runner.at(lease)).status_code == 200:
-            return lease, true
+def _bring(runner: Caller, job: str, lie: Lie = lambda true: true) -> httpx.Response:
+    """The answer to the outcome of a job's trial, true or not."""
+    lease = wait_until(lambda: _leased(runner, job), 60, f"{job} waits for its trial")
+    with _kept_alive(runner, lease):
+        told = lie(_simulated(json.dumps([lease["machine"], lease["controls"]])))
+        versions = {**_versions(), "engine_version": told.engine_version}
+        return runner.outcome(lease, write_trajectory(told), versions=versions)
+
+
+@contextmanager
+def _kept_alive(runner: Caller, lease: dict[str, Any]) -> Iterator[None]:
+    """Renews a lease meanwhile."""
+    ended = threading.Event()
+
+    def beat() -> None:
+        while not ended.wait(0.5):
+            beat = {**_beat(runner.name), "leases": [runner.named(lease)]}
+            runner.ask("POST", "/heartbeat", json=beat)
+
+    thread = threading.Thread(target=beat)
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join()
 
 
 @cached(cache={})

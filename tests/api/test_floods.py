@@ -18,6 +18,7 @@ from buildarena_pipeline.agents import sessions as agent_sessions
 from buildarena_pipeline.catalog.specs import SweepSpec
 from buildarena_pipeline.runtime.context import open_context
 from buildarena_store.jobs import verifications
+from buildarena_store.states import Verdict
 
 START = {"tool": "start", "arguments": {"init_shift": [0, 0, 0], "init_rotation": [0, 0, 0]}}
 
@@ -162,7 +163,7 @@ def test_equal_verifications_are_one_and_open_ones_are_bounded(
     assert other.post(f"/v1/jobs/{ids[0]}/verify").json()["id"] == same[0].json()["id"]
     assert other.post(f"/v1/jobs/{ids[9]}/verify").status_code == 202
     # One that ended leaves room, and the same job can be verified again.
-    context.store.verifications.finish(same[0].json()["id"], {"ok": True, "checks": []})
+    context.store.verifications.finish(same[0].json()["id"], {}, verdict=Verdict.VERIFIED)
     wait_until(
         lambda: greedy.post(f"/v1/jobs/{ids[0]}/verify").status_code == 202, 15, "there is room"
     )

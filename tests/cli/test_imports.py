@@ -24,14 +24,17 @@ def test_imported_results_are_marked_until_and_after_they_count(
     assert "2 scores count when" in said
     board = printed(url, "leaderboard")
     assert "builtin/expert*†" in board
-    assert "2 were imported, 2 of them are not verified and count nowhere" in board
+    assert "2 were imported" in board
+    assert "2 wait for their verification, 0 were refuted: they count nowhere" in board
     job = context.store.jobs.page(limit=1)[0]
     assert f"an archive of {sweep_id}" in printed(url, "job", "show", job.id)
-    assert "not verified here" in printed(url, "job", "show", job.id)
+    assert "waits for its verification: it counts nowhere" in printed(url, "job", "show", job.id)
     while verification_runner(context).process_one():
         pass
-    assert "2 were imported, 0 of them are not" in printed(url, "leaderboard")
-    assert "verified here at" in printed(url, "job", "show", job.id)
+    board = printed(url, "leaderboard")
+    assert "2 were imported" in board
+    assert "count nowhere" not in board
+    assert "verified at" in printed(url, "job", "show", job.id)
     assert "2/2" in printed(url, "leaderboard", "--task", "lift-1")
 
 

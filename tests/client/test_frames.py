@@ -28,6 +28,7 @@ JOB = {
     "success": None,
     "indicator": None,
     "censored": False,
+    "by_runner": False,
     **dict.fromkeys(("actions", "faults", "refused_actions"), 0),
     "flags": None,
     "metrics": None,
