@@ -1,5 +1,8 @@
 # Two commands matter to a newcomer: `make demo` and `make test`.
 SHELL := /bin/bash
+# Compiled modules are kept, whatever the machine says: without them every process compiles again all
+# that it imports, which is most of what a short one does.
+unexport PYTHONDONTWRITEBYTECODE
 # The Python to use; without it, set-up looks for one that has wheels for everything.
 PYTHON ?=
 export PYTHON
