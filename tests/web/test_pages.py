@@ -34,9 +34,9 @@ def test_pages_work_in_a_browser(tmp_path, files) -> None:
         in_browser(stack.url, [files], BUILDARENA_WEB_REPORT=str(report))
 
 
-def test_people_build_and_bring_machines(tmp_path) -> None:
+def test_people_build_and_bring_machines_and_strangers_do_nothing(tmp_path) -> None:
     with running_stack(tmp_path, simulators=("pybullet", "mujoco")) as stack:
-        in_browser(stack.url, ["e2e/build"])
+        in_browser(stack.url, ["e2e/build", "e2e/strangers"])
 
 
 def test_pages_ask_for_a_key_and_offer_what_it_may(tmp_path) -> None:

@@ -22,8 +22,11 @@ export const ATTACH = (base: number, face: number): Record<string, string> => ({
   new_block: "Small Wooden Block",
 });
 
+/** How a browser is started. */
+export const LAUNCH = { executablePath: CHROMIUM, args: ARGUMENTS };
+
 export function launched(): Promise<Browser> {
-  return chromium.launch({ executablePath: CHROMIUM, args: ARGUMENTS });
+  return chromium.launch(LAUNCH);
 }
 
 /** Expects that a page has no serious fault of accessibility. */
