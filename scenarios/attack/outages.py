@@ -6,11 +6,13 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections import Counter
 from contextlib import suppress
 from pathlib import Path
 
 import httpx
 import psutil
+from redis import Redis
 from scenarios.attack.arena import Arena, Tried
 from support.servers.stacks import wait_until
 
@@ -83,6 +85,28 @@ def stopped_broker(arena: Arena) -> Tried:
         f"{number} submissions, the slowest {slowest * 1000:.0f} ms; all done "
         f"{time.monotonic() - started:.0f} s after it went on"
     )
+    return found
+
+
+def flushed_broker(arena: Arena) -> Tried:
+    """The broker loses all it has, again and again, while jobs wait."""
+    found = Tried("the broker flushed 20 times while jobs wait")
+    body = {"tasks": ["support-1"], "models": ["builtin/idle"], "seeds": [*range(9000, 9030)]}
+    sweep = arena.innocent.post("/v1/sweeps", {**body, "simulator": "mujoco"})["id"]
+    started = time.monotonic()
+    with Redis.from_url(arena.stack.environment["BUILDARENA_BROKER_URL"]) as broker:
+        for _ in range(20):
+            broker.flushall()
+            time.sleep(0.1)
+    wait_until(
+        lambda: arena.innocent.get(f"/v1/sweeps/{sweep}")["progress"]["done"] == 30,
+        120,
+        "all jobs end",
+    )
+    jobs = arena.innocent.get(f"/v1/jobs?sweep={sweep}&limit=50")["jobs"]
+    requests = [job["usage"]["requests"] for job in jobs]
+    found.require(len(set(requests)) == 1, f"sessions asked {Counter(requests)} times")
+    found.refused = f"30 jobs done within {time.monotonic() - started:.0f} s, none run twice"
     return found
 
 

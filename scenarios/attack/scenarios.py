@@ -11,7 +11,12 @@ from typing import Any
 
 from scenarios.attack import floods
 from scenarios.attack.arena import HOSTILE, Arena, Tried
-from scenarios.attack.outages import full_disk, killed_supervisor, stopped_broker
+from scenarios.attack.outages import (
+    flushed_broker,
+    full_disk,
+    killed_supervisor,
+    stopped_broker,
+)
 from scenarios.attack.runners import (
     forged_trials,
     harmful_runner,
@@ -19,6 +24,7 @@ from scenarios.attack.runners import (
     noisy_runner,
     strangers,
 )
+from scenarios.attack.twofold import backups_during_kills, two_processes
 from support.clients.tenants import everything
 from support.servers.api_process import Service
 from support.servers.stacks import wait_until
@@ -293,5 +299,8 @@ SCENARIOS: dict[str, Callable[[Arena], Tried]] = {
     **{kind: flood(kind) for kind in ("streams", "archives", "exports", "boards", "verifications")},
     "full disk": full_disk,
     "stopped broker": stopped_broker,
+    "flushed broker": flushed_broker,
+    "two processes": two_processes,
+    "backups during kills": backups_during_kills,
     "killed supervisor": killed_supervisor,
 }
