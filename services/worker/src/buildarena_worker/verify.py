@@ -33,7 +33,6 @@ from buildarena_simulation import (
     UnknownEngineError,
     read_trajectory,
     schema_of,
-    simulate,
     write_trajectory,
 )
 from buildarena_store import (
@@ -52,6 +51,7 @@ from buildarena_store import (
 from buildarena_store.jobs.histories import Histories
 from buildarena_worker.game_trials import annotations_again, logged_trajectory
 from buildarena_worker.jobs import loop_of, pack_of
+from buildarena_worker.processors import other_processor, simulate_as
 from buildarena_worker.session.host import ReplayHost
 from buildarena_worker.session.results import (
     Failed,
@@ -238,11 +238,8 @@ class Verifier:
                 simulated_by = (record.versions or {}).get("simulation")
                 version = f"{name}: simulation version"
                 checks.append(_compare(version, simulated_by, SIMULATION_VERSION))
-                trajectory = simulate(
-                    machine,
-                    task.scenario,
-                    record.engine,
-                    controls=None if controls is None else tuple(controls),
+                trajectory = simulate_as(
+                    record.versions or {}, machine, task, record.engine, controls=controls
                 )
         except (MachineNotSimulable, MachineNotPlayableError):
             repeated, digest = failed_score(task, machine), None
@@ -255,6 +252,8 @@ class Verifier:
             repeated = score(task, machine, trajectory)
             digest = _hash(self._written_as(record.trajectory_hash, trajectory))
         checks.append(_compare(f"{name}: trajectory", record.trajectory_hash, digest))
+        if digest is not None and record.engine != BESIEGE and not checks[-1].ok:
+            checks += self._processor_checks(name, record, trajectory)
         for field in SCORED:
             kept = _plain(getattr(record, field))
             checks.append(_compare(f"{name}: {field}", kept, _plain(getattr(repeated, field))))
@@ -267,6 +266,19 @@ class Verifier:
                 schema = schema_of(self._artifacts.get(kept))
                 return write_trajectory(trajectory, schema=schema)
         return write_trajectory(trajectory)
+
+    def _processor_checks(
+        self, name: str, record: RolloutRecord, repeated: Trajectory
+    ) -> list[Check]:
+        """Whether another kind of processor may be why the bytes differ, and how far they do."""
+        kept = None
+        with suppress(ArtifactStoreError, TrajectoryFormatError, ValueError):
+            if record.trajectory_hash is not None:
+                kept = read_trajectory(self._artifacts.get(record.trajectory_hash))
+        reason = other_processor(record.versions or {}, kept, repeated)
+        if reason is None:
+            return []
+        return [Check(name=f"{name}: processor", ok=False, kept=reason[0], found=dict(reason[1]))]
 
     def _played(self, job: Job, record: RolloutRecord, machine: Machine, task: Task) -> Trajectory:
         """What the kept log of a trial in the game tells; the game itself plays nothing again.
