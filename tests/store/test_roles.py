@@ -14,16 +14,16 @@ from support.stages import work
 
 from buildarena_api.app import create_app
 from buildarena_pipeline.catalog.models import load_registry
-from buildarena_pipeline.catalog.specs import JobSpec
+from buildarena_pipeline.catalog.specs import SweepSpec
 from buildarena_pipeline.runtime.context import Context, open_context
 from buildarena_pipeline.runtime.reaper import Reaper
+from buildarena_pipeline.submission.submission import Submissions
 from buildarena_store import Database, tables
 from buildarena_store.rights import ROLES
 from buildarena_store.roles import OWNER, RoleError, make_roles
 from buildarena_store.states import CONSTRUCT_QUEUE, simulate_queue
 from buildarena_worker.wiring import verifier
 
-SPEC = JobSpec(task="lift-1", model="builtin/expert", simulator="mujoco")
 PROCESSES = ("api", "construct", "simulate")
 PERMANENT = ("api_keys", "budgets", "names", "jobs", "sweeps", "tasks", "journal", "events")
 """What nobody removes rows from, but the owner."""
@@ -148,10 +148,26 @@ def test_workers_read_no_keys_and_raise_no_limit(contexts, role) -> None:
         "INSERT INTO jobs (id) VALUES ('job_x')",
         "INSERT INTO tasks (name) VALUES ('x')",
         "UPDATE journal SET reply = '{}'",
+        "UPDATE sweeps SET owner = 'key_x'",
+        "UPDATE sweep_jobs SET wanted = false",
         "UPDATE events SET kind = 'x'",
         "SELECT 1 FROM board_cells",
     ):
         assert not allowed(contexts[role], statement), statement
+
+
+def test_a_worker_stops_a_sweep_whose_budget_is_used_up(contexts) -> None:
+    api = contexts["api"]
+    spec = SweepSpec(
+        tasks=["lift-1"],
+        models=["builtin/expert"],
+        simulator="mujoco",
+        samples=1,
+        budget={"max_requests": 1},
+    )
+    sweep = Submissions(api, load_registry()).submit_sweep(spec).sweep.id
+    work(contexts["construct"], queues=(CONSTRUCT_QUEUE,))
+    assert api.store.sweeps.get(sweep).state == "budget_exhausted"
 
 
 def test_a_simulation_worker_sees_no_replies_and_spends_nothing(contexts) -> None:
@@ -160,6 +176,7 @@ def test_a_simulation_worker_sees_no_replies_and_spends_nothing(contexts) -> Non
         "INSERT INTO journal (job_id) VALUES ('job_x')",
         "UPDATE budgets SET spent_cost_usd = 0",
         "INSERT INTO reservations (job_id) VALUES ('job_x')",
+        "UPDATE sweeps SET state = 'active'",
     ):
         assert not allowed(contexts["simulate"], statement), statement
 

@@ -86,6 +86,8 @@ ROLES: Final[Mapping[str, Role]] = MappingProxyType(
                 **_WORKED,
                 "budgets": (*_LOST, *_SPENT),
                 "reservations": _WHOLE,
+                # A sweep whose budget is used up is stopped by the worker that finds it so.
+                "sweeps": ("state",),
                 "verifications": _WHOLE,
             },
             removes=_REAPS,
