@@ -10,5 +10,5 @@ bench-agreement-workshop: $(STAMP) ## The same for 120 machines of the workshop'
 	@$(TEST_PYTHON) -m benchmarks.simulation.bench_agreement --set workshop \
 		--json .buildarena/bench-agreement-workshop.json
 
-bench-processors: $(STAMP) ## Compares 200 trials' bytes over kinds of processors; 30 minutes
+bench-processors: $(STAMP) ## Compares 200 trials' bytes over kinds of processors; an hour
 	@$(TEST_PYTHON) -m benchmarks.simulation.bench_processors --json .buildarena/bench-processors.json

@@ -1,8 +1,8 @@
 """Trials by number, whose trajectories are compared between processors.
 
 `python -m benchmarks.simulation.processor_trials COUNT` runs the first trials and prints a line of
-JSON for each, after one with the processor as manifests say it. A third are bridges under a load
-that grows until they break: breaking amplifies the last bit of a sum.
+JSON for each, after one with the processor as manifests say it. Bridges under a load that grows
+until they break are among them: breaking amplifies the last bit of a sum.
 """
 
 import argparse
