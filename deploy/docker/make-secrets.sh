@@ -24,6 +24,15 @@ random | keep grafana_password
 random | head -c 20 | keep s3_access_key
 random | keep s3_secret_key
 printf 'postgresql://buildarena:%s@postgres:5432/buildarena' "$(cat "$folder/postgres_password")" | keep database_url
+# The superuser's URL above is for the service `roles` alone, which makes these logins.
+login() {
+    printf 'postgresql://buildarena_%s_login:%s@postgres:5432/buildarena' "$1" "$(random)"
+}
+login owner | keep database_url_owner
+login api | keep database_url_api
+login construct | keep database_url_construct
+login simulate | keep database_url_simulate
+login reader | keep database_url_reader
 printf 'redis://:%s@valkey:6379/0' "$(cat "$folder/valkey_password")" | keep broker_url
 printf '{"identities": [{"name": "buildarena", "credentials": [{"accessKey": "%s", "secretKey": "%s"}], "actions": ["Admin", "Read", "Write", "List"]}]}' \
     "$(cat "$folder/s3_access_key")" "$(cat "$folder/s3_secret_key")" | keep s3_config

@@ -25,6 +25,7 @@ from buildarena_simulation import (
     SIMULATION_VERSION,
     Trajectory,
     engine_version,
+    processor,
     simulate,
     write_trajectory,
 )
@@ -210,6 +211,7 @@ def _versions() -> dict[str, str]:
         "engine": ENGINE,
         "simulation": SIMULATION_VERSION,
         "engine_version": engine_version(ENGINE),
+        "processor": dict(processor()),
     }
 
 

@@ -274,6 +274,7 @@ def restore_elsewhere(run: Run, project: Project) -> tuple[Project, Service]:
         other.compose("--profile", "tools", "create", "--no-build", "tools")
         mounted = run.engine.json("volume", "inspect", f"{other.name}_backups")[0]["Mountpoint"]
         shutil.copytree(run.folder / "backups", mounted, dirs_exist_ok=True)
+        other.compose("run", "--rm", "--no-deps", "roles")
         other.compose("run", "--rm", "--no-deps", "tools", "restore", "/backups")
         other.compose("up", "--detach", "--no-build")
         key = run.secrets_of("second")["admin_key"]

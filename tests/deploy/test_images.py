@@ -9,6 +9,7 @@ import pytest
 import yaml
 
 from buildarena_cli.command_table import COMMANDS
+from buildarena_geometry import kernels
 from buildarena_pipeline.runtime.settings import Settings
 from buildarena_pipeline.runtime.simulators.installed import installed_engines
 
@@ -92,13 +93,13 @@ def test_every_queue_has_a_service_and_every_target_a_recipe() -> None:
     assert {_target(service) for service in OURS.values()} <= targets
     engines = {f"simulate-{name}" for name in installed_engines()}
     assert {"api", "construct", "migrate", "proxy", *engines} <= set(SERVICES)
-    assert SERVICES["migrate"]["command"][0] in COMMANDS
+    assert {SERVICES[name]["command"][0] for name in ("migrate", "roles")} <= set(COMMANDS)
 
 
 def test_only_settings_that_exist_are_set() -> None:
-    known = {f"BUILDARENA_{name.upper()}" for name in Settings.model_fields}
+    known = {f"BUILDARENA_{name.upper()}" for name in Settings.model_fields} | {kernels.CHOICE}
     client = {"BUILDARENA_URL", "BUILDARENA_KEY"}
-    proxy = {"BUILDARENA_SITE", "BUILDARENA_TLS"}
+    proxy = {"BUILDARENA_SITE", "BUILDARENA_TLS", "BUILDARENA_BASE_PATH"}
     for name, service in OURS.items():
         allowed = {"proxy": proxy, "tools": known | client}.get(name, known)
         for variable in variables(service):
@@ -112,12 +113,15 @@ def test_no_secret_stands_in_a_variable() -> None:
             secret = re.search(r"PASSWORD|SECRET|KEY|TOKEN|DATABASE_URL|BROKER_URL", variable)
             if secret:
                 assert str(value).startswith("/run/secrets/"), (name, variable)
-                assert str(value).removeprefix("/run/secrets/") in service["secrets"]
+                mounted = [
+                    each if isinstance(each, str) else each["target"] for each in service["secrets"]
+                ]
+                assert str(value).removeprefix("/run/secrets/") in mounted
 
 
 def test_each_secret_is_made_and_each_variable_is_explained() -> None:
     script = (ROOT / "deploy/docker/make-secrets.sh").read_text()
-    made = set(re.findall(r"keep (\w+)$", script, re.MULTILINE))
+    made = set(re.findall(r"\| keep (\w+)$", script, re.MULTILINE))
     assert made == set(COMPOSE["secrets"])
     example = (ROOT / ".env.example").read_text()
     used = dict(re.findall(r"\$\{(\w+):-([^}]*)\}", COMPOSE_TEXT))

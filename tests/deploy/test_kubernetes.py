@@ -19,6 +19,7 @@ from support.documents.manifests import (
 )
 from support.documents.promtool import needs_promtool, promtool
 
+from buildarena_pipeline import __version__
 from buildarena_pipeline.catalog.models import load_registry
 from buildarena_pipeline.runtime.settings import ARTIFACT_CREDENTIALS, SECRETS, Settings
 from buildarena_pipeline.runtime.simulators.installed import installed_engines
@@ -29,6 +30,7 @@ SCHEMA = json.loads(
 )
 DOCKERFILE = KUBERNETES.parent / "docker" / "Dockerfile"
 VERSIONS = ("1.29", kubernetes_validate.latest_version())
+VERSION = __version__
 OURS = ("api", "construct", "simulate-mujoco", "simulate-pybullet")
 FILES = sorted(path for path in KUBERNETES.rglob("*.yaml") if path.name != "kustomization.yaml")
 BUCKET = {"AWS_ENDPOINT", "AWS_REGION"}
@@ -166,8 +168,8 @@ def test_each_workload_has_its_image_and_program(overlay) -> None:
     found = pods(rendered(overlay))
     images = {name: found[name]["spec"]["containers"][0]["image"] for name in [*OURS, "migrate"]}
     assert images == {
-        **{name: f"buildarena/{name}:latest" for name in OURS},
-        "migrate": "buildarena/tools:latest",
+        **{name: f"buildarena/{name}:{VERSION}" for name in OURS},
+        "migrate": f"buildarena/tools:{VERSION}",
     }
     assert {f"simulate-{engine}" for engine in installed_engines()} <= set(OURS)
     targets = re.findall(r"^FROM \S+ AS (\S+)$", DOCKERFILE.read_text(), re.MULTILINE)
@@ -189,7 +191,8 @@ def test_pods_are_stopped_and_moved_with_care(overlay) -> None:
         assert ("readinessProbe" in container) == (name == "api")
         assert "livenessProbe" in container
     api = pods(documents)["api"]["spec"]["containers"][0]
-    assert "tcpSocket" in api["livenessProbe"], "a lost database must not have the API killed"
+    alive = api["livenessProbe"]["httpGet"]["path"]
+    assert alive == "/openapi.json", "a lost database must not have the API killed"
     assert api["readinessProbe"]["httpGet"]["path"] == "/v1/health"
 
 
@@ -216,7 +219,7 @@ def test_nothing_goes_in_or_out_that_is_not_named(overlay) -> None:
             assert rule["ports"], policy
     stores = policies["stores-out"]["spec"]["podSelector"]["matchLabels"]
     reach = {name for name, given in labels.items() if stores.items() <= given.items()}
-    assert reach == {*OURS, "migrate"}
+    assert reach == {*OURS, "migrate"} | ({"roles"} & set(labels))
 
 
 @each_overlay

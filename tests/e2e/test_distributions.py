@@ -98,10 +98,25 @@ def test_a_new_version_goes_everywhere(tmp_path) -> None:
             target = copy / file.relative_to(path.parent)
             target.parent.mkdir(parents=True, exist_ok=True)
             target.write_text(file.read_text())
+    deployed = [
+        ROOT / "docker-compose.yml",
+        ROOT / ".env.example",
+        *(ROOT / "deploy/kubernetes/overlays").glob("*/kustomization.yaml"),
+    ]
+    for path in deployed:
+        target = tmp_path / path.relative_to(ROOT)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_text(path.read_text())
     packages = [str(tmp_path / path.parent.relative_to(ROOT)) for path in PROJECTS]
     script = ["bash", str(ROOT / "mk/version.sh")]
-    done = subprocess.run([*script, "7.1.0rc2", *packages], capture_output=True, check=False)
+    done = subprocess.run(
+        [*script, "7.1.0rc2", *packages], cwd=tmp_path, capture_output=True, check=False
+    )
     assert done.returncode == 0
+    for path in deployed:
+        text = (tmp_path / path.relative_to(ROOT)).read_text()
+        assert "7.1.0rc2" in text
+        assert str(project(PROJECTS[0])["version"]) not in text
     old = str(project(PROJECTS[0])["version"])
     changed = [p.read_text() for p in tmp_path.rglob("*") if p.is_file()]
     assert not [text for text in changed if f'"{old}"' in text or f"=={old}" in text]

@@ -1,17 +1,9 @@
-"""One set of BLAS kernels for all tests, whichever processor runs them.
+"""The kernels that the goldens were made with, wherever the processor has them.
 
-OpenBLAS picks its kernels when numpy is imported, by the processor or by OPENBLAS_CORETYPE, and
-they round differently. A bridge's collapse amplifies the last bit: the goldens were made with the
-kernels pinned here. Importing this module pins them for this process and its children, so it
-comes before numpy.
+A bridge's collapse amplifies the last bit of a sum, so the product pins its kernels as it is
+imported; here it is imported before whatever else of the tests loads numpy.
 """
 
-import os
-import sys
-from pathlib import Path
+from buildarena_geometry import kernels
 
-_PROCESSOR = Path("/proc/cpuinfo")
-
-assert "numpy" not in sys.modules, "OpenBLAS has chosen its kernels already"
-if _PROCESSOR.exists() and " avx512f " in _PROCESSOR.read_text():
-    os.environ["OPENBLAS_CORETYPE"] = "SkylakeX"
+assert not kernels.LATE, "OpenBLAS has chosen its kernels already"

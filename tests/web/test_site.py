@@ -22,7 +22,12 @@ SWEEP = {
     "seeds": [0, 1],
     "simulator": "mujoco",
 }
-OTHER = {**SWEEP, "name": "</script><img src=x onerror=alert(1)>another", "tasks": ["support-1"], "seeds": [1]}
+OTHER = {
+    **SWEEP,
+    "name": "</script><img src=x onerror=alert(1)>another",
+    "tasks": ["support-1"],
+    "seeds": [1],
+}
 PLACE = "some/where"
 
 

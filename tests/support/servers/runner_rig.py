@@ -19,7 +19,13 @@ from buildarena_pipeline.catalog.specs import JobSpec
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.simulators.simulator import Simulator
 from buildarena_pipeline.submission.submission import Submissions
-from buildarena_simulation import SIMULATION_VERSION, Trajectory, engine_version, simulate
+from buildarena_simulation import (
+    SIMULATION_VERSION,
+    Trajectory,
+    engine_version,
+    processor,
+    simulate,
+)
 from buildarena_simworker.engines import EngineSimulator
 from buildarena_simworker.remote.api import RunnerApi, tls_context
 from buildarena_simworker.remote.slots import Heartbeats, Slot
@@ -30,6 +36,7 @@ VERSIONS = {
     "simulation": SIMULATION_VERSION,
     "engine": "mujoco",
     "engine_version": engine_version("mujoco"),
+    "processor": dict(processor()),
 }
 
 

@@ -53,4 +53,5 @@ COMMANDS: Final[Mapping[str, Entry]] = {
     "artifacts": Entry("artifacts", "app", "Look after the store of artifacts."),
     "history": Entry("histories", "app", "Pack what old jobs left in the database."),
     "migrate": Entry("worker", "migrate", "Bring the database to this program's schema."),
+    "roles": Entry("worker", "roles", "Make the logins of a service's processes."),
 }

@@ -1,5 +1,9 @@
 """BuildArena's tasks in Inspect."""
 
+from buildarena_geometry import kernels as kernels  # before numpy
+
+# isort: split
+
 from buildarena_inspect.tasks import TASKS
 
 __all__ = ["TASKS"]

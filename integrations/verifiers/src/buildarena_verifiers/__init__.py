@@ -1,5 +1,9 @@
 """BuildArena's tasks as an environment of verifiers: taskset, harness and environment."""
 
+from buildarena_geometry import kernels as kernels  # before numpy
+
+# isort: split
+
 from buildarena_verifiers.environment import BuildEnv, BuildEnvConfig, load_environment
 from buildarena_verifiers.harness import BuildHarness
 from buildarena_verifiers.harness_config import BuildHarnessConfig

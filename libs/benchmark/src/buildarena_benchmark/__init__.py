@@ -1,5 +1,9 @@
 """Tasks, scorers, statistics and leaderboard mathematics of BuildArena."""
 
+from buildarena_geometry import kernels as kernels  # before numpy
+
+# isort: split
+
 from buildarena_benchmark.constraints import broken_constraint
 from buildarena_benchmark.errors import BenchmarkError, SourceError, TaskError, ValidationIssue
 from buildarena_benchmark.robustness import Robustness, robustness

@@ -1,5 +1,9 @@
 """Machines for the game Besiege: machine files, scripts and levels out, files and logs in."""
 
+from buildarena_geometry import kernels as kernels  # before numpy
+
+# isort: split
+
 from buildarena_besiege.any_file import read_any_machine, read_presses
 from buildarena_besiege.errors import (
     BesiegeError,

@@ -3,6 +3,10 @@
 Importing this package loads no engine; the first trial does.
 """
 
+from buildarena_geometry import kernels as kernels  # before numpy
+
+# isort: split
+
 from buildarena_environment.calls import Answer, call, call_text, read_call
 from buildarena_environment.choices import references
 from buildarena_environment.environment import (

@@ -1,5 +1,8 @@
 """Build machines block by block; every step is checked."""
 
+from buildarena_geometry import kernels as kernels  # before numpy
+
+# isort: split
 from buildarena_geometry.blocks import Block, Connector, Joint, KeyPress
 from buildarena_geometry.documents.log import ActionLog, ActionRecord
 from buildarena_geometry.documents.write import DOCUMENT_VERSION

@@ -3,6 +3,10 @@
 Importing this package loads no engine, no pyarrow and no scipy; `simulate` does, when called.
 """
 
+from buildarena_geometry import kernels as kernels  # before numpy
+
+# isort: split
+
 from buildarena_simulation.constants import DEFAULT_ENGINE
 from buildarena_simulation.engines.registry import ENGINES, engine_version
 from buildarena_simulation.errors import (
@@ -13,6 +17,7 @@ from buildarena_simulation.errors import (
     UnknownEngineError,
 )
 from buildarena_simulation.parquet import read_trajectory, schema_of, write_trajectory
+from buildarena_simulation.processor import processor
 from buildarena_simulation.rollout import SIMULATION_VERSION, require_engine, simulate
 from buildarena_simulation.scenario import Scenario
 from buildarena_simulation.trajectory import Bearing, Break, Event, JointPeak, Trajectory
@@ -33,6 +38,7 @@ __all__ = [
     "TrajectoryFormatError",
     "UnknownEngineError",
     "engine_version",
+    "processor",
     "read_trajectory",
     "require_engine",
     "schema_of",

@@ -30,6 +30,7 @@ from buildarena_simulation.force_control import ForceSchedule, plan_forces
 from buildarena_simulation.holding import Holding
 from buildarena_simulation.machine import bindings_of, structure_of
 from buildarena_simulation.placement import Start, start_digest, start_of
+from buildarena_simulation.processor import warn_if_late
 from buildarena_simulation.recording import Recorder
 from buildarena_simulation.scenario import Scenario
 from buildarena_simulation.structure.clusters import find_clusters
@@ -167,6 +168,7 @@ def simulate_structure(
         controls, control = varied_presses(controls, scenario.control, seed)
         scenario = scenario.model_copy(update={"control": control})
     controls = ended_presses(controls, scenario.control)
+    warn_if_late()
     adapter = create_engine(engine, world)
     try:
         with single_threaded():

@@ -18,6 +18,7 @@ from sqlalchemy.exc import TimeoutError as PoolTimeoutError
 from sqlalchemy.pool import ConnectionPoolEntry
 
 from buildarena_store.errors import SchemaVersionError
+from buildarena_store.rights import grant_rights
 
 IDLE_S = 2.0
 GIVEN_UP = {
@@ -155,7 +156,9 @@ class Database:
             raise NoConnectionError(None, None, error) from error
 
     def migrate(self) -> str:
-        """Brings the schema to the newest revision; safe to run from several processes at once.
+        """Brings the schema to the newest revision, and gives roles their rights on its tables.
+
+        It is safe to run from several processes at once.
 
         Returns:
             The revision the database has now.
@@ -164,6 +167,8 @@ class Database:
             connection.execute(text("SELECT pg_advisory_lock(:key)"), {"key": MIGRATION_LOCK})
             try:
                 command.upgrade(alembic_config(self.url), "head")
+                with self.engine.begin() as owner:
+                    grant_rights(owner)
             finally:
                 connection.execute(text("SELECT pg_advisory_unlock(:key)"), {"key": MIGRATION_LOCK})
                 connection.rollback()

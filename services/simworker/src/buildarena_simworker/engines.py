@@ -18,6 +18,7 @@ from buildarena_simulation import (
     MachineNotSimulable,
     SimulationError,
     engine_version,
+    processor,
     simulate,
 )
 
@@ -40,6 +41,7 @@ class EngineSimulator:
             "simulation": SIMULATION_VERSION,
             "engine": name,
             "engine_version": engine_version(name),
+            "processor": dict(processor()),
         }
 
     def run(self, trial: TrialRequest) -> TrialResult:

@@ -39,7 +39,6 @@ from buildarena_simulation import (
     engine_version,
     read_trajectory,
     schema_of,
-    simulate,
     write_trajectory,
 )
 from buildarena_store import (
@@ -59,6 +58,7 @@ from buildarena_store.jobs.histories import Histories
 from buildarena_store.states import Verdict
 from buildarena_worker.game_trials import annotations_again, logged_trajectory
 from buildarena_worker.jobs import loop_of, pack_of
+from buildarena_worker.processors import other_processor, simulate_as
 from buildarena_worker.session.host import ReplayHost
 from buildarena_worker.session.results import (
     Failed,
@@ -286,11 +286,8 @@ class Verifier:
                 ]
             else:
                 checks += self._version_checks(name, record)
-                trajectory = simulate(
-                    machine,
-                    task.scenario,
-                    record.engine,
-                    controls=None if controls is None else tuple(controls),
+                trajectory = simulate_as(
+                    record.versions or {}, machine, task, record.engine, controls=controls
                 )
         except (MachineNotSimulable, MachineNotPlayableError):
             repeated, digest = failed_score(task, machine), None
@@ -302,6 +299,8 @@ class Verifier:
             repeated = score(task, machine, trajectory)
             digest = _hash(self._written_as(record.trajectory_hash, trajectory))
         checks.append(_compare(f"{name}: trajectory", record.trajectory_hash, digest, trial=trial))
+        if digest is not None and record.engine != BESIEGE and not checks[-1].ok:
+            checks += self._processor_checks(name, record, trajectory)
         for field in SCORED:
             kept = _plain(getattr(record, field))
             checks.append(_compare(f"{name}: {field}", kept, _plain(getattr(repeated, field))))
@@ -323,6 +322,19 @@ class Verifier:
                 schema = schema_of(self._artifacts.get(kept))
                 return write_trajectory(trajectory, schema=schema)
         return write_trajectory(trajectory)
+
+    def _processor_checks(
+        self, name: str, record: RolloutRecord, repeated: Trajectory
+    ) -> list[Check]:
+        """Whether another kind of processor may be why the bytes differ, and how far they do."""
+        kept = None
+        with suppress(ArtifactStoreError, TrajectoryFormatError, ValueError):
+            if record.trajectory_hash is not None:
+                kept = read_trajectory(self._artifacts.get(record.trajectory_hash))
+        reason = other_processor(record.versions or {}, kept, repeated)
+        if reason is None:
+            return []
+        return [_compare(f"{name}: processor", reason[0], dict(reason[1]), able=False)]
 
     def _played(self, job: Job, record: RolloutRecord, machine: Machine, task: Task) -> Trajectory:
         """What the kept log of a trial in the game tells; the game itself plays nothing again.

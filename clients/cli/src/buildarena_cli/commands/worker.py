@@ -1,10 +1,11 @@
-"""`buildarena worker` and `migrate`: parts of a service that runs on several machines."""
+"""`buildarena worker`, `migrate` and `roles`: parts of a service that runs on several machines."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
@@ -15,6 +16,9 @@ from buildarena_cli.lazy import new_group
 from buildarena_cli.options import DEFAULT_URL, JsonOption, UrlOption
 from buildarena_cli.suggestions import did_you_mean
 from buildarena_cli.terminal.output import columns, minute_of, number, print_json, print_table, say
+
+if TYPE_CHECKING:
+    from buildarena_store import Database
 
 app = new_group("Run workers by themselves.")
 
@@ -106,8 +110,50 @@ def check_runner(
 def migrate() -> None:
     """Bring the database to this program's schema.
 
-    The database is the one that BUILDARENA_DATABASE_URL names.
+    The database is the one that BUILDARENA_DATABASE_URL names. Roles that `buildarena roles` made
+    get their rights on it.
     """
+    with _database() as database:
+        say(f"schema {database.migrate()}")
+
+
+def roles(
+    logins: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="ROLE=FILE",
+            help="A role (owner, api, construct, simulate, reader), and a file with the URL that "
+            "its process signs in with.",
+        ),
+    ],
+) -> None:
+    """Make the logins of a service's processes.
+
+    Each has only the rights of its role. BUILDARENA_DATABASE_URL names an account that may make
+    roles; the owner gets the tables, and then migrates. It is safe to repeat: new passwords count.
+    """
+    from buildarena_store.roles import RoleError, make_roles
+
+    urls = {}
+    for login in logins:
+        role, separator, file = login.partition("=")
+        if not separator:
+            raise CommandError(f"{login!r} is not ROLE=FILE, such as api=secrets/api_url")
+        try:
+            urls[role] = Path(file).read_text(encoding="utf-8").strip()
+        except OSError as error:
+            raise CommandError(f"{file} can't be read: {error.strerror}") from error
+    with _database() as database:
+        try:
+            make_roles(database, urls)
+        except RoleError as error:
+            raise CommandError(str(error)) from error
+    say(f"logins for {', '.join(urls)}")
+
+
+@contextmanager
+def _database() -> Iterator[Database]:
+    """The database that the settings name."""
     from buildarena_pipeline.errors import StartupError
     from buildarena_pipeline.runtime.settings import load_settings
     from buildarena_store import Database
@@ -117,8 +163,10 @@ def migrate() -> None:
     except (StartupError, ValueError) as error:
         raise CommandError(str(error)) from error
     database = Database(url)
-    say(f"schema {database.migrate()}")
-    database.close()
+    try:
+        yield database
+    finally:
+        database.close()
 
 
 def _known(queue: str) -> list[str]:

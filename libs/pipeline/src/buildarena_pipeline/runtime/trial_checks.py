@@ -6,6 +6,10 @@ are unpacked, nor that they tell of this machine in this scenario. What passes i
 
 from __future__ import annotations
 
+from buildarena_geometry import kernels  # noqa: F401 - before numpy
+
+# isort: split
+
 import hashlib
 import io
 import math

@@ -1,0 +1,89 @@
+"""A trial as it was run on another kind of processor: in a process with that one's kernels.
+
+``python -m buildarena_environment.other_kernels`` reads what to simulate from its standard input
+and writes the trajectory as Parquet.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Final
+
+from buildarena_environment.processes import PARENT, end_with_parent
+from buildarena_geometry import KeyPress, Machine, kernels
+from buildarena_simulation import (
+    Scenario,
+    SimulationError,
+    Trajectory,
+    read_trajectory,
+    simulate,
+    write_trajectory,
+)
+
+LONGEST_S: Final = 600.0
+
+
+def can_run(name: str) -> bool:
+    """Whether this processor has the kernels of this name."""
+    return name in kernels.runnable()
+
+
+def simulate_with(
+    name: str,
+    machine: Machine,
+    scenario: Scenario,
+    engine: str,
+    *,
+    controls: Sequence[KeyPress] | None = None,
+) -> Trajectory:
+    """As `buildarena_simulation.simulate`, with the kernels that OpenBLAS calls by this name.
+
+    Raises:
+        SimulationError: The processor lacks them, or the trial failed; never scored.
+    """
+    if not can_run(name):
+        raise SimulationError(f"this processor has no kernels {name}")
+    question = {
+        "machine": machine.to_document(),
+        "scenario": scenario.model_dump_json(),
+        "engine": engine,
+        "controls": None if controls is None else [asdict(press) for press in controls],
+    }
+    try:
+        done = subprocess.run(
+            [sys.executable, "-m", __name__],
+            input=json.dumps(question).encode(),
+            env={**os.environ, kernels.CHOICE: name, PARENT: str(os.getpid())},
+            capture_output=True,
+            timeout=LONGEST_S,
+            check=True,
+        )
+    except subprocess.TimeoutExpired as error:
+        raise SimulationError(f"the trial took longer than {LONGEST_S:g} s") from error
+    except subprocess.CalledProcessError as error:
+        told = error.stderr.decode("utf-8", "replace").strip().splitlines()
+        raise SimulationError(f"with kernels {name}: {told[-1] if told else error}") from error
+    return read_trajectory(done.stdout)
+
+
+def main() -> None:
+    """Simulates what the standard input describes."""
+    end_with_parent()
+    question = json.load(sys.stdin)
+    controls = question["controls"]
+    trajectory = simulate(
+        Machine.from_document(question["machine"]),
+        Scenario.model_validate_json(question["scenario"]),
+        question["engine"],
+        controls=None if controls is None else tuple(KeyPress(**press) for press in controls),
+    )
+    sys.stdout.buffer.write(write_trajectory(trajectory))
+
+
+if __name__ == "__main__":
+    main()

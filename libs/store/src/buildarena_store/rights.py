@@ -1,0 +1,158 @@
+"""Who may do what in the database: one role for each kind of process, and the owner.
+
+A role is a group without a password; a process signs in as a member of its own. The owner of the
+tables migrates, makes backups and restores, and grants the rights below; no process is it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any, Final
+
+from psycopg import sql
+from sqlalchemy import Connection, text
+
+_ACCOUNTS = ("api_keys", "names")
+_SUBMITTED = ("budgets", "job_wants", "sweeps", "sweep_jobs", "tasks")
+_WORK = ("artifacts", "attempts", "events", "job_artifacts", "jobs", "rollouts")
+_SESSIONS = ("external_calls", "journal")
+_FIGURES = ("board_changes", "figure_changes", "figures", "workers")
+_BOARDS = ("board_cells", "board_state")
+_SCHEMA = ("alembic_version", "schema_compatibility")
+_EVERY = (
+    *_ACCOUNTS,
+    *_SUBMITTED,
+    *_WORK,
+    *_SESSIONS,
+    *_FIGURES,
+    *_BOARDS,
+    *_SCHEMA,
+    "reservations",
+    "verifications",
+)
+_LOST = ("lost_cost_usd", "lost_requests")
+_SPENT = ("spent_cost_usd", "spent_requests", "spent_tokens")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Role:
+    """The rights of one kind of process.
+
+    Attributes:
+        meaning: Which process, in a sentence.
+        reads: Tables that it reads.
+        adds: Tables that it adds rows to.
+        changes: Tables whose rows it changes: all columns, or those that are named.
+        removes: Tables that it removes rows from.
+    """
+
+    meaning: str
+    reads: tuple[str, ...]
+    adds: tuple[str, ...] = ()
+    changes: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    removes: tuple[str, ...] = ()
+
+
+_WHOLE: tuple[str, ...] = ()
+_REAPS: Final = ("figure_changes", "job_artifacts", "reservations", "workers")
+"""What every process removes: each may be the one whose reaper ends leases and counts figures."""
+_WORKED: Final = dict.fromkeys(
+    ("artifacts", "attempts", "figures", "job_artifacts", "jobs", "rollouts", "workers"), _WHOLE
+)
+
+ROLES: Final[Mapping[str, Role]] = MappingProxyType(
+    {
+        "api": Role(
+            meaning="The API: accounts, submissions, runners' trials, imports, boards.",
+            reads=_EVERY,
+            adds=tuple(name for name in _EVERY if name not in _SCHEMA),
+            changes={
+                name: _WHOLE for name in _EVERY if name not in {*_SCHEMA, "events", "journal"}
+            },
+            removes=(*_REAPS, *_BOARDS, "job_wants"),
+        ),
+        "construct": Role(
+            meaning="Construct workers: sessions, their costs, verifications.",
+            reads=tuple(name for name in _EVERY if name not in {*_ACCOUNTS, *_BOARDS}),
+            adds=(
+                *("artifacts", "attempts", "events", "job_artifacts", "rollouts"),
+                *_SESSIONS,
+                *_FIGURES,
+                "reservations",
+            ),
+            changes={
+                **_WORKED,
+                "budgets": (*_LOST, *_SPENT),
+                "reservations": _WHOLE,
+                # A sweep whose budget is used up is stopped by the worker that finds it so.
+                "sweeps": ("state",),
+                "verifications": _WHOLE,
+            },
+            removes=_REAPS,
+        ),
+        "simulate": Role(
+            meaning="Simulation workers: trials and their scores.",
+            reads=tuple(name for name in _EVERY if name not in {*_ACCOUNTS, *_BOARDS, "journal"}),
+            adds=("artifacts", "attempts", "events", "job_artifacts", *_FIGURES),
+            changes={**_WORKED, "budgets": _LOST, "verifications": _WHOLE},
+            removes=_REAPS,
+        ),
+        "reader": Role(meaning="Reports and dumps: reads everything.", reads=_EVERY),
+    }
+)
+
+
+def group_of(role: str) -> str:
+    """The name of a role in the database."""
+    return f"buildarena_{role}"
+
+
+def tables_named() -> frozenset[str]:
+    """Every table that a role's rights name."""
+    return frozenset(_EVERY)
+
+
+def grant_rights(connection: Connection) -> list[str]:
+    """Gives each role that the server has exactly its rights on this database's tables.
+
+    Args:
+        connection: The owner's, in a transaction.
+
+    Returns:
+        The roles.
+    """
+    known = set(connection.execute(text("SELECT rolname FROM pg_roles")).scalars())
+    made = [role for role in ROLES if group_of(role) in known]
+    for role in made:
+        group, rights = sql.Identifier(group_of(role)), ROLES[role]
+        for kind in ("TABLES", "SEQUENCES"):
+            run_with(connection, f"REVOKE ALL ON ALL {kind} IN SCHEMA public FROM {{}}", group)
+        run_with(connection, "GRANT USAGE ON SCHEMA public TO {}", group)
+        for right, tables in (
+            ("SELECT", rights.reads),
+            ("INSERT", rights.adds),
+            ("DELETE", rights.removes),
+        ):
+            for table in tables:
+                run_with(connection, f"GRANT {right} ON {{}} TO {{}}", sql.Identifier(table), group)
+        for table, columns in rights.changes.items():
+            right = f"UPDATE ({', '.join(columns)})" if columns else "UPDATE"
+            run_with(connection, f"GRANT {right} ON {{}} TO {{}}", sql.Identifier(table), group)
+        if rights.adds:
+            run_with(connection, "GRANT USAGE ON ALL SEQUENCES IN SCHEMA public TO {}", group)
+    return made
+
+
+def run_with(connection: Connection, statement: str, *parts: sql.Composable) -> None:
+    """Runs a statement whose braces stand for names and literals.
+
+    Args:
+        connection: Where.
+        statement: The statement.
+        parts: What its braces stand for, in order.
+    """
+    driver: Any = connection.connection.driver_connection
+    composed = sql.SQL(statement).format(*parts).as_string(driver)
+    connection.exec_driver_sql(composed.replace("%", "%%"))

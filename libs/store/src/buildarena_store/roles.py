@@ -1,0 +1,134 @@
+"""Roles of the database and the logins of processes; their rights are in `rights`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+from psycopg import sql
+from sqlalchemy import Connection, make_url, text
+
+from buildarena_store.database import MIGRATION_LOCK, Database
+from buildarena_store.errors import StoreError
+from buildarena_store.rights import ROLES, group_of
+from buildarena_store.rights import run_with as _run
+
+OWNER: Final = "owner"
+"""The role that migrates and grants: it owns the tables, and no process is it."""
+
+
+class RoleError(StoreError):
+    """A role or a login that can't be used; the message says why."""
+
+
+def make_roles(database: Database, logins: Mapping[str, str]) -> None:
+    """Makes the roles, and a login of each that is named; safe to repeat, with new passwords too.
+
+    A login has no right but its role's. The owner's gets database, schema and all tables, so that
+    an older installation whose tables are a superuser's is taken over.
+
+    Args:
+        database: Connected as whoever may create roles and owns what there is.
+        logins: By role or `OWNER`, the URL that the process signs in with.
+
+    Raises:
+        RoleError: A name is no role, or a URL has no user or password.
+    """
+    accounts = {role: _account(role, url) for role, url in logins.items()}
+    names = [name for name, _ in accounts.values()]
+    if len(set(names)) < len(names):
+        raise RoleError(f"each role needs a login of its own; there are {', '.join(names)}")
+    with database.transaction() as connection:
+        connection.execute(text("SELECT pg_advisory_xact_lock(:key)"), {"key": MIGRATION_LOCK})
+        for role in ROLES:
+            _make(connection, group_of(role), "NOLOGIN")
+        for role, (name, password) in accounts.items():
+            _make(connection, name, "LOGIN")
+            _set_password(connection, name, password)
+            if role == OWNER:
+                _own(connection, name)
+            else:
+                _leave_other_groups(connection, name, group_of(role))
+                group = sql.Identifier(group_of(role))
+                _run(connection, "GRANT {} TO {}", group, sql.Identifier(name))
+        base = sql.Identifier(str(connection.execute(text("SELECT current_database()")).scalar()))
+        _run(connection, "REVOKE ALL ON DATABASE {} FROM PUBLIC", base)
+        _run(connection, "REVOKE CREATE ON SCHEMA public FROM PUBLIC")
+        for role in ROLES:
+            _run(connection, "GRANT CONNECT ON DATABASE {} TO {}", base, _group(role))
+
+
+def _group(role: str) -> sql.Identifier:
+    return sql.Identifier(group_of(role))
+
+
+def _account(role: str, url: str) -> tuple[str, str]:
+    if role not in {*ROLES, OWNER}:
+        raise RoleError(f"no role {role!r}; there are {', '.join([*ROLES, OWNER])}")
+    named = make_url(url)
+    if not named.username or not named.password:
+        raise RoleError(f"the URL of {role} has no user and password")
+    return named.username, named.password
+
+
+def _make(connection: Connection, name: str, login: str) -> None:
+    wanted = {"name": name}
+    if connection.execute(text("SELECT 1 FROM pg_roles WHERE rolname = :name"), wanted).first():
+        plain = text(
+            "SELECT NOT (rolsuper OR rolcreaterole OR rolcreatedb OR rolreplication "
+            "OR rolbypassrls) FROM pg_roles WHERE rolname = :name"
+        )
+        if not connection.execute(plain, wanted).scalar():
+            raise RoleError(f"{name} is a superuser or may do more than a process should")
+        return
+    _run(
+        connection,
+        f"CREATE ROLE {{}} {login} NOSUPERUSER NOCREATEDB NOCREATEROLE NOREPLICATION NOBYPASSRLS",
+        sql.Identifier(name),
+    )
+
+
+def _set_password(connection: Connection, name: str, password: str) -> None:
+    """Sends a verifier, so that no log of the server has the password."""
+    driver: Any = connection.connection.driver_connection
+    verifier = driver.pgconn.encrypt_password(
+        password.encode(), name.encode(), b"scram-sha-256"
+    ).decode()
+    _run(
+        connection,
+        "ALTER ROLE {} LOGIN PASSWORD {}",
+        sql.Identifier(name),
+        sql.Literal(verifier),
+    )
+
+
+def _leave_other_groups(connection: Connection, name: str, group: str) -> None:
+    memberships = text(
+        "SELECT parent.rolname FROM pg_auth_members JOIN pg_roles AS parent ON parent.oid = roleid "
+        "JOIN pg_roles AS child ON child.oid = member WHERE child.rolname = :name"
+    )
+    for parent in connection.execute(memberships, {"name": name}).scalars().all():
+        if parent != group:
+            _run(connection, "REVOKE {} FROM {}", sql.Identifier(parent), sql.Identifier(name))
+
+
+def _own(connection: Connection, name: str) -> None:
+    """Hands database, schema and everything in it to the owner."""
+    owner = sql.Identifier(name)
+    base = sql.Identifier(str(connection.execute(text("SELECT current_database()")).scalar()))
+    _run(connection, "ALTER DATABASE {} OWNER TO {}", base, owner)
+    _run(connection, "ALTER SCHEMA public OWNER TO {}", owner)
+    for statement in connection.execute(text(_OWNED)).scalars().all():
+        _run(connection, statement + " OWNER TO {}", owner)
+
+
+_OWNED: Final = """
+    SELECT format('ALTER %s public.%I', CASE relkind WHEN 'S' THEN 'SEQUENCE'
+        WHEN 'v' THEN 'VIEW' ELSE 'TABLE' END, relname)
+    FROM pg_class WHERE relnamespace = 'public'::regnamespace AND relkind IN ('r', 'p', 'v', 'S')
+        AND NOT EXISTS (SELECT FROM pg_depend WHERE classid = 'pg_class'::regclass
+            AND objid = pg_class.oid AND deptype IN ('a', 'i') AND relkind = 'S')
+    UNION ALL
+    SELECT format('ALTER FUNCTION public.%I(%s)', proname, pg_get_function_identity_arguments(oid))
+    FROM pg_proc WHERE pronamespace = 'public'::regnamespace
+"""

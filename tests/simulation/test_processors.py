@@ -1,0 +1,83 @@
+"""Trials give the same bytes on several kinds of processors."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+from benchmarks.simulation.bench_processors import as_on, compared, lines
+from support.machines.references import load_machine
+
+from buildarena_benchmark import builtin_tasks
+from buildarena_environment.other_kernels import simulate_with
+from buildarena_geometry import kernels
+from buildarena_simulation import SimulationError, processor, simulate, write_trajectory
+
+OTHERS = kernels.runnable()[1:]
+several = pytest.mark.skipif(not OTHERS, reason="this processor has one kind of kernels")
+TRIALS = 1
+TASK = builtin_tasks()["support-1"]
+SCENARIO = TASK.scenario.model_copy(update={"duration_s": 2.6})
+
+
+@several
+def test_what_the_libraries_would_choose_does_not_matter() -> None:
+    first, second = (lines(TRIALS, as_on(name)) for name in (kernels.runnable()[0], OTHERS[0]))
+    assert first[0] == second[0]
+    assert compared(first[1:], second[1:])["equal"] == TRIALS
+
+
+@several
+def test_a_trial_of_other_kernels_is_repeated_to_the_byte() -> None:
+    machine = load_machine("deck")
+    own, *others = (
+        write_trajectory(trajectory)
+        for trajectory in (
+            simulate(machine, SCENARIO, "mujoco"),
+            simulate_with(OTHERS[0], machine, SCENARIO, "mujoco"),
+            simulate_with(OTHERS[0], machine, SCENARIO, "mujoco"),
+            simulate_with(kernels.runnable()[0], machine, SCENARIO, "mujoco"),
+        )
+    )
+    assert others[0] == others[1], "the same kernels, the same bytes"
+    assert others[0] != own, "the trial tells kernels apart"
+    assert others[2] == own
+
+
+def test_kernels_that_no_processor_has_are_an_error() -> None:
+    with pytest.raises(SimulationError, match="no kernels Abacus"):
+        simulate_with("Abacus", load_machine("beam"), SCENARIO, "mujoco")
+
+
+@several
+def test_a_trial_that_fails_there_says_why() -> None:
+    with pytest.raises(SimulationError, match="no engine 'steam'"):
+        simulate_with(OTHERS[0], load_machine("beam"), SCENARIO, "steam")
+
+
+def test_the_processor_is_said_by_what_rounds() -> None:
+    assert set(processor()) == {"blas", "numpy", "machine", "libm"}
+    if kernels.PINNED is not None:
+        assert processor()["blas"] == kernels.PINNED
+
+
+@several
+def test_a_program_that_loaded_numpy_first_is_warned_where_it_matters() -> None:
+    program = (
+        "import numpy, warnings\n"
+        "from buildarena_simulation.processor import warn_if_late\n"
+        "with warnings.catch_warnings(record=True) as caught:\n"
+        "    warn_if_late(); warn_if_late()\n"
+        "print(*(str(warning.message) for warning in caught), sep='\\n')"
+    )
+    for name, warned in ((OTHERS[0], True), (kernels.runnable()[0], False)):
+        environment = {**os.environ, "OPENBLAS_CORETYPE": name}
+        done = subprocess.run(
+            [sys.executable, "-c", program],
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        assert (f"kernels {name} in place of" in done.stdout) == warned
+        assert done.stdout.count("Import buildarena first") == warned

@@ -1,0 +1,264 @@
+"""Each kind of process does its work with a role of its own, and can't do what is not its work."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from itertools import product
+
+import pytest
+from sqlalchemy import make_url, text
+from sqlalchemy.exc import IntegrityError, ProgrammingError
+from starlette.testclient import TestClient
+from support.stages import work
+
+from buildarena_api.app import create_app
+from buildarena_pipeline.catalog.models import load_registry
+from buildarena_pipeline.catalog.specs import SweepSpec
+from buildarena_pipeline.runtime.context import Context, open_context
+from buildarena_pipeline.runtime.reaper import Reaper
+from buildarena_pipeline.submission.submission import Submissions
+from buildarena_store import Database, tables
+from buildarena_store.rights import ROLES
+from buildarena_store.roles import OWNER, RoleError, make_roles
+from buildarena_store.states import CONSTRUCT_QUEUE, simulate_queue
+from buildarena_worker.wiring import verifier
+
+PROCESSES = ("api", "construct", "simulate")
+PERMANENT = ("api_keys", "budgets", "names", "jobs", "sweeps", "tasks", "journal", "events")
+"""What nobody removes rows from, but the owner."""
+
+
+def url_of(database_url: str, role: str) -> str:
+    """A login of this test worker's own: roles belong to the whole server."""
+    name = f"{make_url(database_url).database}_{role}"
+    url = make_url(database_url).set(username=name, password=f"secret of {role} %s '\"")
+    return url.render_as_string(hide_password=False)
+
+
+@pytest.fixture(scope="module")
+def logins(database_url) -> Iterator[dict[str, str]]:
+    """A URL for each role."""
+    urls = {role: url_of(database_url, role) for role in ROLES}
+    database = Database(database_url)
+    make_roles(database, urls)
+    database.migrate()
+    yield urls
+    with database.transaction() as connection:
+        for url in urls.values():
+            name = make_url(url).username
+            connection.execute(text(f'DROP OWNED BY "{name}"'))
+            connection.execute(text(f'DROP ROLE "{name}"'))
+    database.close()
+
+
+@pytest.fixture
+def contexts(context, logins) -> Iterator[dict[str, Context]]:
+    """The process of each role, on an empty database."""
+    made = {
+        role: open_context(context.settings.model_copy(update={"database_url": url}))
+        for role, url in logins.items()
+    }
+    yield made
+    for each in made.values():
+        each.close()
+
+
+def allowed(context: Context, statement: str) -> bool:
+    """Whether the role may run a statement; it changes nothing."""
+    refused = ""
+    with context.store.database.engine.connect() as connection:
+        try:
+            connection.execute(text(statement))
+        except (ProgrammingError, IntegrityError) as error:
+            refused = str(error)
+    denied = any(words in refused for words in ("permission denied", "must be", "must have"))
+    assert denied or not refused or "null value" in refused, refused
+    return not denied
+
+
+def test_a_job_goes_through_processes_with_roles_of_their_own(contexts) -> None:
+    api = contexts["api"]
+    with TestClient(create_app(api, load_registry()), base_url="http://127.0.0.1") as client:
+        sweep = {
+            "tasks": ["lift-1"],
+            "models": ["builtin/expert"],
+            "simulator": "mujoco",
+            "samples": 1,
+        }
+        limited = {**sweep, "budget": {"max_requests": 1000}}
+        made = client.post("/v1/sweeps", json=limited)
+        assert made.status_code == 202, made.text
+        (job,) = api.store.jobs.page(limit=10)
+        for _ in range(6):
+            work(contexts["construct"], queues=(CONSTRUCT_QUEUE,))
+            work(contexts["simulate"], queues=(simulate_queue("mujoco"),))
+        done = api.store.jobs.get(job.id)
+        assert done.outcome == "success", done
+        for name in PROCESSES:
+            Reaper(contexts[name]).reap()
+        assert client.get("/v1/leaderboard").status_code == 200
+        assert client.get(f"/v1/sweeps/{made.json()['id']}").status_code == 200
+        assert client.get("/v1/metrics").status_code == 200
+        key = client.post("/v1/keys", json={"name": "ada", "scopes": ["submit"]})
+        assert key.status_code == 201, key.text
+        assert client.post(f"/v1/jobs/{job.id}/verify").status_code in {200, 202}
+    assert verifier(contexts["construct"]).verify(job.id)["ok"]
+    with contexts["reader"].store.database.transaction() as connection:
+        for table in tables.metadata.tables:
+            connection.execute(text(f"SELECT count(*) FROM {table}"))
+
+
+@pytest.mark.parametrize("role", list(ROLES))
+def test_no_process_changes_the_schema_or_the_server(contexts, role) -> None:
+    for statement in (
+        "CREATE TABLE mine (a int)",
+        "CREATE TEMPORARY TABLE mine (a int)",
+        "DROP TABLE jobs",
+        "TRUNCATE jobs",
+        "ALTER TABLE jobs ADD COLUMN mine int",
+        "CREATE ROLE mine",
+        "GRANT pg_read_server_files TO CURRENT_USER",
+        "ALTER TABLE jobs DISABLE TRIGGER ALL",
+        "CREATE FUNCTION mine() RETURNS int LANGUAGE sql AS 'SELECT 1'",
+        "UPDATE alembic_version SET version_num = 'x'",
+        "COPY jobs TO PROGRAM 'cat'",
+        "SELECT pg_read_file('/etc/passwd')",
+        "SELECT rolpassword FROM pg_authid",
+        "SET ROLE buildarena",
+    ):
+        assert not allowed(contexts[role], statement), statement
+
+
+@pytest.mark.parametrize(("role", "table"), list(product(ROLES, PERMANENT)))
+def test_no_process_removes_what_results_rest_on(contexts, role, table) -> None:
+    assert not allowed(contexts[role], f"DELETE FROM {table}")
+
+
+@pytest.mark.parametrize("role", ["construct", "simulate"])
+def test_workers_read_no_keys_and_raise_no_limit(contexts, role) -> None:
+    for statement in (
+        "SELECT secret_hash FROM api_keys",
+        "SELECT 1 FROM api_keys",
+        "SELECT 1 FROM names",
+        "INSERT INTO api_keys (id) VALUES ('key_x')",
+        "UPDATE budgets SET max_cost_usd = 1e6",
+        "INSERT INTO budgets (id) VALUES ('key_x')",
+        "INSERT INTO sweeps (id) VALUES ('sweep_x')",
+        "INSERT INTO jobs (id) VALUES ('job_x')",
+        "INSERT INTO tasks (name) VALUES ('x')",
+        "UPDATE journal SET reply = '{}'",
+        "UPDATE sweeps SET owner = 'key_x'",
+        "UPDATE sweep_jobs SET wanted = false",
+        "UPDATE events SET kind = 'x'",
+        "SELECT 1 FROM board_cells",
+    ):
+        assert not allowed(contexts[role], statement), statement
+
+
+def test_a_worker_stops_a_sweep_whose_budget_is_used_up(contexts) -> None:
+    api = contexts["api"]
+    spec = SweepSpec(
+        tasks=["lift-1"],
+        models=["builtin/expert"],
+        simulator="mujoco",
+        samples=1,
+        budget={"max_requests": 1},
+    )
+    sweep = Submissions(api, load_registry()).submit_sweep(spec).sweep.id
+    work(contexts["construct"], queues=(CONSTRUCT_QUEUE,))
+    assert api.store.sweeps.get(sweep).state == "budget_exhausted"
+
+
+def test_a_simulation_worker_sees_no_replies_and_spends_nothing(contexts) -> None:
+    for statement in (
+        "SELECT reply FROM journal",
+        "INSERT INTO journal (job_id) VALUES ('job_x')",
+        "UPDATE budgets SET spent_cost_usd = 0",
+        "INSERT INTO reservations (job_id) VALUES ('job_x')",
+        "UPDATE sweeps SET state = 'active'",
+    ):
+        assert not allowed(contexts["simulate"], statement), statement
+
+
+def test_a_reader_only_reads(contexts) -> None:
+    for table in tables.metadata.tables:
+        assert allowed(contexts["reader"], f"SELECT 1 FROM {table}")
+        assert not allowed(contexts["reader"], f"INSERT INTO {table} DEFAULT VALUES")
+
+
+def test_rights_name_every_table_there_is(context) -> None:
+    with context.store.database.engine.connect() as connection:
+        there = text("SELECT tablename FROM pg_tables WHERE schemaname = 'public'")
+        found = set(connection.execute(there).scalars())
+    assert set(ROLES["reader"].reads) == found
+
+
+def test_a_login_has_one_role_only_and_new_rights_replace_old_ones(
+    context, contexts, logins
+) -> None:
+    owner = context.store.database
+    name = make_url(logins["reader"]).username
+    with owner.transaction() as connection:
+        connection.execute(text(f'GRANT buildarena_api TO "{name}"'))
+        connection.execute(text("GRANT DELETE ON jobs TO buildarena_reader"))
+    assert allowed(contexts["reader"], "DELETE FROM jobs")
+    make_roles(owner, {"reader": logins["reader"]})
+    owner.migrate()
+    assert not allowed(contexts["reader"], "DELETE FROM jobs")
+    assert not allowed(contexts["reader"], "UPDATE jobs SET detail = ''")
+
+
+def test_an_owner_who_is_no_superuser_takes_an_older_installation_over(database_url) -> None:
+    """Its tables were made by a superuser, who signed every process in."""
+    name = f"{make_url(database_url).database}_older"
+    older = make_url(database_url).set(database=name).render_as_string(hide_password=False)
+    superuser = Database(database_url)
+    with superuser.statement() as connection:
+        connection.execute(text(f"CREATE DATABASE {name}"))
+    database = Database(older)
+    database.migrate()
+    url = url_of(older, OWNER)
+    make_roles(database, {OWNER: url})
+    make_roles(database, {OWNER: url})
+    owner = Database(url)
+    owner.migrate()
+    with owner.transaction() as connection:
+        mine = connection.execute(
+            text(
+                "SELECT count(*) FILTER (WHERE relowner <> current_user::regrole), count(*) "
+                "FROM pg_class WHERE relkind IN ('r', 'S') "
+                "AND relnamespace = 'public'::regnamespace"
+            )
+        ).one()
+        assert mine[0] == 0
+        assert mine[1] > 20
+        connection.execute(text("ALTER TABLE jobs ADD COLUMN further int"))
+        connection.execute(text("DROP FUNCTION recount_jobs()"))
+        assert not connection.execute(
+            text("SELECT rolsuper OR rolcreaterole FROM pg_roles WHERE rolname = current_user")
+        ).scalar()
+    owner.close()
+    database.close()
+    with superuser.statement() as connection:
+        connection.execute(text(f"DROP DATABASE {name} WITH (FORCE)"))
+        connection.execute(text(f'DROP ROLE "{make_url(url).username}"'))
+    superuser.close()
+
+
+@pytest.mark.parametrize(
+    ("role", "url", "message"),
+    [
+        ("admin", "postgresql://a:b@h/d", "no role 'admin'; there are api"),
+        ("api", "postgresql://a@h/d", "no user and password"),
+        ("api", os.environ.get("TEST_POSTGRES_URL", "postgresql://buildarena:x@h/d"), "superuser"),
+    ],
+)
+def test_logins_that_are_none_are_refused(context, role, url, message) -> None:
+    with pytest.raises(RoleError, match=message):
+        make_roles(context.store.database, {role: url})
+
+
+def test_two_roles_need_two_logins(context, logins) -> None:
+    with pytest.raises(RoleError, match="login of its own"):
+        make_roles(context.store.database, {"api": logins["api"], OWNER: logins["api"]})

@@ -1,0 +1,97 @@
+"""A result of another kind of processor is simulated as it was there, or the report says why."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from support.stages import work
+
+from buildarena_benchmark import builtin_tasks
+from buildarena_environment.other_kernels import simulate_with
+from buildarena_geometry import Machine, kernels
+from buildarena_pipeline.catalog.specs import JobSpec
+from buildarena_simulation import processor, write_trajectory
+from buildarena_store import tables
+from buildarena_worker.wiring import verifier
+
+SPEC = JobSpec(task="support-1", model="builtin/expert", simulator="mujoco")
+several = pytest.mark.skipif(
+    len(kernels.runnable()) < 2, reason="this processor has one kind of kernels"
+)
+
+
+@pytest.fixture
+def job(context, submissions):
+    """A finished bridge of the expert's."""
+    submitted, _ = submissions.submit_job(SPEC)
+    work(context)
+    done = context.store.jobs.get(submitted.id)
+    assert done.outcome == "success"
+    return done
+
+
+def as_of(context, job, versions, trajectory: bytes) -> None:
+    """Has the job's rollout be another processor's, whose bytes are these."""
+    digest = context.artifacts.put(trajectory, "application/vnd.apache.parquet").hash
+    with context.store.database.transaction() as connection:
+        connection.execute(
+            tables.rollouts.update()
+            .where(tables.rollouts.c.job_id == job.id)
+            .values(versions=versions, trajectory_hash=digest)
+        )
+
+
+def failed(context, job) -> dict[str, dict[str, object]]:
+    checks = verifier(context).verify(job.id).as_document()["checks"]
+    return {check["name"]: check for check in checks if not check["ok"]}
+
+
+def elsewhere(context, job) -> bytes:
+    """The trajectory's bytes with this processor's second kind of kernels."""
+    (record,) = context.store.rollouts.read(job.id)
+    document = context.artifacts.get(record.machine_hash)
+    trajectory = simulate_with(
+        kernels.runnable()[1],
+        Machine.from_document(json.loads(document)),
+        builtin_tasks()[SPEC.task].scenario,
+        "mujoco",
+    )
+    return write_trajectory(trajectory)
+
+
+def test_a_manifest_names_the_processor(job) -> None:
+    assert job.manifest["simulator"]["processor"] == dict(processor())
+
+
+@several
+def test_a_result_of_other_kernels_is_verified_with_them(context, job) -> None:
+    (record,) = context.store.rollouts.read(job.id)
+    trajectory = elsewhere(context, job)
+    there = {**processor(), "blas": kernels.runnable()[1], "numpy": "X86_V3"}
+    as_of(context, job, {**record.versions, "processor": there}, trajectory)
+    assert "rollout 0: trajectory" not in failed(context, job)
+
+
+@several
+@pytest.mark.parametrize("there", [None, {"blas": "NeoverseN1", "machine": "aarch64"}, "a cloud"])
+def test_what_differs_is_said_where_the_kernels_are_not_here(context, job, there) -> None:
+    (record,) = context.store.rollouts.read(job.id)
+    trajectory = elsewhere(context, job)
+    as_of(context, job, {**record.versions, "processor": there}, trajectory)
+    checks = failed(context, job)
+    assert "rollout 0: trajectory" in checks
+    reason = checks["rollout 0: processor"]
+    assert reason["kept"] == there
+    found = reason["found"]
+    assert found["blas"] == processor()["blas"]
+    assert found["apart_from_s"] > 0.0
+    assert found["farthest_apart"] > 0.0
+
+
+def test_changed_bytes_of_the_same_processor_have_no_such_excuse(context, job) -> None:
+    (record,) = context.store.rollouts.read(job.id)
+    as_of(context, job, record.versions, b"changed")
+    checks = failed(context, job)
+    assert "rollout 0: trajectory" in checks
+    assert "rollout 0: processor" not in checks
