@@ -6,6 +6,7 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
 from fastapi import Depends, FastAPI
+from fastapi.routing import APIRoute
 from fastapi_offline import FastAPIOffline
 from starlette.routing import Route
 from uvicorn.middleware.proxy_headers import ProxyHeadersMiddleware
@@ -34,6 +35,7 @@ from buildarena_api.http.own_pool import OwnPool
 from buildarena_api.http.problems import add_problem_handlers, problem_responses
 from buildarena_api.http.rate_limits import RateLimits
 from buildarena_api.http.response_cache import ResponseCache
+from buildarena_api.http.weights import Weights
 from buildarena_api.leaderboard.cache import BoardCache
 from buildarena_api.replays.making import Replays
 from buildarena_api.routes import (
@@ -177,7 +179,7 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
 def _add_routes(app: FastAPI) -> None:
     app.include_router(health.router)
     for route in (*LIMITED_THEMSELVES, *ORDINARY):
-        own = [] if route in LIMITED_THEMSELVES else [limited("ordinary")]
+        own = [] if route in LIMITED_THEMSELVES else [limited()]
         app.include_router(
             route.router,
             dependencies=[Depends(caller_of), *own],
@@ -201,17 +203,19 @@ def _add_middleware(app: FastAPI) -> None:
         buffers=app.state.body_buffers,
     )
     routes = [
-        (found.path, found.methods or ())
+        found
         for part in (health, runner, *ORDINARY, *LIMITED_THEMSELVES)
         for found in part.router.routes
         if isinstance(found, Route)
     ]
-    app.add_middleware(MethodMiddleware, routes=routes)
+    methods = [(found.path, found.methods or ()) for found in routes]
+    app.add_middleware(MethodMiddleware, routes=methods)
     app.add_middleware(FormerNamesMiddleware)
     if not settings.require_keys:
         app.add_middleware(LocalOnlyMiddleware, is_page=is_page)
     app.add_middleware(RequestLog, metrics=app.state.metrics)
-    app.add_middleware(OverloadMiddleware, known=known_key(app))
+    weights = Weights(found for found in routes if isinstance(found, APIRoute))
+    app.add_middleware(OverloadMiddleware, known=known_key(app), weights=weights)
     if settings.base_path:
         app.add_middleware(BasePathMiddleware, base=settings.base_path)
     if settings.trusted_proxies:

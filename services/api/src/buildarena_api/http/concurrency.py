@@ -16,6 +16,7 @@ from fastapi import Depends, Request
 
 from buildarena_api.http.access import Caller, caller_of, who_asks
 from buildarena_api.http.problems import ProblemError
+from buildarena_api.http.weights import weight_of
 
 MAX_WAITING = 64
 """Requests of one caller that wait for their turn; more are refused."""
@@ -36,16 +37,26 @@ class ConcurrencyLimit:
         total: How many all callers together may have.
         wait_s: How long one that finds its caller's share used up waits for its turn.
         retry_s: When a refused caller may come back.
+        in_turns: Whether callers wait, and take turns, where all together have used up the total;
+            they are refused otherwise.
     """
 
     def __init__(
-        self, what: str, *, per_caller: int, total: int, wait_s: float = 0.0, retry_s: int = 2
+        self,
+        what: str,
+        *,
+        per_caller: int,
+        total: int,
+        wait_s: float = 0.0,
+        retry_s: int = 2,
+        in_turns: bool = False,
     ) -> None:
         self._what = what
         self._per_caller = per_caller
         self._total = total
         self._wait_s = wait_s
         self._retry_s = retry_s
+        self._in_turns = in_turns
         self._used = 0
         self._shares: dict[str, _Share] = {}
 
@@ -68,10 +79,11 @@ class ConcurrencyLimit:
                 self._shares.pop(who, None)
 
     async def _enter(self, share: _Share) -> None:
-        if share.used >= self._per_caller:
+        is_full = self._used >= self._total
+        if share.used >= self._per_caller or (is_full and self._in_turns):
             await self._wait(share)  # the place of one that left is handed on
             return
-        if self._used >= self._total:
+        if is_full:
             message = f"the service has {self._total} {self._what} going on, as many as it may"
             raise self._refusal(503, message)
         share.used += 1
@@ -95,16 +107,32 @@ class ConcurrencyLimit:
             raise
 
     def _leave(self, share: _Share) -> None:
+        share.used -= 1
+        self._used -= 1
+        if not self._in_turns:
+            self._hand_on(share)
+            return
+        for who, other in self._shares.items():
+            if other.used < self._per_caller and self._hand_on(other):
+                self._shares[who] = self._shares.pop(who)  # the others come before it now
+                return
+
+    def _hand_on(self, share: _Share) -> bool:
+        """Gives a place that came free to one that waits, if any of a caller's does."""
         while share.waiting:
             turn = share.waiting.popleft()
             if not turn.done():
                 turn.set_result(None)
-                return
-        share.used -= 1
-        self._used -= 1
+                share.used += 1
+                self._used += 1
+                return True
+        return False
 
     def _share_is_used(self) -> str:
-        return f"{self._per_caller} {self._what} are going on, as many as one caller may have"
+        return (
+            f"{self._per_caller} {self._what} of yours are going on or {MAX_WAITING} wait, as many "
+            "as one caller may have"
+        )
 
     def _refusal(self, status: int, detail: str) -> ProblemError:
         return ProblemError(status, detail, headers={"Retry-After": str(self._retry_s)})
@@ -115,6 +143,8 @@ class ConcurrencyLimits:
     """The limits of one API process."""
 
     ordinary: ConcurrencyLimit
+    heavy: ConcurrencyLimit
+    files: ConcurrencyLimit
     streams: ConcurrencyLimit
     archives: ConcurrencyLimit
     exports: ConcurrencyLimit
@@ -128,6 +158,13 @@ def usual_limits() -> ConcurrencyLimits:
     return ConcurrencyLimits(
         # Fewer than there are threads and connections, so that one caller leaves some.
         ordinary=ConcurrencyLimit("requests", per_caller=8, total=1000, wait_s=30.0, retry_s=1),
+        # Each takes a core and the interpreter for as long as it lasts: one caller's never have
+        # more of these than another's light question.
+        heavy=ConcurrencyLimit(
+            "heavy questions", per_caller=1, total=2, wait_s=30.0, in_turns=True
+        ),
+        # One process checks them, one after the other.
+        files=ConcurrencyLimit("checks", per_caller=1, total=2, wait_s=30.0, in_turns=True),
         streams=ConcurrencyLimit("event streams", per_caller=32, total=512, retry_s=5),
         archives=ConcurrencyLimit("archive transfers", per_caller=1, total=2, retry_s=5),
         exports=ConcurrencyLimit("exports", per_caller=2, total=4),
@@ -140,7 +177,7 @@ def usual_limits() -> ConcurrencyLimits:
 
 
 def limited(
-    kind: str,
+    kind: str | None = None,
     *,
     until: str = "function",
     caller: Callable[..., Awaitable[Caller]] = caller_of,
@@ -148,7 +185,7 @@ def limited(
     """A dependency: the caller's place among those of a kind.
 
     Args:
-        kind: A field of `ConcurrencyLimits`.
+        kind: A field of `ConcurrencyLimits`; None for the lane of its weight.
         until: ``function``, or ``request`` to keep the place until the answer was sent.
         caller: The dependency that says who asks.
     """
@@ -156,7 +193,7 @@ def limited(
     # Annotations are looked up outside of this function, where its arguments are not.
     async def take_place(request: Request, _: Caller = Depends(caller)) -> AsyncIterator[None]:  # noqa: B008
         limits: ConcurrencyLimits = request.app.state.concurrency
-        limit: ConcurrencyLimit = getattr(limits, kind)
+        limit: ConcurrencyLimit = getattr(limits, kind or weight_of(request.scope).lane)
         async with limit.slot(who_asks(request)):
             yield
 

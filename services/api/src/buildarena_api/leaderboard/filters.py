@@ -2,21 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Annotated
+from typing import Annotated, Final
 
 from fastapi import Depends, Query, Request
 
 from buildarena_api.dependencies import ContextDep
 from buildarena_api.http.problems import ProblemError
+from buildarena_api.http.weights import HEAVIEST
 from buildarena_api.leaderboard.cache import BoardCache, Question
 from buildarena_benchmark import ValidationIssue, builtin_tasks, paper_tasks
 from buildarena_benchmark.flags import ScoringPolicy
 from buildarena_benchmark.leaderboard import BoardQuery
 
+PARTIAL: Final = ("sweep", "since", "until")
+"""Filters by which only some jobs of a cell count: boards are made of jobs then."""
+NARROWED: Final = ("task", "level", "category", "model")
 MAX_SWEEPS = 50
 """Sweeps that one board is made of at most."""
+
+
+def weight_of_board(query: Mapping[str, str]) -> int:
+    """What a question for a board weighs: one that others ask too is in memory."""
+    if any(name in query for name in PARTIAL):
+        return HEAVIEST
+    return 5 if any(name in query for name in NARROWED) else 2
 
 
 async def _boards(request: Request) -> BoardCache:

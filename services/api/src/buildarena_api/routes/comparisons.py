@@ -11,6 +11,7 @@ from pydantic import BaseModel, Field
 from buildarena_api.dependencies import ExportingDep
 from buildarena_api.http.concurrency import limited
 from buildarena_api.http.problems import problem_responses
+from buildarena_api.http.weights import HEAVIEST, weighs
 from buildarena_api.leaderboard.policies import UnderPolicy
 from buildarena_api.routes.leaderboard import TaskDuelView
 from buildarena_benchmark.flags import ScoringPolicy
@@ -73,6 +74,7 @@ class SweepComparison(UnderPolicy):
 
 
 @router.get("/{sweep_id}/compare/{other_id}", responses=problem_responses(404, 422, 503))
+@weighs(HEAVIEST, lane="exports")
 async def compare_sweeps(
     sweep_id: str,
     other_id: str,

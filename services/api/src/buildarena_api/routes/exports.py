@@ -15,6 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 from buildarena_api.dependencies import ExportingDep, RegistryDep
 from buildarena_api.http.concurrency import limited
 from buildarena_api.http.problems import problem_responses
+from buildarena_api.http.weights import HEAVIEST, weighs
 from buildarena_api.leaderboard.filters import BoardsDep, SelectionDep
 from buildarena_api.leaderboard.views import Board, PublishedView, Row, board_view
 from buildarena_benchmark import paper_tasks
@@ -97,6 +98,7 @@ RESULTS = TypeAdapter(list[Result])
         **problem_responses(404, 422, 503),
     },
 )
+@weighs(HEAVIEST, lane="exports")
 async def export(
     exporting: ExportingDep,
     boards: BoardsDep,
@@ -137,6 +139,7 @@ async def export(
     response_model=list[Result],
     responses=problem_responses(404, 503),
 )
+@weighs(HEAVIEST, lane="exports")
 async def sweep_results(sweep_id: str, exporting: ExportingDep) -> Response:
     """All ended jobs of a sweep with their rounds: what a report is made of."""
     body = await exporting.run(_results, exporting.context.store, sweep_id)
@@ -155,7 +158,8 @@ def _results(store: Store, sweep_id: str) -> bytes:
         )
         for trial, rounds in store.results.boards.of_sweep(sweep_id)
     ]
-    return RESULTS.dump_json(found)
+    # One by one: no call keeps the interpreter for long.
+    return b"[" + b",".join(result.model_dump_json().encode() for result in found) + b"]"
 
 
 def _rendered(kind: str, ranked: RankedBoard, as_view: Callable[[RankedBoard], Board]) -> bytes:
