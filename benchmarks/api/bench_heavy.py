@@ -43,7 +43,6 @@ REQUESTERS = 80
 LIGHT = "/v1/jobs?limit=20"
 PAUSE_S = 0.01
 KINDS = ("list", "text", "board", "comparison", "replay")
-TASKS = ("lift-1", "support-1", "static-1")
 
 
 def hostile_paths(kind: str, session: str, seed: int) -> Iterator[str]:
@@ -271,9 +270,11 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    if sys.argv[1:2] == ["attack"]:
-        sys.stdout.write(json.dumps(asyncio.run(attack(*sys.argv[2:6], float(sys.argv[6])))))
-    elif sys.argv[1:2] == ["light"]:
-        sys.stdout.write(json.dumps(ask_light(*sys.argv[2:4], float(sys.argv[4]))))
-    else:
-        main()
+    match sys.argv[1:]:
+        case ["attack", url, secret, session, kinds, for_s]:
+            told = asyncio.run(attack(url, secret, session, kinds, float(for_s)))
+            sys.stdout.write(json.dumps(told))
+        case ["light", url, secret, for_s]:
+            sys.stdout.write(json.dumps(ask_light(url, secret, float(for_s))))
+        case _:
+            main()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import sys
+from importlib import import_module
 
 from sqlalchemy.exc import OperationalError
 
@@ -69,9 +70,11 @@ def _settle() -> None:
     """Takes what the process always has out of the garbage collector's sight.
 
     Looking through it all takes 0.2 s, in which nobody is answered, and happens whenever a question
-    makes many objects. What the first board would load is loaded before, so that it is part of it.
+    makes many objects. What the first board and the first
+    comparison would load is loaded before, so that it is part of it.
     """
     published_overall()
+    import_module("scipy.stats")
     gc.collect()
     gc.freeze()
     gc.set_threshold(*COLLECTING)

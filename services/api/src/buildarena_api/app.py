@@ -73,7 +73,7 @@ from buildarena_pipeline.submission.submission import Submissions
 
 WATCHERS = 3
 """Threads and connections for key checks and event streams."""
-EXPORTERS = 6
+EXPORTERS = 4
 """Threads and connections for exports and archives: as many as may go on at once."""
 ORDINARY = (
     verifications,

@@ -99,12 +99,12 @@ class RateLimits:
         window goes on, as evenly as nobody knows better.
         """
         missing = max(0, cost - stats.remaining - 1)
-        wait_s = stats.reset_time - time.time() + missing * self._item.get_expiry() / self._item.amount
+        wait_s = (
+            stats.reset_time - time.time() + missing * self._item.get_expiry() / self._item.amount
+        )
         return Refused(wait_s=max(1, math.ceil(wait_s)), left=stats.remaining)
 
     async def close(self) -> None:
         """Closes the connections."""
         await self._breaker.close()
         await self._pool.aclose()
-
-

@@ -1,7 +1,7 @@
 """What questions weigh: how many of the lightest ones they are worth.
 
-A route says with `weighs` what it is worth; one that says nothing weighs 1. The weight is known from
-method, path and query alone, so that it is found at the door, before a key is looked up. It is
+A route says with `weighs` what it is worth; one that says nothing weighs 1. The weight is known
+from method, path and query alone, so that it is found at the door, before a key is looked up. It is
 taken from the caller's rate, and all that weighs more than 1 goes through a narrow lane.
 """
 
@@ -100,7 +100,7 @@ class Weights:
 
     def __init__(self, routes: Iterable[APIRoute]) -> None:
         self._routes = [
-            (path_pattern(route.path), route.methods, declared)
+            (path_pattern(route.path), frozenset(route.methods or ()), declared)
             for route in routes
             if (declared := _declared.get(route.endpoint)) is not None
         ]

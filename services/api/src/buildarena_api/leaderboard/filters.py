@@ -10,6 +10,7 @@ from typing import Annotated, Final
 from fastapi import Depends, Query, Request
 
 from buildarena_api.dependencies import ContextDep
+from buildarena_api.http.access import who_asks
 from buildarena_api.http.problems import ProblemError
 from buildarena_api.http.weights import HEAVIEST
 from buildarena_api.leaderboard.cache import BoardCache, Question
@@ -59,6 +60,7 @@ class Selection:
 def select_board(
     boards: BoardsDep,
     context: ContextDep,
+    request: Request,
     *,
     track: Annotated[str | None, Query(description="Default: the first with ended jobs")] = None,
     task: Annotated[list[str] | None, Query(description="Only these tasks")] = None,
@@ -120,14 +122,21 @@ def select_board(
         )
     query = BoardQuery(
         tasks=chosen,
-        models=frozenset(model) if model else None,
+        # Invented names are not told from each other: their empty boards are one.
+        models=boards.known_models(model) if model else None,
         since=since,
         until=until,
         policy=policy,
         overall=_ranked_over(task, category),
     )
     track = track or (tracks[0] if tracks else None)
-    question = Question(track=track or "", query=query, sweeps=sweeps, members=members)
+    question = Question(
+        track=track or "",
+        query=query,
+        sweeps=sweeps,
+        members=members,
+        asked_by=who_asks(request),
+    )
     return Selection(track=track, tracks=tracks, query=query, question=question)
 
 

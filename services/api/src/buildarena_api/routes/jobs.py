@@ -170,6 +170,7 @@ def _require_known(
     known = {
         "task": lambda: list(context.tasks.newest()),
         "model": lambda: list(registry.models),
+        "flag": lambda: list(known_flags()),
     }
     for name, value in given.items():
         if value is None:
@@ -178,7 +179,7 @@ def _require_known(
         if value in choices:
             continue
         if name == "flag":
-            used = context.store.jobs.used_flags([*known_flags(), value])
+            used = context.store.jobs.used_flags([value])
         else:
             used = context.store.jobs.distinct(name)
         if value in used or not (choices or used):
