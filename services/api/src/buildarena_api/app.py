@@ -8,7 +8,6 @@ from contextlib import asynccontextmanager
 from fastapi import Depends, FastAPI
 from fastapi.routing import APIRoute
 from fastapi_offline import FastAPIOffline
-from starlette.routing import Route
 from uvicorn.middleware.proxy_headers import ProxyHeadersMiddleware
 
 from buildarena_api.dashboard.files import read_pages
@@ -188,6 +187,16 @@ def _add_routes(app: FastAPI) -> None:
     app.include_router(runner.router, responses=problem_responses(401, 403, 429))
 
 
+def all_routes() -> list[APIRoute]:
+    """Every route of the application."""
+    return [
+        found
+        for part in (health, runner, *ORDINARY, *LIMITED_THEMSELVES)
+        for found in part.router.routes
+        if isinstance(found, APIRoute)
+    ]
+
+
 def _add_middleware(app: FastAPI) -> None:
     """The last one added is the first that a request meets."""
     settings: Settings = app.state.context.settings
@@ -202,20 +211,14 @@ def _add_middleware(app: FastAPI) -> None:
         admit=admission(app),
         buffers=app.state.body_buffers,
     )
-    routes = [
-        found
-        for part in (health, runner, *ORDINARY, *LIMITED_THEMSELVES)
-        for found in part.router.routes
-        if isinstance(found, Route)
-    ]
+    routes = all_routes()
     methods = [(found.path, found.methods or ()) for found in routes]
     app.add_middleware(MethodMiddleware, routes=methods)
     app.add_middleware(FormerNamesMiddleware)
     if not settings.require_keys:
         app.add_middleware(LocalOnlyMiddleware, is_page=is_page)
     app.add_middleware(RequestLog, metrics=app.state.metrics)
-    weights = Weights(found for found in routes if isinstance(found, APIRoute))
-    app.add_middleware(OverloadMiddleware, known=known_key(app), weights=weights)
+    app.add_middleware(OverloadMiddleware, known=known_key(app), weights=Weights(routes))
     if settings.base_path:
         app.add_middleware(BasePathMiddleware, base=settings.base_path)
     if settings.trusted_proxies:

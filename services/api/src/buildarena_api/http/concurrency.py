@@ -24,6 +24,7 @@ MAX_WAITING = 64
 
 @dataclass(slots=True)
 class _Share:
+    who: str
     used: int = 0
     waiting: deque[asyncio.Future[None]] = field(default_factory=deque)
 
@@ -61,15 +62,19 @@ class ConcurrencyLimit:
         self._shares: dict[str, _Share] = {}
 
     @asynccontextmanager
-    async def slot(self, who: str) -> AsyncIterator[None]:
+    async def slot(self, who: str, *, weight: int = 1) -> AsyncIterator[None]:
         """Keeps a place inside the block.
+
+        Args:
+            who: The caller.
+            weight: What the question weighs, for the message.
 
         Raises:
             ProblemError: 429 when the caller has as many as one may, 503 when all together have.
         """
-        share = self._shares.setdefault(who, _Share())
+        share = self._shares.setdefault(who, _Share(who))
         try:
-            await self._enter(share)
+            await self._enter(share, weight)
             try:
                 yield
             finally:
@@ -78,10 +83,10 @@ class ConcurrencyLimit:
             if not share.used and not share.waiting:
                 self._shares.pop(who, None)
 
-    async def _enter(self, share: _Share) -> None:
+    async def _enter(self, share: _Share, weight: int) -> None:
         is_full = self._used >= self._total
         if share.used >= self._per_caller or (is_full and self._in_turns):
-            await self._wait(share)  # the place of one that left is handed on
+            await self._wait(share, weight)  # the place of one that left is handed on
             return
         if is_full:
             message = f"the service has {self._total} {self._what} going on, as many as it may"
@@ -89,9 +94,9 @@ class ConcurrencyLimit:
         share.used += 1
         self._used += 1
 
-    async def _wait(self, share: _Share) -> None:
+    async def _wait(self, share: _Share, weight: int) -> None:
         if not self._wait_s or len(share.waiting) >= MAX_WAITING:
-            raise self._refusal(429, self._share_is_used())
+            raise self._refusal(429, self._share_is_used(weight))
         turn: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         share.waiting.append(turn)
         try:
@@ -103,7 +108,7 @@ class ConcurrencyLimit:
             with suppress(ValueError):
                 share.waiting.remove(turn)
             if isinstance(error, TimeoutError):
-                raise self._refusal(429, self._share_is_used()) from error
+                raise self._refusal(429, self._share_is_used(weight)) from error
             raise
 
     def _leave(self, share: _Share) -> None:
@@ -112,9 +117,10 @@ class ConcurrencyLimit:
         if not self._in_turns:
             self._hand_on(share)
             return
-        for who, other in self._shares.items():
+        if self._shares.pop(share.who, None) is not None:
+            self._shares[share.who] = share  # all others come before it now
+        for other in self._shares.values():
             if other.used < self._per_caller and self._hand_on(other):
-                self._shares[who] = self._shares.pop(who)  # the others come before it now
                 return
 
     def _hand_on(self, share: _Share) -> bool:
@@ -128,10 +134,12 @@ class ConcurrencyLimit:
                 return True
         return False
 
-    def _share_is_used(self) -> str:
+    def _share_is_used(self, weight: int) -> str:
+        wait = f" and {MAX_WAITING} wait" if self._wait_s else ""
+        weighs = f"; this one weighs {weight}, and no place is left for it" if weight > 1 else ""
         return (
-            f"{self._per_caller} {self._what} of yours are going on or {MAX_WAITING} wait, as many "
-            "as one caller may have"
+            f"{self._per_caller} {self._what} are going on{wait}, as many as one caller may "
+            f"have{weighs}"
         )
 
     def _refusal(self, status: int, detail: str) -> ProblemError:
@@ -193,8 +201,9 @@ def limited(
     # Annotations are looked up outside of this function, where its arguments are not.
     async def take_place(request: Request, _: Caller = Depends(caller)) -> AsyncIterator[None]:  # noqa: B008
         limits: ConcurrencyLimits = request.app.state.concurrency
-        limit: ConcurrencyLimit = getattr(limits, kind or weight_of(request.scope).lane)
-        async with limit.slot(who_asks(request)):
+        weight = weight_of(request.scope)
+        limit: ConcurrencyLimit = getattr(limits, kind or weight.lane)
+        async with limit.slot(who_asks(request), weight=weight.units):
             yield
 
     scope: Any = until
