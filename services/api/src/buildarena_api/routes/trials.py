@@ -48,7 +48,6 @@ async def _scenes(request: Request) -> ResponseCache:
     },
     response_class=Response,
 )
-@weighs(5)
 def get_trajectory(
     job_id: str, context: ContextDep, request: Request, number: Number = 0
 ) -> Response:
